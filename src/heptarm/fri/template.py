@@ -1,0 +1,274 @@
+"""The hot path of FRI: fixed layouts for the datagrams that pass a thousand times a second.
+
+`CommandTemplate` writes a joint (and torque or wrench) command; `MonitoringReader` reads the joint arrays of a monitoring
+message in one `struct` call and compares all that seldom changes (robot info, connection, keys) with the message before.
+Both agree with `heptarm.fri.codec`, on which the reader falls back as soon as anything differs.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.fri import codec
+from heptarm.fri import messages as m
+from heptarm.fri.protobuf import (
+    MalformedMessage,
+    fields,
+    put_bytes,
+    put_packed,
+    put_unpacked,
+    put_varint,
+    read_varint,
+    varint,
+)
+from heptarm.fri.version import COMMAND_ID, MONITORING_ID, Version, unwrap
+
+_ZERO = (0.0,) * 7
+_COMMAND_HEAD = put_varint(1, COMMAND_ID) + b"\x10"  # then sequence, 0x18, reflected
+_MONITORING_HEAD = put_varint(1, MONITORING_ID) + b"\x10"
+
+Floats = npt.NDArray[np.float64]
+
+
+class CommandTemplate:
+    """Encodes commands with a fixed set of fields.
+
+    Args:
+        version: wire format.
+        torque: the command carries superposed joint torques.
+        wrench: the command carries a Cartesian wrench.
+
+    Attributes:
+        q: shape (7,) [rad], a view into the message: assign with `q[:] = …`.
+        tau: shape (7,) [Nm], or None.
+        wrench: shape (6,) [N, Nm], or None.
+    """
+
+    __slots__ = ("_body", "_framed", "q", "tau", "wrench")
+
+    def __init__(self, version: Version, *, torque: bool = False, wrench: bool = False) -> None:
+        body = put_bytes(1, put_unpacked(1, _ZERO))
+        wrench_at = len(body) + 4
+        if wrench:
+            body += put_bytes(2, put_packed(1, (0.0,) * 6))
+        tau_at = len(body) + 3
+        if torque:
+            body += put_bytes(3, put_unpacked(1, _ZERO))
+        head = put_bytes(2, body)[: -len(body)]
+        self._body = bytearray(head + body)
+        self._framed = version.traits.framed
+        shift = len(head)
+        self.q: Floats = np.ndarray(7, "<f8", self._body, shift + 3, (9,))
+        self.tau: Floats | None = np.ndarray(7, "<f8", self._body, shift + tau_at, (9,)) if torque else None
+        self.wrench: Floats | None = np.ndarray(6, "<f8", self._body, shift + wrench_at) if wrench else None
+
+    def encode(self, sequence: int, reflected: int) -> bytes:
+        """The datagram with the arrays' present content."""
+        counters = varint(sequence) + b"\x18" + varint(reflected)
+        head = bytes((0x0A, len(_COMMAND_HEAD) + len(counters))) + _COMMAND_HEAD + counters
+        message = head + self._body
+        if self._framed:
+            return len(message).to_bytes(4, "little") + message + zlib.crc32(message).to_bytes(4, "little")
+        return message
+
+
+class Sample:
+    """What a control law needs of one monitoring message, without the cost of the full value.
+
+    Joint arrays are tuples of 7, None where the message has none: `q`, `tau`, `q_cmd`, `tau_cmd`, `tau_ext`, `q_ipo`.
+
+    Attributes:
+        sequence: the controller's counter.
+        robot: robot info.
+        connection: session state, quality, period.
+        stamp: controller's clock, (s, ns); (0, 0) if absent.
+        tracking: tracking performance; NaN if absent.
+    """
+
+    __slots__ = (
+        "_datagram",
+        "_version",
+        "connection",
+        "q",
+        "q_cmd",
+        "q_ipo",
+        "robot",
+        "sequence",
+        "stamp",
+        "tau",
+        "tau_cmd",
+        "tau_ext",
+        "tracking",
+    )
+
+    q: m.Joints | None
+    tau: m.Joints | None
+    q_cmd: m.Joints | None
+    tau_cmd: m.Joints | None
+    tau_ext: m.Joints | None
+    q_ipo: m.Joints | None
+    sequence: int
+    robot: m.RobotInfo | None
+    connection: m.ConnectionInfo | None
+    stamp: tuple[int, int]
+    tracking: float
+    _datagram: bytes
+    _version: Version
+
+    @property
+    def message(self) -> m.Monitoring:
+        """The full value, decoded on demand."""
+        return codec.decode_monitoring(self._datagram, self._version)
+
+
+def _sample(datagram: bytes, version: Version, full: m.Monitoring) -> Sample:
+    """The sample of a fully decoded message."""
+    sample = Sample()
+    monitor, ipo = full.monitor or m.MonitorData(), full.ipo or m.IpoData()
+    sample._datagram, sample._version = datagram, version
+    sample.sequence, sample.robot, sample.connection = full.header.sequence, full.robot, full.connection
+    sample.q, sample.tau, sample.q_cmd = monitor.q, monitor.tau, monitor.q_cmd
+    sample.tau_cmd, sample.tau_ext, sample.q_ipo = monitor.tau_cmd, monitor.tau_ext, ipo.q
+    sample.stamp = (monitor.stamp.seconds, monitor.stamp.nanoseconds) if monitor.stamp else (0, 0)
+    sample.tracking = math.nan if ipo.tracking is None else ipo.tracking
+    return sample
+
+
+def _varint_at(data: bytes, pos: int) -> tuple[int, int]:
+    """A varint of a datagram that is long enough for any; small ones first, they are the most."""
+    octet = data[pos]
+    return (octet, pos + 1) if octet < 0x80 else read_varint(data, pos, len(data))
+
+
+class _Layout:
+    """Where everything stands in a message whose arrays are KUKA's, and what must not differ from the one before.
+
+    Holds for: header, robot info, monitor data of joint arrays and a stamp, connection, ipo data of a joint array and
+    enumerations. Anything else (IO, poses, transformations) has no layout and is decoded in full.
+    """
+
+    _ARRAYS = ((1, "q"), (2, "tau"), (3, "q_cmd"), (4, "tau_cmd"), (5, "tau_ext"))
+
+    def __init__(self, datagram: bytes, full: m.Monitoring, version: Version) -> None:
+        self._version = version
+        self._robot, self._connection = full.robot, full.connection
+        message = unwrap(datagram, version)
+        sections = {tag: value for tag, _, value in fields(message) if isinstance(value, bytes)}
+        monitor, ipo = full.monitor, full.ipo
+        if monitor is None or monitor.stamp is None or set(sections) - {1, 2, 3, 4, 5} or 4 not in sections:
+            raise MalformedMessage("no fixed layout")
+        self._before = (put_bytes(2, sections[2]) if 2 in sections else b"") + b"\x1a"
+        names = [name for _, name in self._ARRAYS]
+        present = [tag for tag, name in self._ARRAYS if getattr(monitor, name) is not None]
+        arrays = b"".join(put_bytes(tag, put_unpacked(1, _ZERO)) for tag in present)
+        tracked = ipo is not None and ipo.tracking is not None
+        ipo_array = put_bytes(1, put_unpacked(1, _ZERO)) if ipo is not None and ipo.q is not None else b""
+        enums = sections[5][len(ipo_array) : len(sections[5]) - 9 * tracked] if 5 in sections else b""
+        after = put_bytes(4, sections[4])
+        if 5 in sections:
+            after += (
+                b"\x2a"
+                + varint(len(sections[5]))
+                + ipo_array
+                + enums
+                + (b"\x61" + bytes(8) if tracked else b"")
+            )
+        self._front, self._front_runs = _struct_of(arrays, len(present) * 7)
+        self._back, self._back_runs = _struct_of(after, 7 * bool(ipo_array) + tracked)
+        self._slots = [(names[tag - 1], 7 * index) for index, tag in enumerate(present)]
+        self._absent = [name for name in names if getattr(monitor, name) is None]
+        self._has_ipo, self._tracked = bool(ipo_array), tracked
+
+    def read(self, message: bytes, datagram: bytes) -> Sample | None:
+        """The sample of a message of this layout; None if it differs in anything that must be equal."""
+        if message[0] != 0x0A or message[2:8] != _MONITORING_HEAD:
+            return None
+        sequence, pos = _varint_at(message, 8)
+        if message[pos] != 0x18:
+            return None
+        _, pos = _varint_at(message, pos + 1)
+        if pos != 2 + message[1] or not message.startswith(self._before, pos):
+            return None
+        size, pos = _varint_at(message, pos + len(self._before))
+        end = pos + size
+        front = self._front.unpack_from(message, pos)
+        pos += self._front.size
+        if (
+            front[::2] != self._front_runs
+            or message[pos] != 0x7A
+            or message[pos + 1] != end - pos - 2
+            or message[pos + 2] != 0x08
+        ):
+            return None
+        seconds, pos = _varint_at(message, pos + 3)
+        if message[pos] != 0x10:
+            return None
+        nanoseconds, pos = _varint_at(message, pos + 1)
+        if pos != end or len(message) - end != self._back.size:
+            return None
+        back = self._back.unpack_from(message, end)
+        if back[::2] != self._back_runs:
+            return None
+        values, tail = front[1::2], back[1::2]
+        sample = Sample()
+        sample._datagram, sample._version = datagram, self._version
+        sample.sequence, sample.robot, sample.connection = sequence, self._robot, self._connection
+        for name, at in self._slots:
+            setattr(sample, name, values[at : at + 7])
+        for name in self._absent:
+            setattr(sample, name, None)
+        sample.q_ipo = tail[:7] if self._has_ipo else None
+        sample.tracking = tail[-1] if self._tracked else math.nan
+        sample.stamp = (seconds, nanoseconds)
+        return sample
+
+
+def _struct_of(body: bytes, doubles: int) -> tuple[struct.Struct, tuple[bytes, ...]]:
+    """A struct that reads `body` as runs of fixed octets around `doubles` doubles, which are zero in it; and the runs."""
+    runs: list[bytes] = []
+    rest = body
+    for _ in range(doubles):
+        run, _, rest = rest.partition(bytes(8))
+        runs.append(run)
+    runs.append(rest)
+    return struct.Struct("<" + "d".join(f"{len(run)}s" for run in runs)), tuple(runs)
+
+
+class MonitoringReader:
+    """Decodes the monitoring messages of one session.
+
+    The first message of a layout is decoded in full. As long as everything but counters, stamps and doubles stays the same,
+    later ones are read from their known places; any difference goes the full way again.
+    """
+
+    def __init__(self, version: Version) -> None:
+        self._version = version
+        self._layout: _Layout | None = None
+
+    def read(self, datagram: bytes) -> Sample:
+        """Decode a controller's datagram.
+
+        Raises:
+            MalformedMessage: it is not a legal monitoring message of this version.
+        """
+        if self._layout is not None:
+            try:
+                sample = self._layout.read(unwrap(datagram, self._version), datagram)
+            except (
+                IndexError,
+                struct.error,
+            ):  # shorter than the layout: the full decoder names what is wrong
+                sample = None
+            if sample is not None:
+                return sample
+        full = codec.decode_monitoring(datagram, self._version)
+        try:
+            self._layout = _Layout(datagram, full, self._version)
+        except MalformedMessage:
+            self._layout = None
+        return _sample(datagram, self._version, full)

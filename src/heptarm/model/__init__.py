@@ -1,0 +1,1 @@
+"""The arm as mathematics: kinematics, inverse kinematics with redundancy, dynamics. Needs no connection."""

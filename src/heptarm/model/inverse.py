@@ -1,0 +1,304 @@
+"""Analytic inverse kinematics of an LBR with KUKA's redundancy: arm angle E1, Status and Turn.
+
+Geometry after Shimizu, Kakuya, Yoon, Kitagaki, Kosuge, "Analytical Inverse Kinematic Computation for 7-DOF Redundant
+Manipulators With Joint Limits and Its Application to Redundancy Resolution", IEEE T-RO 24(5), 2008, with KUKA's zero of the
+arm angle: E1 is the angle about the shoulder-wrist line away from the arm that reaches the wrist with A3 = 0 in the same
+Status. Status: bit 0, the wrist is behind A1's x axis; bit 1, A4 < 0; bit 2, A6 <= 0. Turn: bit i, A(i+1) < 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import atan2, cos, hypot, pi, sin, sqrt
+from typing import TypeAlias
+
+import numpy as np
+
+from heptarm.errors import Unreachable
+from heptarm.model.kinematics import Columns, Vec, flange
+from heptarm.values.arrays import Array
+from heptarm.values.pose import Pose
+from heptarm.values.robot import RobotModel
+
+#: Rows of a rotation matrix.
+Rows: TypeAlias = tuple[Vec, Vec, Vec]
+
+_SINGULAR = 1e-9
+_GRID = tuple(np.linspace(-pi, pi, 73)[:-1])
+_FINE = tuple(np.linspace(-pi, pi, 1441)[:-1])
+
+
+@dataclass(frozen=True, slots=True)
+class Redundancy:
+    """KUKA's redundancy of a joint position.
+
+    Attributes:
+        e1: arm angle [rad], in (-pi, pi].
+        status: bits 0-2, see the module.
+        turn: sign bits of the joints.
+    """
+
+    e1: float
+    status: int
+    turn: int
+
+
+def rows(pose: Pose | Array) -> tuple[Rows, Vec]:
+    """Rotation rows and position of a pose or a homogeneous matrix, as floats."""
+    m = (pose.matrix if isinstance(pose, Pose) else pose).tolist()
+    return (tuple(m[0][:3]), tuple(m[1][:3]), tuple(m[2][:3])), (m[0][3], m[1][3], m[2][3])
+
+
+def _times(a: Rows, b: Rows) -> Rows:
+    (b00, b01, b02), (b10, b11, b12), (b20, b21, b22) = b
+    r = [
+        (
+            x * b00 + y * b10 + z * b20,
+            x * b01 + y * b11 + z * b21,
+            x * b02 + y * b12 + z * b22,
+        )
+        for x, y, z in a
+    ]
+    return r[0], r[1], r[2]
+
+
+def _transposed(a: Rows) -> Rows:
+    t = list(zip(*a, strict=True))
+    return t[0], t[1], t[2]
+
+
+def _about(u: Vec, angle: float) -> Rows:
+    """Rotation about the unit vector u (Rodrigues)."""
+    x, y, z = u
+    c, s = cos(angle), sin(angle)
+    k = 1.0 - c
+    return (
+        (c + x * x * k, x * y * k - z * s, x * z * k + y * s),
+        (y * x * k + z * s, c + y * y * k, y * z * k - x * s),
+        (z * x * k - y * s, z * y * k + x * s, c + z * z * k),
+    )
+
+
+def _zy(a: float, b: float) -> Rows:
+    """Rz(a) Ry(b)."""
+    ca, sa, cb, sb = cos(a), sin(a), cos(b), sin(b)
+    return (ca * cb, -sa, ca * sb), (sa * cb, ca, sa * sb), (-sb, 0.0, cb)
+
+
+def _wrap(angle: float) -> float:
+    return angle - 2 * pi if angle > pi else angle + 2 * pi if angle <= -pi else angle
+
+
+def _zyz(r: Rows, negative: bool, near: float) -> Vec:
+    """Angles a, b, c of r = Rz(a) Ry(b) Rz(c) with b of the wanted sign; where b is 0, a keeps `near`."""
+    s = hypot(r[0][2], r[1][2])
+    if s < _SINGULAR:
+        # only a + c (b = 0) or a - c (b = pi) is determined
+        if r[2][2] > 0:
+            return near, 0.0, _wrap(atan2(r[1][0], r[0][0]) - near)
+        return near, -pi if negative else pi, _wrap(near - atan2(-r[1][0], -r[0][0]))
+    if negative:
+        return atan2(-r[1][2], -r[0][2]), atan2(-s, r[2][2]), atan2(-r[2][1], r[2][0])
+    return atan2(r[1][2], r[0][2]), atan2(s, r[2][2]), atan2(r[2][1], -r[2][0])
+
+
+def _reference(robot: RobotModel, w: Vec, q4: float, behind: bool) -> tuple[float, float]:
+    """A1 and A2 of the arm with A3 = 0 whose wrist is at w (from the shoulder)."""
+    radius = hypot(w[0], w[1])
+    q1 = atan2(w[1], w[0])
+    if behind:
+        q1, radius = q1 + pi, -radius
+    return q1, atan2(radius, w[2]) - atan2(-robot.d_ew * sin(q4), robot.d_se + robot.d_ew * cos(q4))
+
+
+def _elbow(robot: RobotModel, w: Vec) -> float:
+    """|A4| from the shoulder-wrist distance; half-angle form, accurate near the straight arm.
+
+    Raises:
+        Unreachable: the wrist is too far from or too near to the shoulder.
+    """
+    square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+    far, near = robot.d_se + robot.d_ew, abs(robot.d_se - robot.d_ew)
+    above, below = far * far - square, square - near * near
+    if above < -1e-9 or below < -1e-9 or square < 1e-9:
+        raise Unreachable(
+            f"the wrist would be {sqrt(square):.3f} m from the shoulder; the {robot.title} reaches "
+            f"{max(near, 0.0):.3f} to {far:.3f} m",
+            code=51,
+            value=round(sqrt(square), 4),
+            allowed=f"[{near:.3f}, {far:.3f}] m",
+            hint="bring the target nearer, or change its orientation",
+        )
+    return 2.0 * atan2(sqrt(max(above, 0.0)), sqrt(max(below, 0.0)))
+
+
+def _wrist(robot: RobotModel, r: Rows, p: Vec) -> Vec:
+    """Wrist as seen from the shoulder."""
+    d = robot.d_wf
+    return (p[0] - d * r[0][2], p[1] - d * r[1][2], p[2] - d * r[2][2] - robot.d_bs)
+
+
+def raw(
+    robot: RobotModel,
+    r: Rows,
+    p: Vec,
+    e1: float,
+    status: int,
+    near: Sequence[float] | None = None,
+    *,
+    continuous: bool = False,
+) -> tuple[float, ...]:
+    """Joint positions of a flange pose for an arm angle and a Status; limits are not checked.
+
+    Args:
+        robot: the robot.
+        r: rows of the flange's rotation.
+        p: position of the flange in the base frame [m].
+        e1: arm angle [rad].
+        status: bit 0 selects the reference arm of E1; bits 0 and 2 select A2's and A6's branch, unless `continuous`.
+        near: joint positions that decide where a singularity leaves a choice.
+        continuous: of the two branches of the shoulder and of the wrist take the one next to `near`, so that a path
+            may pass through A2 = 0 or A6 = 0.
+
+    Raises:
+        Unreachable: out of reach.
+    """
+    w = _wrist(robot, r, p)
+    q4 = _elbow(robot, w)
+    if status & 2:
+        q4 = -q4
+    a1, a2 = _reference(robot, w, q4, bool(status & 1))
+    length = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    r03 = _times(_about((w[0] / length, w[1] / length, w[2] / length), e1), _zy(a1, a2))
+    hint = near if near is not None else (a1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if continuous and near is not None:
+        shoulder = _next(_zyz(r03, False, hint[0]), _zyz(r03, True, hint[0]), hint[0], hint[1])
+    else:
+        shoulder = _zyz(r03, False, hint[0])
+        # bit 0: sign of the wrist's x in the frame of A1
+        ahead = w[0] * cos(shoulder[0]) + w[1] * sin(shoulder[0])
+        if abs(ahead) < _SINGULAR:
+            same = cos(shoulder[0] - a1) > 0
+        else:
+            same = (ahead < 0) == bool(status & 1)
+        if not same:
+            shoulder = _zyz(r03, True, hint[0])
+    r47 = _times(_transposed(_times(r03, _zy(0.0, -q4))), r)
+    if continuous and near is not None:
+        wrist = _next(_zyz(r47, False, hint[4]), _zyz(r47, True, hint[4]), hint[4], hint[5])
+    else:
+        wrist = _zyz(r47, bool(status & 4), hint[4])
+    return (*shoulder, q4, *wrist)
+
+
+def _next(one: Vec, other: Vec, a: float, b: float) -> Vec:
+    """The branch whose first two angles are nearer to (a, b)."""
+
+    def distance(v: Vec) -> float:
+        return abs(_wrap(v[0] - a)) + abs(v[1] - b)
+
+    return one if distance(one) <= distance(other) else other
+
+
+def inside(robot: RobotModel, q: Sequence[float], tolerance: float = 1e-9) -> bool:
+    """Whether all joints are within their limits."""
+    return all(
+        low - tolerance <= value <= high + tolerance
+        for low, value, high in zip(robot.q_min.tolist(), q, robot.q_max.tolist(), strict=True)
+    )
+
+
+def status_of(robot: RobotModel, q: Sequence[float]) -> int:
+    """Status bits of a joint position."""
+    columns, p = flange(robot, q)
+    w = _wrist(robot, _rows(columns), p)
+    behind = w[0] * cos(q[0]) + w[1] * sin(q[0]) < -_SINGULAR
+    return behind | (q[3] < 0) << 1 | (q[5] <= 0) << 2
+
+
+def _rows(columns: Columns) -> Rows:
+    x, y, z = columns
+    return (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
+
+
+def arm_angle(robot: RobotModel, q: Sequence[float], behind: bool) -> float:
+    """E1 [rad] of a joint position, against the reference arm of Status bit 0 = `behind`."""
+    columns, p = flange(robot, q)
+    w = _wrist(robot, _rows(columns), p)
+    length = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    a1, a2 = _reference(robot, w, q[3], behind)
+    c, s = cos(q[2]), sin(q[2])
+    turned = _times(_times(_zy(q[0], q[1]), ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))), _transposed(_zy(a1, a2)))
+    axial = (turned[2][1] - turned[1][2]) * w[0] + (turned[0][2] - turned[2][0]) * w[1]
+    axial += (turned[1][0] - turned[0][1]) * w[2]
+    return atan2(axial / length, turned[0][0] + turned[1][1] + turned[2][2] - 1.0)
+
+
+def redundancy(robot: RobotModel, q: Sequence[float]) -> Redundancy:
+    """E1, Status and Turn of a joint position, shape (7,) [rad]."""
+    values = [float(v) for v in q]
+    status = status_of(robot, values)
+    turn = sum((value < 0) << index for index, value in enumerate(values))
+    return Redundancy(arm_angle(robot, values, bool(status & 1)), status, turn)
+
+
+def solve(
+    robot: RobotModel,
+    pose: Pose | Array,
+    *,
+    e1: float | None = None,
+    status: int | None = None,
+    near: Sequence[float] | None = None,
+) -> Array:
+    """Joint positions within the limits that bring the flange to a pose.
+
+    With E1 and Status given, exactly that arm. What is not given is kept from `near` if it leads to a solution within
+    the limits, and otherwise chosen: all Status values and arm angles are searched, and the solution next to `near`
+    (without it: next to the middle of the limits) is taken.
+
+    Args:
+        robot: the robot.
+        pose: of the flange in the base frame.
+        e1: arm angle [rad].
+        status: bits 0-2.
+        near: joint positions, shape (7,) [rad].
+
+    Returns:
+        Shape (7,) [rad].
+
+    Raises:
+        Unreachable: no solution within the joint limits; the text says what is in the way.
+    """
+    r, p = rows(pose)
+    hint = None if near is None else [float(v) for v in near]
+    if hint is not None:
+        own = redundancy(robot, hint)
+        candidate = raw(
+            robot, r, p, own.e1 if e1 is None else e1, own.status if status is None else status, hint
+        )
+        if inside(robot, candidate):
+            return np.array(candidate)
+    middle = hint if hint is not None else [0.0, 0.3, 0.0, -pi / 2, 0.0, pi / 3, 0.0]
+    states = range(8) if status is None else (status,)
+    angles: tuple[float, ...] = _GRID if e1 is None else (e1,)
+    for grid in (angles, _FINE) if e1 is None else (angles,):
+        found = [q for s in states for a in grid if inside(robot, q := raw(robot, r, p, a, s, hint))]
+        if found:
+            return np.array(min(found, key=lambda q: sum((x - y) ** 2 for x, y in zip(q, middle, strict=True))))
+    raise Unreachable(
+        "the pose is within reach, but every arm position that leads there breaks a joint limit",
+        code=51,
+        hint="change the orientation" + ("" if e1 is None and status is None else ", or leave E1 and Status free"),
+    )
+
+
+def solve_all(robot: RobotModel, pose: Pose | Array, *, e1: float) -> list[Array]:
+    """All solutions within the limits for an arm angle, one for each Status that has one.
+
+    Raises:
+        Unreachable: out of reach.
+    """
+    r, p = rows(pose)
+    found = (raw(robot, r, p, e1, status) for status in range(8))
+    return [np.array(q) for q in found if inside(robot, q)]

@@ -1,0 +1,1 @@
+"""Frozen values, numpy only: poses, motions, states, results, robots."""

@@ -1,0 +1,173 @@
+"""FRI messages: golden bytes, round trips in every version, strictness, and the fast layouts against the full codec."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from heptarm.fri import codec, version
+from heptarm.fri import messages as m
+from heptarm.fri.protobuf import MalformedMessage, put_bytes, put_packed, put_unpacked, put_varint
+from heptarm.fri.template import CommandTemplate, MonitoringReader
+from heptarm.fri.version import Version
+
+from . import strategies as some
+from .golden import COMMAND_1X, COMMAND_27, MONITORING_1X
+
+every_version = pytest.mark.parametrize("wire", Version)
+
+
+def test_golden_monitoring_message_reads_and_writes_back_to_the_same_bytes() -> None:
+    seen = codec.decode_monitoring(MONITORING_1X, Version.V1_15)
+    assert seen.header == m.Header(1301, 1299)
+    assert seen.connection == m.ConnectionInfo(m.SessionState.COMMANDING_ACTIVE, m.Quality.EXCELLENT, 1, 1)
+    assert seen.monitor is not None and seen.monitor.q == pytest.approx((0.1, 0.4, -0.1, -1.2, 0.2, 0.9, 0.0))
+    assert (
+        seen.ipo is not None and seen.ipo.tracking == 1.0 and seen.ipo.command_mode is m.CommandMode.POSITION
+    )
+    assert codec.encode_monitoring(seen, Version.V1_15) == MONITORING_1X
+
+
+@pytest.mark.parametrize(("octets", "wire"), [(COMMAND_1X, Version.V1_15), (COMMAND_27, Version.V2_7)])
+def test_golden_commands_read_and_write_back_to_the_same_bytes(octets: bytes, wire: Version) -> None:
+    seen = codec.decode_command(octets, wire)
+    assert seen.header.sequence == seen.header.reflected in (1300, 1301)
+    assert codec.encode_command(seen, wire) == octets
+
+
+def test_template_writes_the_golden_commands() -> None:
+    for octets, wire in ((COMMAND_1X, Version.V1_15), (COMMAND_27, Version.V2_7)):
+        seen = codec.decode_command(octets, wire)
+        template = CommandTemplate(wire)
+        template.q[:] = seen.q
+        assert template.encode(seen.header.sequence, seen.header.reflected) == octets
+
+
+@every_version
+@given(data=st.data())
+def test_monitoring_round_trip(wire: Version, data: st.DataObject) -> None:
+    value = data.draw(some.monitorings(wire))
+    assert codec.decode_monitoring(codec.encode_monitoring(value, wire), wire) == value
+
+
+@every_version
+@given(data=st.data())
+def test_command_round_trip(wire: Version, data: st.DataObject) -> None:
+    value = data.draw(some.commands(wire))
+    assert codec.decode_command(codec.encode_command(value, wire), wire) == value
+
+
+@every_version
+@given(data=st.data())
+def test_fast_reader_agrees_with_the_codec(wire: Version, data: st.DataObject) -> None:
+    """Two messages in a row: the second meets the layout of the first, equal or not."""
+    reader = MonitoringReader(wire)
+    first = data.draw(some.monitorings(wire))
+    second = data.draw(st.just(replace(first, header=m.Header(300, 70_000))) | some.monitorings(wire))
+    for value in (first, second):
+        sample = reader.read(codec.encode_monitoring(value, wire))
+        monitor, ipo = value.monitor or m.MonitorData(), value.ipo or m.IpoData()
+        arrays = (sample.q, sample.tau, sample.q_cmd, sample.tau_cmd, sample.tau_ext, sample.q_ipo)
+        assert arrays == (monitor.q, monitor.tau, monitor.q_cmd, monitor.tau_cmd, monitor.tau_ext, ipo.q)
+        assert (sample.sequence, sample.robot, sample.connection) == (
+            value.header.sequence,
+            value.robot,
+            value.connection,
+        )
+        assert sample.tracking == ipo.tracking or (ipo.tracking is None and math.isnan(sample.tracking))
+        assert sample.message == value
+
+
+@every_version
+@given(header=some.headers, q=some.joints, tau=some.joints, wrench=some.numbers(6))
+def test_template_agrees_with_the_codec(
+    wire: Version, header: m.Header, q: m.Joints, tau: m.Joints, wrench: m.Joints
+) -> None:
+    for with_tau, with_wrench in ((False, False), (True, False), (False, True), (True, True)):
+        template = CommandTemplate(wire, torque=with_tau, wrench=with_wrench)
+        template.q[:] = q
+        if template.tau is not None:
+            template.tau[:] = tau
+        if template.wrench is not None:
+            template.wrench[:] = wrench
+        value = m.Command(header, q=q, tau=tau if with_tau else None, wrench=wrench if with_wrench else None)
+        assert template.encode(header.sequence, header.reflected) == codec.encode_command(value, wire)
+
+
+@every_version
+@settings(max_examples=300)
+@given(data=st.data(), octets=st.binary(max_size=200))
+def test_any_octets_only_raise_malformed(wire: Version, data: st.DataObject, octets: bytes) -> None:
+    good = bytearray(codec.encode_monitoring(data.draw(some.monitorings(wire)), wire))
+    for _ in range(data.draw(st.integers(1, 4))):
+        good[data.draw(st.integers(0, len(good) - 1))] = data.draw(st.integers(0, 255))
+    reader = MonitoringReader(wire)
+    for candidate in (octets, bytes(good), bytes(good[: len(good) // 2])):
+        for read in (
+            reader.read,
+            lambda one: codec.decode_monitoring(one, wire),
+            lambda one: codec.decode_command(one, wire),
+        ):
+            try:
+                read(candidate)
+            except MalformedMessage:
+                pass
+
+
+@pytest.mark.parametrize("size", [0, 6, 8])
+def test_joint_arrays_of_another_length_are_refused(size: int) -> None:
+    body = put_bytes(1, put_unpacked(1, (0.5,) * size))
+    message = COMMAND_1X[:12] + put_bytes(2, body)
+    with pytest.raises(MalformedMessage, match=f"has {size} values, exactly 7"):
+        codec.decode_command(message, Version.V1_15)
+
+
+def test_packed_and_unpacked_are_read_and_unknown_fields_skipped() -> None:
+    packed = (
+        COMMAND_1X[:12]
+        + put_bytes(2, put_bytes(1, put_packed(1, (0.5,) * 7)) + put_varint(99, 3))
+        + put_bytes(14, b"later")
+    )
+    assert codec.decode_command(packed, Version.V1_15).q == (0.5,) * 7
+
+
+def test_another_version_is_named_in_words() -> None:
+    with pytest.raises(MalformedMessage, match="speaks FRI 2.7"):
+        codec.decode_command(COMMAND_27, Version.V1_15)
+    with pytest.raises(MalformedMessage, match="speaks FRI 1.x or 2.5"):
+        codec.decode_command(COMMAND_1X, Version.V2_7)
+    with pytest.raises(MalformedMessage, match="wrong CRC"):
+        codec.decode_command(COMMAND_27[:-1] + b"\0", Version.V2_7)
+    with pytest.raises(MalformedMessage, match="id is 212993, 2380098"):
+        codec.decode_monitoring(COMMAND_1X, Version.V1_15)
+
+
+@pytest.mark.parametrize("wire", [Version.V1_15, Version.V2_5, Version.V2_7])
+def test_version_is_recognised_from_one_datagram(wire: Version) -> None:
+    joints = (0.1,) * 7
+    monitor = m.MonitorData(q=joints, q_cmd=None if wire.traits.quaternions else joints)
+    octets = codec.encode_monitoring(m.Monitoring(m.Header(1, 0), monitor=monitor), wire)
+    assert version.recognise(octets) is wire
+
+
+def test_what_a_version_cannot_carry_is_refused_on_writing() -> None:
+    header, joints = m.Header(1, 1), (0.0,) * 7
+    signal = m.IoValue("A.b", m.IoType.BOOLEAN, m.IoDirection.OUTPUT, 1)
+    for value, wire, text in (
+        (m.Command(header, io=(signal,)), Version.V1_11, "IO"),
+        (m.Command(header, io=(signal,) * 11), Version.V1_15, "at most 10"),
+        (m.Command(header, pose=m.Transformation("p", joints)), Version.V1_15, "Cartesian pose"),
+        (m.Command(header, q=(0.0,) * 6), Version.V1_15, "exactly 7"),
+        (m.Command(header, io=(replace(signal, name="x" * 64),)), Version.V1_15, "1 to 63"),
+    ):
+        with pytest.raises(ValueError, match=text):
+            codec.encode_command(value, wire)
+
+
+def test_crc_is_the_plain_one() -> None:
+    assert zlib.crc32(COMMAND_27[4:-4]) == int.from_bytes(COMMAND_27[-4:], "little")
