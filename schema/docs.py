@@ -1,0 +1,89 @@
+"""Writes docs/reference/protocol.md and errors.md from the schema."""
+
+from __future__ import annotations
+
+from spec import SIZES, Field, Spec
+
+
+def _table(fields: list[Field]) -> list[str]:
+    if not fields:
+        return ["No fields.", ""]
+    lines = ["| field | type | unit | range | meaning |", "|---|---|---|---|---|"]
+    for one in fields:
+        note = one.doc + ("; NaN keeps the default" if one.nan and "NaN" not in one.doc else "")
+        if one.has_default:
+            note += f"; default {one.default}"
+        lines.append(f"| `{one.name}` | `{one.type.text}` | {one.unit} | {one.range_text} | {note.lstrip('; ')} |")
+    return [*lines, ""]
+
+
+def protocol(spec: Spec) -> str:
+    p = spec.protocol
+    lines = [
+        "# The wire protocol",
+        "",
+        "This page is generated from `schema/protocol.toml`; any language can speak the protocol from it.",
+        "",
+        f"TCP, port {p['port']}, the cabinet listens. Version {p['major']}.{p['minor']}: equal major versions understand each"
+        " other. Everything is big endian, SI units, quaternions x y z w. Poses are of the moved frame in the robot's base frame.",
+        "",
+        f"A frame is a header of {sum(SIZES[one['type']] for one in spec.header)} octets and a body of at most"
+        f" {p['max_body']} octets. Any split or merge of the byte stream is legal.",
+        "",
+        "## Header",
+        "",
+        "| field | type | meaning |",
+        "|---|---|---|",
+    ]
+    lines += [f"| `{one['name']}` | `{one['type']}` | {one.get('doc', '')} |" for one in spec.header]
+    lines += [
+        "",
+        "## Types",
+        "",
+        "`str` is a u16 count of octets and UTF-8; `bytes` a u32 count and octets; `list<T>` a u16 count and the entries;"
+        " `opt<T>` an octet 0 or 1 and, with 1, the value; `f64[7]` seven numbers. A union is an octet with the tag and the"
+        " member. NaN and infinity are refused unless a field says that NaN keeps its default.",
+        "",
+        "## Messages",
+        "",
+        "| id | message | from | kind | who | meaning |",
+        "|---|---|---|---|---|---|",
+    ]
+    for message in spec.messages.values():
+        lines.append(
+            f"| {message.id} | [{message.name}](#{message.name.lower()}) | {message.source} | {message.kind} | {message.role} | {message.doc} |"
+        )
+    lines.append("")
+    for message in spec.messages.values():
+        lines += [f"### {message.name}", "", f"Id {message.id}, {message.kind}. {message.doc}", ""]
+        if message.groups:
+            lines += ["A u16 mask of the groups, then each group whose bit is set, in this order:", "", "| bit | group |", "|---|---|"]
+            lines += [f"| {number} | `{bit}`: [{kind}](#{kind.lower()}) |" for bit, number, kind in message.groups] + [""]
+        else:
+            lines += _table(message.fields)
+    lines += ["## Structs", ""]
+    for struct in spec.structs.values():
+        lines += [f"### {struct.name}", "", struct.doc, "", *_table(struct.fields)]
+    lines += ["## Unions", ""]
+    for union in spec.unions.values():
+        lines += [f"### {union.name}", "", union.doc, "", "| tag | member |", "|---|---|"]
+        lines += [f"| {tag} | {member} |" for tag, member in union.members] + [""]
+    lines += ["## Enumerations", ""]
+    for enum in spec.enums.values():
+        lines += [f"### {enum.name}", "", f"{enum.doc} `{enum.base}`.", "", f"| {'bit' if enum.flags else 'value'} | name | meaning |", "|---|---|---|"]
+        lines += [f"| {value['bit' if enum.flags else 'value']} | {value['name']} | {value.get('doc', '')} |" for value in enum.values] + [""]
+    return "\n".join(lines)
+
+
+def errors(spec: Spec) -> str:
+    lines = [
+        "# Codes",
+        "",
+        "Every refusal and every failed motion carries a code, the parameter, its value, what is allowed, and a text. This table"
+        " is generated from `schema/errors.toml`.",
+        "",
+        "| code | name | Python error | what it means | what to do |",
+        "|---|---|---|---|---|",
+    ]
+    lines += [f"| {e['code']} | `{e['name']}` | `{e['class']}` | {e['title']} | {e['advice']} |" for e in spec.errors]
+    return "\n".join([*lines, ""])

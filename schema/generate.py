@@ -1,0 +1,53 @@
+"""Writes the Python codec, the Java codec, the golden vectors and the protocol pages from the schema.
+
+    python schema/generate.py           write
+    python schema/generate.py --check   fail if anything that is committed differs from the schema
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import docs
+import examples
+import java
+import python
+import spec as schema
+
+ROOT = schema.HERE.parent
+JAVA = ROOT / "cabinet" / "core" / "src" / "heptarm" / "wire"
+
+
+def outputs() -> dict[Path, str]:
+    spec = schema.load()
+    wire = ROOT / "src" / "heptarm" / "wire"
+    pages = ROOT / "docs" / "reference"
+    result = {
+        wire / "messages.py": python.messages(spec),
+        wire / "codes.py": python.codes(spec),
+        pages / "protocol.md": docs.protocol(spec),
+        pages / "errors.md": docs.errors(spec),
+        schema.HERE / "golden" / "vectors.json": json.dumps(examples.golden(spec), indent=1) + "\n",
+    }
+    return result | {JAVA / name: text for name, text in java.files(spec).items()}
+
+
+def main() -> int:
+    differing = []
+    for path, text in outputs().items():
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            differing.append(path.relative_to(ROOT))
+            if "--check" not in sys.argv:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(text, encoding="utf-8")
+    if "--check" in sys.argv and differing:
+        print("differs from the schema; run python schema/generate.py:", *differing, sep="\n  ")
+        return 1
+    print(f"{len(differing)} files written" if differing else "everything agrees with the schema")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
