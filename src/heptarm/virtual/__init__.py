@@ -1,0 +1,1 @@
+"""The virtual cabinet: a simulated robot under the real cabinet application."""

@@ -1,0 +1,72 @@
+"""What the plant is asked to do: one motion with all its parameters, in SI, and who wants to hear of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import nan
+from typing import Protocol
+
+Seven = tuple[float, ...]
+_FULL: Seven = (1.0,) * 7
+
+
+class Listener(Protocol):
+    """Hears of an order; called by the thread that ticks the plant, must not block."""
+
+    def started(self) -> None:
+        """The motion begins."""
+
+    def finished(self, cause: str, text: str) -> None:
+        """The motion has ended: "done", "cancelled" or "error" with its text."""
+
+
+class PlanError(ValueError):
+    """The motion cannot be planned; the text is of the kind that Sunrise gives.
+
+    Attributes:
+        kind: "joint_limit", "unreachable" or "planning".
+    """
+
+    def __init__(self, kind: str, text: str) -> None:
+        super().__init__(text)
+        self.kind = kind
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """One motion. NaN stands for "the default".
+
+    Attributes:
+        id: chosen by the caller, unique.
+        kind: "ptp", "lin", "lin_rel" or "hold".
+        joints: target of a ptp [rad]; None: `pose` is the target.
+        pose: target of the moved frame in the base: x y z [m], quaternion x y z w.
+        redundancy: E1 [rad] (NaN: keep), Status and Turn (-1: keep).
+        tcp: flange to moved frame, x y z [m], quaternion.
+        offset: of a lin_rel: translation and rotation in the axes of the reference.
+        reference: axes of a lin_rel's offset as a quaternion in the base; None: the moved frame's own.
+        joint_velocity: fractions of each axis' maximum, as the next two.
+        cart_velocity: [m/s]; then [m/s²], [m/s³]; orientation [rad/s], [rad/s²], [rad/s³].
+        duration: of a hold [s]; NaN: until cancelled.
+        listener: hears of start and end.
+    """
+
+    id: int
+    kind: str
+    joints: Seven | None = None
+    pose: Seven | None = None
+    redundancy: tuple[float, int, int] = (nan, -1, -1)
+    tcp: Seven = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+    offset: Seven | None = None
+    reference: Seven | None = None
+    joint_velocity: Seven = _FULL
+    joint_acceleration: Seven = _FULL
+    joint_jerk: Seven = _FULL
+    cart_velocity: float = nan
+    cart_acceleration: float = nan
+    cart_jerk: float = nan
+    ori_velocity: float = nan
+    ori_acceleration: float = nan
+    ori_jerk: float = nan
+    duration: float = nan
+    listener: Listener | None = field(default=None, compare=False)

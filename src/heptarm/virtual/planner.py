@@ -1,0 +1,202 @@
+"""Turns an order into a path and a profile, or refuses it with a text of the kind that Sunrise gives.
+
+KUKA's speed parameters are applied as the cabinet does: relative ones scale each axis' limit before the smallest counts,
+Cartesian ones bound the path. Where the joints could not follow a Cartesian path at the programmed speed, the whole path is
+slowed down.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isnan, sqrt
+
+import numpy as np
+
+from heptarm.errors import Unreachable
+from heptarm.model import inverse
+from heptarm.model.kinematics import forward
+from heptarm.values.arrays import Array
+from heptarm.values.pose import Pose, multiply, rotation
+from heptarm.values.robot import RobotModel
+from heptarm.virtual.order import Order, PlanError
+from heptarm.virtual.path import CartesianLine, JointLine
+from heptarm.virtual.profile import Limits, Profile, travel
+
+#: What a Cartesian motion does where its order says nothing: m/s, m/s², m/s³ and rad/s, rad/s², rad/s³.
+CARTESIAN_DEFAULT = (1.0, 4.0, 40.0)
+ORIENTATION_DEFAULT = (1.5, 6.0, 60.0)
+
+_SAMPLES = 101
+_LARGEST_STEP = 0.35  # rad between two samples; more is a jump to another branch
+_RESERVE = 0.7  # share of an axis' acceleration for s'' and for the path's curvature each
+_NEVER = 1e9
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A motion that can be carried out.
+
+    Attributes:
+        order: what was asked.
+        start: joint positions it begins at, shape (7,) [rad].
+        end: joint positions it ends at, shape (7,) [rad].
+        path: joint positions over s; None for a hold.
+        profile: s over time; None for a hold.
+        braking: limits of s when it is cancelled.
+    """
+
+    order: Order
+    start: Array
+    end: Array
+    path: JointLine | CartesianLine | None
+    profile: Profile | None
+    braking: Limits
+
+    @property
+    def duration(self) -> float:
+        """Time at full speed [s]; infinite for an endless hold."""
+        if self.profile is not None:
+            return self.profile.duration
+        return _NEVER if isnan(self.order.duration) else self.order.duration
+
+
+def plan(robot: RobotModel, order: Order, start: Array) -> Plan:
+    """Plan an order from rest at `start`, shape (7,) [rad].
+
+    Raises:
+        PlanError: a joint limit, an unreachable pose, or a path that cannot be led.
+    """
+    if order.kind == "hold":
+        return Plan(order, start, start, None, None, Limits(1.0, 1.0, 1.0))
+    if order.kind == "ptp":
+        return _plan_joints(robot, order, start, _joint_target(robot, order, start))
+    if order.kind in ("lin", "lin_rel"):
+        return _plan_line(robot, order, start)
+    raise PlanError("planning", f"Can not plan motion: no motion of kind {order.kind!r}")
+
+
+def _pose(values: tuple[float, ...]) -> Pose:
+    return Pose.of(values[:3], values[3:])
+
+
+def _joint_target(robot: RobotModel, order: Order, start: Array) -> Array:
+    if order.joints is not None:
+        target = np.array(order.joints)
+    else:
+        assert order.pose is not None
+        e1, status, _ = order.redundancy
+        try:
+            target = inverse.solve(
+                robot,
+                _pose(order.pose) @ _pose(order.tcp).inverse(),
+                e1=None if isnan(e1) else e1,
+                status=None if status < 0 else status,
+                near=start.tolist(),
+            )
+        except Unreachable as error:
+            raise PlanError("unreachable", f"Can not plan motion: frame is not reachable: {error.text}") from None
+    _check_limits(robot, target)
+    return target
+
+
+def _check_limits(robot: RobotModel, q: Array) -> None:
+    outside = [i for i in range(7) if not robot.q_min[i] - 1e-9 <= q[i] <= robot.q_max[i] + 1e-9]
+    if outside:
+        axes = " ".join(f"A{i + 1}" for i in outside)
+        values = ", ".join(
+            f"A{i + 1} = {np.degrees(q[i]):.2f} deg of [{np.degrees(robot.q_min[i]):.0f}, {np.degrees(robot.q_max[i]):.0f}]"
+            for i in outside
+        )
+        raise PlanError("joint_limit", f"Can not plan motion: Command Position violates limit {axes} ({values})")
+
+
+def _plan_joints(robot: RobotModel, order: Order, start: Array, end: Array) -> Plan:
+    path = JointLine(start, end)
+    way = np.maximum(np.abs(path.way), 1e-12)
+    full = Limits(float((robot.dq_max / way).min()), float((robot.ddq_max / way).min()), float((robot.dddq_max / way).min()))
+    limits = Limits(
+        float((robot.dq_max * order.joint_velocity / way).min()),
+        float((robot.ddq_max * order.joint_acceleration / way).min()),
+        float((robot.dddq_max * order.joint_jerk / way).min()),
+    )
+    if float(np.abs(path.way).max()) < 1e-9:
+        return Plan(order, start, end, None, None, full)
+    return Plan(order, start, end, path, travel(limits), full)
+
+
+def _target(order: Order, origin: Pose) -> Pose:
+    if order.kind == "lin":
+        assert order.pose is not None
+        return _pose(order.pose)
+    assert order.offset is not None
+    offset = _pose(order.offset)
+    if order.reference is None:
+        return origin @ offset
+    axes = np.array(order.reference)
+    back = axes * np.array([-1.0, -1.0, -1.0, 1.0])
+    turn = multiply(multiply(axes, offset.quat), back)
+    return Pose(origin.xyz + rotation(axes) @ offset.xyz, multiply(turn, origin.quat))
+
+
+def _plan_line(robot: RobotModel, order: Order, start: Array) -> Plan:
+    tcp = _pose(order.tcp)
+    target = _target(order, Pose.from_matrix(forward(robot, start)) @ tcp)
+    e1 = None if isnan(order.redundancy[0]) else order.redundancy[0]
+    path = CartesianLine(robot, start, target, tcp, e1)
+    samples = _sample(robot, path)
+    if path.length < 1e-7 and path.angle < 1e-7 and e1 is None:
+        return Plan(order, start, start, None, None, Limits(1.0, 1.0, 1.0))
+    wanted = _cartesian_limits(order, path)
+    possible = _joint_limits(robot, samples, np.array(order.joint_velocity), np.array(order.joint_acceleration))
+    braking = _joint_limits(robot, samples, np.ones(7), np.ones(7))
+    return Plan(order, start, samples[-1], path, travel(wanted.least(possible)), braking)
+
+
+def _sample(robot: RobotModel, path: CartesianLine) -> Array:
+    """Joint positions along the path, shape (101, 7); refuses what cannot be led."""
+    samples = [path.start]
+    for index in range(1, _SAMPLES):
+        s = index / (_SAMPLES - 1)
+        try:
+            q = path.at(s, samples[-1])
+        except Unreachable as error:
+            raise PlanError(
+                "unreachable", f"Can not plan motion: the path is not reachable at {100 * s:.0f} %: {error.text}"
+            ) from None
+        step = np.abs(q - samples[-1])
+        if step.max() > _LARGEST_STEP:
+            raise PlanError(
+                "planning",
+                f"Can not plan motion: A{int(step.argmax()) + 1} would have to jump at {100 * s:.0f} % of the path (singularity)",
+            )
+        _check_limits(robot, q)
+        samples.append(q)
+    return np.array(samples)
+
+
+def _or(value: float, default: float) -> float:
+    return default if isnan(value) else value
+
+
+def _cartesian_limits(order: Order, path: CartesianLine) -> Limits:
+    length, angle = max(path.length, 1e-12), max(path.angle, 1e-12)
+    line = (order.cart_velocity, order.cart_acceleration, order.cart_jerk)
+    turn = (order.ori_velocity, order.ori_acceleration, order.ori_jerk)
+    by_line = Limits(*(_or(v, d) / length for v, d in zip(line, CARTESIAN_DEFAULT, strict=True)))
+    by_turn = Limits(*(_or(v, d) / angle for v, d in zip(turn, ORIENTATION_DEFAULT, strict=True)))
+    return by_line.least(by_turn)
+
+
+def _joint_limits(robot: RobotModel, samples: Array, velocity: Array, acceleration: Array) -> Limits:
+    """Limits of s that keep every axis within its own along the samples."""
+    step = 1.0 / (_SAMPLES - 1)
+    slope = np.abs(np.gradient(samples, step, axis=0)).max(axis=0)
+    curve = np.abs(np.diff(samples, 2, axis=0) / step**2).max(axis=0)
+    slope, curve = np.maximum(slope, 1e-12), np.maximum(curve, 1e-12)
+    by_speed = float((robot.dq_max * velocity / slope).min())
+    by_curve = sqrt(_RESERVE / 2 * float((robot.ddq_max * acceleration / curve).min()))
+    return Limits(
+        min(by_speed, by_curve),
+        _RESERVE * float((robot.ddq_max * acceleration / slope).min()),
+        _RESERVE * float((robot.dddq_max / slope).min()),
+    )

@@ -1,0 +1,418 @@
+"""The plant: a simulated LBR with its motion controller, one millisecond a tick.
+
+MuJoCo steps the dynamics; planned motions are carried out by a computed-torque law that tracks tightly and knows the model's
+inertia, gravity, friction. The plant needs neither JVM nor clock: whoever calls `tick` owns its time.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, nan
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from heptarm.model import inverse
+from heptarm.values.arrays import Array
+from heptarm.values.robot import RobotModel, robot
+from heptarm.virtual import ring
+from heptarm.virtual.order import Order, PlanError
+from heptarm.virtual.planner import Plan, plan
+from heptarm.virtual.profile import Profile, brake
+
+TICK_NS = 1_000_000
+TICK = 1e-3
+
+#: Bandwidth of the position controller [rad/s] and its damping ratio.
+BANDWIDTH = 90.0
+DAMPING = 1.0
+
+#: A motion is done when every measured joint is this near to its command [rad] and this slow [rad/s] ...
+SETTLED = 5e-5
+SETTLED_SPEED = 1e-3
+#: ... or after this many ticks.
+SETTLE_TICKS = 500
+
+#: Slew of the application override and of pausing [1/s].
+OVERRIDE_SLEW = 4.0
+
+MODELS = Path(__file__).parent / "models"
+HOME = (0.0, 0.0, 0.0, -np.pi / 2, 0.0, np.pi / 2, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """State of the plant after a tick; arrays of shape (7,) unless said otherwise.
+
+    Attributes:
+        time: plant time [s].
+        q: measured positions [rad].
+        q_cmd: commanded positions [rad].
+        dq: velocities [rad/s].
+        tau: torques at the sensors [Nm].
+        tau_ext: external load acting on the joints [Nm].
+        tau_cmd: commanded torques [Nm].
+        wrench: external force and torque acting on the flange, base axes, shape (6,) [N, Nm].
+        order: id of the running order, 0 if none.
+        progress: of the running order, 0 to 1.
+    """
+
+    time: float
+    q: Array
+    q_cmd: Array
+    dq: Array
+    tau: Array
+    tau_ext: Array
+    tau_cmd: Array
+    wrench: Array
+    order: int
+    progress: float
+
+
+class _Run:
+    """An order under way."""
+
+    __slots__ = ("braking", "cancelled", "ended", "plan", "profile", "settling", "started", "time")
+
+    def __init__(self, planned: Plan | None, order: Order) -> None:
+        self.plan = planned
+        self.profile: Profile | None = planned.profile if planned else None
+        self.time = 0.0
+        self.braking = False
+        self.cancelled = False
+        self.ended = False
+        self.settling = 0
+        self.started = False
+
+
+class Plant:
+    """A simulated robot.
+
+    Args:
+        model: "iiwa7" or "iiwa14".
+        q: joint positions at the start, shape (7,) [rad].
+    """
+
+    def __init__(self, model: str = "iiwa14", *, q: tuple[float, ...] = HOME) -> None:
+        self.robot: RobotModel = robot(model)
+        self.model = mujoco.MjModel.from_xml_path(str(MODELS / f"{model.replace('med', 'iiwa')}.xml"))
+        self.data = mujoco.MjData(self.model)
+        self.data.qpos[:7] = q
+        mujoco.mj_forward(self.model, self.data)
+        self.ring = ring.Ring()
+        self.tick_count = 0
+        self.override = 1.0
+        self.on_wake: Callable[[int], None] | None = None
+        self._site = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SITE, "flange")
+        self._views()
+        self._command = [self._q.copy() for _ in range(3)]  # set-points of the last, this and the next tick
+        self._scale = 1.0
+        self._paused = False
+        self._push: Array | None = None
+        self._push_until = inf
+        self._lock = threading.Lock()
+        self._inbox: deque[tuple[Order, Plan | None]] = deque()
+        self._cancels: deque[int | None] = deque()
+        self._run: _Run | None = None
+        self._tail: Array | None = None  # where the last accepted order ends; None: not known
+        self._open = 0  # accepted orders that have not ended
+        self._write(0, 0.0, nan)
+
+    def _views(self) -> None:
+        d = self.data
+        self._q, self._dq, self._acc = d.qpos[:7], d.qvel[:7], d.qacc[:7]
+        self._bias, self._passive = d.qfrc_bias[:7], d.qfrc_passive[:7]
+        self._constraint, self._applied = d.qfrc_constraint[:7], d.qfrc_applied[:7]
+        self._ctrl = d.ctrl[:7]
+        self._armature = self.model.dof_armature[:7].copy()
+        self._limit = self.robot.tau_max
+        self._mass = np.zeros((self.model.nv, self.model.nv))
+        self._jp = np.zeros((3, self.model.nv))
+        self._jr = np.zeros((3, self.model.nv))
+        self._tau = np.zeros(7)
+        self._tau_ext = np.zeros(7)
+        self._tau_cmd = np.zeros(7)
+        self._wrench = np.zeros(6)
+
+    # ------------------------------------------------------------------------------ orders, from any thread
+
+    @property
+    def time_ns(self) -> int:
+        """Plant time [ns]."""
+        return self.tick_count * TICK_NS
+
+    @property
+    def idle(self) -> bool:
+        """No order is running or waiting."""
+        return self._open == 0
+
+    def submit(self, order: Order) -> None:
+        """Plan an order from the end of what is queued and append it.
+
+        While the arm brakes, the place it will come to rest at is not known; then the order is planned when its turn comes,
+        and a planning error reaches its listener.
+
+        Raises:
+            PlanError: it cannot be planned; nothing has changed.
+        """
+        with self._lock:
+            start = self._command[2].copy() if self._open == 0 else self._tail
+            planned = None if start is None else plan(self.robot, order, start)
+            self._tail = None if planned is None else planned.end
+            self._open += 1
+            self._inbox.append((order, planned))
+
+    def cancel(self, order_id: int | None = None) -> None:
+        """Cancel an order (None: all): the running one brakes on its path, waiting ones are dropped."""
+        with self._lock:
+            self._tail = None
+            self._cancels.append(order_id)
+
+    def stop(self) -> None:
+        """Cancel everything."""
+        self.cancel(None)
+
+    def pause(self) -> None:
+        """Come to rest on the path, keeping all orders."""
+        self._paused = True
+
+    def resume(self) -> None:
+        """Go on after a pause."""
+        self._paused = False
+
+    def apply_wrench(self, force: Array | tuple[float, ...], torque: Array | tuple[float, ...] = (0, 0, 0), *, duration: float = inf) -> None:
+        """Push the flange with a force [N] and a torque [Nm], base axes, for a time [s]; zeros end it."""
+        self._push_until = self.tick_count * TICK + duration
+        self._push = np.concatenate([np.asarray(force, dtype=np.float64), np.asarray(torque, dtype=np.float64)])
+
+    # ------------------------------------------------------------------------------ the tick
+
+    def step(self, ticks: int = 1) -> None:
+        """Run a number of ticks."""
+        for _ in range(ticks):
+            self.tick()
+
+    def tick(self) -> None:
+        """One millisecond: set-point, control law, dynamics, state."""
+        m, d = self.model, self.data
+        progress, remaining = self._advance()
+        before, now, after = self._command
+        mujoco.mj_step1(m, d)
+        self._external()
+        mujoco.mj_fullM(m, d, self._mass)
+        wanted = (after - 2 * now + before) * 1e6
+        wanted += BANDWIDTH * BANDWIDTH * (now - self._q)
+        wanted += 2 * DAMPING * BANDWIDTH * ((after - before) * 500.0 - self._dq)
+        torque = self._mass[:7, :7] @ wanted + self._bias - self._passive
+        np.clip(torque, -self._limit, self._limit, out=torque)
+        self._ctrl[:] = torque
+        mujoco.mj_step2(m, d)
+        self._tau_cmd = torque
+        # the sensors sit behind the gear: rotor inertia and gear friction are not in them
+        self._tau = torque - self._armature * self._acc + self._passive
+        self._tau_ext = self._applied + self._constraint
+        self.tick_count += 1
+        self._estimate()
+        self._write(self._run_id(), progress, remaining)
+
+    def _advance(self) -> tuple[float, float]:
+        """Shift the set-points and compute the next one; returns progress and remaining time."""
+        command = self._command
+        while self._cancels:
+            self._cancel_now(self._cancels.popleft())
+        goal = 0.0 if self._paused else self.override
+        step = OVERRIDE_SLEW * TICK
+        self._scale += min(step, max(-step, goal - self._scale))
+        run = self._run
+        if run is None:
+            run = self._next()
+        command[0], command[1] = command[1], command[2]
+        if run is None:
+            return 0.0, nan
+        if not run.started:
+            run.started = True
+            if run.plan is not None and run.plan.order.listener is not None:
+                run.plan.order.listener.started()
+        return self._follow(run)
+
+    def _follow(self, run: _Run) -> tuple[float, float]:
+        planned = run.plan
+        assert planned is not None
+        if run.ended:
+            return self._settle(run)
+        run.time += TICK if run.braking else TICK * self._scale
+        if planned.path is None or run.profile is None:
+            if run.cancelled or run.time >= planned.duration or planned.order.kind != "hold":
+                run.ended = True
+            return min(1.0, run.time / planned.duration), planned.duration - run.time
+        s = run.profile.at(run.time)[0]
+        if run.time >= run.profile.duration:
+            run.ended = True
+        s = min(max(s, 0.0), 1.0)
+        # at the very end take the planned joints: the path's samples may end a rounding error beside them
+        self._command[2] = planned.end if s == 1.0 else planned.path.at(s, self._command[2])
+        return s, run.profile.duration - run.time
+
+    def _settle(self, run: _Run) -> tuple[float, float]:
+        run.settling += 1
+        at_rest = float(np.abs(self._q - self._command[2]).max()) <= SETTLED
+        at_rest = at_rest and float(np.abs(self._dq).max()) <= SETTLED_SPEED
+        if at_rest or run.settling >= SETTLE_TICKS:
+            self._end("cancelled" if run.cancelled else "done", "")
+        return (nan if run.cancelled else 1.0), 0.0
+
+    def _end(self, cause: str, text: str) -> None:
+        run = self._run
+        assert run is not None and run.plan is not None
+        self._run = None
+        self._closed(run.plan.order, cause, text)
+
+    def _closed(self, order: Order, cause: str, text: str) -> None:
+        with self._lock:
+            self._open -= 1
+        if order.listener is not None:
+            order.listener.finished(cause, text)
+
+    def _next(self) -> _Run | None:
+        while self._inbox:
+            order, planned = self._inbox.popleft()
+            here = self._command[2]
+            if planned is None or float(np.abs(planned.start - here).max()) > 1e-9:
+                try:
+                    planned = plan(self.robot, order, here.copy())
+                except PlanError as error:
+                    self._closed(order, "error", str(error))
+                    continue
+                with self._lock:
+                    if not self._inbox:
+                        self._tail = planned.end
+            self._run = _Run(planned, order)
+            return self._run
+        return None
+
+    def _cancel_now(self, order_id: int | None) -> None:
+        run = self._run
+        if run is not None and run.plan is not None and order_id in (None, run.plan.order.id):
+            self._brake(run)
+        kept: list[tuple[Order, Plan | None]] = []
+        while self._inbox:
+            order, _ = self._inbox.popleft()
+            if order_id in (None, order.id):
+                self._closed(order, "cancelled", "")
+            else:
+                kept.append((order, None))
+        self._inbox.extend(kept)
+
+    def _brake(self, run: _Run) -> None:
+        planned = run.plan
+        assert planned is not None
+        if run.cancelled:
+            return
+        run.cancelled = True
+        if run.ended or run.profile is None or planned.path is None:
+            run.ended = run.ended or planned.path is None
+            return
+        s, velocity, acceleration = run.profile.at(run.time)
+        scale = self._scale
+        run.profile = brake((s, velocity * scale, acceleration * scale * scale), planned.braking)
+        run.time, run.braking = 0.0, True
+
+    # ------------------------------------------------------------------------------ torques and state
+
+    def _external(self) -> None:
+        if self._push is None:
+            return
+        if self.tick_count * TICK >= self._push_until or not self._push.any():
+            self._push = None
+            self._applied[:] = 0.0
+            return
+        mujoco.mj_jacSite(self.model, self.data, self._jp, self._jr, self._site)
+        self._applied[:] = self._jp[:, :7].T @ self._push[:3] + self._jr[:, :7].T @ self._push[3:]
+
+    def _estimate(self) -> None:
+        """Wrench at the flange from the external torques: least squares, damped near singularities."""
+        if not self._tau_ext.any():
+            self._wrench[:] = 0.0
+            return
+        mujoco.mj_jacSite(self.model, self.data, self._jp, self._jr, self._site)
+        j = np.vstack([self._jp[:, :7], self._jr[:, :7]])
+        self._wrench = np.linalg.solve(j @ j.T + 1e-6 * np.eye(6), j @ self._tau_ext)
+
+    def _run_id(self) -> int:
+        return 0 if self._run is None or self._run.plan is None else self._run.plan.order.id
+
+    def _write(self, order: int, progress: float, remaining: float) -> None:
+        k, r = self.tick_count, self.ring
+        slot = k % ring.SLOTS
+        words, reals = r.ints[slot], r.floats[slot]
+        words[ring.SEQ] = 2 * k + 1
+        words[ring.TIME] = k * TICK_NS
+        q = self._q
+        reals[2:9] = q
+        reals[9:16] = self._command[2]
+        reals[16:23] = self._dq
+        reals[23:30] = self._tau
+        reals[30:37] = self._tau_ext
+        reals[37:44] = self._tau_cmd
+        values = q.tolist()
+        (x, y, z), p = inverse.flange(self.robot, values)
+        reals[44:47] = p
+        reals[47:51] = _quaternion(x, y, z)
+        reals[51:57] = self._wrench
+        flags = ring.READY | ring.BRAKES_OPEN | ring.MASTERED
+        if self._paused:
+            flags |= ring.PAUSED
+        if order:
+            flags |= ring.MOVING
+        words[ring.FLAGS] = flags
+        words[ring.MODE] = 2
+        words[ring.ORDER] = order
+        reals[ring.PROGRESS] = progress
+        reals[ring.REMAINING] = remaining
+        status = inverse.status_of(self.robot, values)
+        reals[ring.E1] = inverse.arm_angle(self.robot, values, bool(status & 1))
+        turn = sum((v < 0) << i for i, v in enumerate(values))
+        words[ring.REDUNDANCY] = status | turn << 8
+        words[ring.SEQ] = 2 * k + 2
+        r.header[ring.NEWEST] = k
+        wake = self.on_wake
+        if wake is not None and k * TICK_NS >= r.header[ring.WAKE]:
+            wake(k * TICK_NS)
+
+    @property
+    def snapshot(self) -> Snapshot:
+        """The newest state, copied."""
+        slot = self.ring.floats[self.tick_count % ring.SLOTS]
+        return Snapshot(
+            self.tick_count * TICK,
+            self._q.copy(),
+            self._command[2].copy(),
+            self._dq.copy(),
+            self._tau.copy(),
+            self._tau_ext.copy(),
+            self._tau_cmd.copy(),
+            self._wrench.copy(),
+            self._run_id(),
+            float(slot[ring.PROGRESS]),
+        )
+
+
+def _quaternion(x: tuple[float, ...], y: tuple[float, ...], z: tuple[float, ...]) -> tuple[float, ...]:
+    """Quaternion x y z w of the columns of a rotation; the largest component leads."""
+    xx, yy, zz = x[0], y[1], z[2]
+    w = xx + yy + zz
+    if w >= xx and w >= yy and w >= zz:
+        q = (y[2] - z[1], z[0] - x[2], x[1] - y[0], 1.0 + w)
+    elif xx >= yy and xx >= zz:
+        q = (1.0 + xx - yy - zz, x[1] + y[0], x[2] + z[0], y[2] - z[1])
+    elif yy >= zz:
+        q = (x[1] + y[0], 1.0 + yy - xx - zz, y[2] + z[1], z[0] - x[2])
+    else:
+        q = (x[2] + z[0], y[2] + z[1], 1.0 + zz - xx - yy, x[1] - y[0])
+    n = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]) ** -0.5
+    n = -n if q[3] < 0 else n
+    return q[0] * n, q[1] * n, q[2] * n, q[3] * n

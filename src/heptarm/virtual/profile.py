@@ -1,0 +1,74 @@
+"""Jerk-limited profiles of the path parameter s: to the end of the path, and to a stop on it.
+
+Ruckig computes both in one dimension, where it is exact and needs no intermediate waypoints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ruckig import ControlInterface, InputParameter, Result, Ruckig, Trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Largest velocity, acceleration and jerk of s, all positive."""
+
+    velocity: float
+    acceleration: float
+    jerk: float
+
+    def least(self, other: Limits) -> Limits:
+        """The stricter of two, each by each."""
+        return Limits(
+            min(self.velocity, other.velocity),
+            min(self.acceleration, other.acceleration),
+            min(self.jerk, other.jerk),
+        )
+
+
+class Profile:
+    """s over time."""
+
+    __slots__ = ("_trajectory", "duration")
+
+    def __init__(self, parameters: InputParameter) -> None:
+        trajectory = Trajectory(1)
+        if Ruckig(1).calculate(parameters, trajectory) not in (Result.Working, Result.Finished):
+            raise ValueError("no profile for these limits")
+        self._trajectory = trajectory
+        self.duration = float(trajectory.duration)
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        """s, ds/dt, d²s/dt² at a time [s]; beyond the end it keeps its last values."""
+        position, velocity, acceleration = self._trajectory.at_time(min(time, self.duration))
+        return position[0], velocity[0], acceleration[0]
+
+
+def _parameters(state: tuple[float, float, float], limits: Limits) -> InputParameter:
+    parameters = InputParameter(1)
+    parameters.current_position = [state[0]]
+    parameters.current_velocity = [state[1]]
+    parameters.current_acceleration = [state[2]]
+    parameters.max_velocity = [limits.velocity]
+    parameters.max_acceleration = [limits.acceleration]
+    parameters.max_jerk = [limits.jerk]
+    return parameters
+
+
+def travel(limits: Limits) -> Profile:
+    """From rest at 0 to rest at 1."""
+    parameters = _parameters((0.0, 0.0, 0.0), limits)
+    parameters.target_position = [1.0]
+    parameters.target_velocity = [0.0]
+    parameters.target_acceleration = [0.0]
+    return Profile(parameters)
+
+
+def brake(state: tuple[float, float, float], limits: Limits) -> Profile:
+    """From a state (s, velocity, acceleration) to rest, wherever on the path that is."""
+    parameters = _parameters(state, limits)
+    parameters.control_interface = ControlInterface.Velocity
+    parameters.target_velocity = [0.0]
+    parameters.target_acceleration = [0.0]
+    return Profile(parameters)
