@@ -1,0 +1,78 @@
+package heptarm.core;
+
+import heptarm.wire.Cause;
+import heptarm.wire.Code;
+import heptarm.wire.ControlChanged;
+import heptarm.wire.OnLost;
+
+/** Who controls the robot: one client at most. A controller that is lost or silent loses control and the arm stops. */
+final class Authority {
+    private final Server server;
+    private Client holder;
+    private double watchdog;
+    private OnLost onLost;
+
+    Authority(Server server) {
+        this.server = server;
+    }
+
+    synchronized void take(Client client, double watchdogSeconds, OnLost whenLost) throws Refusal {
+        if (holder != null && holder != client) {
+            throw new Refusal(Code.CONTROL_TAKEN, "controller", holder.name(), "",
+                    holder.name() + " (session " + holder.session + ") controls this robot");
+        }
+        boolean changed = holder == null;
+        holder = client;
+        watchdog = watchdogSeconds;
+        onLost = whenLost;
+        if (changed) {
+            server.broadcast(new ControlChanged(client.name(), client.session, "took control"));
+        }
+    }
+
+    void release(Client client) {
+        synchronized (this) {
+            if (holder != client) {
+                return;
+            }
+            holder = null;
+        }
+        server.executor.endAll(Cause.STOPPED, "control was released");
+        server.broadcast(new ControlChanged("", 0, client.name() + " released control"));
+    }
+
+    /** The controller is gone or silent. */
+    void lost(Client client, String why) {
+        OnLost what;
+        synchronized (this) {
+            if (holder != client) {
+                return;
+            }
+            holder = null;
+            what = onLost;
+        }
+        if (what == OnLost.STOP) {
+            server.executor.endAll(Cause.LOST, client.name() + " was lost: " + why);
+            server.robot.stop();
+        }
+        server.log.warn(client.name() + " lost control: " + why);
+        server.broadcast(new ControlChanged("", 0, client.name() + " was lost: " + why));
+    }
+
+    synchronized boolean holds(Client client) {
+        return holder == client;
+    }
+
+    synchronized Client holder() {
+        return holder;
+    }
+
+    synchronized String name() {
+        return holder == null ? "" : holder.name();
+    }
+
+    /** Silence [s] after which the controller counts as lost. */
+    synchronized double watchdog() {
+        return watchdog;
+    }
+}

@@ -1,0 +1,139 @@
+package heptarm.core;
+
+import heptarm.wire.Accepted;
+import heptarm.wire.Cancel;
+import heptarm.wire.Code;
+import heptarm.wire.Goodbye;
+import heptarm.wire.Item;
+import heptarm.wire.Message;
+import heptarm.wire.Messages;
+import heptarm.wire.Pause;
+import heptarm.wire.Ping;
+import heptarm.wire.Pong;
+import heptarm.wire.Ptp;
+import heptarm.wire.Recover;
+import heptarm.wire.Rejected;
+import heptarm.wire.ReleaseControl;
+import heptarm.wire.Resume;
+import heptarm.wire.RobotInfo;
+import heptarm.wire.Run;
+import heptarm.wire.SetOverride;
+import heptarm.wire.ShowMessage;
+import heptarm.wire.Stop;
+import heptarm.wire.Subscribe;
+import heptarm.wire.TakeControl;
+import heptarm.wire.Violation;
+import heptarm.wire.WireException;
+
+/** Turns the requests of an open session into actions, and every refusal into an answer that says why. */
+final class Dispatcher {
+    private final Server server;
+
+    Dispatcher(Server server) {
+        this.server = server;
+    }
+
+    /** Handles one frame; called by the client's reader. Nothing that a client sends gets past here as an exception. */
+    void handle(Client client, int type, long request, byte[] data, int offset, int length) {
+        try {
+            Message message = Messages.read(type, data, offset, length);
+            if (message == null || !Messages.fromClient(type)) {
+                throw new Refusal(Code.UNKNOWN_MESSAGE, "message " + type + " is not known here");
+            }
+            if (message instanceof Ping) {
+                client.answer(new Pong(((Ping) message).sent, client.heard()), 0);
+                return;
+            }
+            if (message instanceof Pong) {
+                return;
+            }
+            if (message instanceof Goodbye) {
+                client.leave("it said goodbye");
+                return;
+            }
+            if (Messages.needsControl(type) && !server.authority.holds(client)) {
+                String holder = server.authority.name();
+                throw new Refusal(Code.NOT_IN_CONTROL, "controller", holder, client.name(),
+                        holder.length() == 0 ? "nobody controls the robot; take control first"
+                                : holder + " controls the robot, not " + client.name());
+            }
+            message.validate("");
+            client.answer(act(client, message), request);
+        } catch (WireException e) {
+            refuse(client, request, new Refusal(Code.BAD_BODY, "message " + type + ": " + e.getMessage()));
+        } catch (Violation e) {
+            refuse(client, request, new Refusal(e.code, e.parameter, e.value, e.allowed, e.getMessage()));
+        } catch (Refusal e) {
+            refuse(client, request, e);
+        } catch (RuntimeException e) {
+            server.log.error("message " + type + " of " + client.name(), e);
+            refuse(client, request, new Refusal(Code.INTERNAL, String.valueOf(e)));
+        }
+    }
+
+    private void refuse(Client client, long request, Refusal why) {
+        client.answer(new Rejected(why.code, why.parameter, why.value, why.allowed, why.getMessage()), request);
+    }
+
+    private Message act(Client client, Message message) throws Refusal {
+        long id = 0;
+        if (message instanceof Stop) {
+            server.executor.stop(((Stop) message).kind);
+        } else if (message instanceof Run) {
+            id = run((Run) message);
+        } else if (message instanceof Cancel) {
+            server.executor.cancel(((Cancel) message).id);
+        } else if (message instanceof Subscribe) {
+            Subscribe wish = (Subscribe) message;
+            if (wish.rate > server.config.maxRate) {
+                throw new Refusal(Code.OUT_OF_RANGE, "rate", Double.toString(wish.rate), "[0, " + server.config.maxRate + "] Hz",
+                        "this cabinet pushes at most " + server.config.maxRate + " states a second");
+            }
+            server.sampler.subscribe(client, wish.groups, wish.rate);
+        } else if (message instanceof TakeControl) {
+            TakeControl wish = (TakeControl) message;
+            server.authority.take(client, wish.watchdog, wish.on_lost);
+        } else if (message instanceof ReleaseControl) {
+            server.authority.release(client);
+        } else if (message instanceof Pause) {
+            server.robot.pause();
+        } else if (message instanceof Resume) {
+            server.robot.resume();
+        } else if (message instanceof SetOverride) {
+            server.robot.setOverride(((SetOverride) message).value);
+        } else if (message instanceof Recover) {
+            server.robot.recover();
+        } else if (message instanceof ShowMessage) {
+            ShowMessage note = (ShowMessage) message;
+            server.robot.show(note.severity.value(), note.text);
+        } else {
+            throw new Refusal(Code.UNSUPPORTED, "this cabinet application cannot handle message " + message.type() + " yet");
+        }
+        return new Accepted(id);
+    }
+
+    private long run(Run run) throws Refusal {
+        RobotInfo info = server.robot.info();
+        for (int i = 0; i < run.items.length; i++) {
+            Item item = run.items[i];
+            String path = "items[" + i + "].";
+            if (item.motion instanceof Ptp) {
+                checkJoints(((Ptp) item.motion).q, info, path + "motion.q");
+            }
+            server.robot.check(item, path);
+        }
+        return server.executor.add(run);
+    }
+
+    private static void checkJoints(double[] q, RobotInfo info, String path) throws Refusal {
+        for (int i = 0; i < q.length; i++) {
+            if (q[i] < info.q_min[i] - 1e-9 || q[i] > info.q_max[i] + 1e-9) {
+                throw new Refusal(Code.JOINT_LIMIT, path + "[" + i + "]", Double.toString(q[i]),
+                        "[" + info.q_min[i] + ", " + info.q_max[i] + "] rad",
+                        "A" + (i + 1) + " would be at " + Math.round(Math.toDegrees(q[i]) * 100) / 100.0 + " deg; the "
+                                + info.title + " allows " + Math.round(Math.toDegrees(info.q_min[i])) + " to "
+                                + Math.round(Math.toDegrees(info.q_max[i])) + " deg");
+            }
+        }
+    }
+}

@@ -1,0 +1,305 @@
+package heptarm.core;
+
+import java.util.ArrayDeque;
+import java.util.ArrayList;
+import java.util.List;
+
+import heptarm.wire.Cause;
+import heptarm.wire.Code;
+import heptarm.wire.ItemReached;
+import heptarm.wire.MotionFinished;
+import heptarm.wire.MotionStarted;
+import heptarm.wire.PositionMode;
+import heptarm.wire.Run;
+import heptarm.wire.StopKind;
+import heptarm.wire.When;
+
+/** Carries out programs one after the other, each as one batch of jobs, and tells everybody what becomes of them. */
+final class Executor {
+    private static final int MAX_QUEUED = 1000;
+
+    private final Server server;
+    private final ArrayDeque<Program> queue = new ArrayDeque<Program>();
+    private Program running;
+    private long lastId;
+    private boolean closed;
+    private Thread thread;
+
+    Executor(Server server) {
+        this.server = server;
+    }
+
+    void start() {
+        thread = new Thread(new Runnable() {
+            public void run() {
+                work();
+            }
+        }, "ha-motion");
+        thread.setDaemon(true);
+        thread.start();
+    }
+
+    /** A program and what becomes of it. Guarded by itself. */
+    private final class Program {
+        final long id;
+        final Run run;
+        final List<Job> jobs = new ArrayList<Job>();
+        final Job.Ended[] ended;
+        int item;
+        Cause cause;
+        String why = "";
+        int code;
+        String text = "";
+        long began;
+
+        Program(long id, Run run) {
+            this.id = id;
+            this.run = run;
+            this.ended = new Job.Ended[run.items.length];
+        }
+
+        /** Ends it for a cause; the first cause counts. */
+        void end(Cause newCause, String newWhy) {
+            List<Job> all;
+            synchronized (this) {
+                if (cause == null) {
+                    cause = newCause;
+                    why = newWhy;
+                }
+                all = new ArrayList<Job>(jobs);
+                notifyAll();
+            }
+            for (int i = all.size() - 1; i >= 0; i--) {
+                all.get(i).cancel(); // from the last, so that none of them begins while the others are cancelled
+            }
+        }
+
+        Job.Listener listener(final int index) {
+            return new Job.Listener() {
+                public void started() {
+                    synchronized (Program.this) {
+                        item = index;
+                    }
+                    server.broadcast(new MotionStarted(id, index));
+                }
+
+                public void finished(Job.Ended how, int failureCode, String failure) {
+                    synchronized (Program.this) {
+                        ended[index] = how;
+                        if (how == Job.Ended.FAILED && cause == null) {
+                            cause = Cause.FAILED;
+                            code = failureCode;
+                            text = failure;
+                        }
+                        Program.this.notifyAll();
+                    }
+                }
+            };
+        }
+    }
+
+    // ------------------------------------------------------------------------------- requests, from readers
+
+    long add(Run run) throws Refusal {
+        List<Program> replaced = new ArrayList<Program>();
+        Program program;
+        synchronized (this) {
+            boolean busy = running != null || !queue.isEmpty();
+            if (run.when == When.REJECT && busy) {
+                throw new Refusal(Code.BUSY, "when", "reject", "", "motion " + (running != null ? running.id : queue.peek().id)
+                        + " is running; wait for it, or use when=\"queue\" or when=\"replace\"");
+            }
+            if (queue.size() >= MAX_QUEUED) {
+                throw new Refusal(Code.QUEUE_FULL, MAX_QUEUED + " programs are waiting already");
+            }
+            if (run.when == When.REPLACE) {
+                replaced.addAll(queue);
+                queue.clear();
+                if (running != null) {
+                    replaced.add(0, running);
+                }
+            }
+            lastId = lastId % 0xFFFFFFFFL + 1;
+            program = new Program(lastId, run);
+            queue.add(program);
+            notifyAll();
+        }
+        end(replaced, Cause.REPLACED, "motion " + program.id + " took its place");
+        return program.id;
+    }
+
+    void cancel(long id) throws Refusal {
+        List<Program> chosen = take(id);
+        if (id != 0 && chosen.isEmpty()) {
+            throw new Refusal(Code.UNKNOWN_MOTION, "id", Long.toString(id), "", "motion " + id + " is neither running nor waiting");
+        }
+        end(chosen, Cause.CANCELLED, "");
+    }
+
+    void stop(StopKind kind) {
+        if (kind == StopKind.AFTER_MOTION) {
+            List<Program> waiting;
+            synchronized (this) {
+                waiting = new ArrayList<Program>(queue);
+                queue.clear();
+            }
+            end(waiting, Cause.STOPPED, "a stop was commanded");
+            return;
+        }
+        endAll(Cause.STOPPED, "a stop was commanded");
+        server.robot.stop();
+    }
+
+    void endAll(Cause cause, String why) {
+        end(take(0), cause, why);
+    }
+
+    private synchronized List<Program> take(long id) {
+        List<Program> chosen = new ArrayList<Program>();
+        if (running != null && (id == 0 || running.id == id)) {
+            chosen.add(running);
+        }
+        for (Program program : new ArrayList<Program>(queue)) {
+            if (id == 0 || program.id == id) {
+                queue.remove(program);
+                chosen.add(program);
+            }
+        }
+        return chosen;
+    }
+
+    private void end(List<Program> programs, Cause cause, String why) {
+        for (Program program : programs) {
+            program.end(cause, why);
+            boolean waiting;
+            synchronized (this) {
+                waiting = program != running;
+            }
+            if (waiting && program.began == 0) {
+                tell(program, Double.NaN);
+            }
+        }
+    }
+
+    /** Id of what runs (0: nothing), its item, and the number of programs that wait. */
+    synchronized long[] status() {
+        return new long[] {running == null ? 0 : running.id, running == null ? 0 : running.item, queue.size()};
+    }
+
+    void close() {
+        synchronized (this) {
+            closed = true;
+            notifyAll();
+        }
+        endAll(Cause.STOPPED, "the cabinet application ends");
+        Threads.join(thread);
+    }
+
+    // ------------------------------------------------------------------------------- the motion thread
+
+    private void work() {
+        try {
+            while (true) {
+                Program program;
+                synchronized (this) {
+                    while (queue.isEmpty() && !closed) {
+                        wait();
+                    }
+                    if (closed) {
+                        return;
+                    }
+                    program = queue.poll();
+                    program.began = server.clock.nanos();
+                    running = program;
+                }
+                try {
+                    carryOut(program);
+                } catch (RuntimeException e) {
+                    server.log.error("motion " + program.id, e);
+                    synchronized (program) {
+                        program.cause = Cause.FAILED;
+                        program.code = Code.INTERNAL;
+                        program.text = String.valueOf(e);
+                    }
+                    program.end(Cause.FAILED, "");
+                }
+                synchronized (this) {
+                    running = null;
+                }
+                tell(program, residual());
+            }
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
+        }
+    }
+
+    private void carryOut(Program program) throws InterruptedException {
+        for (int i = 0; i < program.run.items.length; i++) {
+            synchronized (program) {
+                if (program.cause != null) {
+                    program.ended[i] = Job.Ended.CANCELLED;
+                    continue;
+                }
+            }
+            try {
+                Job job = server.robot.start(program.run.items[i],
+                        program.run.items[i].mode == null ? new PositionMode() : program.run.items[i].mode, program.listener(i));
+                boolean tooLate;
+                synchronized (program) {
+                    program.jobs.add(job);
+                    tooLate = program.cause != null;
+                }
+                if (tooLate) {
+                    job.cancel();
+                }
+            } catch (Refusal e) {
+                program.listener(i).finished(Job.Ended.FAILED, e.code, e.getMessage());
+            }
+        }
+        for (int i = 0; i < program.ended.length; i++) {
+            boolean cancelRest = false;
+            boolean reached;
+            synchronized (program) {
+                while (program.ended[i] == null) {
+                    program.wait();
+                }
+                reached = program.ended[i] == Job.Ended.DONE && i + 1 < program.ended.length;
+                cancelRest = program.cause != null;
+            }
+            if (reached) {
+                server.broadcast(new ItemReached(program.id, i));
+            }
+            if (cancelRest) {
+                program.end(program.cause, program.why);
+            }
+        }
+    }
+
+    private double residual() {
+        double[] q = new double[7];
+        double[] commanded = new double[7];
+        server.robot.readJoints(q, commanded);
+        double worst = 0.0;
+        for (int i = 0; i < 7; i++) {
+            worst = Math.max(worst, Math.abs(q[i] - commanded[i]));
+        }
+        return worst;
+    }
+
+    private void tell(Program program, double residual) {
+        double[] q = new double[7];
+        server.robot.readJoints(q, new double[7]);
+        Cause cause;
+        String text;
+        synchronized (program) {
+            cause = program.cause;
+            if (cause == null) {
+                Job.Ended last = program.ended[program.ended.length - 1];
+                cause = last == Job.Ended.DONE ? Cause.FINISHED : last == Job.Ended.CONDITION ? Cause.CONDITION : Cause.STOPPED;
+            }
+            text = program.text.length() > 0 ? program.text : program.why;
+        }
+        double duration = program.began == 0 ? 0.0 : (server.clock.nanos() - program.began) * 1e-9;
+        server.broadcast(new MotionFinished(program.id, program.item, cause, -1, residual, duration, q, program.code, text));
+    }
+}

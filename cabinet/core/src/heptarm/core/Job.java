@@ -1,0 +1,24 @@
+package heptarm.core;
+
+/** A motion that the robot has accepted. */
+public interface Job {
+    /** Brakes on the path if it runs, leaves the queue otherwise. May be called from any thread, more than once. */
+    void cancel();
+
+    /** Hears of a job. Called from threads of the robot; must not block. */
+    interface Listener {
+        void started();
+
+        /**
+         * The job has ended.
+         *
+         * @param ended how
+         * @param code code of a failure, 0 otherwise
+         * @param text the robot's words on a failure
+         */
+        void finished(Ended ended, int code, String text);
+    }
+
+    /** How a job ended. */
+    enum Ended { DONE, CANCELLED, CONDITION, FAILED }
+}

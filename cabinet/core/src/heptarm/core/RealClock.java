@@ -1,0 +1,21 @@
+package heptarm.core;
+
+/** The machine's own monotonic clock. */
+public final class RealClock implements Clock {
+    public long nanos() {
+        return System.nanoTime();
+    }
+
+    public long sleepUntil(long nanos) throws InterruptedException {
+        long left = nanos - System.nanoTime();
+        while (left > 0) {
+            Thread.sleep(left / 1000000L, (int) (left % 1000000L));
+            left = nanos - System.nanoTime();
+        }
+        return System.nanoTime();
+    }
+
+    public double rate() {
+        return 1.0;
+    }
+}

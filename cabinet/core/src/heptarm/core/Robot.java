@@ -1,0 +1,74 @@
+package heptarm.core;
+
+import heptarm.wire.FrameInfo;
+import heptarm.wire.Item;
+import heptarm.wire.Mode;
+import heptarm.wire.PoseState;
+import heptarm.wire.RobotInfo;
+import heptarm.wire.SafetyState;
+import heptarm.wire.SignalInfo;
+import heptarm.wire.ToolInfo;
+import heptarm.wire.WrenchState;
+
+/**
+ * A robot as the core sees it, in SI. The application implements it on the cabinet's API; tests may do without a cabinet.
+ *
+ * <p>Reading methods are called by the sampler alone, {@link #start} by the motion thread, all others by any thread.
+ */
+public interface Robot {
+    RobotInfo info();
+
+    /** Name of the cabinet, for people. */
+    String cabinet();
+
+    /** Whether the robot is simulated. */
+    boolean isVirtual();
+
+    /** What can be asked for: names of motions, modes and functions. */
+    String[] capabilities();
+
+    ToolInfo[] tools();
+
+    FrameInfo[] frames();
+
+    SignalInfo[] signals();
+
+    /** Measured and commanded joint positions [rad]. */
+    void readJoints(double[] q, double[] commanded);
+
+    /** Measured, external and commanded torques [Nm]; NaN where the robot does not tell. */
+    void readTorques(double[] measured, double[] external, double[] commanded);
+
+    PoseState readPose(long stamp);
+
+    WrenchState readWrench(long stamp);
+
+    SafetyState readSafety(long stamp);
+
+    /** Progress of the running motion in [0, 1] and its remaining time [s]; NaN where the robot does not tell. */
+    void readProgress(double[] progressAndRemaining);
+
+    /** Checks that an item can be carried out here; nothing moves. */
+    void check(Item item, String path) throws Refusal;
+
+    /** Appends an item to what the robot carries out. Returns at once; planning errors come to the listener. */
+    Job start(Item item, Mode mode, Job.Listener listener) throws Refusal;
+
+    /** Brakes whatever moves and drops what waits. Never blocks for long. */
+    void stop();
+
+    void pause();
+
+    void resume();
+
+    /** Factor on every programmed speed, 0 to 1. */
+    void setOverride(double value);
+
+    double override();
+
+    /** Does what software may do to make the robot ready; refuses with the operator's steps otherwise. */
+    void recover() throws Refusal;
+
+    /** Shows a text to the person at the robot. */
+    void show(int severity, String text);
+}

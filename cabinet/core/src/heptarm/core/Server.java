@@ -1,0 +1,162 @@
+package heptarm.core;
+
+import java.io.IOException;
+import java.net.InetAddress;
+import java.net.InetSocketAddress;
+import java.net.ServerSocket;
+import java.net.Socket;
+import java.util.List;
+import java.util.concurrent.CopyOnWriteArrayList;
+import java.util.concurrent.atomic.AtomicInteger;
+
+import heptarm.wire.Code;
+import heptarm.wire.Encoder;
+import heptarm.wire.Message;
+import heptarm.wire.Protocol;
+
+/**
+ * The cabinet's side of heptarm: accepts clients, runs their programs, pushes state, watches over all of it.
+ *
+ * <p>It outlives its clients: they may come and go any number of times without anybody at the smartPAD.
+ */
+public final class Server {
+    static final int MAX_CLIENTS = 16;
+
+    final Robot robot;
+    final Config config;
+    final Clock clock;
+    final Log log;
+    final Authority authority;
+    final Executor executor;
+    final Sampler sampler;
+    final Dispatcher dispatcher;
+
+    private final Watchdog watchdog;
+    private final List<Client> clients = new CopyOnWriteArrayList<Client>();
+    private final AtomicInteger sessions = new AtomicInteger();
+    private ServerSocket socket;
+    private Thread acceptor;
+    private volatile boolean closed;
+
+    public Server(Robot robot, Config config, Clock clock, Log log) {
+        this.robot = robot;
+        this.config = config;
+        this.clock = clock;
+        this.log = log;
+        this.authority = new Authority(this);
+        this.executor = new Executor(this);
+        this.sampler = new Sampler(this);
+        this.dispatcher = new Dispatcher(this);
+        this.watchdog = new Watchdog(this);
+    }
+
+    /** Opens the port and starts the threads; returns the port. */
+    public int start() throws IOException {
+        socket = new ServerSocket();
+        socket.setReuseAddress(true);
+        socket.bind(new InetSocketAddress(InetAddress.getByName(config.bind), config.port), MAX_CLIENTS);
+        executor.start();
+        sampler.start();
+        watchdog.start();
+        acceptor = new Thread(new Runnable() {
+            public void run() {
+                accept();
+            }
+        }, "ha-acceptor");
+        acceptor.setDaemon(true);
+        acceptor.start();
+        log.info("heptarm " + Config.VERSION + " listens on " + config.bind + ":" + socket.getLocalPort()
+                + ", protocol " + Protocol.MAJOR + "." + Protocol.MINOR);
+        return socket.getLocalPort();
+    }
+
+    /** Stops motion, says goodbye to all clients, closes the port, ends all threads. */
+    public void close() {
+        if (closed) {
+            return;
+        }
+        closed = true;
+        executor.close();
+        robot.stop();
+        for (Client client : clients) {
+            client.goodbye(Code.SHUTTING_DOWN, "the cabinet application ends");
+        }
+        try {
+            socket.close();
+        } catch (IOException e) {
+            log.error("closing the port", e);
+        }
+        watchdog.close();
+        sampler.close();
+        Threads.join(acceptor);
+        for (Client client : clients) {
+            client.join();
+        }
+    }
+
+    private void accept() {
+        while (!closed) {
+            try {
+                Socket peer = socket.accept();
+                peer.setTcpNoDelay(true);
+                int session = sessions.incrementAndGet();
+                Client client = new Client(this, peer, session);
+                if (clients.size() >= MAX_CLIENTS) {
+                    client.refuse(Code.TOO_MANY_CLIENTS, "this cabinet serves " + MAX_CLIENTS + " clients at a time");
+                } else if (!config.allows(peer.getInetAddress().getHostAddress())) {
+                    client.refuse(Code.NOT_ALLOWED, peer.getInetAddress().getHostAddress()
+                            + " is not on the allow-list (process data heptarm.allow)");
+                } else {
+                    clients.add(client);
+                    client.start();
+                }
+            } catch (IOException e) {
+                if (!closed) {
+                    log.warn("a connection was not accepted: " + e);
+                }
+            } catch (RuntimeException e) {
+                log.error("accepting a connection", e);
+            }
+        }
+    }
+
+    List<Client> clients() {
+        return clients;
+    }
+
+    /** A client's connection has ended. */
+    void left(Client client, String why) {
+        clients.remove(client);
+        sampler.forget(client);
+        if (authority.holds(client)) {
+            authority.lost(client, why);
+        }
+    }
+
+    /** Sends an event to every open session. */
+    void broadcast(Message event) {
+        byte[] body = event.body();
+        for (Client client : clients) {
+            if (client.isOpen()) {
+                client.event(event.type(), body);
+            }
+        }
+    }
+
+    /** A frame without its sequence number, which the client's connection fills in. */
+    byte[] frame(int type, byte[] body, long request) {
+        Encoder out = new Encoder(Protocol.HEADER + body.length);
+        out.putU16(Protocol.MAGIC);
+        out.putU8(Protocol.MAJOR);
+        out.putU8(0);
+        out.putU16(type);
+        out.putU32(body.length);
+        out.putU32(0);
+        out.putU32(request);
+        out.putI64(clock.nanos());
+        byte[] whole = new byte[Protocol.HEADER + body.length];
+        System.arraycopy(out.data(), 0, whole, 0, Protocol.HEADER);
+        System.arraycopy(body, 0, whole, Protocol.HEADER, body.length);
+        return whole;
+    }
+}

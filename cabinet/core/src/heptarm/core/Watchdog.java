@@ -1,0 +1,97 @@
+package heptarm.core;
+
+import heptarm.wire.Code;
+import heptarm.wire.Ping;
+import heptarm.wire.SafetyChanged;
+import heptarm.wire.SafetyState;
+
+/** Watches over the clients and the robot: silence, stuck connections, changes of the safety state. */
+final class Watchdog {
+    private static final long PERIOD_NS = 10000000L;
+    private static final double STUCK = 2.0;
+    private static final double HANDSHAKE = 5.0;
+    private static final int SILENT_HEARTBEATS = 5;
+    private static final int SAFETY_EVERY = 5;
+
+    private final Server server;
+    private Thread thread;
+    private volatile boolean closed;
+    private SafetyState safety;
+
+    Watchdog(Server server) {
+        this.server = server;
+    }
+
+    void start() {
+        thread = new Thread(new Runnable() {
+            public void run() {
+                work();
+            }
+        }, "ha-watchdog");
+        thread.setDaemon(true);
+        thread.start();
+    }
+
+    void close() {
+        closed = true;
+        thread.interrupt();
+        Threads.join(thread);
+    }
+
+    private void work() {
+        long next = server.clock.nanos();
+        int round = 0;
+        try {
+            while (!closed) {
+                next = Math.max(next + PERIOD_NS, server.clock.nanos());
+                server.clock.sleepUntil(next);
+                try {
+                    look();
+                    if (++round % SAFETY_EVERY == 0) {
+                        lookAtSafety();
+                    }
+                } catch (RuntimeException e) {
+                    server.log.error("watching", e);
+                }
+            }
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
+        }
+    }
+
+    private void look() {
+        long now = server.clock.nanos();
+        double scale = 1e-9 / server.clock.rate(); // time-outs of the link count the client's seconds
+        for (Client client : server.clients()) {
+            double silence = (now - client.heard()) * scale;
+            long began = client.writeBegan();
+            if (began != 0 && (now - began) * scale > STUCK) {
+                client.leave("it does not read what it asked for");
+            } else if (!client.isOpen()) {
+                if (silence > HANDSHAKE) {
+                    client.leave("it never said Hello");
+                }
+            } else if (silence > SILENT_HEARTBEATS * server.config.heartbeat) {
+                client.goodbye(Code.SILENT, "nothing was heard for " + Math.round(silence * 1000) + " ms");
+            } else if (server.authority.holds(client) && silence > server.authority.watchdog()) {
+                server.authority.lost(client, "silent for " + Math.round(silence * 1000) + " ms, its watchdog time is "
+                        + Math.round(server.authority.watchdog() * 1000) + " ms");
+            } else if ((now - client.sent()) * scale > server.config.heartbeat) {
+                client.event(Ping.TYPE, new Ping(now).body());
+            }
+        }
+    }
+
+    private void lookAtSafety() {
+        SafetyState seen = server.robot.readSafety(server.clock.nanos());
+        int changing = ~heptarm.wire.SafetyBits.MOVING;
+        if (safety != null && ((seen.bits ^ safety.bits) & changing) == 0 && seen.mode == safety.mode) {
+            return;
+        }
+        if (safety != null) {
+            boolean ready = (seen.bits & heptarm.wire.SafetyBits.READY_TO_MOVE) != 0;
+            server.broadcast(new SafetyChanged(seen.bits, seen.mode, ready ? "the robot is ready to move" : "the robot is not ready to move"));
+        }
+        safety = seen;
+    }
+}
