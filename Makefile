@@ -1,0 +1,49 @@
+# Every target does the set-up it needs. Stamps under build/ keep repeats fast.
+PY := .venv/bin/python
+STAMPS := build/stamps
+
+.PHONY: setup cabinet demo test lint check bench docs wheel clean
+
+setup: $(STAMPS)/venv cabinet  ## virtual environment, package, compiled cabinet
+
+$(STAMPS)/venv: pyproject.toml scripts/setup.sh
+	scripts/setup.sh all
+	@mkdir -p $(STAMPS) && touch $@
+
+$(STAMPS)/jdk: scripts/setup_jdk.py cabinet/toolchain.py $(STAMPS)/venv
+	$(PY) scripts/setup_jdk.py
+	@mkdir -p $(STAMPS) && touch $@
+
+$(STAMPS)/browser: scripts/setup_browser.sh
+	scripts/setup_browser.sh
+	@mkdir -p $(STAMPS) && touch $@
+
+cabinet: $(STAMPS)/venv $(STAMPS)/jdk  ## compile the cabinet application and its doubles
+	@$(PY) cabinet/build.py
+
+demo: setup  ## motions on the virtual cabinet, a table and a plot
+	.venv/bin/heptarm demo
+
+lint: $(STAMPS)/venv  ## ruff, mypy, import contract
+	.venv/bin/ruff check .
+	.venv/bin/mypy
+	.venv/bin/lint-imports
+
+check: $(STAMPS)/venv  ## the generated files agree with the schema
+	$(PY) schema/generate.py --check
+
+test: setup $(STAMPS)/browser lint check  ## everything; fast tests first
+	$(PY) -m pytest
+
+bench: setup  ## figures as JSON lines; ONLY=name runs one, LIST=1 names them
+	@$(PY) -m bench $(if $(ONLY),--only $(ONLY)) $(if $(LIST),--list)
+
+docs: $(STAMPS)/venv  ## the site, in docs/_build/html
+	.venv/bin/sphinx-build -W -q -b html docs docs/_build/html
+	@echo docs/_build/html/index.html
+
+wheel: setup  ## a wheel with the compiled jars, in dist/
+	$(PY) -m build --wheel
+
+clean:  ## everything that make made, but for the virtual environment
+	rm -rf build dist docs/_build src/heptarm/virtual/jars .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
