@@ -1,0 +1,1 @@
+"""The arm: connecting, motions and their handles, state, the link beneath."""

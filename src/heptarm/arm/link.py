@@ -1,0 +1,366 @@
+"""A session over a transport: requests, events, heartbeats.
+
+Who reads the connection? While a caller waits for an answer, the caller reads itself: that saves two changes of
+threads, half of a round trip. At all other times the thread "heptarm-link" reads. It waits for the connection to become
+readable without taking anything, so a caller need not wake it to take its place; `_token` says who may take.
+A caller's thread may be interrupted anywhere (Ctrl-C). If that happens after octets were taken and before they were
+understood, nobody knows where the next frame begins: then the link is given up, and the cabinet stops the arm.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from _thread import LockType, allocate_lock
+from collections.abc import Callable
+
+from heptarm.arm.refusals import farewell, refusal, rejection
+from heptarm.errors import ConnectFailed, ConnectionLost, HeptarmError, RemoteProtocolError, Timeout
+from heptarm.io.clock import Clock
+from heptarm.io.transport import Transport
+from heptarm.wire.clock_offset import ClockOffset
+from heptarm.wire.codes import Code
+from heptarm.wire.messages import (
+    MAJOR,
+    MINOR,
+    Accepted,
+    Challenge,
+    Goodbye,
+    Message,
+    Ping,
+    Pong,
+    Refusal,
+    Rejected,
+    Welcome,
+)
+from heptarm.wire.session import Received, Session, StateReceived
+from heptarm.wire.transitions import SessionState
+
+_log = logging.getLogger("heptarm.link")
+
+_BUFFER = 65536
+#: Stands in the buffer until octets come; random, so that no frame begins like it.
+_NOTHING = bytes.fromhex("5a0f93c1d2e8471b")
+#: How long a caller waits for the link thread to finish what it is just reading [s].
+_TURN = 0.0002
+#: Pings at the start, and the pause between them [s]: enough to see a virtual clock's rate.
+_PROBES, _PROBE_PAUSE = 6, 0.003
+
+
+class _Slot:
+    """Where an answer is put down."""
+
+    __slots__ = ("answer", "lock", "on_answer")
+
+    def __init__(self, on_answer: Callable[[Message], None] | None) -> None:
+        self.lock: LockType = allocate_lock()
+        self.lock.acquire()
+        self.answer: Message | None = None
+        self.on_answer = on_answer
+
+
+class Link:
+    """One connection to a cabinet, from Hello to Goodbye.
+
+    Args:
+        transport: a fresh connection; it belongs to the link from now on.
+        clock: this side's clock.
+        key: pre-shared key, or None.
+        on_event: called with each event, in the order of the wire; must not block.
+        on_state: called with (body, our clock at its receipt [ns]) of each pushed state; must not block.
+        on_lost: called once, from the link thread, with why the link ended; not after `close`.
+    """
+
+    def __init__(
+        self,
+        transport: Transport,
+        clock: Clock,
+        *,
+        key: bytes | None = None,
+        on_event: Callable[[Message], None],
+        on_state: Callable[[bytes, int], None],
+        on_lost: Callable[[HeptarmError], None],
+    ) -> None:
+        from heptarm.wire.session import Side
+
+        self.offset = ClockOffset()
+        self.peer = transport.peer
+        self._transport = transport
+        self._clock = clock
+        self._has_key = key is not None
+        self._session = Session(Side.CLIENT, key=key)
+        self._on_event = on_event
+        self._on_state = on_state
+        self._on_lost = on_lost
+        self._view = memoryview(bytearray(_BUFFER))
+        self._sending = threading.Lock()
+        self._token = threading.Lock()
+        self._leading = False
+        self._slots: dict[int, _Slot] = {}
+        self._welcome: Welcome | None = None
+        self._error: HeptarmError | None = None
+        self._closing = False
+        self._heartbeat = 1.0
+        self._watchdog = float("inf")
+        self._heard = clock.nanos()
+        self._thread = threading.Thread(target=self._run, name="heptarm-link", daemon=True)
+
+    # ------------------------------------------------------------------------------------ opening
+
+    def open(self, *, name: str, version: str, timeout: float) -> Welcome:
+        """Say Hello, prove the key if asked, learn the cabinet's clock, and start the link thread.
+
+        Raises:
+            ConnectFailed: the cabinet does not answer, or refuses the session.
+        """
+        deadline = self._clock.nanos() + round(timeout * 1e9)
+        try:
+            self._say(self._session.hello(name=name, version=version))
+            while self._welcome is None:
+                self._step(deadline, f"no session within {timeout:g} s")
+            for count in range(1, _PROBES + 1):
+                self.ping()
+                while self.offset.count < count:
+                    self._step(deadline, f"no answer to a ping within {timeout:g} s")
+                self._clock.sleep(_PROBE_PAUSE)
+        except HeptarmError as error:
+            self._lose(error)
+            if isinstance(error, ConnectFailed):
+                raise
+            raise ConnectFailed(
+                f"no session with {self.peer}: {error.text}", code=error.code, hint=error.hint
+            ) from error
+        except BaseException:
+            self._lose(ConnectionLost("interrupted while connecting"))
+            raise
+        self._heartbeat = self._welcome.heartbeat
+        self._thread.start()
+        return self._welcome
+
+    def _step(self, deadline: int, late: str) -> None:
+        with self._token:
+            self._read(wait=True)
+        if self._error is not None:
+            raise self._error
+        if self._clock.nanos() > deadline:
+            raise ConnectFailed(
+                f"{self.peer} is connected but answers nothing: {late}",
+                hint="check that a cabinet listens there",
+            )
+
+    def _handshake(self, message: Message) -> None:
+        if isinstance(message, Challenge):
+            if not self._has_key:
+                raise ConnectFailed(
+                    f"the cabinet at {self.peer} asks for a pre-shared key",
+                    code=int(Code.WRONG_KEY),
+                    hint='connect(..., key="...") with the key that its process data names',
+                )
+            self._say(self._session.proof())
+        elif isinstance(message, Refusal):
+            raise refusal(message, major=MAJOR, minor=MINOR)
+        elif isinstance(message, Welcome):
+            self._welcome = message
+
+    # ------------------------------------------------------------------------------------ talking
+
+    @property
+    def error(self) -> HeptarmError | None:
+        """Why the link has ended; None while it stands."""
+        return self._error
+
+    def expect_watchdog(self, seconds: float) -> None:
+        """Keep the cabinet's watchdog of that length fed (seconds of the cabinet's clock)."""
+        self._watchdog = seconds
+
+    def request(
+        self, message: Message, *, timeout: float, on_answer: Callable[[Message], None] | None = None
+    ) -> Message:
+        """Send a request and wait for its answer.
+
+        Args:
+            message: the request.
+            timeout: how long to wait [s].
+            on_answer: called with the answer before anything that came after it is looked at; must not block.
+
+        Raises:
+            CommandRejected: the cabinet refuses (or another error of the table of codes).
+            ConnectionLost: the link has ended.
+            Timeout: no answer in time.
+        """
+        slot = _Slot(on_answer)
+        self._say(message, slot)
+        deadline = self._clock.nanos() + round(timeout * 1e9)
+        if self._token.acquire(timeout=_TURN):
+            try:
+                self._leading = True
+                while slot.answer is None and self._error is None and self._clock.nanos() < deadline:
+                    self._read(wait=True)
+            finally:
+                self._leading = False
+                self._token.release()
+        if slot.answer is None and self._error is None:
+            slot.lock.acquire(timeout=max(0.0, (deadline - self._clock.nanos()) * 1e-9))
+        answer = slot.answer
+        if answer is None:
+            if self._error is not None:
+                raise self._lost()
+            raise Timeout(f"the cabinet did not answer a {type(message).__name__} within {timeout:g} s")
+        if isinstance(answer, Rejected):
+            raise rejection(answer)
+        return answer
+
+    def accept(
+        self, message: Message, *, timeout: float, on_answer: Callable[[Message], None] | None = None
+    ) -> int:
+        """A request that is answered with an id; returns it. Raises as `request` does."""
+        answer = self.request(message, timeout=timeout, on_answer=on_answer)
+        if not isinstance(answer, Accepted):
+            raise RemoteProtocolError(f"a {type(answer).__name__} answers a {type(message).__name__}")
+        return answer.id
+
+    def post(self, message: Message) -> None:
+        """Send a request without waiting for its answer; callable from the callbacks."""
+        self._say(message, _Slot(None))
+
+    def ping(self) -> None:
+        """Probe the cabinet's clock; the answer goes into `offset`."""
+        self._say(Ping(sent=self._clock.nanos()))
+
+    def _say(self, message: Message, slot: _Slot | None = None) -> None:
+        with self._sending:
+            if self._error is not None:
+                raise self._lost()
+            request = 0
+            if slot is not None:
+                request = self._session.next_request()
+                self._slots[request] = slot
+            data = self._session.send(message, request=request, time=self._clock.nanos())
+            try:
+                self._transport.send(data)
+            except HeptarmError as error:
+                self._lose(error)
+                raise
+            except BaseException:
+                # a part of the frame may have left: nothing can follow it
+                self._lose(ConnectionLost("interrupted while sending"))
+                raise
+
+    # ------------------------------------------------------------------------------------ reading
+
+    def _read(self, *, wait: bool) -> None:
+        """Take what has come and act on it; the caller holds the token."""
+        view = self._view
+        view[:8] = _NOTHING
+        try:
+            size = self._transport.receive_into(view, wait=wait)
+            if size == 0:
+                return
+            now = self._heard = self._clock.nanos()
+            session = self._session
+            session.receive_data(view[:size])
+            for event in session.events():
+                if type(event) is StateReceived:
+                    self._on_state(event.body, now)
+                elif type(event) is Received:
+                    self._dispatch(event, now)
+        except HeptarmError as error:
+            self._lose(error)
+        except BaseException:
+            if view[:8] != _NOTHING:
+                self._lose(ConnectionLost("interrupted while reading"))
+            raise
+
+    def _dispatch(self, event: Received, now: int) -> None:
+        message = event.message
+        kind = message.KIND
+        if kind == "answer":
+            slot = self._slots.pop(event.request, None)
+            if slot is not None:
+                if slot.on_answer is not None:
+                    slot.on_answer(message)
+                slot.answer = message
+                slot.lock.release()
+        elif isinstance(message, Ping):
+            self._say(Pong(sent=message.sent, received=now))
+        elif isinstance(message, Pong):
+            self.offset.feed(message.sent, message.received, now)
+        elif isinstance(message, Goodbye):
+            self._lose(farewell(message, self.peer))
+        elif kind == "handshake":
+            self._handshake(message)
+        else:
+            self._on_event(message)
+
+    def _run(self) -> None:
+        clock, transport = self._clock, self._transport
+        due = clock.nanos()
+        while self._error is None:
+            try:
+                now = clock.nanos()
+                if now >= due:
+                    self.ping()
+                    due = now + self._interval()
+                rest = max(0.0, (due - now) * 1e-9)
+                if self._leading:
+                    # a caller reads; most are done within a fraction of a millisecond
+                    clock.sleep(0.0005)
+                    if self._leading and self._token.acquire(timeout=rest):
+                        self._token.release()
+                elif transport.wait_readable(rest):
+                    if not self._leading and self._token.acquire(blocking=False):
+                        try:
+                            self._read(wait=False)
+                        finally:
+                            self._token.release()
+                elif now - self._heard > self._silence():
+                    self._lose(
+                        ConnectionLost(
+                            f"nothing heard from {self.peer} for {(now - self._heard) * 1e-9:.1f} s",
+                            code=int(Code.SILENT),
+                            hint="check the network and the load of both machines",
+                        )
+                    )
+            except HeptarmError as error:
+                self._lose(error)
+        if not self._closing:
+            _log.info("link to %s ended: %s", self.peer, self._error)
+            self._on_lost(self._error)
+
+    def _interval(self) -> int:
+        """Pause between pings [ns], a quarter of what the cabinet tolerates on its own clock."""
+        return round(min(self._heartbeat, self._watchdog) / 4 / max(self.offset.rate, 1.0) * 1e9)
+
+    def _silence(self) -> int:
+        return round(max(2 * self._heartbeat, 1.0) * 1e9)
+
+    # ------------------------------------------------------------------------------------- ending
+
+    def close(self) -> None:
+        """Say goodbye and end the thread; closing twice is legal."""
+        self._closing = True
+        if self._error is None and self._session.state is SessionState.OPEN:
+            try:
+                self._say(Goodbye(code=0, text="the client closes"))
+            except HeptarmError as error:
+                _log.debug("no goodbye to %s: %s", self.peer, error)
+        self._lose(ConnectionLost(f"the connection to {self.peer} is closed"))
+        if self._thread.is_alive() and self._thread is not threading.current_thread():
+            self._thread.join(5.0)
+
+    def _lose(self, error: HeptarmError) -> None:
+        if self._error is None:
+            self._error = error
+        self._transport.close()
+        for request in list(self._slots):
+            slot = self._slots.pop(request, None)
+            if slot is not None:
+                slot.lock.release()
+
+    def _lost(self) -> HeptarmError:
+        """A fresh error for each who asks: one exception raised in two threads mixes up their tracebacks."""
+        error = self._error
+        assert error is not None
+        if isinstance(error, ConnectionLost):
+            return ConnectionLost(error.text, code=error.code, hint=error.hint)
+        return ConnectionLost(f"the connection to {self.peer} is lost: {error.text}", code=error.code)

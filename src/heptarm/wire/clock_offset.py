@@ -1,0 +1,112 @@
+"""Estimate of the cabinet's clock from pings: sans IO, fed with triples of time stamps.
+
+A ping sent at `a` (our clock), seen by the cabinet at `m` (its clock) and answered at `b` (our clock) says that
+the cabinet's clock showed `m` at some moment of [a, b]: at the middle, give or take half the round trip. As time
+passes a sample says less, because clocks drift; so the sample with the smallest half round trip plus drift counts
+(the filter of NTP, RFC 5905, in its simplest form). A virtual cabinet's clock may run faster than ours: its rate
+is the one that the best old and the best new sample give, unless 1 explains them. It may also stall (a busy
+machine): a sample that no drift explains starts the estimate anew.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import NamedTuple
+
+#: How far two clocks of nominally equal rate may drift apart: 100 ppm, twice a poor quartz.
+DRIFT = 1e-4
+#: Deviation from the estimate that is still no step [ns].
+TOLERANCE = 300_000
+
+
+class _Sample(NamedTuple):
+    ours: float  # middle of the round trip, our clock [ns]
+    theirs: float  # the cabinet's clock then [ns]
+    slack: float  # half the round trip [ns]
+
+
+class ClockOffset:
+    """The cabinet's clock as a function of ours.
+
+    Args:
+        window: number of samples that count.
+        span: samples older than this many seconds of our clock are forgotten.
+    """
+
+    def __init__(self, *, window: int = 64, span: float = 30.0) -> None:
+        self._samples: deque[_Sample] = deque(maxlen=window)
+        self._span = span * 1e9
+        self._anchor = _Sample(0.0, 0.0, float("inf"))
+        self._rate = 1.0
+        self._count = 0
+
+    def feed(self, sent: int, received: int, returned: int) -> None:
+        """Take one ping.
+
+        Args:
+            sent: our clock when the ping left [ns].
+            received: the cabinet's clock when it came [ns].
+            returned: our clock when the answer came [ns].
+        """
+        self._count += 1
+        if returned < sent:
+            return
+        sample = _Sample((sent + returned) / 2, received, (returned - sent) / 2)
+        samples = self._samples
+        if len(samples) > 2 and self._is_step(sample):
+            samples.clear()
+        samples.append(sample)
+        while samples[0].ours < returned - self._span:
+            samples.popleft()
+        self._rate = self._fit()
+        self._anchor = min(samples, key=lambda s: s.slack + DRIFT * (sample.ours - s.ours))
+
+    def _is_step(self, sample: _Sample) -> bool:
+        since = sample.ours - self._anchor.ours
+        off = sample.theirs - (self._anchor.theirs + since * self._rate)
+        round_trips = (sample.slack + self._anchor.slack) * max(self._rate, 1.0)
+        drift = DRIFT if self._rate == 1.0 else 0.01 * self._rate
+        return abs(off) > round_trips + drift * since + TOLERANCE
+
+    def _fit(self) -> float:
+        """The rate nearest to 1 that the best sample of the older and of the newer half allow."""
+        samples = list(self._samples)
+        if len(samples) < 2:
+            return self._rate
+        half = len(samples) // 2
+        old = min(samples[:half], key=lambda s: s.slack)
+        new = min(samples[half:], key=lambda s: s.slack)
+        base = new.ours - old.ours
+        if base <= 0:
+            return self._rate
+        rate, slack = (new.theirs - old.theirs) / base, (old.slack * max(self._rate, 1.0) + new.slack) / base
+        if abs(rate - 1.0) <= slack + DRIFT:
+            return 1.0
+        # outside what drift and round trips explain: the clock really runs at another rate
+        return max(rate, 0.0)
+
+    @property
+    def count(self) -> int:
+        """Number of pings so far."""
+        return self._count
+
+    @property
+    def rate(self) -> float:
+        """Cabinet seconds per second of ours."""
+        return self._rate
+
+    @property
+    def uncertainty(self) -> float:
+        """Half the round trip of the sample that counts [s]; infinite before the first."""
+        return self._anchor.slack * 1e-9
+
+    def to_cabinet(self, ours: int) -> int:
+        """The cabinet's clock [ns] when ours shows `ours` [ns]."""
+        anchor = self._anchor
+        return round(anchor.theirs + (ours - anchor.ours) * self._rate)
+
+    def age(self, stamp: int, ours: int) -> float:
+        """Seconds of cabinet time from `stamp` (cabinet clock, ns) to `ours` (our clock, ns); NaN: unknown."""
+        if not self._samples:
+            return float("nan")
+        return (self.to_cabinet(ours) - stamp) * 1e-9
