@@ -18,7 +18,7 @@ $(STAMPS)/browser: scripts/setup_browser.sh
 	scripts/setup_browser.sh
 	@mkdir -p $(STAMPS) && touch $@
 
-cabinet: $(STAMPS)/venv $(STAMPS)/jdk  ## compile the cabinet application and its doubles
+cabinet: $(STAMPS)/jdk  ## compile the cabinet application and its doubles
 	@$(PY) cabinet/build.py
 
 demo: setup  ## motions on the virtual cabinet, a table and a plot

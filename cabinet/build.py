@@ -3,9 +3,9 @@
     python cabinet/build.py            compile what has changed, write the jars
     python cabinet/build.py --force    compile everything
 
-core knows nothing of KUKA; the doubles stand in for KUKA's classes and use core; app uses both. After the Eclipse
-compiler has run, every class of core and app is looked at: class version 50, no member that Java 6 lacks, no forbidden
-package. Only the Python standard library is used, so that the wheel's build hook can call it.
+core knows nothing of KUKA; the doubles stand in for KUKA's classes and use core; app uses both. After the
+Eclipse compiler has run, every class of core and app is looked at: class version 50, no member that Java 6
+lacks, no forbidden package. Python's standard library is enough, so that the wheel's build hook can call it.
 """
 
 from __future__ import annotations
@@ -113,8 +113,8 @@ def _compile(part: Part) -> None:
     jdk = toolchain.find_jdk()
     if part.for_robot:
         library = toolchain.java7_library(jdk, OUT)
-        command = [*toolchain.find_ecj(jdk), "-bootclasspath", str(library), "-source", "1.6", "-target", "1.6"]
-        command += ["-nowarn"]
+        command = [*toolchain.find_ecj(jdk), "-bootclasspath", str(library)]
+        command += ["-source", "1.6", "-target", "1.6", "-nowarn"]
     else:
         command = [jdk.javac, "--release", "17", "-Xlint:-options"]
     command += ["-proc:none", "-g", "-encoding", "UTF-8", "-d", str(classes)]

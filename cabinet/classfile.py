@@ -12,7 +12,8 @@ JAVA_6 = 50
 """The class version of Java 6."""
 
 # Size in bytes of a constant after its tag; Utf8 (1) is read by hand.
-_SIZES = {3: 4, 4: 4, 5: 8, 6: 8, 7: 2, 8: 2, 9: 4, 10: 4, 11: 4, 12: 4, 15: 3, 16: 2, 17: 4, 18: 4, 19: 2, 20: 2}
+_SIZES = dict.fromkeys((7, 8, 16, 19, 20), 2) | {15: 3} | dict.fromkeys((3, 4, 9, 10, 11, 12, 17, 18), 4)
+_SIZES |= {5: 8, 6: 8}
 _CLASS_IN_DESCRIPTOR = re.compile(r"L([^;<]+)[;<]")
 
 
@@ -33,7 +34,7 @@ def read(data: bytes) -> ClassFile:
         data: the bytes of the file.
 
     Returns:
-        Its name, its version, every class it names (also in descriptors) and every member (class, name, descriptor).
+        Name, version, every class it names (also in descriptors), every member (class, name, descriptor).
 
     Raises:
         ValueError: it is no class file.
@@ -106,4 +107,4 @@ class Refusals:
             arguments = descriptor[: descriptor.find(")") + 1]
             names = {(at, what) for at in (owner, "*") for what in (name, name + arguments)}
             if names & self.members:
-                yield f"{file.name}: uses {owner.replace('/', '.')}.{name}{descriptor}, which Java 6 does not have"
+                yield f"{file.name}: uses {owner.replace('/', '.')}.{name}{descriptor}, which Java 6 lacks"

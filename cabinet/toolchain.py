@@ -1,4 +1,4 @@
-"""Finds the JDK and the Eclipse compiler, and makes the library signatures of Java 7 from the JDK's own record."""
+"""Finds the JDK and the Eclipse compiler, and takes Java 7's library signatures from the JDK's record."""
 
 from __future__ import annotations
 
@@ -70,7 +70,9 @@ def find_jdk() -> Jdk:
             return jdk
     if jdks:
         return jdks[0]
-    raise ToolMissing(f"no JDK 17 found to compile the cabinet. On Debian or Ubuntu:\n    sudo sh -c '{INSTALL}'")
+    raise ToolMissing(
+        f"no JDK 17 to compile the cabinet with. On Debian or Ubuntu:\n    sudo sh -c '{INSTALL}'"
+    )
 
 
 def find_ecj(jdk: Jdk) -> list[str]:
@@ -85,17 +87,20 @@ def find_ecj(jdk: Jdk) -> list[str]:
     if command := shutil.which("ecj"):
         return [command]
     raise ToolMissing(
-        "the Eclipse compiler (ecj) is missing; only it still compiles for the cabinet's Java 6. On Debian or Ubuntu:\n"
+        "the Eclipse compiler (ecj) is missing; only it still compiles for Java 6. On Debian or Ubuntu:\n"
         f"    sudo sh -c '{INSTALL}'\n"
         "elsewhere fetch org.eclipse.jdt:ecj:3.32.0 from Maven Central and set ECJ_JAR to the jar's path"
     )
 
 
 def java7_library(jdk: Jdk, folder: Path) -> Path:
-    """Writes a jar with the signatures of Java 7's library (or of the oldest that the JDK knows) and returns its path.
+    """Writes a jar with the signatures of Java 7's library, or of the oldest that the JDK knows.
 
-    Compiling against it, and not against the JDK's own library, refuses newer members and keeps newer descriptors (such
-    as ``ByteBuffer.flip`` returning a ByteBuffer) out of the class files.
+    Compiling against it, and not against the JDK's own library, refuses newer members and keeps newer
+    descriptors (such as ``ByteBuffer.flip`` returning a ByteBuffer) out of the class files.
+
+    Returns:
+        The path of the jar.
     """
     release = "7" if jdk.knows_java_7 else "8"
     target = folder / f"library-{release}-of-jdk-{jdk.version}.jar"

@@ -13,7 +13,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "cabinet"))
 
-import toolchain  # noqa: E402
+import toolchain
 
 
 def _install() -> None:
@@ -37,7 +37,7 @@ def main() -> int:
             print(missing, file=sys.stderr)
             return 1
         if not jdk.knows_java_7:
-            print(f"note: JDK {jdk.version} no longer knows Java 7; newer library calls are checked against Java 8")
+            print(f"note: JDK {jdk.version} no longer knows Java 7; library calls are checked against Java 8")
         return 0
     return 1
 

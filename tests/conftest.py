@@ -9,4 +9,8 @@ _LATE = ("slow", "browser")
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Sorts the tests; the sort is stable, so files keep their own order."""
-    items.sort(key=lambda item: max((1 + _LATE.index(m.name) for m in item.iter_markers() if m.name in _LATE), default=0))
+    items.sort(key=_rank)
+
+
+def _rank(item: pytest.Item) -> int:
+    return max((1 + _LATE.index(mark.name) for mark in item.iter_markers() if mark.name in _LATE), default=0)

@@ -36,4 +36,6 @@ def cabinet_sources() -> Path:
     for folder in (packed, checkout):
         if (folder / "core" / "src").is_dir():
             return folder
-    raise HeptarmError("the cabinet's sources are not in this installation", hint="reinstall heptarm from its wheel")
+    raise HeptarmError(
+        "this installation lacks the cabinet's sources", hint="reinstall heptarm from its wheel"
+    )

@@ -1,0 +1,104 @@
+"""The cabinet's build: what it refuses, and that what it made is fit for a JRE 6."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "cabinet"))
+
+import classfile  # noqa: E402
+import toolchain  # noqa: E402
+
+REFUSALS = classfile.Refusals.load(ROOT / "cabinet" / "java7.txt", ("com/kuka/",))
+JARS = ROOT / "src" / "heptarm" / "virtual" / "jars"
+
+
+@pytest.fixture(scope="module")
+def jdk() -> toolchain.Jdk:
+    return toolchain.find_jdk()
+
+
+def _verdict(jdk: toolchain.Jdk, folder: Path, body: str, *, ecj: bool = False) -> list[str]:
+    """Compiles a class with the JDK's own library and lists what the check says of it."""
+    source = folder / "Probe.java"
+    source.write_text(f"class Probe {{ {body} }}")
+    command = (
+        [*toolchain.find_ecj(jdk), "-source", "1.6", "-target", "1.6", "-nowarn"] if ecj else [jdk.javac]
+    )
+    subprocess.run([*command, "-proc:none", "-d", str(folder), str(source)], check=True, capture_output=True)
+    return list(REFUSALS.of(classfile.read((folder / "Probe.class").read_bytes())))
+
+
+@pytest.mark.parametrize(
+    ("body", "named"),
+    [
+        ("int f(long a) { return Long.compare(a, 1L); }", "java.lang.Long.compare(JJ)I"),
+        ("int f(int a) { return Integer.compare(a, 1); }", "java.lang.Integer.compare(II)I"),
+        ("Object f(Object a) { return java.util.Objects.toString(a); }", "java.util.Objects"),
+        (
+            "Object f() { return java.nio.charset.StandardCharsets.UTF_8; }",
+            "java.nio.charset.StandardCharsets",
+        ),
+        ("Object f(java.io.File a) { return a.toPath(); }", "java.nio.file.Path"),
+        ("void f(java.io.IOException a) { a.addSuppressed(a); }", "java.io.IOException.addSuppressed"),
+        ("void f(Object a) throws Exception { ((AutoCloseable) a).close(); }", "java.lang.AutoCloseable"),
+        ("java.nio.file.Path[] field;", "java.nio.file.Path"),
+        ("Object f() { return java.net.InetAddress.getLoopbackAddress(); }", "getLoopbackAddress"),
+        ("Object f() { return new AssertionError(null, null); }", "java.lang.AssertionError.<init>"),
+        ("java.io.Closeable f() { return new java.net.Socket(); }", "java.io.Closeable"),
+    ],
+)
+def test_newer_library_members_are_refused_by_name(
+    jdk: toolchain.Jdk, tmp_path: Path, body: str, named: str
+) -> None:
+    verdict = _verdict(jdk, tmp_path, body, ecj=True)
+    assert any(named in line for line in verdict), verdict
+
+
+def test_older_members_of_the_same_name_pass(jdk: toolchain.Jdk, tmp_path: Path) -> None:
+    body = """
+        int f(Long a, Long b) { return a.compareTo(b) + "x".compareTo("y"); }
+        Object g() { return new AssertionError("text"); }
+        Object h(java.util.regex.Matcher m) { return m.group(1) + m.group(); }
+        Object i() { return java.nio.charset.Charset.forName("UTF-8"); }"""
+    assert _verdict(jdk, tmp_path, body, ecj=True) == []
+
+
+def test_newer_class_version_is_refused(jdk: toolchain.Jdk, tmp_path: Path) -> None:
+    assert any("class version" in line for line in _verdict(jdk, tmp_path, "int x;"))
+
+
+def test_compiling_against_java_7_keeps_newer_descriptors_out(jdk: toolchain.Jdk, tmp_path: Path) -> None:
+    source = tmp_path / "Probe.java"
+    source.write_text("class Probe { Object f(java.nio.ByteBuffer b) { return b.flip(); } }")
+    library = toolchain.java7_library(jdk, tmp_path)
+    command = [*toolchain.find_ecj(jdk), "-bootclasspath", str(library), "-source", "1.6", "-target", "1.6"]
+    subprocess.run(
+        [*command, "-proc:none", "-d", str(tmp_path), str(source)], check=True, capture_output=True
+    )
+    members = classfile.read((tmp_path / "Probe.class").read_bytes()).members
+    assert ("java/nio/ByteBuffer", "flip", "()Ljava/nio/Buffer;") in members
+
+
+@pytest.mark.parametrize("jar", ["heptarm-core.jar", "heptarm-app.jar"])
+def test_every_class_for_the_robot_is_java_6(jar: str) -> None:
+    with zipfile.ZipFile(JARS / jar) as file:
+        classes = [classfile.read(file.read(name)) for name in file.namelist() if name.endswith(".class")]
+    assert classes
+    assert {one.version for one in classes} == {classfile.JAVA_6}
+    assert not any(name.startswith("heptarm/doubles/") for one in classes for name in one.classes)
+    if jar == "heptarm-core.jar":
+        assert not any(name.startswith("com/kuka/") for one in classes for name in one.classes)
+
+
+def test_doubles_say_that_they_must_not_be_deployed() -> None:
+    with zipfile.ZipFile(JARS / "heptarm-doubles-not-for-robots.jar") as file:
+        assert "Never deploy" in file.read("META-INF/MANIFEST.MF").decode().replace("\r\n ", "")
+        assert b"Never deploy" in file.read("NEVER-DEPLOY-TO-A-ROBOT.txt")
+        assert "META-INF/services/heptarm.core.Clock" in file.namelist()
