@@ -1,0 +1,77 @@
+"""Every Python snippet of the documentation runs, page by page, against one virtual cabinet; the site builds.
+
+A page's blocks run in order in one process, as a reader would type them. A block whose fence says ``python no-run`` is
+only compiled; pages without a block that runs are skipped.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+BLOCK = re.compile(r"^( *)```(?:python|\{code-block\} python)([^\n]*)\n(.*?)^\1```", re.S | re.M)
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+RUNNER = """
+import os, sys
+os.environ.setdefault("MPLBACKEND", "Agg")
+page = {"__name__": "__main__"}
+for name in sys.argv[1:]:
+    source = open(name, encoding="utf-8").read()
+    exec(compile(source, os.path.basename(name), "exec"), page)
+"""
+
+
+def _blocks(page: Path) -> list[tuple[int, str, bool]]:
+    """Line, source and whether to run it, of every Python block of a page."""
+    text = page.read_text(encoding="utf-8")
+    found = []
+    for match in BLOCK.finditer(text):
+        indent, info, body = match.groups()
+        source = "\n".join(line.removeprefix(indent) for line in body.splitlines()) + "\n"
+        found.append((text[: match.start()].count("\n") + 1, source, "no-run" not in info))
+    return found
+
+
+def _id(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if _blocks(page)], ids=_id)
+def test_snippets_compile(page: Path) -> None:
+    for line, source, _ in _blocks(page):
+        compile(source, f"{_id(page)}:{line}", "exec")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [p for p in PAGES if any(run for *_, run in _blocks(p))], ids=_id)
+def test_snippets_run(page: Path, tmp_path: Path) -> None:
+    files = []
+    for line, source, run in _blocks(page):
+        if run:
+            # Named after its place in the page, so that a traceback leads there.
+            files.append(tmp_path / f"{page.stem}-line-{line}.py")
+            files[-1].write_text(source, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-W", "error::SyntaxWarning", "-c", RUNNER, *map(str, files)],
+        cwd=tmp_path,
+        env=os.environ | {"HEPTARM_TARGET": "sim://iiwa14"},
+        capture_output=True,
+        text=True,
+        timeout=240,
+        check=False,
+    )
+    assert done.returncode == 0, f"{_id(page)}:\n{done.stdout}\n{done.stderr}"
+
+
+@pytest.mark.slow
+def test_site_builds_without_a_warning(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html", str(ROOT / "docs"), str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "index.html").exists()
