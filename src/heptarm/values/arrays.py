@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias
+import math
+from dataclasses import Field
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +12,37 @@ import numpy.typing as npt
 from heptarm.errors import LimitError, ShapeError
 
 Array: TypeAlias = npt.NDArray[np.float64]
+
+
+class Value:
+    """Base of frozen dataclasses that hold arrays: equal and hashed by their numbers; NaN equals NaN."""
+
+    __slots__ = ()
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+    def __eq__(self, other: object) -> bool:
+        if type(self) is not type(other):
+            return NotImplemented
+        return self._key() == other._key()  # type: ignore[attr-defined]
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def _key(self) -> tuple[object, ...]:
+        return tuple(_key(getattr(self, name)) for name, f in self.__dataclass_fields__.items() if f.compare)
+
+
+def _key(value: object) -> object:
+    if isinstance(value, np.ndarray):
+        return value.tobytes()
+    return "nan" if isinstance(value, float) and value != value else value
+
+
+def frozen(values: npt.ArrayLike) -> Array:
+    """The values as a read-only array, unchecked; an array of doubles is not copied."""
+    result = np.asarray(values, dtype=np.float64)
+    result.flags.writeable = False
+    return result
 
 
 def array(value: npt.ArrayLike, size: int, name: str, *, nan: bool = False) -> Array:
@@ -26,15 +59,16 @@ def array(value: npt.ArrayLike, size: int, name: str, *, nan: bool = False) -> A
         LimitError: an entry is infinite, or NaN where that is not legal.
     """
     try:
-        result = np.array(value, dtype=np.float64)
+        given = np.asarray(value)
+        if given.dtype.kind not in "iuf":
+            raise ShapeError("no numbers")
+        result = given.astype(np.float64) + 0.0  # + 0.0: -0.0 becomes 0.0, so that equal arrays hash alike
     except (TypeError, ValueError):
         raise ShapeError(
             f"{name} is {value!r}; {size} numbers are wanted", parameter=name, value=value
         ) from None
     if result.shape != (size,):
-        raise ShapeError(
-            f"{name} has shape {result.shape}; ({size},) is wanted", parameter=name, value=value
-        )
+        raise ShapeError(f"{name} has shape {result.shape}; ({size},) is wanted", parameter=name, value=value)
     wrong = np.isinf(result) if nan else ~np.isfinite(result)
     if wrong.any():
         index = int(np.argmax(wrong))
@@ -57,8 +91,8 @@ def within(
         LimitError: it is outside, or not a number.
     """
     if value is None:
-        return float("nan")
-    number = float(value)
+        return math.nan
+    number = scalar(value, name)
     if not (low < number if above else low <= number) or not number <= high:
         bounds = f"{'(' if above else '['}{low:g}, {high:g}]{' ' + unit if unit else ''}"
         raise LimitError(
@@ -71,19 +105,33 @@ def within(
     return number
 
 
-def fractions(value: npt.ArrayLike | None, name: str) -> Array:
+def scalar(value: object, name: str) -> float:
+    """One number.
+
+    Raises:
+        ShapeError: it is something else.
+    """
+    if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
+        return float(value) + 0.0
+    raise ShapeError(f"{name} is {value!r}; one number is wanted", parameter=name, value=value)
+
+
+def fractions(value: npt.ArrayLike | None, name: str, *, nan: bool = False) -> Array:
     """Per-axis fractions in (0, 1], shape (7,), from one number, seven, or None (NaN: keep the default).
+
+    Args:
+        value: one number for all axes, or seven.
+        name: of the parameter, for the error.
+        nan: NaN entries are legal ("keep the default").
 
     Raises:
         ShapeError: neither one number nor seven.
         LimitError: one is outside (0, 1].
     """
     if value is None:
-        value = np.nan
-    if np.ndim(value) == 0:
-        value = np.full(7, value)
-    result = array(value, 7, name, nan=True)
-    for index, entry in enumerate(result):
-        if not np.isnan(entry):
-            within(float(entry), f"{name}[{index}]", 0.0, 1.0, above=True)
+        return frozen(np.full(7, np.nan))
+    result = array(np.full(7, value) if np.ndim(value) == 0 else value, 7, name, nan=nan)
+    for index, entry in enumerate(result.tolist()):
+        if entry == entry:  # not NaN
+            within(entry, f"{name}[{index}]", 0.0, 1.0, above=True)
     return result

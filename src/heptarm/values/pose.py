@@ -118,7 +118,7 @@ class Pose:
 
     @property
     def array(self) -> Array:
-        """x y z qx qy qz qw, shape (7,)."""
+        """X y z qx qy qz qw, shape (7,)."""
         return np.concatenate([self.xyz, self.quat])
 
     def __matmul__(self, other: Pose) -> Pose:

@@ -1,7 +1,8 @@
 """The robots: dimensions and limits of the LBR family.
 
-Kinematics, position, velocity and torque limits are the data sheets' as collected by lbr_description, Drake and iiwa_ros.
-KUKA publishes no acceleration and jerk limits; the values here are parameters of the virtual cabinet.
+Kinematics, position, velocity and torque limits are the data sheets' as collected by lbr_description, Drake
+and iiwa_ros. KUKA publishes no acceleration and jerk limits; the values here are parameters of the virtual
+cabinet.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from heptarm.errors import CommandRejected, LimitError
 from heptarm.values.arrays import Array
 from heptarm.values.pose import deg
 
-#: Acceleration and jerk of every axis in the virtual cabinet; MoveIt configurations use the same acceleration.
+#: Acceleration and jerk of every axis in the virtual cabinet; MoveIt configurations have this acceleration.
 ACCELERATION = 10.0
 JERK = 100.0
 
@@ -93,7 +94,11 @@ def _robot(
 
 
 _SEVEN = ((0.34, 0.4, 0.4, 0.126), deg(98, 98, 100, 130, 140, 180, 180), (176.0, 176, 110, 110, 110, 40, 40))
-_FOURTEEN = ((0.36, 0.42, 0.4, 0.126), deg(85, 85, 100, 75, 130, 135, 135), (320.0, 320, 176, 176, 110, 40, 40))
+_FOURTEEN = (
+    (0.36, 0.42, 0.4, 0.126),
+    deg(85, 85, 100, 75, 130, 135, 135),
+    (320.0, 320, 176, 176, 110, 40, 40),
+)
 
 #: All robots by name. The Med variants share the arms of the iiwa ones.
 ROBOTS: dict[str, RobotModel] = {
@@ -113,4 +118,6 @@ def robot(name: str) -> RobotModel:
     try:
         return ROBOTS[name]
     except KeyError:
-        raise CommandRejected(f"no robot {name!r}; there are {', '.join(ROBOTS)}", parameter="model") from None
+        raise CommandRejected(
+            f"no robot {name!r}; there are {', '.join(ROBOTS)}", parameter="model"
+        ) from None

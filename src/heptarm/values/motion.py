@@ -1,0 +1,417 @@
+"""Motions: frozen values that say where to go and how, to be reused and composed.
+
+They are checked when they are made, against everything that does not need the robot; limits of the robot
+itself are checked when they are sent. What is not given keeps the cabinet's default.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import inf
+from typing import TypeAlias
+
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected, ShapeError
+from heptarm.values.arrays import Array, Value, array, fractions, within
+from heptarm.values.limits import Blending, CartesianDynamics, JointDynamics
+from heptarm.values.pose import Pose
+from heptarm.values.redundancy import Redundancy
+
+#: The frame that a tool moves: the attached tool's, without a tool the flange.
+TOOL = "tool"
+#: The robot's base frame.
+BASE = "base"
+
+_AXES = JointDynamics()
+_FREE = CartesianDynamics()
+_EXACT = Blending()
+_LONGEST_NAME = 128
+_LONGEST_HOLD = 1e6
+_PATH = (
+    ("speed_mps", 10.0, "m/s"),
+    ("acceleration_mps2", 100.0, "m/s²"),
+    ("jerk_mps3", 1e4, "m/s³"),
+    ("speed_radps", 20.0, "rad/s"),
+    ("acceleration_radps2", 200.0, "rad/s²"),
+    ("jerk_radps3", 2e4, "rad/s³"),
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ptp(Value):
+    """Point to point to joint positions; every axis starts and ends with the others.
+
+    Attributes:
+        q: target, shape (7,) [rad].
+        joints: fractions of the axes' maxima.
+        blending: into the following motion.
+    """
+
+    q: Array
+    joints: JointDynamics = _AXES
+    blending: Blending = _EXACT
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "q", array(self.q, 7, "q"))
+
+    def under(self, ceiling: float) -> Ptp:
+        """The same motion, no axis faster than that fraction of its maximum."""
+        return replace(self, joints=self.joints.under(ceiling))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PtpPose(Value):
+    """Point to point to a pose of the moved frame.
+
+    Attributes:
+        pose: target in the base frame.
+        near: joint positions whose arm angle and Status the target keeps, shape (7,) [rad]; None: the
+            present ones.
+        redundancy: the arm position meant; given instead of `near`.
+        moving: the moved frame.
+        joints: fractions of the axes' maxima.
+        blending: into the following motion.
+    """
+
+    pose: Pose
+    near: Array | None = None
+    redundancy: Redundancy | None = None
+    moving: str = TOOL
+    joints: JointDynamics = _AXES
+    blending: Blending = _EXACT
+
+    def __post_init__(self) -> None:
+        _target(self.pose)
+        object.__setattr__(self, "near", _near(self.near, self.redundancy))
+        _name(self.moving, "moving")
+
+    def under(self, ceiling: float) -> PtpPose:
+        """The same motion, no axis faster than that fraction of its maximum."""
+        return replace(self, joints=self.joints.under(ceiling))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lin(Value):
+    """Straight line of the moved frame to a pose, the orientation turning along.
+
+    Attributes:
+        pose: target in the base frame.
+        near: joint positions whose arm angle the target takes, shape (7,) [rad]; None: the present one's.
+        redundancy: the arm position meant; given instead of `near`.
+        moving: the moved frame.
+        path: limits along the path.
+        joints: fractions of the axes' maxima, as well.
+        blending: into the following motion.
+    """
+
+    pose: Pose
+    near: Array | None = None
+    redundancy: Redundancy | None = None
+    moving: str = TOOL
+    path: CartesianDynamics = _FREE
+    joints: JointDynamics = _AXES
+    blending: Blending = _EXACT
+
+    def __post_init__(self) -> None:
+        _target(self.pose)
+        object.__setattr__(self, "near", _near(self.near, self.redundancy))
+        _name(self.moving, "moving")
+
+    def under(self, ceiling: float) -> Lin:
+        """The same motion, no axis faster than that fraction of its maximum."""
+        return replace(self, joints=self.joints.under(ceiling))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinRel(Value):
+    """Straight line of the moved frame by an offset from where it is when the motion starts.
+
+    Attributes:
+        offset: translation and rotation.
+        frame: whose axes the offset is given in: "tool" (the moved frame), "base", or a frame's name.
+        moving: the moved frame.
+        path: limits along the path.
+        joints: fractions of the axes' maxima, as well.
+        blending: into the following motion.
+    """
+
+    offset: Pose
+    frame: str = TOOL
+    moving: str = TOOL
+    path: CartesianDynamics = _FREE
+    joints: JointDynamics = _AXES
+    blending: Blending = _EXACT
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.offset, Pose):
+            raise ShapeError(
+                f"offset is {self.offset!r}; a Pose is wanted", parameter="offset", value=self.offset
+            )
+        _name(self.frame, "frame")
+        _name(self.moving, "moving")
+
+    def under(self, ceiling: float) -> LinRel:
+        """The same motion, no axis faster than that fraction of its maximum."""
+        return replace(self, joints=self.joints.under(ceiling))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Hold(Value):
+    """Holds the position.
+
+    Attributes:
+        duration: [s]; infinite: until it is cancelled.
+    """
+
+    duration: float = inf
+
+    def __post_init__(self) -> None:
+        if self.duration != inf:
+            object.__setattr__(
+                self, "duration", within(self.duration, "seconds", 0.0, _LONGEST_HOLD, above=True, unit="s")
+            )
+
+    def under(self, ceiling: float) -> Hold:
+        """The same: a hold has no speed."""
+        within(ceiling, "speed", 0.0, 1.0, above=True)
+        return self
+
+
+Motion: TypeAlias = Ptp | PtpPose | Lin | LinRel | Hold
+
+
+def ptp(
+    target: npt.ArrayLike | Pose,
+    *,
+    near: npt.ArrayLike | None = None,
+    redundancy: Redundancy | None = None,
+    moving: str = TOOL,
+    speed: npt.ArrayLike | None = None,
+    acceleration: npt.ArrayLike | None = None,
+    jerk: npt.ArrayLike | None = None,
+    blend_rel: float = 0.0,
+    blend_m: float = 0.0,
+    blend_rad: float = 0.0,
+) -> Ptp | PtpPose:
+    """Point to point motion in joint space.
+
+    Args:
+        target: joint positions, shape (7,) [rad], or a pose of the moved frame in the base frame.
+        near: for a pose: joint positions whose arm angle and Status it keeps, shape (7,) [rad].
+        redundancy: for a pose: E1, Status and Turn, instead of `near`.
+        moving: for a pose: the moved frame: "tool", "flange" or a frame's name.
+        speed: fraction of each axis' maximum, (0, 1], one for all or shape (7,).
+        acceleration: likewise.
+        jerk: likewise.
+        blend_rel: fraction of the path at its end that may be blended into the next motion, [0, 1].
+        blend_m: the same as a distance of the moved frame [m].
+        blend_rad: the same as a rotation of the moved frame [rad].
+
+    Raises:
+        ShapeError: a wrong shape.
+        LimitError: a value outside its range.
+        CommandRejected: an argument that belongs to a pose is given with joint positions, or both ways of
+            choosing the arm position.
+    """
+    joints = _joints(speed, acceleration, jerk)
+    blending = _blending(blend_rel, blend_m, blend_rad)
+    if isinstance(target, Pose):
+        return PtpPose(target, _seven(near, "near"), redundancy, moving, joints, blending)
+    if near is not None or redundancy is not None or moving != TOOL:
+        raise CommandRejected(
+            "near, redundancy and moving belong to a pose; joint positions leave no choice",
+            parameter="near",
+            hint="leave them out",
+        )
+    return Ptp(array(target, 7, "q"), joints, blending)
+
+
+def lin(
+    pose: Pose,
+    *,
+    near: npt.ArrayLike | None = None,
+    redundancy: Redundancy | None = None,
+    moving: str = TOOL,
+    speed_mps: float | None = None,
+    acceleration_mps2: float | None = None,
+    jerk_mps3: float | None = None,
+    speed_radps: float | None = None,
+    acceleration_radps2: float | None = None,
+    jerk_radps3: float | None = None,
+    joint_speed: npt.ArrayLike | None = None,
+    joint_acceleration: npt.ArrayLike | None = None,
+    joint_jerk: npt.ArrayLike | None = None,
+    blend_rel: float = 0.0,
+    blend_m: float = 0.0,
+    blend_rad: float = 0.0,
+) -> Lin:
+    """Straight line of the moved frame to a pose.
+
+    Args:
+        pose: target of the moved frame in the base frame.
+        near: joint positions whose arm angle the target takes, shape (7,) [rad].
+        redundancy: E1 and Status of the target, instead of `near`.
+        moving: the moved frame: "tool" (the attached tool's, without a tool the flange), "flange" or a
+            frame's name.
+        speed_mps: speed along the path [m/s], up to 10.
+        acceleration_mps2: [m/s²], up to 100.
+        jerk_mps3: [m/s³], up to 10 000.
+        speed_radps: speed of the rotation [rad/s], up to 20.
+        acceleration_radps2: [rad/s²], up to 200.
+        jerk_radps3: [rad/s³], up to 20 000.
+        joint_speed: fraction of each axis' maximum that may be used, (0, 1], one for all or shape (7,).
+        joint_acceleration: likewise.
+        joint_jerk: likewise.
+        blend_rel: fraction of the path at its end that may be blended into the next motion, [0, 1].
+        blend_m: the same as a distance [m].
+        blend_rad: the same as a rotation [rad].
+
+    Raises:
+        ShapeError: a wrong shape or type.
+        LimitError: a value outside its range.
+        CommandRejected: both `near` and `redundancy`.
+    """
+    return Lin(
+        pose,
+        _seven(near, "near"),
+        redundancy,
+        moving,
+        _path(speed_mps, acceleration_mps2, jerk_mps3, speed_radps, acceleration_radps2, jerk_radps3),
+        _joints(joint_speed, joint_acceleration, joint_jerk),
+        _blending(blend_rel, blend_m, blend_rad),
+    )
+
+
+def lin_rel(
+    x: float = 0.0,
+    y: float = 0.0,
+    z: float = 0.0,
+    a: float = 0.0,
+    b: float = 0.0,
+    c: float = 0.0,
+    *,
+    frame: str = TOOL,
+    moving: str = TOOL,
+    speed_mps: float | None = None,
+    acceleration_mps2: float | None = None,
+    jerk_mps3: float | None = None,
+    speed_radps: float | None = None,
+    acceleration_radps2: float | None = None,
+    jerk_radps3: float | None = None,
+    joint_speed: npt.ArrayLike | None = None,
+    joint_acceleration: npt.ArrayLike | None = None,
+    joint_jerk: npt.ArrayLike | None = None,
+    blend_rel: float = 0.0,
+    blend_m: float = 0.0,
+    blend_rad: float = 0.0,
+) -> LinRel:
+    """Straight line of the moved frame by an offset from where it is when the motion starts.
+
+    Args:
+        x: translation [m], as y and z.
+        y: see x.
+        z: see x.
+        a: rotation Rz(a) Ry(b) Rx(c) [rad], as b and c.
+        b: see a.
+        c: see a.
+        frame: whose axes these are: "tool" (the moved frame's own), "base", or a frame's name.
+        moving: the moved frame, as for `lin`; the speeds and blending as well.
+        speed_mps: see `lin`.
+        acceleration_mps2: see `lin`.
+        jerk_mps3: see `lin`.
+        speed_radps: see `lin`.
+        acceleration_radps2: see `lin`.
+        jerk_radps3: see `lin`.
+        joint_speed: see `lin`.
+        joint_acceleration: see `lin`.
+        joint_jerk: see `lin`.
+        blend_rel: see `lin`.
+        blend_m: see `lin`.
+        blend_rad: see `lin`.
+
+    Raises:
+        ShapeError: a wrong shape or type.
+        LimitError: a value outside its range.
+    """
+    x, y, z, a, b, c = array([x, y, z, a, b, c], 6, "offset").tolist()
+    return LinRel(
+        Pose.xyz_abc(x, y, z, a, b, c),
+        frame,
+        moving,
+        _path(speed_mps, acceleration_mps2, jerk_mps3, speed_radps, acceleration_radps2, jerk_radps3),
+        _joints(joint_speed, joint_acceleration, joint_jerk),
+        _blending(blend_rel, blend_m, blend_rad),
+    )
+
+
+def hold(seconds: float = inf) -> Hold:
+    """Hold the position.
+
+    Args:
+        seconds: how long [s], up to 1e6; infinite: until it is cancelled.
+
+    Raises:
+        LimitError: not positive, or NaN.
+    """
+    return Hold(seconds)
+
+
+def _seven(value: npt.ArrayLike | None, name: str) -> Array | None:
+    return None if value is None else array(value, 7, name)
+
+
+def _joints(
+    velocity: npt.ArrayLike | None, acceleration: npt.ArrayLike | None, jerk: npt.ArrayLike | None
+) -> JointDynamics:
+    return JointDynamics(
+        fractions(velocity, "speed"), fractions(acceleration, "acceleration"), fractions(jerk, "jerk")
+    )
+
+
+def _path(*values: float | None) -> CartesianDynamics:
+    return CartesianDynamics(
+        *(
+            within(value, name, 0.0, high, above=True, unit=unit)
+            for value, (name, high, unit) in zip(values, _PATH, strict=True)
+        )
+    )
+
+
+def _blending(relative: float, distance: float, orientation: float) -> Blending:
+    return Blending(
+        within(relative, "blend_rel", 0.0, 1.0),
+        within(distance, "blend_m", 0.0, 2.0, unit="m"),
+        within(orientation, "blend_rad", 0.0, 6.3, unit="rad"),
+    )
+
+
+def _target(pose: Pose) -> None:
+    if not isinstance(pose, Pose):
+        raise ShapeError(
+            f"the target is {pose!r}; a Pose is wanted",
+            parameter="pose",
+            value=pose,
+            hint="build one with Pose.xyz_abc(x, y, z, a, b, c)",
+        )
+
+
+def _near(near: Array | None, redundancy: Redundancy | None) -> Array | None:
+    if near is not None and redundancy is not None:
+        raise CommandRejected(
+            "near and redundancy both choose the arm position", parameter="near", hint="give one of them"
+        )
+    if redundancy is not None and not isinstance(redundancy, Redundancy):
+        raise ShapeError(f"redundancy is {redundancy!r}; a Redundancy is wanted", parameter="redundancy")
+    return _seven(near, "near")
+
+
+def _name(value: str, parameter: str) -> None:
+    if not isinstance(value, str) or not 1 <= len(value.encode()) <= _LONGEST_NAME:
+        raise ShapeError(
+            f"{parameter} is {value!r}; the name of a frame is wanted, up to {_LONGEST_NAME} octets",
+            code=3,
+            parameter=parameter,
+            value=value,
+            hint='for example "tool" or "base"',
+        )

@@ -1,0 +1,297 @@
+"""What is known of the robot at one moment: groups of measurements, each with its own time stamp.
+
+A cabinet samples groups at their own periods, since each of its getters takes time; so a state is a set of
+groups that are each consistent in themselves. A group that is not subscribed is missing, and asking for it
+says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from math import nan
+from typing import TypeVar
+
+import numpy as np
+
+from heptarm.errors import StaleState
+from heptarm.values.arrays import Array, Value, frozen
+from heptarm.values.pose import Pose
+from heptarm.values.redundancy import Redundancy
+
+_T = TypeVar("_T")
+
+
+def _unknown() -> Array:
+    return frozen(np.full(3, nan))
+
+
+class OperationMode(Enum):
+    """The cabinet's operation mode."""
+
+    T1 = "t1"  # reduced speed, enabling switch held
+    T2 = "t2"  # full speed, enabling switch held
+    AUT = "aut"  # automatic
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Joints(Value):
+    """Joint positions.
+
+    Attributes:
+        stamp: cabinet time of the measurement [ns].
+        q: measured, shape (7,) [rad].
+        q_cmd: commanded, shape (7,) [rad].
+        dq: low-pass filtered velocity, shape (7,) [rad/s]; NaN before the second sample.
+    """
+
+    stamp: int
+    q: Array
+    q_cmd: Array
+    dq: Array
+
+    def __post_init__(self) -> None:
+        for name in ("q", "q_cmd", "dq"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Torques(Value):
+    """Joint torques.
+
+    Attributes:
+        stamp: cabinet time of the measurement [ns].
+        tau: measured, shape (7,) [Nm].
+        tau_ext: external load acting on the robot, shape (7,) [Nm].
+        tau_cmd: commanded, shape (7,) [Nm]; NaN where the cabinet does not tell.
+    """
+
+    stamp: int
+    tau: Array
+    tau_ext: Array
+    tau_cmd: Array
+
+    def __post_init__(self) -> None:
+        for name in ("tau", "tau_ext", "tau_cmd"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cartesian(Value):
+    """Pose of the moved frame in the base frame.
+
+    Attributes:
+        stamp: cabinet time of the measurement [ns].
+        pose: measured.
+        pose_cmd: commanded.
+        redundancy: E1, Status and Turn of the arm.
+    """
+
+    stamp: int
+    pose: Pose
+    pose_cmd: Pose
+    redundancy: Redundancy
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wrench(Value):
+    """External force and torque acting on the robot at the moved frame, in base axes.
+
+    Attributes:
+        stamp: cabinet time of the measurement [ns].
+        force: shape (3,) [N].
+        torque: shape (3,) [Nm].
+        force_inaccuracy: of the estimate, shape (3,) [N]; NaN where the cabinet does not tell.
+        torque_inaccuracy: of the estimate, shape (3,) [Nm]; NaN where the cabinet does not tell.
+    """
+
+    stamp: int
+    force: Array
+    torque: Array
+    force_inaccuracy: Array = field(default_factory=_unknown)
+    torque_inaccuracy: Array = field(default_factory=_unknown)
+
+    def __post_init__(self) -> None:
+        for name in ("force", "torque", "force_inaccuracy", "torque_inaccuracy"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    @property
+    def array(self) -> Array:
+        """fx fy fz [N], tx ty tz [Nm], shape (6,)."""
+        return np.concatenate([self.force, self.torque])
+
+    def valid(self, *, force: float = 10.0, torque: float = 10.0) -> bool:
+        """Whether no inaccuracy exceeds its tolerance; near a singularity the estimate is worthless.
+
+        Args:
+            force: largest inaccuracy that is accepted [N].
+            torque: largest inaccuracy that is accepted [Nm].
+        """
+        return not bool((self.force_inaccuracy > force).any() or (self.torque_inaccuracy > torque).any())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion(Value):
+    """What runs.
+
+    Attributes:
+        stamp: cabinet time of the sample [ns].
+        id: of the running program; 0: none.
+        item: index of its motion that runs.
+        queued: programs waiting.
+        progress: of the motion, [0, 1]; NaN where the cabinet does not tell.
+        remaining: time to the destination [s]; NaN where the cabinet does not tell.
+        override: application override, [0, 1].
+    """
+
+    stamp: int
+    id: int = 0
+    item: int = 0
+    queued: int = 0
+    progress: float = nan
+    remaining: float = nan
+    override: float = 1.0
+
+    @property
+    def active(self) -> bool:
+        """Whether a program runs."""
+        return self.id != 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Safety(Value):
+    """Readiness and safety.
+
+    Attributes:
+        stamp: cabinet time of the sample [ns].
+        mode: operation mode.
+        ready_to_move: the robot would accept a motion.
+        paused: execution is paused.
+        brakes_open: the brakes are open.
+        moving: a motion command is active.
+        mastered: all axes are mastered.
+        emergency_stop: a local or external emergency stop is active.
+        protective_stop: a safety stop is active.
+        operator_safety_open: the safeguard is open.
+        enabling_switch: the enabling switch is held.
+        torque_referenced: the torque sensors are referenced.
+        position_referenced: the positions are referenced.
+        recovery_required: the robot has to be recovered first.
+    """
+
+    stamp: int
+    mode: OperationMode
+    ready_to_move: bool = False
+    paused: bool = False
+    brakes_open: bool = False
+    moving: bool = False
+    mastered: bool = False
+    emergency_stop: bool = False
+    protective_stop: bool = False
+    operator_safety_open: bool = False
+    enabling_switch: bool = False
+    torque_referenced: bool = False
+    position_referenced: bool = False
+    recovery_required: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class State(Value):
+    """A snapshot. The short names reach into the groups and raise StaleState if the group is missing.
+
+    Attributes:
+        joints: positions.
+        torques: torques.
+        cartesian: pose.
+        external: wrench.
+        motion: what runs.
+        status: safety and readiness.
+        sampled: when the newest group was sampled, on this side's clock [ns].
+        clock: this side's clock [ns], for the age.
+    """
+
+    joints: Joints | None = None
+    torques: Torques | None = None
+    cartesian: Cartesian | None = None
+    external: Wrench | None = None
+    motion: Motion | None = None
+    status: Safety | None = None
+    sampled: int = 0
+    clock: Callable[[], int] | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def stamp(self) -> int:
+        """Cabinet time of the newest group [ns]; 0 without any."""
+        groups = (self.joints, self.torques, self.cartesian, self.external, self.motion, self.status)
+        return max((group.stamp for group in groups if group is not None), default=0)
+
+    @property
+    def age(self) -> float:
+        """How long ago the newest group was sampled, now [s]; NaN without a clock."""
+        return nan if self.clock is None else (self.clock() - self.sampled) * 1e-9
+
+    @property
+    def q(self) -> Array:
+        """Measured joint positions, shape (7,) [rad]."""
+        return _of(self.joints, "joints").q
+
+    @property
+    def q_cmd(self) -> Array:
+        """Commanded joint positions, shape (7,) [rad]."""
+        return _of(self.joints, "joints").q_cmd
+
+    @property
+    def dq(self) -> Array:
+        """Joint velocities, shape (7,) [rad/s]; see Joints."""
+        return _of(self.joints, "joints").dq
+
+    @property
+    def tau(self) -> Array:
+        """Measured joint torques, shape (7,) [Nm]."""
+        return _of(self.torques, "torques").tau
+
+    @property
+    def tau_ext(self) -> Array:
+        """External load acting on the robot, shape (7,) [Nm]."""
+        return _of(self.torques, "torques").tau_ext
+
+    @property
+    def tau_cmd(self) -> Array:
+        """Commanded joint torques, shape (7,) [Nm]; see Torques."""
+        return _of(self.torques, "torques").tau_cmd
+
+    @property
+    def pose(self) -> Pose:
+        """Measured pose of the moved frame in the base frame."""
+        return _of(self.cartesian, "pose").pose
+
+    @property
+    def pose_cmd(self) -> Pose:
+        """Commanded pose of the moved frame in the base frame."""
+        return _of(self.cartesian, "pose").pose_cmd
+
+    @property
+    def redundancy(self) -> Redundancy:
+        """E1, Status and Turn of the arm."""
+        return _of(self.cartesian, "pose").redundancy
+
+    @property
+    def wrench(self) -> Wrench:
+        """External force and torque."""
+        return _of(self.external, "wrench")
+
+    @property
+    def safety(self) -> Safety:
+        """Safety and readiness."""
+        return _of(self.status, "safety")
+
+
+def _of(group: _T | None, name: str) -> _T:
+    if group is None:
+        raise StaleState(
+            f"this state has no group {name!r}",
+            parameter=name,
+            hint=f"subscribe to it: groups=(..., {name!r})",
+        )
+    return group
