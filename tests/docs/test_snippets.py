@@ -1,7 +1,7 @@
 """Every Python snippet of the documentation runs, page by page, against one virtual cabinet; the site builds.
 
-A page's blocks run in order in one process, as a reader would type them. A block whose fence says ``python no-run`` is
-only compiled; pages without a block that runs are skipped.
+A page's blocks run in order in one process, as a reader would type them. A block whose fence says
+``python no-run`` is only compiled; pages without a block that runs are skipped.
 """
 
 from __future__ import annotations
