@@ -27,7 +27,7 @@ demo: setup  ## motions on the virtual cabinet, a table and a plot
 lint: $(STAMPS)/venv  ## ruff, mypy, import contract
 	.venv/bin/ruff check .
 	.venv/bin/mypy
-	.venv/bin/lint-imports
+	.venv/bin/lint-imports --no-logo
 
 check: $(STAMPS)/venv  ## the generated files agree with the schema
 	$(PY) schema/generate.py --check
