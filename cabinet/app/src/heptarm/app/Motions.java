@@ -1,0 +1,187 @@
+package heptarm.app;
+
+import static com.kuka.roboticsAPI.motionModel.BasicMotions.lin;
+import static com.kuka.roboticsAPI.motionModel.BasicMotions.linRel;
+import static com.kuka.roboticsAPI.motionModel.BasicMotions.positionHold;
+import static com.kuka.roboticsAPI.motionModel.BasicMotions.ptp;
+
+import java.util.concurrent.TimeUnit;
+
+import com.kuka.roboticsAPI.deviceModel.JointPosition;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
+import com.kuka.roboticsAPI.geometricModel.Frame;
+import com.kuka.roboticsAPI.motionModel.IMotion;
+import com.kuka.roboticsAPI.motionModel.LIN;
+import com.kuka.roboticsAPI.motionModel.RelativeLIN;
+import com.kuka.roboticsAPI.motionModel.RobotMotion;
+import com.kuka.roboticsAPI.motionModel.SplineMotionCP;
+import com.kuka.roboticsAPI.motionModel.controlModeModel.PositionControlMode;
+
+import heptarm.core.Refusal;
+import heptarm.wire.Blending;
+import heptarm.wire.CartesianDynamics;
+import heptarm.wire.Code;
+import heptarm.wire.Hold;
+import heptarm.wire.Item;
+import heptarm.wire.JointDynamics;
+import heptarm.wire.Lin;
+import heptarm.wire.LinRel;
+import heptarm.wire.Motion;
+import heptarm.wire.Orientation;
+import heptarm.wire.OrientationReference;
+import heptarm.wire.OrientationType;
+import heptarm.wire.Pose;
+import heptarm.wire.PositionMode;
+import heptarm.wire.Ptp;
+import heptarm.wire.PtpPose;
+import heptarm.wire.Redundancy;
+
+/** Turns items of a program into Sunrise motions. What cannot be carried out is refused, never ignored. */
+final class Motions {
+    static final String[] CAPABILITIES = {"ptp", "ptp_pose", "lin", "lin_rel", "hold", "override", "pause"};
+
+    private static final int JOINTS = 7;
+
+    private final LBR robot;
+
+    Motions(LBR robot) {
+        this.robot = robot;
+    }
+
+    /** Refuses what this cabinet cannot carry out. */
+    void check(Item item, String path) throws Refusal {
+        if (item.frame.length() > 0 && !"flange".equals(item.frame)) {
+            throw new Refusal(Code.UNKNOWN_NAME, path + "frame", item.frame, "flange", "no frame " + item.frame + " can be moved here");
+        }
+        if (item.mode != null && !(item.mode instanceof PositionMode)) {
+            throw unsupported(path + "mode", item.mode.getClass().getSimpleName());
+        }
+        if (item.until.nodes.length > 0) {
+            throw unsupported(path + "until", "break conditions");
+        }
+        if (item.triggers.length > 0) {
+            throw unsupported(path + "triggers", "triggers");
+        }
+        Motion motion = item.motion;
+        String at = path + "motion.";
+        if (motion instanceof Ptp) {
+            checkBlending(((Ptp) motion).blending, at);
+        } else if (motion instanceof PtpPose) {
+            checkBlending(((PtpPose) motion).blending, at);
+            checkRedundancy(((PtpPose) motion).redundancy, at);
+        } else if (motion instanceof Lin) {
+            checkBlending(((Lin) motion).blending, at);
+            checkRedundancy(((Lin) motion).redundancy, at);
+            checkOrientation(((Lin) motion).orientation, at);
+        } else if (motion instanceof LinRel) {
+            String reference = ((LinRel) motion).reference;
+            checkBlending(((LinRel) motion).blending, at);
+            checkOrientation(((LinRel) motion).orientation, at);
+            if (reference.length() > 0 && !"tool".equals(reference) && !"base".equals(reference)) {
+                throw new Refusal(Code.UNKNOWN_NAME, at + "reference", reference, "tool, base", "no frame " + reference);
+            }
+        } else if (!(motion instanceof Hold)) {
+            throw unsupported(path + "motion", motion.getClass().getSimpleName());
+        }
+    }
+
+    private static Refusal unsupported(String parameter, String what) {
+        return new Refusal(Code.UNSUPPORTED, parameter, what, "", "this version of the cabinet application cannot do that yet: " + what);
+    }
+
+    private static void checkBlending(Blending blending, String path) throws Refusal {
+        if (blending.relative > 0 || blending.distance > 0 || blending.orientation > 0) {
+            throw unsupported(path + "blending", "blending");
+        }
+    }
+
+    private static void checkOrientation(Orientation orientation, String path) throws Refusal {
+        if (orientation.type != OrientationType.VARIABLE || orientation.reference != OrientationReference.BASE) {
+            throw unsupported(path + "orientation", "orientation " + orientation.type + " relative to " + orientation.reference);
+        }
+    }
+
+    private static void checkRedundancy(Redundancy redundancy, String path) throws Refusal {
+        if (Double.isNaN(redundancy.e1) != redundancy.status < 0) {
+            throw new Refusal(Code.OUT_OF_RANGE, path + "redundancy", "E1 " + redundancy.e1 + ", status " + redundancy.status, "",
+                    "E1 and Status belong together: give both or none");
+        }
+    }
+
+    /** The Sunrise motion of a checked item. */
+    IMotion motion(Item item) {
+        Motion motion = item.motion;
+        if (motion instanceof Ptp) {
+            return joints(ptp(new JointPosition(((Ptp) motion).q)), ((Ptp) motion).dynamics);
+        }
+        if (motion instanceof PtpPose) {
+            PtpPose one = (PtpPose) motion;
+            return joints(ptp(frame(one.target, one.redundancy)), one.dynamics);
+        }
+        if (motion instanceof Lin) {
+            Lin one = (Lin) motion;
+            LIN line = lin(frame(one.target, one.redundancy));
+            joints(line, one.joints);
+            cartesian(line, one.dynamics);
+            return line;
+        }
+        if (motion instanceof LinRel) {
+            LinRel one = (LinRel) motion;
+            RelativeLIN line = "base".equals(one.reference) ? linRel(Convert.transformation(one.offset), robot.getRootFrame())
+                    : linRel(Convert.transformation(one.offset));
+            joints(line, one.joints);
+            cartesian(line, one.dynamics);
+            return line;
+        }
+        double duration = ((Hold) motion).duration;
+        long millis = Double.isNaN(duration) ? -1 : Math.max(1, Math.round(duration * 1000));
+        return positionHold(new PositionControlMode(), millis, TimeUnit.MILLISECONDS);
+    }
+
+    private Frame frame(Pose pose, Redundancy redundancy) {
+        Frame frame = new Frame(robot.getRootFrame(), Convert.transformation(pose));
+        if (redundancy.status >= 0) {
+            frame.setRedundancyInformation(robot,
+                    new LBRE1Redundancy(redundancy.e1, redundancy.status, Math.max(0, redundancy.turn)));
+        }
+        return frame;
+    }
+
+    private static IMotion joints(RobotMotion<?> motion, JointDynamics dynamics) {
+        motion.setJointVelocityRel(filled(dynamics.velocity));
+        motion.setJointAccelerationRel(filled(dynamics.acceleration));
+        motion.setJointJerkRel(filled(dynamics.jerk));
+        return motion;
+    }
+
+    /** NaN keeps the default, which is all of it. */
+    private static double[] filled(double[] fractions) {
+        double[] result = new double[JOINTS];
+        for (int i = 0; i < JOINTS; i++) {
+            result[i] = Double.isNaN(fractions[i]) ? 1.0 : fractions[i];
+        }
+        return result;
+    }
+
+    private static void cartesian(SplineMotionCP<?> motion, CartesianDynamics dynamics) {
+        if (!Double.isNaN(dynamics.velocity)) {
+            motion.setCartVelocity(Convert.toMillimetres(dynamics.velocity));
+        }
+        if (!Double.isNaN(dynamics.acceleration)) {
+            motion.setCartAcceleration(Convert.toMillimetres(dynamics.acceleration));
+        }
+        if (!Double.isNaN(dynamics.jerk)) {
+            motion.setCartJerk(Convert.toMillimetres(dynamics.jerk));
+        }
+        if (!Double.isNaN(dynamics.orientation_velocity)) {
+            motion.setOrientationVelocity(dynamics.orientation_velocity);
+        }
+        if (!Double.isNaN(dynamics.orientation_acceleration)) {
+            motion.setOrientationAcceleration(dynamics.orientation_acceleration);
+        }
+        if (!Double.isNaN(dynamics.orientation_jerk)) {
+            motion.setOrientationJerk(dynamics.orientation_jerk);
+        }
+    }
+}

@@ -1,0 +1,271 @@
+package heptarm.app;
+
+import java.util.IdentityHashMap;
+import java.util.Iterator;
+import java.util.List;
+import java.util.Map;
+import java.util.ServiceLoader;
+
+import com.kuka.roboticsAPI.applicationModel.IApplicationControl;
+import com.kuka.roboticsAPI.controllerModel.sunrise.ISafetyState;
+import com.kuka.roboticsAPI.controllerModel.sunrise.ResumeMode;
+import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseExecutionService;
+import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseSafetyState;
+import com.kuka.roboticsAPI.deviceModel.Device;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
+import com.kuka.roboticsAPI.geometricModel.Frame;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+import com.kuka.roboticsAPI.geometricModel.math.Vector;
+import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
+import com.kuka.roboticsAPI.motionModel.ErrorHandlingAction;
+import com.kuka.roboticsAPI.motionModel.IErrorHandler;
+import com.kuka.roboticsAPI.motionModel.IMotion;
+import com.kuka.roboticsAPI.motionModel.IMotionContainer;
+import com.kuka.roboticsAPI.sensorModel.ForceSensorData;
+
+import heptarm.core.Insight;
+import heptarm.core.Job;
+import heptarm.core.Log;
+import heptarm.core.Models;
+import heptarm.core.Refusal;
+import heptarm.core.Robot;
+import heptarm.wire.Code;
+import heptarm.wire.FrameInfo;
+import heptarm.wire.Item;
+import heptarm.wire.Mode;
+import heptarm.wire.OperationMode;
+import heptarm.wire.PoseState;
+import heptarm.wire.Redundancy;
+import heptarm.wire.RobotInfo;
+import heptarm.wire.SafetyBits;
+import heptarm.wire.SafetyState;
+import heptarm.wire.SignalInfo;
+import heptarm.wire.ToolInfo;
+import heptarm.wire.WrenchState;
+
+/** The robot of the cabinet behind the core's seam. */
+final class SunriseRobot implements Robot, IErrorHandler {
+    private final LBR lbr;
+    private final ObjectFrame flange;
+    private final SunriseExecutionService execution;
+    private final IApplicationControl control;
+    private final Log log;
+    private final Motions motions;
+    private final RobotInfo info;
+    private final Insight insight;
+    private final Map<IMotionContainer, SunriseJob> jobs = new IdentityHashMap<IMotionContainer, SunriseJob>();
+    private final Map<IMotionContainer, String> orphans = new IdentityHashMap<IMotionContainer, String>();
+
+    SunriseRobot(LBR lbr, IApplicationControl control, Log log) {
+        this.lbr = lbr;
+        this.flange = lbr.getFlange();
+        this.execution = (SunriseExecutionService) lbr.getController().getExecutionService();
+        this.control = control;
+        this.log = log;
+        this.motions = new Motions(lbr);
+        this.info = Models.describe(lbr.getName(), lbr.getJointLimits().getMinJointPosition().get(),
+                lbr.getJointLimits().getMaxJointPosition().get());
+        Iterator<Insight> found = ServiceLoader.load(Insight.class, Insight.class.getClassLoader()).iterator();
+        this.insight = found.hasNext() ? found.next() : null;
+        control.registerMoveAsyncErrorHandler(this);
+    }
+
+    public RobotInfo info() {
+        return info;
+    }
+
+    public String cabinet() {
+        return lbr.getController().getName();
+    }
+
+    public boolean isVirtual() {
+        return insight != null;
+    }
+
+    public String[] capabilities() {
+        return Motions.CAPABILITIES;
+    }
+
+    public ToolInfo[] tools() {
+        return new ToolInfo[0];
+    }
+
+    public FrameInfo[] frames() {
+        return new FrameInfo[0];
+    }
+
+    public SignalInfo[] signals() {
+        return new SignalInfo[0];
+    }
+
+    public void readJoints(double[] q, double[] commanded) {
+        System.arraycopy(lbr.getCurrentJointPosition().getInternalArray(), 0, q, 0, q.length);
+        System.arraycopy(lbr.getCommandedJointPosition().getInternalArray(), 0, commanded, 0, q.length);
+    }
+
+    public void readTorques(double[] measured, double[] external, double[] commanded) {
+        System.arraycopy(lbr.getMeasuredTorque().getTorqueValues(), 0, measured, 0, measured.length);
+        System.arraycopy(lbr.getExternalTorque().getTorqueValues(), 0, external, 0, external.length);
+        if (insight != null) {
+            insight.readTorques(commanded);
+        } else {
+            java.util.Arrays.fill(commanded, Double.NaN);
+        }
+    }
+
+    public PoseState readPose(long stamp) {
+        Frame measured = lbr.getCurrentCartesianPosition(flange);
+        Frame commanded = lbr.getCommandedCartesianPosition(flange);
+        IRedundancyCollection collection = measured.getRedundancyInformationForDevice(lbr);
+        Redundancy redundancy = new Redundancy(Double.NaN, -1, -1);
+        if (collection instanceof LBRE1Redundancy) {
+            LBRE1Redundancy e1 = (LBRE1Redundancy) collection;
+            redundancy = new Redundancy(e1.getE1(), e1.getStatus(), e1.getTurn());
+        }
+        return new PoseState(stamp, Convert.xyz(measured.transformationFromWorld()),
+                Convert.quaternion(measured.transformationFromWorld()), Convert.xyz(commanded.transformationFromWorld()),
+                Convert.quaternion(commanded.transformationFromWorld()), redundancy);
+    }
+
+    public WrenchState readWrench(long stamp) {
+        ForceSensorData data = lbr.getExternalForceTorque(flange, lbr.getRootFrame());
+        return new WrenchState(stamp, array(data.getForce()), array(data.getTorque()), array(data.getForceInaccuracy()),
+                array(data.getTorqueInaccuracy()));
+    }
+
+    private static double[] array(Vector v) {
+        return new double[] {v.getX(), v.getY(), v.getZ()};
+    }
+
+    public SafetyState readSafety(long stamp) {
+        ISafetyState safety = lbr.getSafetyState();
+        int bits = 0;
+        bits |= lbr.isReadyToMove() ? SafetyBits.READY_TO_MOVE : 0;
+        bits |= execution.isPaused() ? SafetyBits.PAUSED : 0;
+        bits |= lbr.hasActiveMotionCommand() ? SafetyBits.MOVING : 0;
+        bits |= lbr.isMastered() ? SafetyBits.MASTERED : 0;
+        boolean emergency = safety.getEmergencyStopInt() == SunriseSafetyState.EmergencyStop.ACTIVE
+                || safety.getEmergencyStopEx() == SunriseSafetyState.EmergencyStop.ACTIVE;
+        bits |= emergency ? SafetyBits.EMERGENCY_STOP : 0;
+        bits |= safety.getSafetyStopSignal() != SunriseSafetyState.SafetyStopType.NOSTOP ? SafetyBits.PROTECTIVE_STOP : 0;
+        bits |= safety.getOperatorSafetyState() != SunriseSafetyState.OperatorSafety.OPERATOR_SAFETY_CLOSED
+                ? SafetyBits.OPERATOR_SAFETY_OPEN : 0;
+        bits |= safety.getEnablingDeviceState() != SunriseSafetyState.EnablingDeviceState.NONE ? SafetyBits.ENABLING_SWITCH : 0;
+        bits |= safety.areAllAxesGMSReferenced() ? SafetyBits.TORQUE_REFERENCED : 0;
+        bits |= safety.areAllAxesPositionReferenced() ? SafetyBits.POSITION_REFERENCED : 0;
+        return new SafetyState(stamp, bits, mode(lbr.getOperationMode()));
+    }
+
+    private static OperationMode mode(com.kuka.roboticsAPI.deviceModel.OperationMode mode) {
+        if (mode == com.kuka.roboticsAPI.deviceModel.OperationMode.AUT) {
+            return OperationMode.AUT;
+        }
+        return mode == com.kuka.roboticsAPI.deviceModel.OperationMode.T2 ? OperationMode.T2 : OperationMode.T1;
+    }
+
+    public void readProgress(double[] progressAndRemaining) {
+        if (insight != null) {
+            insight.readProgress(progressAndRemaining);
+        }
+    }
+
+    public void check(Item item, String path) throws Refusal {
+        motions.check(item, path);
+    }
+
+    public Job start(Item item, Mode mode, Job.Listener listener) throws Refusal {
+        SunriseJob job = new SunriseJob(listener);
+        try {
+            IMotion motion = motions.motion(item);
+            IMotionContainer container = lbr.moveAsync(motion, job);
+            String failure;
+            synchronized (jobs) {
+                jobs.put(container, job);
+                failure = orphans.remove(container);
+                forgetFinished();
+            }
+            job.set(container);
+            if (failure != null) {
+                job.fail(failure);
+            }
+        } catch (RuntimeException e) {
+            log.warn("a motion was refused by the cabinet: " + e);
+            job.fail(e.getMessage());
+        }
+        return job;
+    }
+
+    /** Under the lock of jobs. */
+    private void forgetFinished() {
+        Iterator<IMotionContainer> all = jobs.keySet().iterator();
+        while (all.hasNext()) {
+            if (all.next().isFinished()) {
+                all.remove();
+            }
+        }
+    }
+
+    /** Sunrise tells of a failed motion here; the error becomes an event, the application goes on. */
+    public ErrorHandlingAction handleError(Device device, IMotionContainer failed, List<IMotionContainer> cancelled) {
+        String text = failed.getErrorMessage();
+        SunriseJob job;
+        synchronized (jobs) {
+            job = jobs.remove(failed);
+            if (job == null) {
+                orphans.put(failed, String.valueOf(text));
+            }
+        }
+        if (job != null) {
+            job.fail(text);
+        }
+        for (IMotionContainer one : cancelled) {
+            SunriseJob behind;
+            synchronized (jobs) {
+                behind = jobs.get(one);
+            }
+            if (behind != null) {
+                behind.cancel();
+            }
+        }
+        return ErrorHandlingAction.Ignore;
+    }
+
+    public void stop() {
+        execution.cancelAll();
+    }
+
+    public void pause() {
+        execution.startPause();
+    }
+
+    public void resume() {
+        execution.resumeExecution(ResumeMode.OnPath);
+    }
+
+    public void setOverride(double value) {
+        control.setApplicationOverride(value);
+    }
+
+    public double override() {
+        return control.getApplicationOverride();
+    }
+
+    public void recover() throws Refusal {
+        if (execution.isPaused()) {
+            execution.resumeExecution(ResumeMode.OnPath);
+        }
+        if (!lbr.isReadyToMove()) {
+            throw new Refusal(Code.NEEDS_OPERATOR, "release the emergency stop and the safety stops, acknowledge at the smartPAD,"
+                    + " hold the enabling switch unless the mode is AUT, and press Start");
+        }
+    }
+
+    public void show(int severity, String text) {
+        if (severity == 0) {
+            log.info(text);
+        } else {
+            log.warn(text);
+        }
+    }
+}

@@ -1,0 +1,6 @@
+package com.kuka.roboticsAPI.applicationModel;
+
+/** State of an application. */
+public enum RoboticsAPIApplicationState {
+    RUNNING, STOPPING
+}

@@ -1,0 +1,34 @@
+package com.kuka.roboticsAPI.controllerModel;
+
+import java.util.Collection;
+import java.util.Collections;
+
+import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseExecutionService;
+import com.kuka.roboticsAPI.deviceModel.Device;
+
+import heptarm.doubles.Station;
+
+/** The cabinet. */
+public class Controller {
+    private final String name;
+    private final Station station;
+    private final SunriseExecutionService execution;
+
+    public Controller(String name, Station station) {
+        this.name = name;
+        this.station = station;
+        this.execution = new SunriseExecutionService(station);
+    }
+
+    public String getName() {
+        return name;
+    }
+
+    public Collection<Device> getDevices() {
+        return Collections.<Device>singletonList(station.robot);
+    }
+
+    public IExecutionService getExecutionService() {
+        return execution;
+    }
+}

@@ -1,0 +1,22 @@
+package com.kuka.roboticsAPI.controllerModel.sunrise;
+
+import com.kuka.roboticsAPI.deviceModel.OperationMode;
+
+/** What the safety controller tells. */
+public interface ISafetyState {
+    SunriseSafetyState.EmergencyStop getEmergencyStopInt();
+
+    SunriseSafetyState.EmergencyStop getEmergencyStopEx();
+
+    SunriseSafetyState.SafetyStopType getSafetyStopSignal();
+
+    SunriseSafetyState.OperatorSafety getOperatorSafetyState();
+
+    SunriseSafetyState.EnablingDeviceState getEnablingDeviceState();
+
+    OperationMode getOperationMode();
+
+    boolean areAllAxesGMSReferenced();
+
+    boolean areAllAxesPositionReferenced();
+}

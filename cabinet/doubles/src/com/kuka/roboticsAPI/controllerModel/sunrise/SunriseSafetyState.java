@@ -1,0 +1,78 @@
+package com.kuka.roboticsAPI.controllerModel.sunrise;
+
+import com.kuka.roboticsAPI.deviceModel.OperationMode;
+
+import heptarm.doubles.Ring;
+
+/** A snapshot of the safety state. */
+public final class SunriseSafetyState implements ISafetyState {
+    /** Emergency stop. */
+    public enum EmergencyStop { ACTIVE, INACTIVE }
+
+    /** Kind of the stop that safety demands. */
+    public enum SafetyStopType {
+        NOSTOP, STOP0, STOP1, STOP2;
+
+        public int toInt() {
+            return ordinal();
+        }
+    }
+
+    /** Operator safety. */
+    public enum OperatorSafety { OPERATOR_SAFETY_CLOSED, OPERATOR_SAFETY_OPEN }
+
+    /** Enabling device. */
+    public enum EnablingDeviceState { NONE, NORMAL, HANDGUIDING }
+
+    private final long flags;
+    private final OperationMode mode;
+
+    public SunriseSafetyState(long flags, OperationMode mode) {
+        this.flags = flags;
+        this.mode = mode;
+    }
+
+    private boolean has(int bit) {
+        return (flags & bit) != 0;
+    }
+
+    @Override
+    public EmergencyStop getEmergencyStopInt() {
+        return has(Ring.EMERGENCY_STOP) ? EmergencyStop.ACTIVE : EmergencyStop.INACTIVE;
+    }
+
+    @Override
+    public EmergencyStop getEmergencyStopEx() {
+        return EmergencyStop.INACTIVE;
+    }
+
+    @Override
+    public SafetyStopType getSafetyStopSignal() {
+        return has(Ring.EMERGENCY_STOP) ? SafetyStopType.STOP1 : SafetyStopType.NOSTOP;
+    }
+
+    @Override
+    public OperatorSafety getOperatorSafetyState() {
+        return OperatorSafety.OPERATOR_SAFETY_CLOSED;
+    }
+
+    @Override
+    public EnablingDeviceState getEnablingDeviceState() {
+        return EnablingDeviceState.NONE;
+    }
+
+    @Override
+    public OperationMode getOperationMode() {
+        return mode;
+    }
+
+    @Override
+    public boolean areAllAxesGMSReferenced() {
+        return has(Ring.MASTERED);
+    }
+
+    @Override
+    public boolean areAllAxesPositionReferenced() {
+        return has(Ring.MASTERED);
+    }
+}

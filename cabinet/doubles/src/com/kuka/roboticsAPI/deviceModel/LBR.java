@@ -1,0 +1,228 @@
+package com.kuka.roboticsAPI.deviceModel;
+
+import java.util.ArrayList;
+import java.util.Arrays;
+import java.util.LinkedHashMap;
+import java.util.List;
+import java.util.Map;
+import java.util.concurrent.atomic.AtomicLong;
+
+import com.kuka.roboticsAPI.controllerModel.Controller;
+import com.kuka.roboticsAPI.controllerModel.sunrise.ISafetyState;
+import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseSafetyState;
+import com.kuka.roboticsAPI.executionModel.CommandInvalidException;
+import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+import com.kuka.roboticsAPI.geometricModel.Frame;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+import com.kuka.roboticsAPI.geometricModel.World;
+import com.kuka.roboticsAPI.geometricModel.math.Matrix;
+import com.kuka.roboticsAPI.geometricModel.math.Transformation;
+import com.kuka.roboticsAPI.geometricModel.math.Vector;
+import com.kuka.roboticsAPI.motionModel.IMotion;
+import com.kuka.roboticsAPI.motionModel.IMotionContainer;
+import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
+import com.kuka.roboticsAPI.sensorModel.ForceSensorData;
+import com.kuka.roboticsAPI.sensorModel.TorqueSensorData;
+
+import heptarm.doubles.Container;
+import heptarm.doubles.Desk;
+import heptarm.doubles.MotionOrder;
+import heptarm.doubles.Orders;
+import heptarm.doubles.Ring;
+import heptarm.doubles.Station;
+
+/** The robot. Motions of the robot itself move its flange. */
+public class LBR extends Robot {
+    private static final int AXES = 7;
+
+    private final Station station;
+    private final ObjectFrame root;
+    private final ObjectFrame flange;
+    private final AtomicLong ids = new AtomicLong();
+    private final Map<Container, Boolean> open = new LinkedHashMap<>(); // value: asynchronous
+
+    public LBR(String name, Controller controller, Station station) {
+        super(name, controller);
+        this.station = station;
+        root = new ObjectFrame("Root", World.Current.getRootFrame(), () -> Transformation.IDENTITY, this);
+        flange = new ObjectFrame("Flange", root, () -> Orders.transformation(numbers(Ring.POSE, 7)), this);
+    }
+
+    private double[] numbers(int word, int count) {
+        double[] out = new double[count];
+        station.ring.read(word, out);
+        return out;
+    }
+
+    private boolean flag(int bit) {
+        return (station.ring.integer(Ring.FLAGS) & bit) != 0;
+    }
+
+    public ObjectFrame getFlange() {
+        return flange;
+    }
+
+    public ObjectFrame getRootFrame() {
+        return root;
+    }
+
+    public int getJointCount() {
+        return AXES;
+    }
+
+    public JointLimits getJointLimits() {
+        double[] limits = station.plant.limits();
+        return new JointLimits(new JointPosition(Arrays.copyOfRange(limits, 0, AXES)),
+                new JointPosition(Arrays.copyOfRange(limits, AXES, 2 * AXES)));
+    }
+
+    public JointPosition getCurrentJointPosition() {
+        return new JointPosition(numbers(Ring.Q, AXES));
+    }
+
+    public JointPosition getCommandedJointPosition() {
+        return new JointPosition(numbers(Ring.Q_CMD, AXES));
+    }
+
+    public TorqueSensorData getMeasuredTorque() {
+        return new TorqueSensorData(numbers(Ring.TAU, AXES));
+    }
+
+    public TorqueSensorData getExternalTorque() {
+        return new TorqueSensorData(numbers(Ring.TAU_EXT, AXES));
+    }
+
+    /** Pose of a frame on the robot in the world, with the redundancy of the arm. */
+    public Frame getCurrentCartesianPosition(AbstractFrame frameOnRobot) {
+        Frame frame = new Frame(frameOnRobot.transformationFromWorld());
+        long redundancy = station.ring.integer(Ring.REDUNDANCY);
+        frame.setRedundancyInformation(this,
+                new LBRE1Redundancy(station.ring.number(Ring.E1), (int) (redundancy & 0xFF), (int) (redundancy >> 8 & 0xFF)));
+        return frame;
+    }
+
+    public Frame getCurrentCartesianPosition(ObjectFrame frameOnRobot, AbstractFrame reference) {
+        return new Frame(reference, reference.transformationTo(frameOnRobot));
+    }
+
+    public Frame getCommandedCartesianPosition(ObjectFrame frameOnRobot) {
+        double[] pose = station.plant.forward(numbers(Ring.Q_CMD, AXES));
+        return new Frame(Orders.transformation(pose).compose(flange.transformationTo(frameOnRobot)));
+    }
+
+    public ForceSensorData getExternalForceTorque(AbstractFrame measureFrame) {
+        return getExternalForceTorque(measureFrame, null);
+    }
+
+    /** External wrench at the origin of a frame, in the axes of another (null: of the same). */
+    public ForceSensorData getExternalForceTorque(AbstractFrame measureFrame, AbstractFrame orientationFrame) {
+        double[] wrench = numbers(Ring.WRENCH, 6);
+        Transformation at = measureFrame.transformationFromWorld();
+        double[] flangePose = numbers(Ring.POSE, 3);
+        double[] lever = {flangePose[0] - at.getX() * 1e-3, flangePose[1] - at.getY() * 1e-3, flangePose[2] - at.getZ() * 1e-3};
+        double[] torque = {wrench[3] + lever[1] * wrench[2] - lever[2] * wrench[1],
+            wrench[4] + lever[2] * wrench[0] - lever[0] * wrench[2], wrench[5] + lever[0] * wrench[1] - lever[1] * wrench[0]};
+        Matrix axes = (orientationFrame == null ? at : orientationFrame.transformationFromWorld()).getRotationMatrix();
+        Vector none = Vector.of(0, 0, 0);
+        return new ForceSensorData(seenFrom(axes, wrench[0], wrench[1], wrench[2]),
+                seenFrom(axes, torque[0], torque[1], torque[2]), none, none);
+    }
+
+    private static Vector seenFrom(Matrix axes, double x, double y, double z) {
+        return Vector.of(axes.get(0, 0) * x + axes.get(1, 0) * y + axes.get(2, 0) * z,
+                axes.get(0, 1) * x + axes.get(1, 1) * y + axes.get(2, 1) * z,
+                axes.get(0, 2) * x + axes.get(1, 2) * y + axes.get(2, 2) * z);
+    }
+
+    public boolean isReadyToMove() {
+        return flag(Ring.READY) && !flag(Ring.PAUSED);
+    }
+
+    public boolean hasActiveMotionCommand() {
+        return flag(Ring.MOVING);
+    }
+
+    public boolean isMastered() {
+        return flag(Ring.MASTERED);
+    }
+
+    public OperationMode getOperationMode() {
+        return OperationMode.values()[(int) station.ring.integer(Ring.MODE)];
+    }
+
+    public ISafetyState getSafetyState() {
+        return new SunriseSafetyState(station.ring.integer(Ring.FLAGS), getOperationMode());
+    }
+
+    public IMotionContainer move(IMotion motion) {
+        return moveFrame(flange, motion, null);
+    }
+
+    public IMotionContainer moveAsync(IMotion motion) {
+        return moveFrameAsync(flange, motion, null);
+    }
+
+    public IMotionContainer move(IMotion motion, IMotionContainerListener listener) {
+        return moveFrame(flange, motion, listener);
+    }
+
+    public IMotionContainer moveAsync(IMotion motion, IMotionContainerListener listener) {
+        return moveFrameAsync(flange, motion, listener);
+    }
+
+    /** Blocks until the motion has ended; an error is thrown. */
+    public IMotionContainer moveFrame(ObjectFrame moved, IMotion motion, IMotionContainerListener listener) {
+        Container container = submit(moved, motion, listener, false);
+        container.await();
+        if (container.hasError()) {
+            throw new CommandInvalidException(container.getErrorMessage());
+        }
+        return container;
+    }
+
+    /** Returns at once; an error goes to the application's handler. */
+    public IMotionContainer moveFrameAsync(ObjectFrame moved, IMotion motion, IMotionContainerListener listener) {
+        return submit(moved, motion, listener, true);
+    }
+
+    private Container submit(ObjectFrame moved, IMotion motion, IMotionContainerListener listener, boolean asynchronous) {
+        long id = ids.incrementAndGet();
+        MotionOrder order = Orders.of(id, motion, moved, this);
+        Container container = new Container(id, motion, station, listener, this::ended);
+        order.listener = container;
+        synchronized (open) {
+            open.put(container, asynchronous);
+        }
+        String error = station.plant.submit(order);
+        if (error != null) {
+            container.finished("error", error);
+        }
+        return container;
+    }
+
+    /** A failed asynchronous motion takes those behind it with it. */
+    private void ended(Container container) {
+        Boolean asynchronous;
+        List<IMotionContainer> tail = new ArrayList<>();
+        synchronized (open) {
+            asynchronous = open.remove(container);
+            if (container.hasError()) {
+                tail.addAll(open.keySet());
+            }
+        }
+        if (container.hasError() && Boolean.TRUE.equals(asynchronous)) {
+            tail.removeIf(other -> ((Container) other).precedes(container));
+            for (IMotionContainer other : tail) {
+                other.cancel();
+            }
+            Desk.current().failed(container, tail);
+        }
+    }
+
+    /** Number of motions that run or wait. */
+    public int activeContainers() {
+        synchronized (open) {
+            return open.size();
+        }
+    }
+}

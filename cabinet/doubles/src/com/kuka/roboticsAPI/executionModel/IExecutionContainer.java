@@ -1,0 +1,5 @@
+package com.kuka.roboticsAPI.executionModel;
+
+/** Something that the cabinet executes. */
+public interface IExecutionContainer {
+}

@@ -1,0 +1,5 @@
+package com.kuka.roboticsAPI.executionModel;
+
+/** Which condition ended a motion. */
+public interface IFiredConditionInfo {
+}

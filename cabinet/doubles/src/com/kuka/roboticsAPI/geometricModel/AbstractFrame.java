@@ -1,0 +1,78 @@
+package com.kuka.roboticsAPI.geometricModel;
+
+import java.util.HashMap;
+import java.util.Map;
+
+import com.kuka.roboticsAPI.deviceModel.Device;
+import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
+import com.kuka.roboticsAPI.geometricModel.math.Transformation;
+import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
+
+/** A frame in the tree whose root is the world. Millimetres, radians. */
+public abstract class AbstractFrame {
+    private final Map<Device, IRedundancyCollection> redundancy = new HashMap<>();
+
+    /** The frame that this one is given in; null for the world itself. */
+    public abstract AbstractFrame getParent();
+
+    abstract Transformation fromParent();
+
+    public Transformation getTransformationFromParent() {
+        return fromParent();
+    }
+
+    public Transformation transformationFromWorld() {
+        AbstractFrame parent = getParent();
+        return parent == null ? fromParent() : parent.transformationFromWorld().compose(fromParent());
+    }
+
+    /** The other frame as seen from this one. */
+    public Transformation transformationTo(AbstractFrame other) {
+        return transformationFromWorld().invert().compose(other.transformationFromWorld());
+    }
+
+    public double distanceTo(AbstractFrame other) {
+        Transformation t = transformationTo(other);
+        return Math.sqrt(t.getX() * t.getX() + t.getY() * t.getY() + t.getZ() * t.getZ());
+    }
+
+    public double getX() {
+        return fromParent().getX();
+    }
+
+    public double getY() {
+        return fromParent().getY();
+    }
+
+    public double getZ() {
+        return fromParent().getZ();
+    }
+
+    public double getAlphaRad() {
+        return fromParent().getAlphaRad();
+    }
+
+    public double getBetaRad() {
+        return fromParent().getBetaRad();
+    }
+
+    public double getGammaRad() {
+        return fromParent().getGammaRad();
+    }
+
+    public IRedundancyCollection getRedundancyInformationForDevice(Device device) {
+        return redundancy.get(device);
+    }
+
+    public void setRedundancyInformation(Device device, IRedundancyCollection value) {
+        redundancy.put(device, value);
+    }
+
+    void copyRedundancyTo(AbstractFrame other) {
+        ((AbstractFrame) other).redundancy.putAll(redundancy);
+    }
+
+    static Transformation transformation(ITransformation any) {
+        return Transformation.of(any);
+    }
+}

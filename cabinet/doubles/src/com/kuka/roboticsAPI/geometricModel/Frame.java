@@ -1,0 +1,116 @@
+package com.kuka.roboticsAPI.geometricModel;
+
+import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
+import com.kuka.roboticsAPI.geometricModel.math.Transformation;
+
+/** A frame that an application makes; without a parent it is given in the world. Mutable. */
+public class Frame extends AbstractFrame {
+    private AbstractFrame parent;
+    private Transformation fromParent;
+
+    public Frame() {
+        this(World.Current.getRootFrame(), Transformation.IDENTITY);
+    }
+
+    public Frame(AbstractFrame parent) {
+        this(parent, Transformation.IDENTITY);
+    }
+
+    public Frame(ITransformation transformation) {
+        this(World.Current.getRootFrame(), transformation);
+    }
+
+    public Frame(AbstractFrame parent, ITransformation transformation) {
+        this.parent = parent;
+        this.fromParent = transformation(transformation);
+    }
+
+    public Frame(double x, double y, double z) {
+        this(x, y, z, 0, 0, 0);
+    }
+
+    public Frame(double x, double y, double z, double a, double b, double c) {
+        this(World.Current.getRootFrame(), x, y, z, a, b, c);
+    }
+
+    public Frame(AbstractFrame parent, double x, double y, double z, double a, double b, double c) {
+        this(parent, Transformation.ofRad(x, y, z, a, b, c));
+    }
+
+    @Override
+    public AbstractFrame getParent() {
+        return parent;
+    }
+
+    @Override
+    Transformation fromParent() {
+        return fromParent;
+    }
+
+    public Frame copy() {
+        return new Frame(parent, fromParent);
+    }
+
+    public Frame copyWithRedundancy() {
+        Frame copy = copy();
+        copyRedundancyTo(copy);
+        return copy;
+    }
+
+    /** Moves this frame by a transformation in its own axes. */
+    public Frame transform(ITransformation by) {
+        fromParent = fromParent.compose(by);
+        return this;
+    }
+
+    public Frame setParent(AbstractFrame newParent) {
+        return setParent(newParent, true);
+    }
+
+    public Frame setParent(AbstractFrame newParent, boolean keepWorldPose) {
+        if (keepWorldPose) {
+            fromParent = newParent.transformationTo(this);
+        }
+        parent = newParent;
+        return this;
+    }
+
+    public Frame setTransformationFromParent(ITransformation transformation) {
+        fromParent = transformation(transformation);
+        return this;
+    }
+
+    private Frame with(double x, double y, double z, double a, double b, double c) {
+        fromParent = Transformation.ofRad(x, y, z, a, b, c);
+        return this;
+    }
+
+    public Frame setX(double value) {
+        return with(value, getY(), getZ(), getAlphaRad(), getBetaRad(), getGammaRad());
+    }
+
+    public Frame setY(double value) {
+        return with(getX(), value, getZ(), getAlphaRad(), getBetaRad(), getGammaRad());
+    }
+
+    public Frame setZ(double value) {
+        return with(getX(), getY(), value, getAlphaRad(), getBetaRad(), getGammaRad());
+    }
+
+    public Frame setAlphaRad(double value) {
+        return with(getX(), getY(), getZ(), value, getBetaRad(), getGammaRad());
+    }
+
+    public Frame setBetaRad(double value) {
+        return with(getX(), getY(), getZ(), getAlphaRad(), value, getGammaRad());
+    }
+
+    public Frame setGammaRad(double value) {
+        return with(getX(), getY(), getZ(), getAlphaRad(), getBetaRad(), value);
+    }
+
+    @Override
+    public String toString() {
+        return fromParent.toString();
+    }
+}

@@ -1,0 +1,59 @@
+package com.kuka.roboticsAPI.motionModel;
+
+import java.util.concurrent.TimeUnit;
+
+import com.kuka.roboticsAPI.deviceModel.JointPosition;
+import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
+import com.kuka.roboticsAPI.geometricModel.math.Transformation;
+import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
+
+/** Makes motions. */
+public final class BasicMotions {
+    private BasicMotions() {
+    }
+
+    public static PTP ptp(double... radians) {
+        return new PTP(new JointPosition(radians));
+    }
+
+    public static PTP ptp(JointPosition position) {
+        return new PTP(position);
+    }
+
+    public static CartesianPTP ptp(AbstractFrame frame) {
+        return new CartesianPTP(frame);
+    }
+
+    public static LIN lin(AbstractFrame frame) {
+        return new LIN(frame);
+    }
+
+    public static RelativeLIN linRel(double x, double y, double z) {
+        return linRel(Transformation.ofTranslation(x, y, z));
+    }
+
+    public static RelativeLIN linRel(double x, double y, double z, AbstractFrame reference) {
+        return linRel(Transformation.ofTranslation(x, y, z), reference);
+    }
+
+    public static RelativeLIN linRel(double x, double y, double z, double a, double b, double c) {
+        return linRel(Transformation.ofRad(x, y, z, a, b, c));
+    }
+
+    public static RelativeLIN linRel(double x, double y, double z, double a, double b, double c, AbstractFrame reference) {
+        return linRel(Transformation.ofRad(x, y, z, a, b, c), reference);
+    }
+
+    public static RelativeLIN linRel(ITransformation offset) {
+        return new RelativeLIN(offset, null);
+    }
+
+    public static RelativeLIN linRel(ITransformation offset, AbstractFrame reference) {
+        return new RelativeLIN(offset, reference);
+    }
+
+    public static PositionHold positionHold(IMotionControlMode mode, long duration, TimeUnit unit) {
+        return new PositionHold(mode, duration, unit);
+    }
+}

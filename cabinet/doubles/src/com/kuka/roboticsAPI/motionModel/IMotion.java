@@ -1,0 +1,5 @@
+package com.kuka.roboticsAPI.motionModel;
+
+/** A motion. */
+public interface IMotion {
+}

@@ -1,0 +1,98 @@
+package com.kuka.roboticsAPI.motionModel;
+
+import java.util.Arrays;
+
+import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
+
+/** A motion of a robot with the parameters that all of them share. */
+public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
+    private static final int AXES = 7;
+
+    private final double[] relative = new double[3 * AXES];
+    private double blendingRel;
+    private double blendingCart;
+    private double blendingOri;
+    private IMotionControlMode mode;
+
+    protected RobotMotion() {
+        Arrays.fill(relative, 1.0);
+    }
+
+    private T setRelative(int block, String name, double[] values) {
+        if (values.length != 1 && values.length != AXES) {
+            throw new IllegalArgumentException(name + " takes one value or " + AXES + ", not " + values.length);
+        }
+        for (double value : values) {
+            if (!(value > 0.0 && value <= 1.0)) {
+                throw new IllegalArgumentException(name + " is " + value + "; it has to be in (0, 1]");
+            }
+        }
+        for (int i = 0; i < AXES; i++) {
+            relative[block * AXES + i] = values.length == 1 ? values[0] : values[i];
+        }
+        return self();
+    }
+
+    public T setJointVelocityRel(double... values) {
+        return setRelative(0, "jointVelocityRel", values);
+    }
+
+    public T setJointAccelerationRel(double... values) {
+        return setRelative(1, "jointAccelerationRel", values);
+    }
+
+    public T setJointJerkRel(double... values) {
+        return setRelative(2, "jointJerkRel", values);
+    }
+
+    public T setBlendingRel(double value) {
+        if (!(value >= 0.0 && value <= 1.0)) {
+            throw new IllegalArgumentException("blendingRel is " + value + "; it has to be in [0, 1]");
+        }
+        blendingRel = value;
+        return self();
+    }
+
+    public T setBlendingCart(double millimetres) {
+        blendingCart = notNegative("blendingCart", millimetres);
+        return self();
+    }
+
+    public T setBlendingOri(double radians) {
+        blendingOri = notNegative("blendingOri", radians);
+        return self();
+    }
+
+    public T setMode(IMotionControlMode value) {
+        mode = value;
+        return self();
+    }
+
+    public IMotionControlMode getMode() {
+        return mode;
+    }
+
+    /** Velocity, acceleration and jerk of each axis as fractions, 21 numbers; for the simulation. */
+    public double[] relativeParameters() {
+        return relative.clone();
+    }
+
+    /** Blending: relative, millimetres, radians; for the simulation. */
+    public double[] blendingParameters() {
+        return new double[] {blendingRel, blendingCart, blendingOri};
+    }
+
+    static double notNegative(String name, double value) {
+        if (!(value >= 0.0) || Double.isInfinite(value)) {
+            throw new IllegalArgumentException(name + " is " + value + "; it must not be negative");
+        }
+        return value;
+    }
+
+    static double positive(String name, double value) {
+        if (!(value > 0.0) || Double.isInfinite(value)) {
+            throw new IllegalArgumentException(name + " is " + value + "; it has to be positive");
+        }
+        return value;
+    }
+}

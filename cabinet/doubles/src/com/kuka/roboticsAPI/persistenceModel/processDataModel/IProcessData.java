@@ -1,0 +1,10 @@
+package com.kuka.roboticsAPI.persistenceModel.processDataModel;
+
+/** A value that a person can set at the smartPAD. */
+public interface IProcessData {
+    <T> T getValue();
+
+    void setValue(Object value);
+
+    void setDefaultValue(Object value);
+}

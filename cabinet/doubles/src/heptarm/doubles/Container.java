@@ -1,0 +1,157 @@
+package heptarm.doubles;
+
+import java.util.concurrent.TimeUnit;
+import java.util.concurrent.TimeoutException;
+
+import com.kuka.roboticsAPI.commandModel.IControllerCommand;
+import com.kuka.roboticsAPI.executionModel.ExecutionState;
+import com.kuka.roboticsAPI.executionModel.IFiredConditionInfo;
+import com.kuka.roboticsAPI.motionModel.IMotion;
+import com.kuka.roboticsAPI.motionModel.IMotionContainer;
+import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
+
+/** A motion that the cabinet has accepted, and what becomes of it. */
+public final class Container implements IMotionContainer, MotionListener {
+    /** Called on the dispatch thread when the container has ended. */
+    public interface Ending {
+        void ended(Container container);
+    }
+
+    final long id;
+    private final IMotion motion;
+    private final Station station;
+    private final IMotionContainerListener listener;
+    private final Ending ending;
+    private ExecutionState state = ExecutionState.Scheduled;
+    private String error;
+
+    public Container(long id, IMotion motion, Station station, IMotionContainerListener listener, Ending ending) {
+        this.id = id;
+        this.motion = motion;
+        this.station = station;
+        this.listener = listener;
+        this.ending = ending;
+    }
+
+    /** Whether this one was accepted before another. */
+    public boolean precedes(Container other) {
+        return id < other.id;
+    }
+
+    @Override
+    public void started() {
+        change(ExecutionState.Executing, null);
+        if (listener != null) {
+            station.dispatch.execute(() -> listener.motionStarted(motion));
+        }
+    }
+
+    @Override
+    public void finished(String cause, String text) {
+        ExecutionState last = "done".equals(cause) ? ExecutionState.Finished
+                : "cancelled".equals(cause) ? ExecutionState.Cancelled : ExecutionState.Error;
+        if (!change(last, last == ExecutionState.Error ? text : null)) {
+            return;
+        }
+        station.dispatch.execute(() -> {
+            ending.ended(this);
+            if (listener != null) {
+                listener.motionFinished(motion);
+                listener.onStateChanged(this, last);
+                listener.containerFinished(this);
+            }
+        });
+    }
+
+    private synchronized boolean change(ExecutionState next, String text) {
+        if (isFinished()) {
+            return false;
+        }
+        state = next;
+        error = text;
+        notifyAll();
+        return true;
+    }
+
+    @Override
+    public synchronized boolean isFinished() {
+        return state == ExecutionState.Finished || state == ExecutionState.Cancelled || state == ExecutionState.Error;
+    }
+
+    @Override
+    public synchronized boolean hasError() {
+        return state == ExecutionState.Error;
+    }
+
+    @Override
+    public synchronized String getErrorMessage() {
+        return error;
+    }
+
+    @Override
+    public synchronized ExecutionState getState() {
+        return state;
+    }
+
+    @Override
+    public void cancel() {
+        if (!isFinished()) {
+            station.plant.cancel(id);
+        }
+    }
+
+    @Override
+    public synchronized void await() {
+        try {
+            while (!isFinished()) {
+                wait();
+            }
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
+            throw new IllegalStateException("interrupted while waiting for a motion", e);
+        }
+    }
+
+    @Override
+    public synchronized void await(long time, TimeUnit unit) throws TimeoutException {
+        long deadline = System.nanoTime() + unit.toNanos(time);
+        try {
+            while (!isFinished()) {
+                long left = deadline - System.nanoTime();
+                if (left <= 0) {
+                    throw new TimeoutException("the motion has not ended within " + time + " " + unit);
+                }
+                TimeUnit.NANOSECONDS.timedWait(this, left);
+            }
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
+            throw new IllegalStateException("interrupted while waiting for a motion", e);
+        }
+    }
+
+    @Override
+    public IMotion getCurrentMotion() {
+        return isFinished() ? null : motion;
+    }
+
+    @Override
+    public IMotion getLastExecutedMotion() {
+        return motion;
+    }
+
+    /** Conditions come with a later version; until then none can have fired. */
+    @Override
+    public IFiredConditionInfo getFiredBreakConditionInfo() {
+        return null;
+    }
+
+    @Override
+    public IControllerCommand getCommand() {
+        return new IControllerCommand() {
+            @Override
+            public String toString() {
+                return motion.getClass().getSimpleName() + " " + id;
+            }
+        };
+    }
+}

@@ -1,0 +1,9 @@
+package heptarm.doubles;
+
+/** Hears of an order; called by the thread that ticks the plant, must not block. */
+public interface MotionListener {
+    void started();
+
+    /** The cause is done, cancelled or error. */
+    void finished(String cause, String text);
+}

@@ -1,0 +1,31 @@
+package heptarm.doubles;
+
+/** One motion for the plant, in SI. NaN and null stand for "the default". */
+public final class MotionOrder {
+    public final long id;
+    public final String kind;
+    /** Target of a ptp [rad]; null: the pose is the target. */
+    public double[] joints;
+    /** Target of the moved frame in the base: x y z [m], quaternion x y z w. */
+    public double[] pose;
+    /** E1 [rad], status, turn; NaN and -1 mean "keep". */
+    public double[] redundancy = {Double.NaN, -1, -1};
+    /** Flange to moved frame. */
+    public double[] tcp = {0, 0, 0, 0, 0, 0, 1};
+    /** Of a relative motion: translation and rotation in the axes of the reference. */
+    public double[] offset;
+    /** Quaternion of the reference's axes in the base; null: the moved frame's own. */
+    public double[] reference;
+    /** Fractions of each axis' maximum: velocity, acceleration, jerk; seven each. */
+    public double[] relative = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+    /** Velocity, acceleration, jerk [m/s ...], then those of the orientation [rad/s ...]. */
+    public double[] cartesian = {Double.NaN, Double.NaN, Double.NaN, Double.NaN, Double.NaN, Double.NaN};
+    /** Of a hold [s]; NaN: until cancelled. */
+    public double duration = Double.NaN;
+    public MotionListener listener;
+
+    public MotionOrder(long id, String kind) {
+        this.id = id;
+        this.kind = kind;
+    }
+}

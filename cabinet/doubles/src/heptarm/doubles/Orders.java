@@ -1,0 +1,139 @@
+package heptarm.doubles;
+
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
+import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+import com.kuka.roboticsAPI.geometricModel.World;
+import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
+import com.kuka.roboticsAPI.geometricModel.math.Matrix;
+import com.kuka.roboticsAPI.geometricModel.math.Transformation;
+import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
+import com.kuka.roboticsAPI.motionModel.CartesianPTP;
+import com.kuka.roboticsAPI.motionModel.IMotion;
+import com.kuka.roboticsAPI.motionModel.LIN;
+import com.kuka.roboticsAPI.motionModel.PTP;
+import com.kuka.roboticsAPI.motionModel.PositionHold;
+import com.kuka.roboticsAPI.motionModel.RelativeLIN;
+import com.kuka.roboticsAPI.motionModel.RobotMotion;
+import com.kuka.roboticsAPI.motionModel.SplineMotionCP;
+
+/** Turns motions of the Sunrise API (millimetres) into the plant's orders (SI). */
+public final class Orders {
+    private static final double MM = 1e-3;
+
+    private Orders() {
+    }
+
+    /** The order for a motion of a frame on the robot. */
+    public static MotionOrder of(long id, IMotion motion, ObjectFrame moved, LBR robot) {
+        MotionOrder order = make(id, motion, robot);
+        order.tcp = pose(robot.getFlange().transformationTo(moved));
+        if (motion instanceof RobotMotion) {
+            order.relative = ((RobotMotion<?>) motion).relativeParameters();
+        }
+        if (motion instanceof SplineMotionCP) {
+            double[] cartesian = ((SplineMotionCP<?>) motion).cartesianParameters();
+            for (int i = 0; i < 3; i++) {
+                cartesian[i] *= MM;
+            }
+            order.cartesian = cartesian;
+        }
+        return order;
+    }
+
+    private static MotionOrder make(long id, IMotion motion, LBR robot) {
+        MotionOrder order;
+        if (motion instanceof PTP) {
+            order = new MotionOrder(id, "ptp");
+            order.joints = ((PTP) motion).getDestination().get();
+        } else if (motion instanceof CartesianPTP) {
+            order = new MotionOrder(id, "ptp");
+            target(order, ((CartesianPTP) motion).getDestination(), robot);
+        } else if (motion instanceof LIN) {
+            order = new MotionOrder(id, "lin");
+            target(order, ((LIN) motion).getDestination(), robot);
+        } else if (motion instanceof RelativeLIN) {
+            RelativeLIN relative = (RelativeLIN) motion;
+            order = new MotionOrder(id, "lin_rel");
+            order.offset = pose(relative.getOffset());
+            if (relative.getReference() != null) {
+                double[] axes = pose(World.Current.getRootFrame().transformationTo(relative.getReference()));
+                order.reference = new double[] {axes[3], axes[4], axes[5], axes[6]};
+            }
+        } else if (motion instanceof PositionHold) {
+            order = new MotionOrder(id, "hold");
+            order.duration = ((PositionHold) motion).seconds();
+        } else {
+            throw new IllegalArgumentException("the virtual cabinet cannot carry out a " + motion.getClass().getName());
+        }
+        return order;
+    }
+
+    private static void target(MotionOrder order, AbstractFrame frame, LBR robot) {
+        order.pose = pose(frame.transformationFromWorld());
+        IRedundancyCollection redundancy = frame.getRedundancyInformationForDevice(robot);
+        if (redundancy instanceof LBRE1Redundancy) {
+            LBRE1Redundancy e1 = (LBRE1Redundancy) redundancy;
+            order.redundancy = new double[] {e1.getE1(), e1.getStatus(), e1.getTurn()};
+        }
+    }
+
+    /** Metres and quaternion x y z w of a transformation. */
+    public static double[] pose(ITransformation any) {
+        Transformation t = Transformation.of(any);
+        Matrix r = t.getRotationMatrix();
+        double[] q = quaternion(r);
+        return new double[] {t.getX() * MM, t.getY() * MM, t.getZ() * MM, q[0], q[1], q[2], q[3]};
+    }
+
+    /** The largest component leads, so that it is accurate everywhere. */
+    private static double[] quaternion(Matrix r) {
+        double trace = r.get(0, 0) + r.get(1, 1) + r.get(2, 2);
+        double[] q = new double[4];
+        int lead = 3;
+        double most = trace;
+        for (int i = 0; i < 3; i++) {
+            if (r.get(i, i) > most) {
+                most = r.get(i, i);
+                lead = i;
+            }
+        }
+        if (lead == 3) {
+            q[0] = r.get(2, 1) - r.get(1, 2);
+            q[1] = r.get(0, 2) - r.get(2, 0);
+            q[2] = r.get(1, 0) - r.get(0, 1);
+            q[3] = 1.0 + trace;
+        } else {
+            int j = (lead + 1) % 3;
+            int k = (lead + 2) % 3;
+            q[lead] = 1.0 + r.get(lead, lead) - r.get(j, j) - r.get(k, k);
+            q[j] = r.get(j, lead) + r.get(lead, j);
+            q[k] = r.get(k, lead) + r.get(lead, k);
+            q[3] = r.get(k, j) - r.get(j, k);
+        }
+        double norm = Math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+        for (int i = 0; i < 4; i++) {
+            q[i] /= norm;
+        }
+        return q;
+    }
+
+    /** Millimetres of metres and a quaternion. */
+    public static Transformation transformation(double[] pose) {
+        double x = pose[3];
+        double y = pose[4];
+        double z = pose[5];
+        double w = pose[6];
+        double a = Math.atan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z));
+        double sb = -2 * (x * z - w * y);
+        double cb = Math.hypot(1 - 2 * (y * y + z * z), 2 * (x * y + w * z));
+        double b = Math.atan2(sb, cb);
+        double c = Math.atan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y));
+        if (cb < 1e-12) {
+            a = Math.atan2(-2 * (x * y - w * z), 1 - 2 * (x * x + z * z));
+            c = 0.0;
+        }
+        return Transformation.ofRad(pose[0] / MM, pose[1] / MM, pose[2] / MM, a, b, c);
+    }
+}

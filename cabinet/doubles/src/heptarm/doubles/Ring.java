@@ -1,0 +1,127 @@
+package heptarm.doubles;
+
+import java.lang.invoke.MethodHandles;
+import java.lang.invoke.VarHandle;
+import java.nio.ByteBuffer;
+import java.nio.ByteOrder;
+
+/**
+ * Reads the plant's last states from memory shared with Python; the layout is that of heptarm/virtual/ring.py.
+ *
+ * <p>A thread that a {@link PlantClock} has woken for a tick reads the state of exactly that tick as long as it is kept;
+ * all others read the newest.
+ */
+public final class Ring {
+    public static final int Q = 2;
+    public static final int Q_CMD = 9;
+    public static final int DQ = 16;
+    public static final int TAU = 23;
+    public static final int TAU_EXT = 30;
+    public static final int TAU_CMD = 37;
+    public static final int POSE = 44;
+    public static final int WRENCH = 51;
+    public static final int FLAGS = 57;
+    public static final int MODE = 58;
+    public static final int ORDER = 59;
+    public static final int PROGRESS = 60;
+    public static final int REMAINING = 61;
+    public static final int E1 = 62;
+    public static final int REDUNDANCY = 63;
+
+    public static final int READY = 1;
+    public static final int PAUSED = 2;
+    public static final int BRAKES_OPEN = 4;
+    public static final int MOVING = 8;
+    public static final int MASTERED = 16;
+    public static final int EMERGENCY_STOP = 32;
+
+    static final long TICK_NS = 1000000L;
+
+    private static final int WORDS = 64;
+    private static final int HEADER = 64;
+    private static final int NEWEST = 0;
+    private static final int ANCHOR = 16;
+    private static final int RATE = 24;
+    private static final int WAKE = 32;
+    /** A view further back than this may be overwritten while it is read. */
+    private static final int OLDEST = 200;
+
+    private static final VarHandle LONGS =
+            MethodHandles.byteBufferViewVarHandle(long[].class, ByteOrder.nativeOrder());
+
+    private final ByteBuffer memory;
+    private final int slots;
+    private final ThreadLocal<long[]> views = ThreadLocal.withInitial(() -> new long[] {-1});
+
+    public Ring(ByteBuffer memory) {
+        this.memory = memory.order(ByteOrder.nativeOrder());
+        this.slots = (int) memory.getLong(8);
+    }
+
+    private long word(int offset) {
+        return (long) LONGS.getAcquire(memory, offset);
+    }
+
+    /** Number of the newest tick. */
+    long newest() {
+        return word(NEWEST);
+    }
+
+    long anchor() {
+        return word(ANCHOR);
+    }
+
+    double rate() {
+        return Double.longBitsToDouble(word(RATE));
+    }
+
+    void wakeAt(long nanos) {
+        LONGS.setRelease(memory, WAKE, nanos);
+    }
+
+    /** The calling thread's getters read this tick from now on. */
+    void view(long tick) {
+        views.get()[0] = tick;
+    }
+
+    private long tick() {
+        long newest = newest();
+        long view = views.get()[0];
+        return view < 0 || newest - view > OLDEST ? newest : view;
+    }
+
+    /** Copies doubles of a state. */
+    public void read(int word, double[] out) {
+        read(word, out, 0, out.length);
+    }
+
+    /** Copies {@code count} doubles of a state from {@code word} on. */
+    public void read(int word, double[] out, int at, int count) {
+        while (true) {
+            long tick = tick();
+            int base = HEADER + (int) (tick % slots) * WORDS * 8;
+            if (word(base) == 2 * tick + 2) {
+                for (int i = 0; i < count; i++) {
+                    out[at + i] = memory.getDouble(base + 8 * (word + i));
+                }
+                VarHandle.loadLoadFence();
+                if (word(base) == 2 * tick + 2) {
+                    return;
+                }
+            }
+            Thread.onSpinWait();
+        }
+    }
+
+    /** One double of a state. */
+    public double number(int word) {
+        double[] out = new double[1];
+        read(word, out);
+        return out[0];
+    }
+
+    /** One integer of a state. */
+    public long integer(int word) {
+        return Double.doubleToRawLongBits(number(word));
+    }
+}

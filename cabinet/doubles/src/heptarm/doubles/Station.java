@@ -1,0 +1,53 @@
+package heptarm.doubles;
+
+import java.nio.ByteBuffer;
+import java.util.Map;
+import java.util.concurrent.ConcurrentHashMap;
+import java.util.concurrent.ExecutorService;
+import java.util.concurrent.Executors;
+
+import com.kuka.roboticsAPI.controllerModel.Controller;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+
+/** The one simulated cabinet of this JVM: plant, ring, robot, process data, and the thread that calls listeners. */
+public final class Station {
+    private static volatile Station current;
+
+    public final Plant plant;
+    public final Ring ring;
+    public final TickHub hub;
+    public final Map<String, Object> processData = new ConcurrentHashMap<>();
+    public final ExecutorService dispatch;
+    public final Controller controller;
+    public final LBR robot;
+
+    private Station(ByteBuffer memory, Plant plant) {
+        this.plant = plant;
+        this.ring = new Ring(memory);
+        this.hub = new TickHub(ring);
+        this.dispatch = Executors.newSingleThreadExecutor(task -> {
+            Thread thread = new Thread(task, "sunrise-dispatch");
+            thread.setDaemon(true);
+            return thread;
+        });
+        this.controller = new Controller("KUKA_Sunrise_Cabinet_1", this);
+        this.robot = new LBR(plant.title().replace(' ', '_') + "_1", controller, this);
+    }
+
+    /** Sets the cabinet up; called once, before anything else. */
+    public static Station open(ByteBuffer memory, Plant plant) {
+        current = new Station(memory, plant);
+        return current;
+    }
+
+    public static Station current() {
+        if (current == null) {
+            throw new IllegalStateException("no virtual cabinet is open");
+        }
+        return current;
+    }
+
+    public void setProcessData(String name, Object value) {
+        processData.put(name, value);
+    }
+}
