@@ -1,15 +1,15 @@
 """Analytic inverse kinematics of an LBR with KUKA's redundancy: arm angle E1, Status and Turn.
 
-Geometry after Shimizu, Kakuya, Yoon, Kitagaki, Kosuge, "Analytical Inverse Kinematic Computation for 7-DOF Redundant
-Manipulators With Joint Limits and Its Application to Redundancy Resolution", IEEE T-RO 24(5), 2008, with KUKA's zero of the
-arm angle: E1 is the angle about the shoulder-wrist line away from the arm that reaches the wrist with A3 = 0 in the same
-Status. Status: bit 0, the wrist is behind A1's x axis; bit 1, A4 < 0; bit 2, A6 <= 0. Turn: bit i, A(i+1) < 0.
+Geometry after Shimizu, Kakuya, Yoon, Kitagaki, Kosuge, "Analytical Inverse Kinematic Computation for 7-DOF
+Redundant Manipulators With Joint Limits and Its Application to Redundancy Resolution", IEEE T-RO 24(5),
+2008, with KUKA's zero of the arm angle: E1 is the angle about the shoulder-wrist line away from the arm that
+reaches the wrist with A3 = 0 in the same Status. Status: bit 0, the wrist is behind A1's x axis; bit 1, A4 < 0;
+bit 2, A6 <= 0. Turn: bit i, A(i+1) < 0.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import atan2, cos, hypot, pi, sin, sqrt
 from typing import TypeAlias
 
@@ -17,31 +17,23 @@ import numpy as np
 
 from heptarm.errors import Unreachable
 from heptarm.model.kinematics import Columns, Vec, flange
+from heptarm.model.selfmotion import events
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
+from heptarm.values.redundancy import Redundancy
 from heptarm.values.robot import RobotModel
 
 #: Rows of a rotation matrix.
 Rows: TypeAlias = tuple[Vec, Vec, Vec]
 
-_SINGULAR = 1e-9
-_GRID = tuple(np.linspace(-pi, pi, 73)[:-1])
-_FINE = tuple(np.linspace(-pi, pi, 1441)[:-1])
-
-
-@dataclass(frozen=True, slots=True)
-class Redundancy:
-    """KUKA's redundancy of a joint position.
-
-    Attributes:
-        e1: arm angle [rad], in (-pi, pi].
-        status: bits 0-2, see the module.
-        turn: sign bits of the joints.
-    """
-
-    e1: float
-    status: int
-    turn: int
+#: Below it sin(b) does not determine the other two angles, and the wrist is neither before nor behind A1.
+_SINGULAR = 1e-10
+_NARROW = 1e-9
+#: Largest step of the arm angle [rad] when the best of an interval is looked for.
+_STEP = pi / 36
+#: Where a solution is looked for when nothing is known: elbow down in front, wrist bent.
+_USUAL = (0.0, 0.3, 0.0, -pi / 2, 0.0, pi / 3, 0.0)
+_USUAL_STATUS = 2
 
 
 def rows(pose: Pose | Array) -> tuple[Rows, Vec]:
@@ -91,16 +83,22 @@ def _wrap(angle: float) -> float:
 
 
 def _zyz(r: Rows, negative: bool, near: float) -> Vec:
-    """Angles a, b, c of r = Rz(a) Ry(b) Rz(c) with b of the wanted sign; where b is 0, a keeps `near`."""
+    """Angles a, b, c of r = Rz(a) Ry(b) Rz(c) with b of the wanted sign; where b is 0, a keeps `near`.
+
+    c comes from a + c = atan2(r10 - r01, r00 + r11), or where b is near pi from a - c, so that r is
+    reproduced to the last digits however little b determines a.
+    """
     s = hypot(r[0][2], r[1][2])
+    upright = r[2][2] >= 0
     if s < _SINGULAR:
-        # only a + c (b = 0) or a - c (b = pi) is determined
-        if r[2][2] > 0:
-            return near, 0.0, _wrap(atan2(r[1][0], r[0][0]) - near)
-        return near, -pi if negative else pi, _wrap(near - atan2(-r[1][0], -r[0][0]))
-    if negative:
-        return atan2(-r[1][2], -r[0][2]), atan2(-s, r[2][2]), atan2(-r[2][1], r[2][0])
-    return atan2(r[1][2], r[0][2]), atan2(s, r[2][2]), atan2(r[2][1], -r[2][0])
+        a, b = near, 0.0 if upright else -pi if negative else pi
+    elif negative:
+        a, b = atan2(-r[1][2], -r[0][2]), -atan2(s, r[2][2])
+    else:
+        a, b = atan2(r[1][2], r[0][2]), atan2(s, r[2][2])
+    if upright:
+        return a, b, _wrap(atan2(r[1][0] - r[0][1], r[0][0] + r[1][1]) - a)
+    return a, b, _wrap(a - atan2(-r[1][0] - r[0][1], r[1][1] - r[0][0]))
 
 
 def _reference(robot: RobotModel, w: Vec, q4: float, behind: bool) -> tuple[float, float]:
@@ -156,10 +154,11 @@ def raw(
         r: rows of the flange's rotation.
         p: position of the flange in the base frame [m].
         e1: arm angle [rad].
-        status: bit 0 selects the reference arm of E1; bits 0 and 2 select A2's and A6's branch, unless `continuous`.
+        status: bit 0 selects the reference arm of E1; bits 0 and 2 select A2's and A6's branch, unless
+            `continuous`.
         near: joint positions that decide where a singularity leaves a choice.
-        continuous: of the two branches of the shoulder and of the wrist take the one next to `near`, so that a path
-            may pass through A2 = 0 or A6 = 0.
+        continuous: of the two branches of the shoulder and of the wrist take the one next to `near`, so that
+            a path may pass through A2 = 0 or A6 = 0.
 
     Raises:
         Unreachable: out of reach.
@@ -229,7 +228,9 @@ def arm_angle(robot: RobotModel, q: Sequence[float], behind: bool) -> float:
     length = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
     a1, a2 = _reference(robot, w, q[3], behind)
     c, s = cos(q[2]), sin(q[2])
-    turned = _times(_times(_zy(q[0], q[1]), ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))), _transposed(_zy(a1, a2)))
+    turned = _times(
+        _times(_zy(q[0], q[1]), ((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0))), _transposed(_zy(a1, a2))
+    )
     axial = (turned[2][1] - turned[1][2]) * w[0] + (turned[0][2] - turned[2][0]) * w[1]
     axial += (turned[1][0] - turned[0][1]) * w[2]
     return atan2(axial / length, turned[0][0] + turned[1][1] + turned[2][2] - 1.0)
@@ -243,6 +244,57 @@ def redundancy(robot: RobotModel, q: Sequence[float]) -> Redundancy:
     return Redundancy(arm_angle(robot, values, bool(status & 1)), status, turn)
 
 
+def intervals(robot: RobotModel, pose: Pose | Array, status: int) -> list[tuple[float, float]]:
+    """Arm angles at which a flange pose can be held in a Status within the joint limits.
+
+    Args:
+        robot: the robot.
+        pose: of the flange in the base frame.
+        status: bits 0-2.
+
+    Returns:
+        Closed intervals of E1 [rad], ascending, the lower end in (-pi, pi]; one that passes through pi goes
+        on above it.
+
+    Raises:
+        Unreachable: out of reach.
+    """
+    r, p = rows(pose)
+    return _intervals(robot, r, p, status)
+
+
+def _intervals(robot: RobotModel, r: Rows, p: Vec, status: int) -> list[tuple[float, float]]:
+    w = _wrist(robot, r, p)
+    q4 = _elbow(robot, w)
+    if status & 2:
+        q4 = -q4
+    if abs(q4) > robot.q_max[3] + 1e-9:
+        return []
+    u = np.array(w) / sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    reference = np.array(_zy(*_reference(robot, w, q4, bool(status & 1))))
+
+    def feasible(e1: float) -> bool:
+        return inside(robot, raw(robot, r, p, e1, status))
+
+    marks = events(robot, u, reference, np.array(r), q4)
+    if not marks:
+        return [(-pi, pi)] if feasible(0.0) else []
+    pairs = list(zip(marks, [*marks[1:], marks[0] + 2 * pi], strict=True))
+    found: list[tuple[float, float]] = []
+    for low, high in pairs:
+        if not feasible((low + high) / 2):
+            continue
+        if found and low - found[-1][1] <= _NARROW:
+            found[-1] = (found[-1][0], high)
+        else:
+            found.append((low, high))
+    # the last interval may end where the first begins, one turn on
+    if len(found) > 1 and found[0][0] + 2 * pi - found[-1][1] <= _NARROW:
+        first = found.pop(0)
+        found[-1] = (found[-1][0], first[1] + 2 * pi)
+    return found
+
+
 def solve(
     robot: RobotModel,
     pose: Pose | Array,
@@ -253,9 +305,10 @@ def solve(
 ) -> Array:
     """Joint positions within the limits that bring the flange to a pose.
 
-    With E1 and Status given, exactly that arm. What is not given is kept from `near` if it leads to a solution within
-    the limits, and otherwise chosen: all Status values and arm angles are searched, and the solution next to `near`
-    (without it: next to the middle of the limits) is taken.
+    With E1 and Status given, exactly that arm. What is not given is kept from `near` if that leads to a
+    solution within the limits. Otherwise the solution next to `near` (without it: next to a usual bent arm)
+    is taken, in the same Status if it has one, then in any. If there is a solution within the limits, one is
+    found.
 
     Args:
         robot: the robot.
@@ -272,33 +325,72 @@ def solve(
     """
     r, p = rows(pose)
     hint = None if near is None else [float(v) for v in near]
+    wanted = status
     if hint is not None:
         own = redundancy(robot, hint)
-        candidate = raw(
-            robot, r, p, own.e1 if e1 is None else e1, own.status if status is None else status, hint
-        )
+        wanted = own.status if status is None else status
+        candidate = raw(robot, r, p, own.e1 if e1 is None else e1, wanted, hint)
         if inside(robot, candidate):
             return np.array(candidate)
-    middle = hint if hint is not None else [0.0, 0.3, 0.0, -pi / 2, 0.0, pi / 3, 0.0]
-    states = range(8) if status is None else (status,)
-    angles: tuple[float, ...] = _GRID if e1 is None else (e1,)
-    for grid in (angles, _FINE) if e1 is None else (angles,):
-        found = [q for s in states for a in grid if inside(robot, q := raw(robot, r, p, a, s, hint))]
-        if found:
-            return np.array(min(found, key=lambda q: sum((x - y) ** 2 for x, y in zip(q, middle, strict=True))))
-    raise Unreachable(
-        "the pose is within reach, but every arm position that leads there breaks a joint limit",
-        code=51,
-        hint="change the orientation" + ("" if e1 is None and status is None else ", or leave E1 and Status free"),
-    )
+    elif wanted is None:
+        wanted = _USUAL_STATUS
+    best = _nearest(robot, r, p, e1, [wanted], hint)
+    if best is None and status is None:
+        best = _nearest(robot, r, p, e1, [s for s in range(8) if s != wanted], hint)
+    if best is None:
+        fixed = " with that E1 or Status" if e1 is not None or status is not None else ""
+        raise Unreachable(
+            f"the pose is within reach, but every arm position that leads there{fixed} breaks a joint limit",
+            code=51,
+            hint="change the orientation" + (", or leave E1 and Status free" if fixed else ""),
+        )
+    return np.array(best)
 
 
-def solve_all(robot: RobotModel, pose: Pose | Array, *, e1: float) -> list[Array]:
-    """All solutions within the limits for an arm angle, one for each Status that has one.
+def _nearest(
+    robot: RobotModel, r: Rows, p: Vec, e1: float | None, states: Sequence[int], hint: Sequence[float] | None
+) -> tuple[float, ...] | None:
+    """The solution next to `hint`, each joint's distance counted in its range; None if there is none."""
+    goal = _USUAL if hint is None else hint
+    weights = (1.0 / (robot.q_max - robot.q_min) ** 2).tolist()
+
+    def distance(q: Sequence[float]) -> float:
+        return float(sum(w * (x - y) * (x - y) for w, x, y in zip(weights, q, goal, strict=True)))
+
+    found: list[tuple[float, ...]] = []
+    for status in states:
+        angles = [e1] if e1 is not None else _samples(_intervals(robot, r, p, status))
+        found += (q for a in angles if inside(robot, q := raw(robot, r, p, a, status, hint)))
+    return min(found, key=distance, default=None)
+
+
+def _samples(spans: Sequence[tuple[float, float]]) -> list[float]:
+    """Arm angles from the insides of intervals: their ends lie on joint limits."""
+    result = []
+    for low, high in spans:
+        count = 1 + int((high - low) / _STEP)
+        result += [low + (high - low) * (i + 0.5) / count for i in range(count)]
+    return result
+
+
+def solve_all(robot: RobotModel, pose: Pose | Array, *, e1: float | None = None) -> list[Array]:
+    """Solutions within the joint limits.
+
+    Args:
+        robot: the robot.
+        pose: of the flange in the base frame.
+        e1: arm angle [rad]; None: the middle of each interval of arm angles.
+
+    Returns:
+        For an arm angle: one for each Status that has one, up to 8. Without: one for each interval of each
+        Status. Each has shape (7,) [rad].
 
     Raises:
         Unreachable: out of reach.
     """
     r, p = rows(pose)
-    found = (raw(robot, r, p, e1, status) for status in range(8))
-    return [np.array(q) for q in found if inside(robot, q)]
+    found: list[tuple[float, ...]] = []
+    for status in range(8):
+        angles = [(a + b) / 2 for a, b in _intervals(robot, r, p, status)] if e1 is None else [e1]
+        found += (q for a in angles if inside(robot, q := raw(robot, r, p, a, status)))
+    return [np.array(q) for q in found]

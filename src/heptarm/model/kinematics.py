@@ -1,8 +1,9 @@
 """Forward kinematics and Jacobian of an LBR.
 
-The chain is Rz(A1) Ry(A2) Rz(A3) Ry(-A4) Rz(A5) Ry(A6) Rz(A7) with all offsets along z: base to shoulder, to elbow, to
-wrist, to flange. A rotation about z or y mixes two columns of the rotation matrix, so the product is six sums a joint; it
-is written with plain floats because numpy's overhead on 3x3 matrices is ten times its work.
+The chain is Rz(A1) Ry(A2) Rz(A3) Ry(-A4) Rz(A5) Ry(A6) Rz(A7) with all offsets along z: base to shoulder, to
+elbow, to wrist, to flange. A rotation about z or y mixes two columns of the rotation matrix, so the product
+is six sums a joint; it is written with plain floats because numpy's overhead on 3x3 matrices is ten times
+its work.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.values.arrays import Array
+from heptarm.values.arrays import Array, array
 from heptarm.values.robot import RobotModel
 
 Vec: TypeAlias = tuple[float, float, float]
@@ -65,8 +66,12 @@ def forward(robot: RobotModel, q: npt.ArrayLike) -> Array:
 
     Returns:
         Homogeneous matrix, shape (4, 4) [m].
+
+    Raises:
+        ShapeError: `q` has not seven entries.
+        LimitError: one is not finite.
     """
-    columns, position = flange(robot, [float(v) for v in np.asarray(q)])
+    columns, position = flange(robot, array(q, 7, "q").tolist())
     result = np.eye(4)
     result[:3, :3] = np.array(columns).T
     result[:3, 3] = position
@@ -96,25 +101,26 @@ def jacobian(robot: RobotModel, q: npt.ArrayLike, point: npt.ArrayLike | None = 
     Args:
         robot: the robot.
         q: joint positions, shape (7,) [rad].
-        point: point of the last link whose velocity is wanted, in the base frame, shape (3,) [m]; None: the flange.
+        point: point of the last link whose velocity is wanted, in the base frame, shape (3,) [m]; None: the
+            flange.
 
     Returns:
         Shape (6, 7): rows vx vy vz [m/rad], wx wy wz.
     """
-    axes, points, tip = joints(robot, [float(v) for v in np.asarray(q)])
+    axes, points, tip = joints(robot, array(q, 7, "q").tolist())
     target = np.asarray(tip if point is None else point, dtype=np.float64)
     z = np.array(axes)
     return np.vstack([np.cross(z, target - np.array(points)).T, z.T])
 
 
 def jacobian_derivative(robot: RobotModel, q: npt.ArrayLike, dq: npt.ArrayLike) -> Array:
-    """Time derivative of the flange's Jacobian along dq, shape (6, 7).
+    """Time derivative of the flange's Jacobian along dq [rad/s], shape (6, 7), base axes.
 
-    dz_i = w_i x z_i with w_i the velocity of the link that carries axis i; the lever's derivative is the difference of the
-    tip's and the point's velocities.
+    dz_i = w_i x z_i with w_i the velocity of the link that carries axis i; the lever's derivative is the
+    difference of the tip's and the point's velocities.
     """
-    axes, points, tip = joints(robot, [float(v) for v in np.asarray(q)])
-    z, p, rates = np.array(axes), np.array(points), np.asarray(dq, dtype=np.float64)
+    axes, points, tip = joints(robot, array(q, 7, "q").tolist())
+    z, p, rates = np.array(axes), np.array(points), array(dq, 7, "dq")
     lever = np.asarray(tip) - p
     spin = np.vstack([np.zeros(3), np.cumsum(z * rates[:, None], axis=0)[:-1]])
     dz = np.cross(spin, z)

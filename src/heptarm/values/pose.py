@@ -24,7 +24,8 @@ class Pose:
 
     Attributes:
         xyz: translation, shape (3,) [m].
-        quat: rotation as a unit quaternion, shape (4,), x y z w, with w >= 0.
+        quat: rotation as a unit quaternion, shape (4,), x y z w; of the two that mean it, the one whose last
+            entry that is not 0 is positive.
 
     Raises:
         ShapeError: wrong shapes, or the quaternion's norm is further than 1e-3 from 1.
@@ -39,8 +40,14 @@ class Pose:
         quat = array(self.quat, 4, "quat")
         norm = float(np.linalg.norm(quat))
         if abs(norm - 1.0) > 1e-3:
-            raise ShapeError(f"quat {quat} has norm {norm:.6g}; 1 is wanted: divide it by its norm")
-        quat = quat / (norm if quat[3] >= 0 else -norm)
+            raise ShapeError(
+                f"quat {quat} has norm {norm:.6g}; 1 is wanted",
+                code=4,
+                parameter="quat",
+                value=norm,
+                hint="divide it by its norm",
+            )
+        quat = quat / (-norm if _turned(quat.tolist()) else norm) + 0.0  # + 0.0: no -0.0, see arrays
         quat.flags.writeable = False
         object.__setattr__(self, "quat", quat)
 
@@ -153,6 +160,11 @@ class Pose:
         """Short form in KUKA's notation, degrees."""
         a, b, c = np.degrees(self.abc)
         return f"Pose(x={self.x:.4f} y={self.y:.4f} z={self.z:.4f} m, a={a:.2f} b={b:.2f} c={c:.2f} deg)"
+
+
+def _turned(quat: list[float]) -> bool:
+    """Whether the last entry that is not 0 is negative."""
+    return next((v for v in reversed(quat) if v != 0.0), 1.0) < 0.0
 
 
 def multiply(p: Any, q: Any) -> Array:

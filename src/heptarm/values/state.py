@@ -118,7 +118,7 @@ class Wrench(Value):
 
     @property
     def array(self) -> Array:
-        """fx fy fz [N], tx ty tz [Nm], shape (6,)."""
+        """Fx fy fz [N], tx ty tz [Nm], shape (6,)."""
         return np.concatenate([self.force, self.torque])
 
     def valid(self, *, force: float = 10.0, torque: float = 10.0) -> bool:
