@@ -1,4 +1,4 @@
-"""Datagrams that the vendor's unmodified C++ client wrote or accepted, byte for byte (from the project's fact page on FRI)."""
+"""Datagrams that the vendor's unmodified C++ client wrote or accepted, byte for byte."""
 
 MONITORING_1X = bytes.fromhex(
     "0a0b08c2a2910110950a18930a1216080710002802280228022802280228022802300038001ad3020a3f099a9999999999b93f099a9999999999d93f099a9999999999b9bf09333333333333f3bf099a9999999999c93f09cdccccccccccec3f0900000000000000"

@@ -1,8 +1,8 @@
 """Encoding and strict decoding of FRI messages, one table-driven walk for all versions.
 
-Strict means: the message id is right, joint arrays have exactly 7 doubles, enumerations have known values, names fit 63
-characters, at most 10 signals and 5 transformations. Packed and unpacked doubles are both read; unknown fields are skipped.
-The hot path has its own encoder and reader in `heptarm.fri.template`.
+Strict means: the message id is right, joint arrays have exactly 7 doubles, enumerations have known values,
+names fit 63 characters, at most 10 signals and 5 transformations. Packed and unpacked doubles are both read;
+unknown fields are skipped. The hot path has its own encoder and reader in `heptarm.fri.template`.
 """
 
 from __future__ import annotations
@@ -184,7 +184,7 @@ def _header(found: _Collected, wanted: int) -> m.Header:
 
 
 def _robot(sub: _Collected) -> m.RobotInfo:
-    drives = []
+    drives: list[m.DriveState] = []
     for kind, value in sub.get(5, []):
         octets = value if isinstance(value, bytes) else bytes([value & 0xFF])
         if kind not in (VARINT, BYTES) or any(octet > max(m.DriveState) for octet in octets):

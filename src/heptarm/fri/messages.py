@@ -1,7 +1,7 @@
 """The values of an FRI exchange, the same for every version; what a version lacks stays None.
 
-Units are FRI's own (rad, Nm, N, and millimetres in transformations), since these values are the wire's; the client turns
-them into SI. Joint arrays have 7 entries. Enumerations and tags: the fact page on FRI.
+Units are FRI's own (rad, Nm, N, and millimetres in transformations), since these values are the wire's; the
+client turns them into SI. Joint arrays have 7 entries.
 """
 
 from __future__ import annotations

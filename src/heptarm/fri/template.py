@@ -1,8 +1,8 @@
 """The hot path of FRI: fixed layouts for the datagrams that pass a thousand times a second.
 
-`CommandTemplate` writes a joint (and torque or wrench) command; `MonitoringReader` reads the joint arrays of a monitoring
-message in one `struct` call and compares all that seldom changes (robot info, connection, keys) with the message before.
-Both agree with `heptarm.fri.codec`, on which the reader falls back as soon as anything differs.
+`CommandTemplate` writes a joint (and torque or wrench) command; `MonitoringReader` reads the joint arrays of a
+monitoring message in one `struct` call and compares all that seldom changes (robot info, connection, keys) with
+the message before. Both agree with `heptarm.fri.codec`, on which the reader falls back as soon as anything differs.
 """
 
 from __future__ import annotations
@@ -229,7 +229,7 @@ class _Layout:
 
 
 def _struct_of(body: bytes, doubles: int) -> tuple[struct.Struct, tuple[bytes, ...]]:
-    """A struct that reads `body` as runs of fixed octets around `doubles` doubles, which are zero in it; and the runs."""
+    """A struct that reads `body` as runs of fixed octets around `doubles` zeroed doubles; and the runs."""
     runs: list[bytes] = []
     rest = body
     for _ in range(doubles):
@@ -242,8 +242,8 @@ def _struct_of(body: bytes, doubles: int) -> tuple[struct.Struct, tuple[bytes, .
 class MonitoringReader:
     """Decodes the monitoring messages of one session.
 
-    The first message of a layout is decoded in full. As long as everything but counters, stamps and doubles stays the same,
-    later ones are read from their known places; any difference goes the full way again.
+    The first message of a layout is decoded in full. As long as everything but counters, stamps and doubles stays
+    the same, later ones are read from their known places; any difference goes the full way again.
     """
 
     def __init__(self, version: Version) -> None:

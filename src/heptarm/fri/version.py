@@ -81,7 +81,8 @@ def wrap(message: bytes, version: Version) -> bytes:
         message = len(message).to_bytes(4, "little") + message + zlib.crc32(message).to_bytes(4, "little")
     if len(message) > MAX_DATAGRAM:
         raise ValueError(
-            f"FRI datagram of {len(message)} octets; at most {MAX_DATAGRAM}: use fewer or shorter IO names and transformations"
+            f"FRI datagram of {len(message)} octets; at most {MAX_DATAGRAM}: "
+            "use fewer or shorter IO names and transformations"
         )
     return message
 
@@ -96,7 +97,8 @@ def unwrap(datagram: bytes, version: Version) -> bytes:
         if not is_framed(datagram):
             if datagram[:1] == b"\x0a":
                 raise MalformedMessage(
-                    "the other side speaks FRI 1.x or 2.5 (no length before the message), this side FRI 2.7: set the same version on both"
+                    "the other side speaks FRI 1.x or 2.5 (no length before the message), this side FRI 2.7: "
+                    "set the same version on both"
                 )
             raise MalformedMessage(
                 f"FRI 2.7 datagram of {len(datagram)} octets: the length before the message does not fit"
