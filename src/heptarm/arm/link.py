@@ -1,10 +1,10 @@
 """A session over a transport: requests, events, heartbeats.
 
 Who reads the connection? While a caller waits for an answer, the caller reads itself: that saves two changes of
-threads, half of a round trip. At all other times the thread "heptarm-link" reads. It waits for the connection to become
-readable without taking anything, so a caller need not wake it to take its place; `_token` says who may take.
-A caller's thread may be interrupted anywhere (Ctrl-C). If that happens after octets were taken and before they were
-understood, nobody knows where the next frame begins: then the link is given up, and the cabinet stops the arm.
+threads, half of a round trip. At all other times the thread "heptarm-link" reads. It waits for the connection to
+become readable without taking anything, so a caller need not wake it to take its place; `_token` says who may take.
+A caller's thread may be interrupted anywhere (Ctrl-C). If that happens after octets were taken and before they
+were understood, nobody knows where the next frame begins: then the link is given up, and the cabinet stops the arm.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from heptarm.wire.messages import (
     Rejected,
     Welcome,
 )
-from heptarm.wire.session import Received, Session, StateReceived
+from heptarm.wire.session import Received, Session, Side, StateReceived
 from heptarm.wire.transitions import SessionState
 
 _log = logging.getLogger("heptarm.link")
@@ -81,8 +81,6 @@ class Link:
         on_state: Callable[[bytes, int], None],
         on_lost: Callable[[HeptarmError], None],
     ) -> None:
-        from heptarm.wire.session import Side
-
         self.offset = ClockOffset()
         self.peer = transport.peer
         self._transport = transport
@@ -170,7 +168,7 @@ class Link:
         return self._error
 
     def expect_watchdog(self, seconds: float) -> None:
-        """Keep the cabinet's watchdog of that length fed (seconds of the cabinet's clock)."""
+        """Ping often enough for a watchdog of that length at the cabinet."""
         self._watchdog = seconds
 
     def request(
@@ -328,8 +326,8 @@ class Link:
             self._on_lost(self._error)
 
     def _interval(self) -> int:
-        """Pause between pings [ns], a quarter of what the cabinet tolerates on its own clock."""
-        return round(min(self._heartbeat, self._watchdog) / 4 / max(self.offset.rate, 1.0) * 1e9)
+        """Pause between pings [ns]: a quarter of what the cabinet tolerates."""
+        return round(min(self._heartbeat, self._watchdog) / 4 * 1e9)
 
     def _silence(self) -> int:
         return round(max(2 * self._heartbeat, 1.0) * 1e9)

@@ -105,6 +105,13 @@ class ClockOffset:
         anchor = self._anchor
         return round(anchor.theirs + (ours - anchor.ours) * self._rate)
 
+    def to_ours(self, theirs: int) -> int:
+        """Our clock [ns] when the cabinet's shows `theirs` [ns]; 0 before the first ping."""
+        anchor = self._anchor
+        if not self._samples:
+            return 0
+        return round(anchor.ours + (theirs - anchor.theirs) / (self._rate or 1.0))
+
     def age(self, stamp: int, ours: int) -> float:
         """Seconds of cabinet time from `stamp` (cabinet clock, ns) to `ours` (our clock, ns); NaN: unknown."""
         if not self._samples:

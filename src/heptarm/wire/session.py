@@ -30,6 +30,7 @@ from heptarm.wire.messages import (
     Message,
     Proof,
     Refusal,
+    Rejected,
     State,
     Welcome,
 )
@@ -142,11 +143,12 @@ class Session:
         after = TRANSITIONS[self._state].get(_SYMBOLS[kind])
         if after is None:
             raise LocalProtocolError(f"a {kind.__name__} may not be sent in state {self._state.value!r}")
-        if (kind.KIND in ("request", "answer")) != (request != 0):
+        is_numbered = kind.KIND in ("request", "answer") and (kind is not Rejected or request != 0)
+        if is_numbered != (request != 0):
             raise LocalProtocolError(f"a {kind.__name__} with request id {request}")
         if kind.KIND == "request" and request in self._waiting:
             raise LocalProtocolError(f"request id {request} is in use")
-        if kind.KIND == "answer" and request not in self._waiting:
+        if kind.KIND == "answer" and is_numbered and request not in self._waiting:
             raise LocalProtocolError(f"no request {request} waits for an answer")
         data = pack(kind.TYPE, message.encode(), seq=self._sent, request=request, time=time)
         self._sent = (self._sent + 1) & _WRAP
@@ -218,9 +220,11 @@ class Session:
         after = TRANSITIONS[self._state].get(_SYMBOLS[kind])
         if after is None or self._source == kind.SOURCE:
             raise _broken(Code.UNEXPECTED_MESSAGE, f"a {kind.__name__} came in state {self._state.value!r}")
-        if (kind.KIND in ("request", "answer")) != (frame.request != 0):
+        # the refusal of a message that was no request carries no id
+        is_numbered = kind.KIND in ("request", "answer") and (kind is not Rejected or frame.request != 0)
+        if is_numbered != (frame.request != 0):
             raise _broken(Code.UNEXPECTED_MESSAGE, f"a {kind.__name__} with request id {frame.request}")
-        if kind.KIND == "answer" and frame.request not in self._waiting:
+        if kind.KIND == "answer" and is_numbered and frame.request not in self._waiting:
             raise _broken(
                 Code.UNEXPECTED_MESSAGE, f"an answer to request {frame.request}, which was not made"
             )

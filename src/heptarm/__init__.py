@@ -1,0 +1,132 @@
+"""Control a KUKA LBR iiwa from Python, with or without a robot on the desk.
+
+::
+
+    import heptarm as ha
+
+    with ha.connect("sim://iiwa14") as arm:
+        arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)))
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from heptarm.arm.arm import Arm
+    from heptarm.arm.connect import connect
+    from heptarm.arm.feed import States
+    from heptarm.arm.handle import MotionHandle
+    from heptarm.arm.target import target_from_env
+    from heptarm.errors import (
+        ArrivalError,
+        CommandRejected,
+        ConnectFailed,
+        ConnectionLost,
+        HeptarmError,
+        LimitError,
+        LocalProtocolError,
+        MissingExtra,
+        ModeConflict,
+        MotionAborted,
+        MotionError,
+        NeedsOperator,
+        NotInControl,
+        NotReady,
+        ProtocolError,
+        QualityLost,
+        RemoteProtocolError,
+        SafetyStop,
+        ShapeError,
+        StaleState,
+        Starved,
+        StreamError,
+        Timeout,
+        Unreachable,
+        VersionMismatch,
+    )
+    from heptarm.values.motion import hold, lin, lin_rel, ptp
+    from heptarm.values.pose import Pose, deg
+    from heptarm.values.redundancy import Redundancy
+    from heptarm.values.result import Cause, Result
+    from heptarm.values.state import State
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Arm",
+    "ArrivalError",
+    "Cause",
+    "CommandRejected",
+    "ConnectFailed",
+    "ConnectionLost",
+    "HeptarmError",
+    "LimitError",
+    "LocalProtocolError",
+    "MissingExtra",
+    "ModeConflict",
+    "MotionAborted",
+    "MotionError",
+    "MotionHandle",
+    "NeedsOperator",
+    "NotInControl",
+    "NotReady",
+    "Pose",
+    "ProtocolError",
+    "QualityLost",
+    "Redundancy",
+    "RemoteProtocolError",
+    "Result",
+    "SafetyStop",
+    "ShapeError",
+    "StaleState",
+    "Starved",
+    "State",
+    "States",
+    "StreamError",
+    "Timeout",
+    "Unreachable",
+    "VersionMismatch",
+    "__version__",
+    "connect",
+    "deg",
+    "hold",
+    "lin",
+    "lin_rel",
+    "ptp",
+    "target_from_env",
+]
+
+#: Where the names live; they are imported when they are used, so that `import heptarm` costs nothing.
+_HOMES = {
+    "Arm": "arm.arm",
+    "connect": "arm.connect",
+    "States": "arm.feed",
+    "MotionHandle": "arm.handle",
+    "target_from_env": "arm.target",
+    "hold": "values.motion",
+    "lin": "values.motion",
+    "lin_rel": "values.motion",
+    "ptp": "values.motion",
+    "Pose": "values.pose",
+    "deg": "values.pose",
+    "Redundancy": "values.redundancy",
+    "Cause": "values.result",
+    "Result": "values.result",
+    "State": "values.state",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, imported at its first use."""
+    if name not in __all__:
+        raise AttributeError(f"module 'heptarm' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"heptarm.{_HOMES.get(name, 'errors')}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """The public names."""
+    return sorted(__all__)

@@ -1,0 +1,189 @@
+"""A program under way: wait for it, cancel it, see how far it is."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Generator
+from concurrent.futures import Future
+from concurrent.futures import TimeoutError as FutureTimeout
+from math import isnan
+from typing import TYPE_CHECKING, Any
+
+from heptarm import errors
+from heptarm.arm.refusals import error_of
+from heptarm.errors import CommandRejected, ConnectionLost, HeptarmError, MotionAborted, Starved, Timeout
+from heptarm.values.result import Cause, Result
+from heptarm.wire.codes import MEANINGS
+from heptarm.wire.messages import ItemReached, Message, MotionFinished, MotionStarted
+
+if TYPE_CHECKING:
+    from heptarm.arm.arm import Arm
+
+#: Ends that are results; all others are errors.
+_GOOD = (Cause.FINISHED, Cause.CANCELLED, Cause.CONDITION, Cause.REPLACED)
+
+
+class MotionHandle:
+    """A program that was sent to the cabinet; made by `Arm.start`.
+
+    It can be awaited in asyncio. Its id is the cabinet's.
+    """
+
+    def __init__(self, arm: Arm, count: int, limit: float) -> None:
+        self._arm = arm
+        self._count = count
+        self._limit = limit
+        self._id = 0
+        self._item = -1
+        self._future: Future[Result] = Future()
+
+    def __repr__(self) -> str:
+        """Short form."""
+        return (
+            f"<MotionHandle {self._id}: {'done' if self.done else 'running' if self.started else 'waiting'}>"
+        )
+
+    @property
+    def id(self) -> int:
+        """The cabinet's number of the program."""
+        return self._id
+
+    @property
+    def limit(self) -> float:
+        """How long `wait` waits unless told otherwise [s]."""
+        return self._limit
+
+    @property
+    def started(self) -> bool:
+        """Whether the first motion has begun."""
+        return self._item >= 0
+
+    @property
+    def done(self) -> bool:
+        """Whether it has ended, in whatever way."""
+        return self._future.done()
+
+    @property
+    def result(self) -> Result | None:
+        """How it ended; None while it has not, or if it ended with an error (`wait` raises it)."""
+        if not self._future.done() or self._future.exception() is not None:
+            return None
+        return self._future.result()
+
+    @property
+    def progress(self) -> float:
+        """How much of it is done, [0, 1]; each motion counts the same."""
+        if self.done:
+            return (
+                1.0 if self.result is not None and self.result.cause is Cause.FINISHED else self._share(0.0)
+            )
+        state = self._arm.newest()
+        seen = None if state is None else state.motion
+        if seen is None or seen.id != self._id or seen.item != max(self._item, 0) or isnan(seen.progress):
+            return self._share(0.0)
+        return self._share(seen.progress)
+
+    def _share(self, of_item: float) -> float:
+        return (max(self._item, 0) + of_item) / self._count
+
+    def wait(self, *, timeout: float | None = None) -> Result:
+        """Wait until it has ended.
+
+        Args:
+            timeout: how long [s]; None: three times as long as the program can take at its speed, and more.
+
+        Returns:
+            How it ended. Cancelling, a break condition and replacement are results as well.
+
+        Raises:
+            MotionAborted: it was ended under way; carries cause, state and history.
+            CommandRejected: the cabinet found while planning that it cannot be done (mostly a LimitError).
+            ConnectionLost: the cabinet was lost; what became of the motion is unknown here, the cabinet stops it.
+            Timeout: it has not ended; it goes on.
+        """
+        limit = self._limit if timeout is None else timeout
+        try:
+            with self._arm.stopping_on_interrupt():
+                return self._future.result(limit)
+        except FutureTimeout:
+            if self._future.done():  # it ended with an error that is a TimeoutError
+                raise
+            raise Timeout(
+                f"motion {self._id} has not ended within {limit:.1f} s",
+                hint="give a longer timeout, or look at arm.state whether the arm may move",
+            ) from None
+
+    def cancel(self) -> None:
+        """End it: a running motion brakes on its path, a waiting one is dropped. Cancelling twice is legal."""
+        self._arm.cancel(self)
+
+    def add_done_callback(self, callback: Callable[[MotionHandle], None]) -> None:
+        """Call `callback(handle)` when it has ended; from the link's thread, so it must not block."""
+        self._future.add_done_callback(lambda _: callback(self))
+
+    def __await__(self) -> Generator[Any, None, Result]:
+        """Wait in asyncio; giving up waiting does not cancel the motion."""
+        return asyncio.shield(asyncio.wrap_future(self._future)).__await__()
+
+    # ---------------------------------------------------------------------------- from the link
+
+    def accepted(self, number: int) -> None:
+        """The cabinet has taken it, under that number."""
+        self._id = number
+
+    def on_event(self, message: Message) -> None:
+        """An event of this program came."""
+        if isinstance(message, MotionStarted):
+            self._item = message.item
+        elif isinstance(message, ItemReached):
+            self._item = max(self._item, message.item)
+        elif isinstance(message, MotionFinished):
+            self._finish(message)
+
+    def lose(self, error: HeptarmError) -> None:
+        """The link was lost."""
+        self._end(
+            ConnectionLost(
+                f"motion {self._id} was under way when the connection was lost: {error.text}",
+                code=error.code,
+                hint="arm.reconnect(), then look where the arm is",
+            )
+        )
+
+    def _finish(self, message: MotionFinished) -> None:
+        result = self._arm.result_of(message)
+        if result.cause in _GOOD:
+            if not self._future.done():
+                self._future.set_result(result)
+            return
+        what = message.text or (MEANINGS[message.code].title if message.code in MEANINGS else "")
+        text = f"motion {message.id} {_WORDS[result.cause]}{': ' + what if what else ''}"
+        meaning = MEANINGS.get(message.code)
+        hint = meaning.advice if meaning is not None else ""
+        kind = getattr(errors, meaning.error) if meaning is not None else MotionAborted
+        if result.cause is Cause.LOST:
+            error: HeptarmError = ConnectionLost(text, code=message.code, hint=hint)
+        elif result.cause is Cause.STARVED:
+            error = Starved(text, code=message.code, hint=hint)
+        elif result.cause is Cause.FAILED and issubclass(kind, CommandRejected) and not self.started:
+            error = error_of(message.code, text)  # found while planning: nothing has moved
+        else:
+            error = MotionAborted(
+                text, result=result, history=self._arm.history(), code=message.code, hint=hint
+            )
+        self._end(error)
+
+    def _end(self, error: HeptarmError) -> None:
+        with contextlib.suppress(Exception):  # InvalidStateError: it has ended before
+            self._future.set_exception(error)
+
+
+_WORDS = {
+    Cause.STOPPED: "was stopped",
+    Cause.LOST: "was stopped because its controller was lost",
+    Cause.FAILED: "failed",
+    Cause.SAFETY: "was ended by a safety function",
+    Cause.DROPPED: "was dropped, because one before it failed",
+    Cause.STARVED: "was stopped for want of targets",
+}

@@ -1,0 +1,195 @@
+"""From motions to the items of a program, checked against the connected robot before anything is sent."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf, isinf, isnan, nan
+
+import numpy as np
+
+from heptarm.errors import HeptarmError, ShapeError
+from heptarm.model.inverse import redundancy
+from heptarm.values import motion as values
+from heptarm.values.arrays import Array
+from heptarm.values.limits import Blending, CartesianDynamics, JointDynamics
+from heptarm.values.motion import Hold, Lin, LinRel, Motion, Ptp, PtpPose
+from heptarm.values.pose import Pose
+from heptarm.values.robot import RobotModel
+from heptarm.wire import messages as wire
+
+_MOTIONS = (Ptp, PtpPose, Lin, LinRel, Hold)
+#: A motion may take this much longer than its slowest plausible estimate, and this much more [s].
+_GENEROUS, _AND_MORE = 3.0, 15.0
+#: The longest straight line inside the workspace of the largest arm [m].
+_LONGEST_LINE = 2.0
+#: Cartesian speed assumed where none is given [m/s].
+_SLOW_LINE = 0.1
+
+
+def listed(motion: Motion | Sequence[Motion]) -> tuple[Motion, ...]:
+    """One motion or several, as a tuple.
+
+    Raises:
+        ShapeError: something else, or none at all.
+    """
+    motions = (motion,) if isinstance(motion, _MOTIONS) else motion
+    if not isinstance(motions, Sequence) or isinstance(motions, str) or not 1 <= len(motions) <= 1000:
+        raise ShapeError(
+            f"{type(motion).__name__} given where a motion or a list of 1 to 1000 motions is wanted",
+            parameter="motion",
+            hint="make motions with ptp, lin, lin_rel and hold",
+        )
+    for index, one in enumerate(motions):
+        if not isinstance(one, _MOTIONS):
+            raise ShapeError(
+                f"motions[{index}] is {one!r}, which is no motion",
+                parameter=f"motions[{index}]",
+                hint="make motions with ptp, lin, lin_rel and hold; joint positions alone are ptp(q)",
+            )
+    return tuple(motions)
+
+
+def items(motions: Sequence[Motion], robot: RobotModel, ceiling: float) -> tuple[wire.Item, ...]:
+    """The items of a program.
+
+    Args:
+        motions: what to do.
+        robot: the connected robot.
+        ceiling: no axis faster than this fraction of its maximum, (0, 1].
+
+    Raises:
+        LimitError: a target is outside the robot's limits; the text names motion, axis, value and range.
+    """
+    result = []
+    for index, motion in enumerate(motions):
+        try:
+            result.append(_item(motion.under(ceiling), robot))
+        except HeptarmError as error:
+            if len(motions) > 1:  # which of them
+                error.text = f"motions[{index}]: {error.text}"
+                error.parameter = f"motions[{index}].{error.parameter}"
+                error.args = (error.text,)
+            raise
+    return tuple(result)
+
+
+def longest(motions: Sequence[Motion], robot: RobotModel, ceiling: float) -> float:
+    """A time that no healthy program takes [s]; infinite if it holds until it is cancelled."""
+    return _AND_MORE + _GENEROUS * sum(_slowest(motion.under(ceiling), robot) for motion in motions)
+
+
+def _slowest(motion: Motion, robot: RobotModel) -> float:
+    if isinstance(motion, Hold):
+        return motion.duration
+    turn = _turn(motion.joints, robot)
+    if isinstance(motion, Lin | LinRel):
+        speed = motion.path.velocity
+        return turn + _LONGEST_LINE / (_SLOW_LINE if isnan(speed) else speed) + 1.0
+    return turn
+
+
+def _turn(joints: JointDynamics, robot: RobotModel) -> float:
+    """Time for every axis to go from end to end, with ramps [s]."""
+    velocity, acceleration = (
+        np.nan_to_num(joints.velocity, nan=1.0),
+        np.nan_to_num(joints.acceleration, nan=1.0),
+    )
+    jerk = np.nan_to_num(joints.jerk, nan=1.0)
+    way = (robot.q_max - robot.q_min) / (robot.dq_max * velocity)
+    ramps = robot.dq_max * velocity / (robot.ddq_max * acceleration) + robot.ddq_max / (robot.dddq_max * jerk)
+    return float(np.max(way + ramps))
+
+
+def _item(motion: Motion, robot: RobotModel) -> wire.Item:
+    if isinstance(motion, Ptp):
+        robot.check(motion.q)
+        return wire.Item(
+            motion=wire.Ptp(
+                q=_tuple(motion.q), dynamics=_joints(motion.joints), blending=_blending(motion.blending)
+            )
+        )
+    if isinstance(motion, PtpPose):
+        return wire.Item(
+            motion=wire.PtpPose(
+                target=_pose(motion.pose),
+                redundancy=_redundancy(motion, robot),
+                dynamics=_joints(motion.joints),
+                blending=_blending(motion.blending),
+            ),
+            frame=_frame(motion.moving),
+        )
+    if isinstance(motion, Lin):
+        return wire.Item(
+            motion=wire.Lin(
+                target=_pose(motion.pose),
+                redundancy=_redundancy(motion, robot),
+                dynamics=_path(motion.path),
+                joints=_joints(motion.joints),
+                blending=_blending(motion.blending),
+            ),
+            frame=_frame(motion.moving),
+        )
+    if isinstance(motion, LinRel):
+        return wire.Item(
+            motion=wire.LinRel(
+                offset=_pose(motion.offset),
+                reference=_frame(motion.frame),
+                dynamics=_path(motion.path),
+                joints=_joints(motion.joints),
+                blending=_blending(motion.blending),
+            ),
+            frame=_frame(motion.moving),
+        )
+    return wire.Item(motion=wire.Hold(duration=nan if isinf(motion.duration) else motion.duration))
+
+
+def _frame(name: str) -> str:
+    """On the wire the moved frame has no name."""
+    return "" if name == values.TOOL else name
+
+
+def _redundancy(motion: PtpPose | Lin, robot: RobotModel) -> wire.Redundancy:
+    if motion.near is not None:
+        robot.check(motion.near, "near")
+        near = redundancy(robot, motion.near.tolist())
+        return wire.Redundancy(e1=near.e1, status=near.status, turn=-1)
+    if motion.redundancy is not None:
+        chosen = motion.redundancy
+        return wire.Redundancy(e1=chosen.e1, status=chosen.status, turn=chosen.turn)
+    return wire.Redundancy(e1=nan, status=-1, turn=-1)
+
+
+def _pose(pose: Pose) -> wire.Pose:
+    return wire.Pose(xyz=_tuple(pose.xyz), quat=_tuple(pose.quat))
+
+
+def _joints(limits: JointDynamics) -> wire.JointDynamics:
+    return wire.JointDynamics(
+        velocity=_tuple(limits.velocity), acceleration=_tuple(limits.acceleration), jerk=_tuple(limits.jerk)
+    )
+
+
+def _path(limits: CartesianDynamics) -> wire.CartesianDynamics:
+    return wire.CartesianDynamics(
+        velocity=limits.velocity,
+        acceleration=limits.acceleration,
+        jerk=limits.jerk,
+        orientation_velocity=limits.orientation_velocity,
+        orientation_acceleration=limits.orientation_acceleration,
+        orientation_jerk=limits.orientation_jerk,
+    )
+
+
+def _blending(blending: Blending) -> wire.Blending:
+    return wire.Blending(
+        relative=blending.relative, distance=blending.distance, orientation=blending.orientation
+    )
+
+
+def _tuple(values: Array) -> tuple[float, ...]:
+    return tuple(values.tolist())
+
+
+def is_endless(motions: Sequence[Motion]) -> bool:
+    """Whether it ends only when it is cancelled."""
+    return any(isinstance(motion, Hold) and motion.duration == inf for motion in motions)
