@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import Array, array
+from heptarm.values.arrays import Array, Value, array
 
 
 def deg(*angles: float) -> Array:
@@ -19,7 +19,7 @@ def deg(*angles: float) -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Pose:
+class Pose(Value):
     """Pose of a frame relative to a reference frame.
 
     Attributes:
@@ -54,7 +54,7 @@ class Pose:
     @classmethod
     def of(cls, xyz: npt.ArrayLike, quat: npt.ArrayLike = (0.0, 0.0, 0.0, 1.0)) -> Pose:
         """Pose from a translation (3,) [m] and a quaternion (4,) x y z w."""
-        return cls(np.asarray(xyz, dtype=np.float64), np.asarray(quat, dtype=np.float64))
+        return cls(cast("Array", xyz), cast("Array", quat))
 
     @classmethod
     def at(cls, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Pose:
@@ -120,8 +120,8 @@ class Pose:
         r = self.rotation
         b = math.atan2(-r[2, 0], math.hypot(r[0, 0], r[1, 0]))
         if math.hypot(r[0, 0], r[1, 0]) < 1e-12:  # gimbal lock: c is taken as 0
-            return np.array([math.atan2(-r[0, 1], r[1, 1]), b, 0.0])
-        return np.array([math.atan2(r[1, 0], r[0, 0]), b, math.atan2(r[2, 1], r[2, 2])])
+            return np.array([math.atan2(-r[0, 1], r[1, 1]), b, 0.0]) + 0.0
+        return np.array([math.atan2(r[1, 0], r[0, 0]), b, math.atan2(r[2, 1], r[2, 2])]) + 0.0
 
     @property
     def array(self) -> Array:
@@ -145,16 +145,6 @@ class Pose:
         """Angle between the orientations [rad], in [0, pi]."""
         difference = multiply(self.quat * np.array([-1.0, -1.0, -1.0, 1.0]), other.quat)
         return 2.0 * math.atan2(float(np.linalg.norm(difference[:3])), abs(float(difference[3])))
-
-    def __eq__(self, other: object) -> bool:
-        """Equal numbers."""
-        return isinstance(other, Pose) and bool(
-            np.array_equal(self.xyz, other.xyz) and np.array_equal(self.quat, other.quat)
-        )
-
-    def __hash__(self) -> int:
-        """Hash of the numbers."""
-        return hash((self.xyz.tobytes(), self.quat.tobytes()))
 
     def __repr__(self) -> str:
         """Short form in KUKA's notation, degrees."""

@@ -1,0 +1,63 @@
+"""The tree of errors."""
+
+from __future__ import annotations
+
+import inspect
+
+import pytest
+
+from heptarm import errors
+from heptarm.errors import HeptarmError, LimitError, MissingExtra, MotionAborted, NeedsOperator, require
+from heptarm.values.result import Cause, Result
+
+ALL = [kind for _, kind in inspect.getmembers(errors, inspect.isclass) if issubclass(kind, HeptarmError)]
+
+
+@pytest.mark.parametrize("kind", ALL)
+def test_documented_in_the_tree(kind: type[HeptarmError]) -> None:
+    assert kind.__name__ in (errors.__doc__ or "")
+    assert kind.__doc__
+
+
+@pytest.mark.parametrize("kind", ALL)
+def test_carries_its_details(kind: type[HeptarmError]) -> None:
+    error = kind("it failed", code=2, parameter="q[3]", value=4.0, allowed="[0, 1]", hint="do less")
+    assert str(error) == "it failed (do less)"
+    assert (error.code, error.parameter, error.value, error.allowed) == (2, "q[3]", 4.0, "[0, 1]")
+    assert str(kind("plain")) == "plain"
+
+
+@pytest.mark.parametrize(
+    ("kind", "builtin"),
+    [
+        ("ConnectFailed", ConnectionError),
+        ("ConnectionLost", ConnectionError),
+        ("CommandRejected", ValueError),
+        ("Timeout", TimeoutError),
+        ("MissingExtra", ImportError),
+    ],
+)
+def test_python_may_catch_them_too(kind: str, builtin: type[Exception]) -> None:
+    assert issubclass(getattr(errors, kind), builtin)
+
+
+def test_motion_errors_carry_their_result() -> None:
+    error = MotionAborted("stopped", result=Result(Cause.SAFETY), history=[1, 2])
+    assert error.cause is Cause.SAFETY
+    assert error.state is None
+    assert error.history == (1, 2)
+    assert MotionAborted("stopped").cause is None
+
+
+def test_operator() -> None:
+    assert NeedsOperator("e-stop", hint="release it").instructions == "release it"
+    assert NeedsOperator("e-stop").instructions == "e-stop"
+
+
+def test_require() -> None:
+    import math
+
+    assert require("math", extra="sim") is math
+    with pytest.raises(MissingExtra, match=r"pip install 'heptarm\[sim\]'"):
+        require("heptarm_no_such_module", extra="sim")
+    assert issubclass(LimitError, ValueError)

@@ -1,0 +1,38 @@
+"""The table of robots."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from heptarm.errors import CommandRejected, LimitError
+from heptarm.values.pose import deg
+from heptarm.values.robot import ROBOTS, RobotModel, robot
+
+
+@pytest.mark.parametrize("model", ROBOTS.values(), ids=list(ROBOTS))
+def test_table(model: RobotModel) -> None:
+    assert robot(model.name) is model
+    assert (model.q_min == -model.q_max).all()
+    for values in (model.q_max, model.dq_max, model.ddq_max, model.dddq_max, model.tau_max):
+        assert values.shape == (7,)
+        assert (values > 0).all()
+        assert not values.flags.writeable
+    model.check(np.zeros(7))
+    model.check(model.q_max)
+
+
+def test_check_names_axis_value_and_range() -> None:
+    with pytest.raises(
+        LimitError, match=r"A4 is 125.00 deg; the LBR iiwa 14 R820 allows -120 to 120 deg"
+    ) as e:
+        robot("iiwa14").check(deg(0, 0, 0, 125, 0, 0, 0), "items[0].motion.q")
+    assert e.value.parameter == "items[0].motion.q[3]"
+    assert e.value.code == 50
+    with pytest.raises(LimitError, match="A1 is nan"):
+        robot("iiwa14").check(np.full(7, np.nan))
+
+
+def test_unknown() -> None:
+    with pytest.raises(CommandRejected, match="no robot 'ur5'; there are iiwa7, iiwa14, med7, med14"):
+        robot("ur5")

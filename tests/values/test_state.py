@@ -1,0 +1,105 @@
+"""States: groups with their own stamps; what is missing says so."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from heptarm.errors import StaleState
+from heptarm.values.pose import Pose
+from heptarm.values.redundancy import Redundancy
+from heptarm.values.result import Cause, Result
+from heptarm.values.state import Cartesian, Joints, Motion, OperationMode, Safety, State, Torques, Wrench
+
+SEVEN = np.arange(7.0)
+
+
+def full() -> State:
+    return State(
+        joints=Joints(1_000, SEVEN, SEVEN + 1, SEVEN + 2),
+        torques=Torques(2_000, SEVEN + 3, SEVEN + 4, SEVEN + 5),
+        cartesian=Cartesian(3_000, Pose.at(x=0.5), Pose.at(x=0.6), Redundancy(0.1, 2, 10)),
+        external=Wrench(2_500, np.array([1.0, 2, 3]), np.array([4.0, 5, 6])),
+        motion=Motion(2_600, id=7, progress=0.5),
+        status=Safety(500, OperationMode.AUT, ready_to_move=True),
+        sampled=10_000_000,
+        clock=lambda: 12_000_000,
+    )
+
+
+def test_short_names_reach_into_the_groups() -> None:
+    s = full()
+    assert s.q.tolist() == SEVEN.tolist()
+    assert s.q_cmd[0] == 1
+    assert s.dq[0] == 2
+    assert (s.tau[0], s.tau_ext[0], s.tau_cmd[0]) == (3, 4, 5)
+    assert (s.pose.x, s.pose_cmd.x) == (0.5, 0.6)
+    assert s.redundancy.status == 2
+    assert s.wrench.array.tolist() == [1, 2, 3, 4, 5, 6]
+    assert s.safety.ready_to_move
+    assert s.motion is not None
+    assert s.motion.active
+
+
+def test_stamps_and_age() -> None:
+    s = full()
+    assert s.stamp == 3_000
+    assert s.age == pytest.approx(0.002)
+    assert State().stamp == 0
+    assert math.isnan(State().age)
+
+
+@pytest.mark.parametrize(
+    ("name", "group"),
+    [
+        ("q", "joints"),
+        ("q_cmd", "joints"),
+        ("dq", "joints"),
+        ("tau", "torques"),
+        ("tau_ext", "torques"),
+        ("tau_cmd", "torques"),
+        ("pose", "pose"),
+        ("pose_cmd", "pose"),
+        ("redundancy", "pose"),
+        ("wrench", "wrench"),
+        ("safety", "safety"),
+    ],
+)
+def test_a_missing_group_is_named(name: str, group: str) -> None:
+    with pytest.raises(StaleState, match=f"no group '{group}'"):
+        getattr(State(), name)
+
+
+def test_equal_by_value_and_read_only() -> None:
+    assert full() == full()
+    assert hash(full()) == hash(full())
+    with pytest.raises(ValueError, match="read-only"):
+        full().q[0] = 1.0
+
+
+def test_wrench_validity() -> None:
+    zero = np.zeros(3)
+    assert Wrench(0, zero, zero).valid()  # the cabinet does not tell
+    assert Wrench(0, zero, zero, zero + 5, zero + 5).valid()
+    assert not Wrench(0, zero, zero, np.array([0.0, 0, 20]), zero).valid()
+    assert not Wrench(0, zero, zero, zero, zero + 11).valid()
+    assert Wrench(0, zero, zero, zero + 20, zero).valid(force=30.0)
+
+
+def test_result() -> None:
+    assert Result(Cause.FINISHED, full(), 1e-5, 1.5).arrived
+    assert not Result(Cause.CANCELLED).arrived
+    assert math.isnan(Result(Cause.DROPPED).residual)
+    assert Cause("finished") is Cause.FINISHED
+    assert Result(Cause.FAILED, text="why") == Result(Cause.FAILED, text="why")
+
+
+def test_causes_are_those_of_the_protocol() -> None:
+    from heptarm.wire import messages
+
+    assert [c.value for c in Cause] == [c.name.lower() for c in messages.Cause]
+    assert [m.value for m in OperationMode] == [m.name.lower() for m in messages.OperationMode]
+    bits = [b.name.lower() for b in messages.SafetyBits if b.name]
+    assert [name for name in Safety.__dataclass_fields__ if name not in ("stamp", "mode")] == bits
