@@ -392,7 +392,6 @@ def test_ctrl_c_stops_the_arm_and_goes_on(peer: Peer) -> None:
     peer.runs(1, wire.MotionStarted(id=1, item=0))
     peer.expect(wire.Stop, wire.Accepted(id=0), peer.finished(1, wire.Cause.STOPPED))
     with peer.arm() as arm:
-        timer = threading.Timer(0.05, signal.raise_signal, (signal.SIGINT,))
         timer = threading.Timer(
             0.05, lambda: signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
         )
@@ -531,4 +530,4 @@ def test_an_interrupted_request_leaves_a_sound_link(peer: Peer) -> None:
             arm.stop()
         timer.join()
         arm.stop()
-        assert arm.state.age < 1.0 or True
+        assert arm.connected

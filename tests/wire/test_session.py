@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -246,7 +248,7 @@ def test_any_split_of_the_octets_means_the_same(cuts: list[int]) -> None:
     client = asked()
     events: list[object] = []
     edges = [0, *sorted(cuts), len(DATA)]
-    for start, end in zip(edges, edges[1:]):
+    for start, end in pairwise(edges):
         events += pour(DATA[start:end], client)
     assert events == EVENTS
     assert len(EVENTS) == 13

@@ -161,8 +161,8 @@ class Arm:
 
     def release_control(self) -> None:
         """Give control back; what runs is stopped."""
+        self._controls = False  # before the cabinet tells everybody
         self._request(wire.ReleaseControl())
-        self._controls = False
         self._linked().expect_watchdog(float("inf"))
 
     def close(self) -> None:
@@ -408,6 +408,7 @@ class Arm:
             chosen |= group
         within(rate, "rate", 0.0, self._greeted().max_rate, unit="Hz")
         self._request(wire.Subscribe(groups=chosen, rate=rate))
+        self._linked().expect_states(rate)
         self._options = replace(self._options, rate=rate, groups=tuple(groups))
 
     # ---------------------------------------------------------------------------------- motion

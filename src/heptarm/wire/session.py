@@ -102,6 +102,7 @@ class Session:
         self._nonce = secrets.token_bytes(32) if nonce is None else nonce
         self._other_nonce = b""
         self._state = SessionState.START
+        self._legal = TRANSITIONS[SessionState.START]
         self._reader = FrameReader()
         self._sent = 0
         self._received = 0
@@ -140,7 +141,7 @@ class Session:
         kind = type(message)
         if self._source != kind.SOURCE and kind.SOURCE != "both":
             raise LocalProtocolError(f"the {self._source} may not send a {kind.__name__}")
-        after = TRANSITIONS[self._state].get(_SYMBOLS[kind])
+        after = self._legal.get(_SYMBOLS[kind])
         if after is None:
             raise LocalProtocolError(f"a {kind.__name__} may not be sent in state {self._state.value!r}")
         is_numbered = kind.KIND in ("request", "answer") and (kind is not Rejected or request != 0)
@@ -204,6 +205,7 @@ class Session:
                 event = self._accept(frame)
             except RemoteProtocolError as error:
                 self._state, self._failed = SessionState.CLOSED, error
+                self._legal = TRANSITIONS[SessionState.CLOSED]
                 raise
             yield event
 
@@ -217,7 +219,7 @@ class Session:
         kind = MESSAGES.get(frame.type)
         if kind is None:
             raise _broken(Code.UNKNOWN_MESSAGE, f"message id {frame.type} is not known")
-        after = TRANSITIONS[self._state].get(_SYMBOLS[kind])
+        after = self._legal.get(_SYMBOLS[kind])
         if after is None or self._source == kind.SOURCE:
             raise _broken(Code.UNEXPECTED_MESSAGE, f"a {kind.__name__} came in state {self._state.value!r}")
         # the refusal of a message that was no request carries no id
@@ -245,7 +247,8 @@ class Session:
         return Received(message, frame.request, frame.time)
 
     def _after(self, kind: type[Message], after: SessionState, request: int) -> None:
-        self._state = after
+        if after is not self._state:
+            self._state, self._legal = after, TRANSITIONS[after]
         if kind.KIND == "request":
             self._waiting[request] = kind
         elif kind.KIND == "answer":
