@@ -27,7 +27,7 @@ from heptarm.virtual.plant import Plant
 log = logging.getLogger("heptarm.virtual")
 
 #: Java threads that get a real-time priority below the loop's where that is allowed, by the start of their names.
-REAL_TIME_THREADS = ("ha-sampler", "ha-writer", "ha-reader", "ha-watchdog")
+REAL_TIME_THREADS = ("ha-sampler", "ha-writer", "ha-watchdog")
 REAL_TIME_PRIORITY = 10
 
 _PORT_PROPERTY = "heptarm.port.bound"

@@ -170,10 +170,6 @@ def open_station(plant: Plant) -> Any:
             plant.resume()
 
         @jpype.JOverride  # type: ignore[untyped-decorator]
-        def setOverride(self, value: float) -> None:
-            plant.override = float(value)
-
-        @jpype.JOverride  # type: ignore[untyped-decorator]
         def forward(self, q: Any) -> Any:
             return jpype.JArray(jpype.JDouble)(Pose.from_matrix(forward(robot, list(q))).array.tolist())
 

@@ -93,7 +93,7 @@ class Pacer:
         gc.collect()
         gc.freeze()
         gc.disable()
-        self._ring.rate[RATE] = self._speed
+        self._ring.reals[RATE] = self._speed
         now_ns, period, header = time.monotonic_ns, self._period, self._ring.header
         done = int(header[NEWEST])  # ticks of plant time that have passed before the loop
         due = now_ns() + period

@@ -105,7 +105,6 @@ class Plant:
         mujoco.mj_forward(self.model, self.data)
         self.ring = ring.Ring()
         self.tick_count = 0
-        self.override = 1.0
         self.on_wake: Callable[[int], None] | None = None
         self._site = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SITE, "flange")
         self._views()
@@ -144,6 +143,15 @@ class Plant:
     def time_ns(self) -> int:
         """Plant time [ns]."""
         return self.tick_count * TICK_NS
+
+    @property
+    def override(self) -> float:
+        """Factor on every programmed speed, 0 to 1; Java writes it straight into the ring."""
+        return float(self.ring.reals[ring.OVERRIDE])
+
+    @override.setter
+    def override(self, value: float) -> None:
+        self.ring.reals[ring.OVERRIDE] = value
 
     @property
     def idle(self) -> bool:
@@ -224,7 +232,7 @@ class Plant:
         command = self._command
         while self._cancels:
             self._cancel_now(self._cancels.popleft())
-        goal = 0.0 if self._paused else self.override
+        goal = 0.0 if self._paused else self.ring.reals[ring.OVERRIDE]
         step = OVERRIDE_SLEW * TICK
         self._scale += min(step, max(-step, goal - self._scale))
         run = self._run

@@ -14,7 +14,7 @@ HEADER_WORDS = 8
 SIZE = 8 * (HEADER_WORDS + SLOTS * WORDS)
 
 # words of the header
-NEWEST, SLOT_COUNT, ANCHOR, RATE, WAKE = range(5)
+NEWEST, SLOT_COUNT, ANCHOR, RATE, WAKE, OVERRIDE = range(6)
 # words of a slot
 SEQ, TIME, Q, Q_CMD, DQ, TAU, TAU_EXT, TAU_CMD, POSE, WRENCH = 0, 1, 2, 9, 16, 23, 30, 37, 44, 51
 FLAGS, MODE, ORDER, PROGRESS, REMAINING, E1, REDUNDANCY = 57, 58, 59, 60, 61, 62, 63
@@ -31,7 +31,7 @@ class Ring:
     Attributes:
         memory: the octets, shared with Java.
         header: header words as integers.
-        rate: header words as floats, for the rate.
+        reals: header words as floats, for rate and override.
         ints: slots as integers, shape (256, 64).
         floats: the same words as floats.
     """
@@ -41,12 +41,13 @@ class Ring:
         words = np.frombuffer(self.memory, dtype=np.int64)
         reals = np.frombuffer(self.memory, dtype=np.float64)
         self.header = words[:HEADER_WORDS]
-        self.rate = reals[:HEADER_WORDS]
+        self.reals = reals[:HEADER_WORDS]
         self.ints = words[HEADER_WORDS:].reshape(SLOTS, WORDS)
         self.floats = reals[HEADER_WORDS:].reshape(SLOTS, WORDS)
         self.header[NEWEST] = -1
         self.header[SLOT_COUNT] = SLOTS
         self.header[WAKE] = NEVER
+        self.reals[OVERRIDE] = 1.0
 
     def read(self, tick: int) -> np.ndarray | None:
         """A copy of a tick's slot as floats, shape (64,); None if it is torn or overwritten."""

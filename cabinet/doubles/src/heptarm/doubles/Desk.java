@@ -67,7 +67,7 @@ public final class Desk implements IApplicationData, IApplicationControl {
             throw new IllegalArgumentException("the application override is " + value + "; it has to be in [0, 1]");
         }
         override = value;
-        station.plant.setOverride(value);
+        station.ring.setOverride(value);
     }
 
     @Override

@@ -20,8 +20,6 @@ public interface Plant {
 
     void resume();
 
-    void setOverride(double value);
-
     /** Flange pose (x y z [m], quaternion x y z w) of joint positions [rad]. */
     double[] forward(double[] q);
 

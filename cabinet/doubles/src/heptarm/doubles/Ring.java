@@ -43,6 +43,7 @@ public final class Ring {
     private static final int ANCHOR = 16;
     private static final int RATE = 24;
     private static final int WAKE = 32;
+    private static final int OVERRIDE = 40;
     /** A view further back than this may be overwritten while it is read. */
     private static final int OLDEST = 200;
 
@@ -77,6 +78,11 @@ public final class Ring {
 
     void wakeAt(long nanos) {
         LONGS.setRelease(memory, WAKE, nanos);
+    }
+
+    /** Factor on every programmed speed. */
+    public void setOverride(double value) {
+        LONGS.setRelease(memory, OVERRIDE, Double.doubleToRawLongBits(value));
     }
 
     /** The calling thread's getters read this tick from now on. */

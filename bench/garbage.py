@@ -1,0 +1,94 @@
+"""A15: random and mutated frames on the port; the application lives."""
+
+from __future__ import annotations
+
+import os
+import random
+import socket
+from collections.abc import Iterator
+
+import heptarm as ha
+from bench.process import Cabinet
+from bench.registry import Figure, benchmark
+from heptarm.wire import messages
+
+FRAMES = int(os.environ.get("BENCH_FRAMES", "100000"))
+_PER_CONNECTION = 250
+
+
+def _frame(number: int, body: bytes, request: int) -> bytes:
+    return messages.HEADER.pack(messages.MAGIC, messages.MAJOR, 0, number, len(body), 0, request, 0) + body
+
+
+def _seeds() -> list[tuple[int, bytes]]:
+    pose = messages.Pose(xyz=(0.5, 0.0, 0.5), quat=(0.0, 1.0, 0.0, 0.0))
+    free = messages.Redundancy(e1=float("nan"), status=-1, turn=-1)
+    items = [
+        messages.Item(motion=messages.Ptp(q=(0.1,) * 7)),
+        messages.Item(motion=messages.PtpPose(target=pose, redundancy=free)),
+        messages.Item(motion=messages.Lin(target=pose, redundancy=free)),
+        messages.Item(motion=messages.LinRel(offset=pose)),
+    ]
+    legal = [
+        messages.Run(items=tuple(items)),
+        messages.Subscribe(groups=messages.Groups.JOINTS, rate=100.0),
+        messages.TakeControl(),
+        messages.Stop(),
+        messages.Cancel(id=0),
+        messages.SetOverride(value=0.5),
+        messages.Ping(sent=1),
+    ]
+    return [(message.TYPE, message.encode()) for message in legal]
+
+
+def garbage(target: tuple[str, int], frames: int, seed: int = 3) -> int:
+    """Send frames that are random, mutated, cut, or of wrong types; returns how many were sent."""
+    chance = random.Random(seed)
+    seeds = _seeds()
+    hello = _frame(messages.Hello.TYPE, messages.Hello(major=messages.MAJOR, minor=0, name="garbage").encode(), 0)
+    sent = 0
+    while sent < frames:
+        with socket.create_connection(target, timeout=5) as peer:
+            peer.settimeout(5)
+            if chance.random() < 0.8:
+                peer.sendall(hello)
+            try:
+                for _ in range(_PER_CONNECTION):
+                    peer.sendall(_one(chance, seeds))
+                    sent += 1
+                    if sent >= frames:
+                        break
+                peer.shutdown(socket.SHUT_WR)
+                while peer.recv(65536):
+                    pass
+            except OSError:
+                sent += 1  # the cabinet has closed this connection, as it should after octets that are no frame
+    return sent
+
+
+def _one(chance: random.Random, seeds: list[tuple[int, bytes]]) -> bytes:
+    number, body = chance.choice(seeds)
+    kind = chance.random()
+    if kind < 0.005:
+        return chance.randbytes(chance.randrange(1, 200))
+    if kind < 0.2:
+        return _frame(chance.randrange(200), chance.randbytes(chance.randrange(0, 300)), chance.randrange(5))
+    changed = bytearray(body)
+    for _ in range(chance.randrange(1, 6)):
+        if changed:
+            changed[chance.randrange(len(changed))] = chance.randrange(256)
+    if kind < 0.4:
+        changed = changed[: chance.randrange(len(changed) + 1)]
+    return _frame(number, bytes(changed), chance.randrange(1, 2**32))
+
+
+@benchmark("garbage", "A15")
+def survive() -> Iterator[Figure]:
+    """Random and mutated frames on the port; then a real client moves the arm."""
+    with Cabinet() as cabinet:
+        sent = garbage(("127.0.0.1", cabinet.port), FRAMES)
+        with ha.connect(cabinet.target) as arm:
+            arm.set_override(1.0)
+            result = arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=0.5)
+            alive = cabinet.process.poll() is None and result.cause is ha.Cause.FINISHED
+    yield Figure("garbage_survived", "A15", sent if alive else 0, "frames", limit=FRAMES, least=True)

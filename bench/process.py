@@ -1,0 +1,63 @@
+"""A virtual cabinet as a process, with its statistics and its memory."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+
+class Cabinet:
+    """Starts `python -m heptarm.virtual.cabinet` on a free port."""
+
+    def __init__(self, *options: str) -> None:
+        self._folder = tempfile.TemporaryDirectory()
+        self._stats = Path(self._folder.name) / "stats.json"
+        began = time.monotonic()
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "heptarm.virtual.cabinet", "--port", "0", "--stats", str(self._stats), *options],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self.process.stdout is not None
+        ready = json.loads(self.process.stdout.readline() or '{"ready": false}')
+        if not ready["ready"]:
+            raise RuntimeError(f"the virtual cabinet did not start: {ready}")
+        self.ready_after = time.monotonic() - began
+        self.port: int = ready["port"]
+
+    @property
+    def target(self) -> str:
+        return f"sim://127.0.0.1:{self.port}"
+
+    def memory(self) -> float:
+        """Proportional set size [MB]: what the process adds to the machine."""
+        text = Path(f"/proc/{self.process.pid}/smaps_rollup").read_text()
+        return next(int(line.split()[1]) for line in text.splitlines() if line.startswith("Pss:")) / 1024
+
+    def stats(self) -> dict[str, Any]:
+        """The loop's statistics so far."""
+        self._stats.unlink(missing_ok=True)
+        self.process.send_signal(signal.SIGUSR1)
+        deadline = time.monotonic() + 5.0
+        while not self._stats.exists() and time.monotonic() < deadline:
+            time.sleep(0.01)
+        return dict(json.loads(self._stats.read_text()))
+
+    def end(self, number: int = signal.SIGTERM) -> int:
+        self.process.send_signal(number)
+        return self.process.wait(timeout=10)
+
+    def __enter__(self) -> Cabinet:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self.process.poll() is None:
+            self.end()
+        self._folder.cleanup()
