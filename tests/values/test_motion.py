@@ -32,7 +32,7 @@ MAKERS: list[Callable[[], Motion]] = [
     lambda: lin_rel(z=-0.1, frame=BASE, speed_mps=0.05),
     lambda: lin_rel(c=0.3),
     lambda: hold(2.0),
-    lambda: hold(),
+    hold,
 ]
 
 

@@ -1,0 +1,158 @@
+"""Masses and inertias of the robots' links.
+
+From lbr_description (lbr-stack, Apache-2.0), whose masses add up to the data sheets' weights. They come from CAD with
+uniform density; published sources differ by up to a factor of two, so they are nominal. Link frames have the
+base's axes when all joints are at zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from heptarm.errors import LimitError
+from heptarm.values.arrays import Array, Value, array, frozen, within
+
+
+def _no_inertia() -> Array:
+    return frozen(np.zeros(6))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body(Value):
+    """A rigid body on the flange: a tool or a load.
+
+    Attributes:
+        mass: [kg], up to 50.
+        com: centre of mass in the flange frame, shape (3,) [m].
+        inertia: xx yy zz xy xz yz about the centre of mass, axes of the flange, shape (6,) [kg m²].
+
+    Raises:
+        ShapeError: wrong shapes.
+        LimitError: a mass outside its range, a number that is not finite, or an inertia that no body has.
+    """
+
+    mass: float
+    com: Array
+    inertia: Array = field(default_factory=_no_inertia)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mass", within(self.mass, "mass", 0.0, 50.0, unit="kg"))
+        object.__setattr__(self, "com", array(self.com, 3, "com"))
+        object.__setattr__(self, "inertia", array(self.inertia, 6, "inertia"))
+        least, middle, most = np.linalg.eigvalsh(symmetric(self.inertia)).tolist()
+        if least < -1e-12 or least + middle < most - 1e-12:
+            raise LimitError(
+                f"no body has the principal inertias {least:g}, {middle:g}, {most:g} kg m²",
+                code=2,
+                parameter="inertia",
+                value=self.inertia.tolist(),
+                allowed="none negative, none above the sum of the other two",
+                hint="check the order xx yy zz xy xz yz and that it is about the centre of mass",
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Links(Value):
+    """The seven moving links of a robot; link i moves with A(i+1).
+
+    Attributes:
+        origin: joint's origin in the frame of the link before, shape (7, 3) [m].
+        mass: shape (7,) [kg].
+        com: centre of mass in the link's frame, shape (7, 3) [m].
+        inertia: about the centre of mass in the link's axes, shape (7, 3, 3) [kg m²].
+        flange: of the last link, shape (3,) [m].
+    """
+
+    origin: Array
+    mass: Array
+    com: Array
+    inertia: Array
+    flange: Array
+
+
+def symmetric(entries: Array) -> Array:
+    """Symmetric matrices of xx yy zz xy xz yz: shape (..., 6) to (..., 3, 3)."""
+    return np.asarray(entries)[..., [[0, 3, 4], [3, 1, 5], [4, 5, 2]]]
+
+
+_FLANGE = (0.0, 0.0, 0.035)
+
+# joint origins
+_ORIGIN_7 = (
+    (0, 0, 0.1475),
+    (0, -0.0105, 0.1925),
+    (0, 0.0105, 0.2075),
+    (0, 0.0105, 0.1925),
+    (0, -0.0105, 0.2075),
+    (0, -0.0707, 0.1925),
+    (0, 0.0707, 0.091),
+)
+_ORIGIN_14 = (
+    (0, 0, 0.1475),
+    (0, -0.01, 0.2125),
+    (0, 0.01, 0.228),
+    (0, 0.0105, 0.192),
+    (0, -0.0105, 0.2075),
+    (0, -0.0707, 0.1925),
+    (0, 0.0707, 0.091),
+)
+
+# mass, centre of mass x y z, inertia xx yy zz xy xz yz; one row a link
+_IIWA7 = (
+    (3.394011, 0, -0.034819, 0.123299, 0.021383, 0.020403, 0.007563, 0, 0, 0.003797),
+    (4.031991, 0, 0.039793, 0.086944, 0.031697, 0.030080, 0.009666, 0, 0, 0.005889),
+    (3.394011, 0, 0.034819, 0.123299, 0.021383, 0.020403, 0.007563, 0, 0, -0.003797),
+    (4.031989, 0, -0.039793, 0.086944, 0.031695, 0.030079, 0.009665, 0, 0, -0.005889),
+    (1.529239, 0, -0.029824, 0.076267, 0.008485, 0.007136, 0.003848, 0, 0, 0.002806),
+    (2.403626, 0, 0.07102, 0.00495, 0.007067, 0.006804, 0.004629, 0, 0, 0.000311),
+    (0.259474, 3e-6, -2e-6, 0.013782, 0.000171, 0.000171, 0.000299, 0, 0, 0),
+)
+_IIWA14 = (
+    (5.289529, 0, -0.033795, 0.132404, 0.042462, 0.042838, 0.015870, 0, 0, 0.006341),
+    (5.688888, 0.000136, 0.047548, 0.076322, 0.055182, 0.053983, 0.016523, -3.3e-5, 5.6e-5, 0.010034),
+    (3.461245, 0, 0.034913, 0.123108, 0.021720, 0.020730, 0.007701, 0, 0, -0.003845),
+    (4.122995, 0, -0.039793, 0.086944, 0.032410, 0.030758, 0.009883, 0, 0, -0.006022),
+    (1.563756, 0, -0.029824, 0.076267, 0.008677, 0.007297, 0.003935, 0, 0, 0.002869),
+    (2.457878, 0, 0.07102, 0.00495, 0.007227, 0.006958, 0.004734, 0, 0, 0.000318),
+    (0.265331, 3e-6, -2e-6, 0.013782, 0.000175, 0.000175, 0.000306, 0, 0, 0),
+)
+_MED7 = (
+    (3.271499, 0, -0.034819, 0.123299, 0.020611, 0.019667, 0.007290, 0, 0, 0.003660),
+    (3.886413, 0, 0.039793, 0.086944, 0.030552, 0.028995, 0.009317, 0, 0, 0.005676),
+    (3.271499, 0, 0.034819, 0.123299, 0.020611, 0.019667, 0.007290, 0, 0, -0.003660),
+    (3.886411, 0, -0.039793, 0.086944, 0.030547, 0.028993, 0.009313, 0, 0, -0.005676),
+    (1.474048, 0, -0.029824, 0.076267, 0.008179, 0.006879, 0.003709, 0, 0, 0.002704),
+    (2.316911, -1e-6, 0.07102, 0.004953, 0.006813, 0.006559, 0.004462, 0, 0, 0.000300),
+    (0.250108, 3e-6, -2e-6, 0.013782, 0.000165, 0.000165, 0.000288, 0, 0, 0),
+)
+_MED14 = (
+    (5.591419, 0, -0.033795, 0.132404, 0.044885, 0.045283, 0.016776, 0, 0, 0.006703),
+    (6.013411, 0.000136, 0.047546, 0.076324, 0.058330, 0.057062, 0.017466, -3.5e-5, 5.9e-5, 0.010605),
+    (3.65879, 0, 0.034913, 0.123108, 0.022960, 0.021913, 0.008140, 0, 0, -0.004065),
+    (4.358267, 0, -0.039793, 0.086944, 0.034255, 0.032512, 0.010444, 0, 0, -0.006365),
+    (1.653015, 0, -0.029824, 0.076267, 0.009172, 0.007714, 0.004159, 0, 0, 0.003033),
+    (2.598211, -1e-6, 0.07102, 0.004953, 0.007640, 0.007355, 0.005004, 0, 0, 0.000336),
+    (0.280474, 3e-6, -2e-6, 0.013782, 0.000185, 0.000185, 0.000323, 0, 0, 0),
+)
+
+
+def _links(origin: tuple[tuple[float, ...], ...], rows: tuple[tuple[float, ...], ...]) -> Links:
+    table = np.array(rows)
+    return Links(
+        frozen(origin),
+        frozen(table[:, 0].copy()),
+        frozen(table[:, 1:4].copy()),
+        frozen(symmetric(table[:, 4:])),
+        frozen(_FLANGE),
+    )
+
+
+#: Links by the robot's name. The Med 14's base is taken as the iiwa 14's: its source differs by 0.5 mm.
+LINKS: dict[str, Links] = {
+    "iiwa7": _links(_ORIGIN_7, _IIWA7),
+    "iiwa14": _links(_ORIGIN_14, _IIWA14),
+    "med7": _links(_ORIGIN_7, _MED7),
+    "med14": _links(_ORIGIN_14, _MED14),
+}

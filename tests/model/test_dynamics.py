@@ -1,0 +1,151 @@
+"""Dynamics against MuJoCo, pinocchio (where installed) and the laws they must obey."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+from heptarm.errors import LimitError, ShapeError
+from heptarm.model.dynamics import (
+    GRAVITY,
+    coriolis,
+    coriolis_matrix,
+    forward_dynamics,
+    gravity,
+    inverse_dynamics,
+    mass_matrix,
+)
+from heptarm.model.kinematics import forward, jacobian
+from heptarm.values.links import LINKS, Body
+from heptarm.values.robot import ROBOTS, RobotModel
+from tests.model.arms import MODELS, random_q
+
+ALL = list(ROBOTS.values())
+LOAD = Body(3.0, (0.02, -0.01, 0.08), (0.02, 0.03, 0.025, 0.001, -0.002, 0.003))
+
+
+def by_name(robot: RobotModel) -> str:
+    return robot.name
+
+
+def mujoco_model(robot: RobotModel, load: Body | None = None) -> tuple[object, object]:
+    """The plant's model without the assumptions that are not rigid-body dynamics, perhaps with a load."""
+    mujoco = pytest.importorskip("mujoco")
+    spec = mujoco.MjSpec.from_string(
+        files("heptarm.virtual").joinpath("models", f"{robot.name}.xml").read_text()
+    )
+    if load is not None:
+        xx, yy, zz, xy, xz, yz = load.inertia
+        tool = spec.body("link_7").add_body(name="load", pos=LINKS[robot.name].flange)
+        tool.mass, tool.ipos, tool.fullinertia = load.mass, load.com, [xx, yy, zz, xy, xz, yz]
+        tool.explicitinertial = True
+    model = spec.compile()
+    model.dof_armature[:] = 0
+    model.dof_damping[:] = 0
+    return model, mujoco.MjData(model)
+
+
+@pytest.mark.parametrize("robot", MODELS, ids=by_name)
+@pytest.mark.parametrize("load", [None, LOAD], ids=["bare", "loaded"])
+def test_that_of_mujoco(robot: RobotModel, load: Body | None) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    model, data = mujoco_model(robot, load)
+    rng = np.random.default_rng(20)
+    full = np.zeros((model.nv, model.nv))
+    for _ in range(50):
+        q, dq, ddq = random_q(robot, rng), rng.normal(size=7), rng.normal(size=7)
+        data.qpos[:7], data.qvel[:7], data.qacc[:7] = q, dq, ddq
+        mujoco.mj_forward(model, data)
+        mujoco.mj_fullM(model, full, data.qM) if hasattr(data, "qM") else mujoco.mj_fullM(model, data, full)
+        assert np.abs(mass_matrix(robot, q, load=load) - full[:7, :7]).max() < 1e-12
+        bias = coriolis(robot, q, dq, load=load) + gravity(robot, q, load=load)
+        assert np.abs(bias - data.qfrc_bias[:7]).max() < 1e-11
+        tau = full[:7, :7] @ ddq + data.qfrc_bias[:7]
+        assert np.abs(inverse_dynamics(robot, q, dq, ddq, load=load) - tau).max() < 1e-11
+        assert np.abs(forward_dynamics(robot, q, dq, tau, load=load) - ddq).max() < 1e-8
+
+
+@pytest.mark.parametrize("robot", MODELS, ids=by_name)
+def test_links_are_those_of_the_plant(robot: RobotModel) -> None:
+    pytest.importorskip("mujoco")
+    model, _ = mujoco_model(robot)
+    links = LINKS[robot.name]
+    for index in range(7):
+        body = model.body(f"link_{index + 1}")  # type: ignore[attr-defined]
+        assert body.mass[0] == links.mass[index]
+        assert np.array_equal(body.pos, links.origin[index])
+        assert np.abs(body.ipos - links.com[index]).max() < 1e-15
+
+
+@pytest.mark.parametrize("robot", ALL, ids=by_name)
+def test_that_of_pinocchio(robot: RobotModel) -> None:
+    pin = pytest.importorskip("pinocchio")
+    links = LINKS[robot.name]
+    model = pin.Model()
+    parent = 0
+    y, z = (pin.JointModelRY, pin.JointModelRZ)
+    minus_y = lambda: pin.JointModelRevoluteUnaligned(np.array([0.0, -1.0, 0.0]))  # noqa: E731
+    for index, joint in enumerate((z, y, z, minus_y, z, y, z)):
+        place = pin.SE3(np.eye(3), links.origin[index].copy())
+        parent = model.addJoint(parent, joint(), place, f"A{index + 1}")
+        inertia = pin.Inertia(float(links.mass[index]), links.com[index].copy(), links.inertia[index].copy())
+        model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+    data = model.createData()
+    rng = np.random.default_rng(21)
+    for _ in range(30):
+        q, dq, ddq = random_q(robot, rng), rng.normal(size=7), rng.normal(size=7)
+        upper = np.triu(pin.crba(model, data, q))
+        assert np.abs(mass_matrix(robot, q) - (upper + np.triu(upper, 1).T)).max() < 1e-12
+        assert np.abs(inverse_dynamics(robot, q, dq, ddq) - pin.rnea(model, data, q, dq, ddq)).max() < 1e-11
+        assert np.abs(gravity(robot, q) - pin.computeGeneralizedGravity(model, data, q)).max() < 1e-11
+
+
+@pytest.mark.parametrize("robot", ALL, ids=by_name)
+def test_laws(robot: RobotModel) -> None:
+    rng = np.random.default_rng(22)
+    h = 1e-6
+    for _ in range(20):
+        q, dq, ddq = random_q(robot, rng), rng.normal(size=7), rng.normal(size=7)
+        m, c = mass_matrix(robot, q, load=LOAD), coriolis_matrix(robot, q, dq, load=LOAD)
+        assert np.abs(m - m.T).max() < 1e-13
+        assert np.linalg.eigvalsh(m).min() > 0
+        rate = (mass_matrix(robot, q + h * dq, load=LOAD) - mass_matrix(robot, q - h * dq, load=LOAD)) / (
+            2 * h
+        )
+        passive = rate - 2 * c
+        assert np.abs(passive + passive.T).max() < 1e-8
+        assert np.allclose(coriolis(robot, q, 2 * dq), 4 * coriolis(robot, q, dq), atol=1e-10)
+        tau = inverse_dynamics(robot, q, dq, ddq, load=LOAD)
+        assert np.abs(forward_dynamics(robot, q, dq, tau, load=LOAD) - ddq).max() < 1e-9
+
+
+@pytest.mark.parametrize("robot", ALL, ids=by_name)
+def test_gravity_is_the_slope_of_the_potential(robot: RobotModel) -> None:
+    """The load's share is the wrench of its weight, through the Jacobian."""
+    rng = np.random.default_rng(23)
+    for _ in range(20):
+        q = random_q(robot, rng)
+        share = gravity(robot, q, load=LOAD) - gravity(robot, q)
+        point = (forward(robot, q) @ np.append(LOAD.com, 1.0))[:3]
+        weight = LOAD.mass * np.array(GRAVITY)
+        assert np.abs(share + jacobian(robot, q, point)[:3].T @ weight).max() < 1e-10
+        assert np.abs(gravity(robot, q, acceleration=(0, 0, 0))).max() == 0.0
+    assert np.abs(gravity(robot, np.zeros(7))).max() < 0.5  # upright, hardly anything to hold
+
+
+@pytest.mark.parametrize(("name", "moving"), [("iiwa7", 19.04), ("iiwa14", 22.85)])
+def test_moving_mass(name: str, moving: float) -> None:
+    assert LINKS[name].mass.sum() == pytest.approx(moving, abs=0.01)
+
+
+def test_refuses() -> None:
+    with pytest.raises(LimitError, match=r"mass is -1; allowed is \[0, 50\] kg"):
+        Body(-1.0, (0, 0, 0))
+    with pytest.raises(LimitError, match="no body has the principal inertias 0, 0, 1"):
+        Body(1.0, (0, 0, 0), (0, 0, 1, 0, 0, 0))
+    with pytest.raises(ShapeError, match="com has shape"):
+        Body(1.0, (0, 0))
+    with pytest.raises(ShapeError, match="dq has shape"):
+        coriolis(ROBOTS["iiwa7"], np.zeros(7), np.zeros(6))

@@ -1,0 +1,110 @@
+"""Forward kinematics and Jacobians against other ways to compute them."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+from heptarm.errors import LimitError, ShapeError
+from heptarm.model.kinematics import flange, forward, jacobian, jacobian_derivative, manipulability
+from heptarm.values.pose import Pose, deg
+from heptarm.values.robot import RobotModel
+from tests.model.arms import MODELS, denavit_hartenberg, random_q
+
+pytestmark = pytest.mark.parametrize("robot", MODELS, ids=lambda m: m.name)
+
+
+def test_forward_is_that_of_denavit_hartenberg(robot: RobotModel) -> None:
+    rng = np.random.default_rng(1)
+    for _ in range(300):
+        q = random_q(robot, rng)
+        assert np.abs(forward(robot, q) - denavit_hartenberg(robot, q)).max() < 1e-14
+
+
+def test_forward_is_that_of_mujoco(robot: RobotModel) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(
+        files("heptarm.virtual").joinpath("models", f"{robot.name}.xml").read_text()
+    )
+    data = mujoco.MjData(model)
+    site = data.site("flange")
+    j = np.zeros((6, model.nv))
+    rng = np.random.default_rng(2)
+    for _ in range(100):
+        q = random_q(robot, rng)
+        data.qpos[:7] = q
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_jacSite(model, data, j[:3], j[3:], site.id)
+        t = forward(robot, q)
+        assert np.abs(t[:3, 3] - site.xpos).max() < 1e-12
+        assert np.abs(t[:3, :3] - site.xmat.reshape(3, 3)).max() < 1e-12
+        assert np.abs(jacobian(robot, q) - j[:, :7]).max() < 1e-12
+
+
+def test_known_positions(robot: RobotModel) -> None:
+    reach = robot.d_bs + robot.d_se + robot.d_ew + robot.d_wf
+    assert Pose.from_matrix(forward(robot, np.zeros(7))) == Pose.at(z=reach)
+    # A4 at -90 deg brings the forearm forward, along +x
+    t = forward(robot, deg(0, 0, 0, -90, 0, 0, 0))
+    assert np.allclose(t[:3, 3], (robot.d_ew + robot.d_wf, 0, robot.d_bs + robot.d_se))
+
+
+def test_floats_and_arrays_agree(robot: RobotModel) -> None:
+    q = [0.1, 0.2, 0.3, -0.4, 0.5, 0.6, 0.7]
+    columns, p = flange(robot, q)
+    t = forward(robot, q)
+    assert np.array_equal(t[:3, :3], np.array(columns).T)
+    assert tuple(t[:3, 3]) == p
+
+
+def test_jacobian_is_the_derivative(robot: RobotModel) -> None:
+    rng = np.random.default_rng(3)
+    h = 1e-6
+    for _ in range(30):
+        q = random_q(robot, rng)
+        j = jacobian(robot, q)
+        for axis in range(7):
+            step = np.zeros(7)
+            step[axis] = h
+            after, before = forward(robot, q + step), forward(robot, q - step)
+            spin = (after[:3, :3] - before[:3, :3]) @ forward(robot, q)[:3, :3].T / (2 * h)
+            assert np.abs((after[:3, 3] - before[:3, 3]) / (2 * h) - j[:3, axis]).max() < 1e-8
+            assert np.abs(np.array([spin[2, 1], spin[0, 2], spin[1, 0]]) - j[3:, axis]).max() < 1e-8
+
+
+def test_jacobian_of_a_tool_point(robot: RobotModel) -> None:
+    q = deg(10, 30, -20, -80, 15, 50, 5)
+    tool = np.array([0.05, -0.02, 0.2, 1.0])
+    h = 1e-6
+    point = (forward(robot, q) @ tool)[:3]
+    numeric = np.array(
+        [
+            (forward(robot, q + h * e) @ tool - forward(robot, q - h * e) @ tool)[:3] / (2 * h)
+            for e in np.eye(7)
+        ]
+    ).T
+    assert np.abs(jacobian(robot, q, point)[:3] - numeric).max() < 1e-8
+
+
+def test_jacobian_derivative_is_the_derivative(robot: RobotModel) -> None:
+    rng = np.random.default_rng(4)
+    h = 1e-6
+    for _ in range(30):
+        q, dq = random_q(robot, rng), rng.normal(size=7)
+        numeric = (jacobian(robot, q + h * dq) - jacobian(robot, q - h * dq)) / (2 * h)
+        assert np.abs(jacobian_derivative(robot, q, dq) - numeric).max() < 1e-8
+
+
+def test_manipulability_vanishes_at_a_singularity(robot: RobotModel) -> None:
+    assert manipulability(robot, np.zeros(7)) < 1e-9
+    assert manipulability(robot, deg(0, 30, 0, -90, 0, 60, 0)) > 0.01
+
+
+def test_refuses(robot: RobotModel) -> None:
+    with pytest.raises(ShapeError, match=r"q has shape \(6,\); \(7,\) is wanted"):
+        forward(robot, np.zeros(6))
+    with pytest.raises(LimitError, match=r"q\[2\] is nan"):
+        jacobian(robot, [0, 0, np.nan, 0, 0, 0, 0])
