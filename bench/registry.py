@@ -33,7 +33,7 @@ class Figure:
         if self.limit is None:
             return True
         measured = self.value if self.ratio is None else self.ratio
-        return measured >= self.limit if self.least else measured <= self.limit
+        return bool(measured >= self.limit if self.least else measured <= self.limit)
 
     def as_dict(self) -> dict[str, Any]:
         ratio = self.ratio

@@ -19,7 +19,6 @@ import jpype.nio
 from heptarm import _resources
 from heptarm.errors import MissingExtra, Unreachable
 from heptarm.model import inverse
-from heptarm.model.kinematics import forward
 from heptarm.values.pose import Pose
 from heptarm.virtual.order import Order, PlanError
 from heptarm.virtual.plant import Plant
@@ -170,8 +169,8 @@ def open_station(plant: Plant) -> Any:
             plant.resume()
 
         @jpype.JOverride  # type: ignore[untyped-decorator]
-        def forward(self, q: Any) -> Any:
-            return jpype.JArray(jpype.JDouble)(Pose.from_matrix(forward(robot, list(q))).array.tolist())
+        def links(self) -> Any:
+            return jpype.JArray(jpype.JDouble)([robot.d_bs, robot.d_se, robot.d_ew, robot.d_wf])
 
         @jpype.JOverride  # type: ignore[untyped-decorator]
         def inverse(self, pose: Any, redundancy: Any, near: Any) -> Any:

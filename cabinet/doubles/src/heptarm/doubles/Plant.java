@@ -20,8 +20,8 @@ public interface Plant {
 
     void resume();
 
-    /** Flange pose (x y z [m], quaternion x y z w) of joint positions [rad]. */
-    double[] forward(double[] q);
+    /** Lengths base-shoulder, shoulder-elbow, elbow-wrist, wrist-flange [m]. */
+    double[] links();
 
     /** Joint positions of a flange pose (x y z [m], quaternion x y z w) next to {@code near}; null if there are none. */
     double[] inverse(double[] pose, double[] redundancy, double[] near);

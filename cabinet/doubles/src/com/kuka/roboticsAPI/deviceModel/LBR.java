@@ -24,6 +24,7 @@ import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
 import com.kuka.roboticsAPI.sensorModel.ForceSensorData;
 import com.kuka.roboticsAPI.sensorModel.TorqueSensorData;
 
+import heptarm.doubles.Arm;
 import heptarm.doubles.Container;
 import heptarm.doubles.Desk;
 import heptarm.doubles.MotionOrder;
@@ -36,6 +37,7 @@ public class LBR extends Robot {
     private static final int AXES = 7;
 
     private final Station station;
+    private final Arm arm;
     private final ObjectFrame root;
     private final ObjectFrame flange;
     private final AtomicLong ids = new AtomicLong();
@@ -44,6 +46,7 @@ public class LBR extends Robot {
     public LBR(String name, Controller controller, Station station) {
         super(name, controller);
         this.station = station;
+        arm = new Arm(station.plant.links());
         root = new ObjectFrame("Root", World.Current.getRootFrame(), () -> Transformation.IDENTITY, this);
         flange = new ObjectFrame("Flange", root, () -> Orders.transformation(numbers(Ring.POSE, 7)), this);
     }
@@ -106,8 +109,8 @@ public class LBR extends Robot {
     }
 
     public Frame getCommandedCartesianPosition(ObjectFrame frameOnRobot) {
-        double[] pose = station.plant.forward(numbers(Ring.Q_CMD, AXES));
-        return new Frame(Orders.transformation(pose).compose(flange.transformationTo(frameOnRobot)));
+        Transformation commanded = arm.flange(numbers(Ring.Q_CMD, AXES));
+        return new Frame(frameOnRobot == flange ? commanded : commanded.compose(flange.transformationTo(frameOnRobot)));
     }
 
     public ForceSensorData getExternalForceTorque(AbstractFrame measureFrame) {

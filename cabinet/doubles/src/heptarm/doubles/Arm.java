@@ -1,0 +1,31 @@
+package heptarm.doubles;
+
+import com.kuka.roboticsAPI.geometricModel.math.Transformation;
+
+/** Forward kinematics of the robot: Rz(A1) Ry(A2) Rz(A3) Ry(-A4) Rz(A5) Ry(A6) Rz(A7), all offsets along z. */
+public final class Arm {
+    private final double[] links;
+
+    /** Lengths base-shoulder, shoulder-elbow, elbow-wrist, wrist-flange [m]. */
+    public Arm(double[] links) {
+        this.links = links.clone();
+    }
+
+    /** Pose of the flange in the base (millimetres) for joint positions [rad]. */
+    public Transformation flange(double[] q) {
+        return up(links[0]).compose(z(q[0])).compose(y(q[1])).compose(up(links[1])).compose(z(q[2])).compose(y(-q[3]))
+                .compose(up(links[2])).compose(z(q[4])).compose(y(q[5])).compose(up(links[3])).compose(z(q[6]));
+    }
+
+    private static Transformation up(double metres) {
+        return Transformation.ofTranslation(0, 0, metres * 1e3);
+    }
+
+    private static Transformation z(double angle) {
+        return Transformation.ofRad(0, 0, 0, angle, 0, 0);
+    }
+
+    private static Transformation y(double angle) {
+        return Transformation.ofRad(0, 0, 0, 0, angle, 0);
+    }
+}
