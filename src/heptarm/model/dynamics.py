@@ -153,7 +153,10 @@ def coriolis(robot: RobotModel, q: npt.ArrayLike, dq: npt.ArrayLike, *, load: Bo
 
 
 def _gravity(posture: _Posture, acceleration: npt.ArrayLike) -> Array:
-    return -np.einsum("n,nia,a->i", posture.mass, posture.linear, array(acceleration, 3, "gravity"))
+    held: Array = np.einsum(
+        "n,nia,a->i", posture.mass, posture.linear, array(acceleration, 3, "acceleration")
+    )
+    return -held
 
 
 def gravity(
