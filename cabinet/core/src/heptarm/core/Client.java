@@ -21,8 +21,6 @@ final class Client {
     private static final int MAX_EVENTS = 4096;
     private static final int MAX_STATES = 64;
     private static final int SEQ = 10;
-    /** After a request the next one is awaited awake for this long: waking up costs more than most requests do. */
-    private static final long AWAKE_NS = 100000L;
 
     final int session;
     private final Server server;
@@ -41,7 +39,6 @@ final class Client {
     private int seq;
     private Thread reader;
     private Thread writer;
-    private long awakeUntil;
     private volatile boolean gone;
     private volatile long heard;
     private volatile long sent;
@@ -119,9 +116,6 @@ final class Client {
                     System.arraycopy(buffer, 0, larger, 0, filled);
                     buffer = larger;
                 }
-                while (in.available() == 0 && System.nanoTime() < awakeUntil) {
-                    continue;
-                }
                 int count = in.read(buffer, filled, buffer.length - filled);
                 if (count < 0) {
                     break;
@@ -164,7 +158,6 @@ final class Client {
             int type = (data[pos + 4] & 0xFF) << 8 | data[pos + 5] & 0xFF;
             long request = int32(data, pos + 14) & 0xFFFFFFFFL;
             if (handshake.isOpen()) {
-                awakeUntil = request == 0 ? awakeUntil : System.nanoTime() + AWAKE_NS;
                 server.dispatcher.handle(this, type, request, data, pos + Protocol.HEADER, length);
             } else if (!handshake.handle(version, type, data, pos + Protocol.HEADER, length)) {
                 return -1;
@@ -198,7 +191,9 @@ final class Client {
         } finally {
             synchronized (outbox) {
                 writing = false;
-                outbox.notify();
+                if (ending || !events.isEmpty() || !states.isEmpty()) {
+                    outbox.notify(); // only then: waking the writer for nothing costs as much as the whole answer
+                }
             }
         }
     }
