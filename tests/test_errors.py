@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import inspect
+import pickle
+from pathlib import Path
 
 import pytest
 
@@ -58,6 +60,23 @@ def test_require() -> None:
     import math
 
     assert require("math", extra="sim") is math
-    with pytest.raises(MissingExtra, match=r"pip install 'heptarm\[sim\]'"):
+    with pytest.raises(MissingExtra, match=r"is not installed .pip install 'heptarm\[sim\]'"):
         require("heptarm_no_such_module", extra="sim")
+
+
+def test_require_tells_broken_from_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "heptarm_broken_module.py").write_text("import heptarm_not_there_either")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(MissingExtra, match="cannot be imported .No module named 'heptarm_not_there_either'"):
+        require("heptarm_broken_module", extra="sim")
+
+
+@pytest.mark.parametrize("kind", ALL)
+def test_pickled(kind: type[HeptarmError]) -> None:
+    error = pickle.loads(pickle.dumps(kind("it failed", code=3, hint="do less")))
+    assert type(error) is kind
+    assert (str(error), error.code) == ("it failed (do less)", 3)
+
+
+def test_limit_errors_are_value_errors() -> None:
     assert issubclass(LimitError, ValueError)

@@ -197,11 +197,16 @@ def require(module: str, *, extra: str) -> Any:
     """Import a module of an optional extra.
 
     Raises:
-        MissingExtra: it is not installed; the text has the command that installs it.
+        MissingExtra: it is not installed, or broken; the hint is the command that installs it.
     """
     try:
         return importlib.import_module(module)
     except ImportError as error:
+        root = module.partition(".")[0]
+        missing = isinstance(error, ModuleNotFoundError) and error.name == root
+        trouble = "is not installed" if missing else f"cannot be imported ({error})"
         raise MissingExtra(
-            f"this needs {module!r}, which is not installed: pip install 'heptarm[{extra}]'"
+            f"this needs {root!r}, which {trouble}",
+            parameter=root,
+            hint=f"pip install 'heptarm[{extra}]'",
         ) from error

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.model.kinematics import flange, forward, jacobian, jacobian_derivative, manipulability
+from heptarm.model.kinematics import flange, forward, jacobian, jacobian_derivative, manipulability, nullspace
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import RobotModel
 from tests.model.arms import MODELS, denavit_hartenberg, random_q
@@ -101,6 +101,19 @@ def test_jacobian_derivative_is_the_derivative(robot: RobotModel) -> None:
 def test_manipulability_vanishes_at_a_singularity(robot: RobotModel) -> None:
     assert manipulability(robot, np.zeros(7)) < 1e-9
     assert manipulability(robot, deg(0, 30, 0, -90, 0, 60, 0)) > 0.01
+
+
+def test_nullspace(robot: RobotModel) -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        q = random_q(robot, rng, 0.9)
+        n = nullspace(robot, q)
+        assert np.abs(n @ n - n).max() < 1e-9
+        assert np.abs(jacobian(robot, q) @ n).max() < 1e-9
+        assert np.trace(n) == pytest.approx(1.0)
+        # along it the pose stays and only the arm angle moves
+        step = 1e-5 * n[np.argmax(np.abs(np.diag(n)))]
+        assert np.abs(forward(robot, q + step) - forward(robot, q)).max() < 1e-9
 
 
 def test_refuses(robot: RobotModel) -> None:

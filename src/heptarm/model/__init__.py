@@ -1,1 +1,41 @@
-"""The arm as mathematics: kinematics, inverse kinematics with redundancy, dynamics. Needs no connection."""
+"""The arm as mathematics: kinematics, inverse kinematics with redundancy, dynamics. Needs no connection.
+
+::
+
+    from heptarm import model
+    from heptarm.values.robot import robot
+
+    iiwa = robot("iiwa14")
+    pose = model.forward(iiwa, q)
+    q = model.solve(iiwa, pose, near=q)
+    tau = model.gravity(iiwa, q)
+"""
+
+from heptarm.model.dynamics import (
+    coriolis,
+    coriolis_matrix,
+    forward_dynamics,
+    gravity,
+    inverse_dynamics,
+    mass_matrix,
+)
+from heptarm.model.inverse import intervals, redundancy, solve, solve_all
+from heptarm.model.kinematics import forward, jacobian, jacobian_derivative, manipulability, nullspace
+
+__all__ = [
+    "coriolis",
+    "coriolis_matrix",
+    "forward",
+    "forward_dynamics",
+    "gravity",
+    "intervals",
+    "inverse_dynamics",
+    "jacobian",
+    "jacobian_derivative",
+    "manipulability",
+    "mass_matrix",
+    "nullspace",
+    "redundancy",
+    "solve",
+    "solve_all",
+]

@@ -131,6 +131,12 @@ def jacobian_derivative(robot: RobotModel, q: npt.ArrayLike, dq: npt.ArrayLike) 
     return np.vstack([(np.cross(dz, lever) + np.cross(z, tip_velocity - point_velocity)).T, dz.T])
 
 
+def nullspace(robot: RobotModel, q: npt.ArrayLike) -> Array:
+    """Projector on the joint motions that do not move the flange, N = 1 - J^+ J, shape (7, 7)."""
+    j = jacobian(robot, q)
+    return np.eye(7) - np.linalg.pinv(j) @ j
+
+
 def manipulability(robot: RobotModel, q: npt.ArrayLike) -> float:
     """Yoshikawa's measure sqrt(det(J Jᵀ)); 0 at a singularity."""
     j = jacobian(robot, q)
