@@ -5,9 +5,15 @@ from __future__ import annotations
 import os
 import time
 import uuid
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from heptarm import Arm
 
 _LATE = ("slow", "browser")
 _MARK = "TESTS_OF_HEPTARM"
@@ -56,3 +62,49 @@ def _started_here() -> list[str]:
         except OSError:
             continue  # ended meanwhile
     return found
+
+
+# ------------------------------------------------------------------------------- a virtual cabinet for all
+
+
+@dataclass(frozen=True)
+class RunningCabinet:
+    """A virtual cabinet that several tests share."""
+
+    host: str
+    port: int
+    pid: int
+
+    @property
+    def target(self) -> str:
+        """What to connect to."""
+        return f"sim://{self.host}:{self.port}"
+
+
+@pytest.fixture(scope="session")
+def cabinet() -> Iterator[RunningCabinet]:
+    """One virtual iiwa 14 for the whole run, in real time; tests leave it at rest and without a controller."""
+    from heptarm.arm.private_cabinet import PrivateCabinet
+    from heptarm.arm.target import Target
+
+    running = PrivateCabinet.start(Target(model="iiwa14"))
+    yield RunningCabinet(running.host, running.port, running.pid)
+    running.close()
+
+
+@pytest.fixture
+def arm(cabinet: RunningCabinet) -> Iterator[Arm]:
+    """An arm in control of the shared cabinet, at its home position."""
+    import heptarm
+
+    with heptarm.connect(cabinet.target) as arm:
+        home = heptarm.deg(0, 30, 0, -90, 0, 60, 0)
+        if abs(arm.state.q - home).max() > 1e-3:
+            arm.move(heptarm.ptp(home))
+        yield arm
+
+
+@pytest.fixture
+def private_target() -> str:
+    """A target that starts a virtual cabinet of one's own, five times as fast as time."""
+    return "sim://iiwa14?speed=5"

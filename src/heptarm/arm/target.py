@@ -45,7 +45,7 @@ class Target:
         if self.is_private:
             query = "&".join(f"{name}={value}" for name, value in self.options)
             return f"sim://{self.model}{'?' + query if query else ''}"
-        return f"{self.host}:{self.port}"
+        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
 
 
 def target_from_env() -> str:

@@ -1,4 +1,4 @@
-"""What every transport can do. `tcp` and `memory` are two; tests/io/conformance.py is what each must pass."""
+"""What every transport can do. `tcp` and `memory` are two; tests/transports/conformance.py is what each must pass."""
 
 from __future__ import annotations
 

@@ -1,0 +1,30 @@
+"""The package as a whole: its names, and that importing it is cheap and quiet."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+import heptarm
+
+
+def test_every_public_name_is_there() -> None:
+    for name in heptarm.__all__:
+        assert getattr(heptarm, name) is not None
+        assert name in dir(heptarm)
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = heptarm.nothing
+
+
+def test_importing_costs_nothing_and_connecting_needs_no_simulator() -> None:
+    code = (
+        "import sys, heptarm\n"
+        "assert 'numpy' not in sys.modules\n"
+        "heptarm.connect, heptarm.ptp\n"
+        "bad = [m for m in sys.modules if m.startswith(('heptarm.virtual', 'mujoco', 'jpype', 'ruckig'))]\n"
+        "assert not bad, bad\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

@@ -1,0 +1,24 @@
+"""Clocks."""
+
+from __future__ import annotations
+
+import time
+
+from heptarm.io.clock import Clock, RealClock, StepClock
+
+
+def test_the_real_clock_goes_on_and_sleeps() -> None:
+    clock: Clock = RealClock()
+    began = clock.nanos()
+    clock.sleep(0.01)
+    clock.sleep(-1.0)
+    assert 9e6 < clock.nanos() - began < 1e9
+    assert abs(clock.nanos() - time.monotonic_ns()) < 1e8
+
+
+def test_a_step_clock_moves_when_told() -> None:
+    clock: Clock = StepClock(5)
+    clock.sleep(1.0)
+    assert clock.nanos() == 1_000_000_005
+    clock.sleep(-1.0)
+    assert clock.nanos() == 1_000_000_005
