@@ -7,7 +7,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from heptarm.errors import LimitError, Unreachable
+from heptarm.errors import LimitError, ShapeError, Unreachable
 from heptarm.model import inverse
 from heptarm.model.kinematics import forward
 from heptarm.values.pose import Pose, deg
@@ -218,6 +218,18 @@ def test_unreachable_says_why(robot: RobotModel) -> None:
     q = deg(0, 30, 0, -90, 0, 60, 0)
     with pytest.raises(Unreachable, match="with that E1 or Status .*leave E1 and Status free"):
         inverse.solve(robot, forward(robot, q), e1=pi, status=0)
+
+
+def test_what_is_not_given_may_be_said(robot: RobotModel) -> None:
+    wanted = forward(robot, deg(0, 30, 0, -90, 0, 60, 0))
+    nothing = Redundancy()
+    assert np.array_equal(
+        inverse.solve(robot, wanted, e1=nothing.e1, status=nothing.status), inverse.solve(robot, wanted)
+    )
+    with pytest.raises(LimitError, match="status is 8"):
+        inverse.solve(robot, wanted, status=8)
+    with pytest.raises(ShapeError, match="near has shape"):
+        inverse.solve(robot, wanted, near=[0.0] * 6)
 
 
 def test_redundancy_is_a_value(robot: RobotModel) -> None:

@@ -10,7 +10,7 @@ bit 2, A6 <= 0. Turn: bit i, A(i+1) < 0.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import atan2, cos, hypot, pi, sin, sqrt
+from math import atan2, cos, hypot, isnan, nan, pi, sin, sqrt
 from typing import TypeAlias
 
 import numpy as np
@@ -18,7 +18,7 @@ import numpy as np
 from heptarm.errors import Unreachable
 from heptarm.model.kinematics import Columns, Vec, flange
 from heptarm.model.selfmotion import events
-from heptarm.values.arrays import Array
+from heptarm.values.arrays import Array, array
 from heptarm.values.pose import Pose
 from heptarm.values.redundancy import Redundancy
 from heptarm.values.robot import RobotModel
@@ -238,7 +238,7 @@ def arm_angle(robot: RobotModel, q: Sequence[float], behind: bool) -> float:
 
 def redundancy(robot: RobotModel, q: Sequence[float]) -> Redundancy:
     """E1, Status and Turn of a joint position, shape (7,) [rad]."""
-    values = [float(v) for v in q]
+    values = array(q, 7, "q").tolist()
     status = status_of(robot, values)
     turn = sum((value < 0) << index for index, value in enumerate(values))
     return Redundancy(arm_angle(robot, values, bool(status & 1)), status, turn)
@@ -313,19 +313,22 @@ def solve(
     Args:
         robot: the robot.
         pose: of the flange in the base frame.
-        e1: arm angle [rad].
-        status: bits 0-2.
+        e1: arm angle [rad]; None or NaN: not given.
+        status: bits 0-2; None or -1: not given.
         near: joint positions, shape (7,) [rad].
 
     Returns:
         Shape (7,) [rad].
 
     Raises:
+        LimitError: a value that is none, as Status 8.
         Unreachable: no solution within the joint limits; the text says what is in the way.
     """
     r, p = rows(pose)
-    hint = None if near is None else [float(v) for v in near]
-    wanted = status
+    hint = None if near is None else array(near, 7, "near").tolist()
+    given = Redundancy(nan if e1 is None else e1, -1 if status is None else status)
+    e1 = None if isnan(given.e1) else given.e1
+    wanted = status = None if given.status < 0 else given.status
     if hint is not None:
         own = redundancy(robot, hint)
         wanted = own.status if status is None else status
