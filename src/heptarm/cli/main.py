@@ -1,0 +1,203 @@
+"""`heptarm`: every command's options and help; the work is done in a module of the command's name."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+from cyclopts import App, Group, Parameter
+
+from heptarm import __version__
+from heptarm.errors import HeptarmError
+
+app = App(name="heptarm", help="Control a KUKA LBR iiwa, with or without a robot on the desk.", version=__version__)
+move_app = App(name="move", help="Move the arm and wait until it rests.")
+app.command(move_app)
+
+_COMMON = Group("Common options")
+Target = Annotated[
+    str | None,
+    Parameter(
+        name="--target",
+        group=_COMMON,
+        help="What to connect to: ADDRESS[:PORT], sim://HOST:PORT or sim://iiwa14. Default: HEPTARM_TARGET.",
+    ),
+]
+Json = Annotated[bool, Parameter(name="--json", group=_COMMON, negative="", help="Print one JSON object a line.")]
+Degrees = Annotated[bool, Parameter(name="--deg", negative="", help="Angles are degrees.")]
+Speed = Annotated[float, Parameter(name="--speed", help="Fraction of the full speed, (0, 1].")]
+Yes = Annotated[bool, Parameter(name="--yes", negative="", help="Do not ask before a real robot moves.")]
+DryRun = Annotated[bool, Parameter(name="--dry-run", negative="", help="Check and show the motion, move nothing.")]
+
+
+@app.command
+def sim(
+    *,
+    model: Annotated[Literal["iiwa7", "iiwa14"], Parameter(help="Robot.")] = "iiwa14",
+    host: Annotated[str, Parameter(help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, Parameter(help="Port; 0 takes a free one.")] = 30001,
+    speed: Annotated[float, Parameter(help="Simulated seconds per second.")] = 1.0,
+    view: Annotated[bool, Parameter(negative="", help="Open a live 3D view in the browser.")] = False,
+    view_port: Annotated[int, Parameter(help="Port of the view; 0 takes a free one.")] = 8080,
+    key: Annotated[str, Parameter(help="Pre-shared key that clients must know.")] = "",
+    verbose: Annotated[bool, Parameter(negative="", help="Show the cabinet's log.")] = False,
+    json: Json = False,
+) -> int:
+    """Run a virtual cabinet until Ctrl-C."""
+    from heptarm.cli import sim as work
+
+    return work.run(
+        model=model, host=host, port=port, speed=speed, view=view, view_port=view_port, key=key, verbose=verbose, as_json=json
+    )
+
+
+@app.command
+def state(
+    *,
+    watch: Annotated[bool, Parameter(negative="", help="Go on until Ctrl-C.")] = False,
+    rate: Annotated[float, Parameter(help="States per second.")] = 10.0,
+    duration: Annotated[float | None, Parameter(help="Watch for this long [s].")] = None,
+    target: Target = None,
+    json: Json = False,
+) -> int:
+    """Show the state of the arm."""
+    from heptarm.cli import state as work
+
+    return work.run(target=target, watch=watch, rate=rate, duration=duration, as_json=json)
+
+
+@move_app.command(name="ptp")
+def move_ptp(
+    a1: float,
+    a2: float,
+    a3: float,
+    a4: float,
+    a5: float,
+    a6: float,
+    a7: float,
+    /,
+    *,
+    deg: Degrees = False,
+    speed: Speed = 0.1,
+    yes: Yes = False,
+    dry_run: DryRun = False,
+    target: Target = None,
+    json: Json = False,
+) -> int:
+    """Point to point, to seven joint positions [rad]."""
+    from heptarm.cli import move as work
+
+    motion = work.ptp((a1, a2, a3, a4, a5, a6, a7), degrees=deg)
+    return work.run(motion, target=target, speed=speed, yes=yes, dry_run=dry_run, as_json=json)
+
+
+@move_app.command(name="lin")
+def move_lin(
+    x: float,
+    y: float,
+    z: float,
+    a: float,
+    b: float,
+    c: float,
+    /,
+    *,
+    deg: Degrees = False,
+    speed: Speed = 0.1,
+    yes: Yes = False,
+    dry_run: DryRun = False,
+    target: Target = None,
+    json: Json = False,
+) -> int:
+    """Straight line to a pose in the base frame: x y z [m], a b c about z y x [rad]."""
+    from heptarm.cli import move as work
+
+    motion = work.lin((x, y, z, a, b, c), degrees=deg)
+    return work.run(motion, target=target, speed=speed, yes=yes, dry_run=dry_run, as_json=json)
+
+
+@move_app.command(name="lin_rel")
+def move_lin_rel(
+    *,
+    x: float = 0.0,
+    y: float = 0.0,
+    z: float = 0.0,
+    a: float = 0.0,
+    b: float = 0.0,
+    c: float = 0.0,
+    frame: Annotated[str, Parameter(help='Whose axes: "tool" or "base".')] = "tool",
+    deg: Degrees = False,
+    speed: Speed = 0.1,
+    yes: Yes = False,
+    dry_run: DryRun = False,
+    target: Target = None,
+    json: Json = False,
+) -> int:
+    """Straight line by an offset [m], [rad]."""
+    from heptarm.cli import move as work
+
+    motion = work.lin_rel((x, y, z, a, b, c), frame=frame, degrees=deg)
+    return work.run(motion, target=target, speed=speed, yes=yes, dry_run=dry_run, as_json=json)
+
+
+@app.command
+def stop(*, target: Target = None, json: Json = False) -> int:
+    """Stop whatever runs; needs no control."""
+    from heptarm.cli import move as work
+
+    return work.stop(target=target, as_json=json)
+
+
+@app.command
+def doctor(*, target: Target = None, json: Json = False) -> int:
+    """Check the installation, and a target if one is given: one verdict and one remedy a line."""
+    from heptarm.cli import doctor as work
+
+    return work.run(target=target, as_json=json)
+
+
+@app.command(name="install-cabinet")
+def install_cabinet(
+    *,
+    out: Annotated[Path, Parameter(help="Folder to write; must be new or empty.")],
+    json: Json = False,
+) -> int:
+    """Write the cabinet application for a Sunrise project, with the steps."""
+    from heptarm.cli import install_cabinet as work
+
+    return work.run(out=out, as_json=json)
+
+
+@app.command
+def demo(
+    *,
+    plot: Annotated[Path, Parameter(help="Where to save the plot.")] = Path("heptarm-demo.png"),
+    target: Target = None,
+    json: Json = False,
+) -> int:
+    """Move a virtual arm through the whole stack; a table and a plot show how it went."""
+    from heptarm.cli import demo as work
+
+    return work.run(target=target, plot=plot, as_json=json)
+
+
+def main() -> None:
+    """Entry point: errors of heptarm are one sentence on standard error and exit code 1."""
+    try:
+        code = app()
+    except HeptarmError as error:
+        if os.environ.get("HEPTARM_DEBUG"):
+            raise
+        print(f"heptarm: {error}", file=sys.stderr)
+        sys.exit(1)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except BrokenPipeError:  # the reader of our output has gone, as in `heptarm state --watch | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(0)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,50 @@
+"""What the commands share: JSON, states as plain data, questions."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from typing import Any
+
+from heptarm.values.state import State
+
+
+def emit(data: dict[str, Any]) -> None:
+    """Print one JSON object; NaN becomes null."""
+    print(json.dumps(_plain(data), ensure_ascii=False), flush=True)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(one) for one in value]
+    return value
+
+
+def state_data(state: State) -> dict[str, Any]:
+    """A state as plain data, SI."""
+    data: dict[str, Any] = {"stamp_ns": state.stamp, "age_s": round(state.age, 6)}
+    if state.joints is not None:
+        data |= {"q": state.q.tolist(), "q_cmd": state.q_cmd.tolist(), "dq": state.dq.tolist()}
+    if state.torques is not None:
+        data |= {"tau": state.tau.tolist(), "tau_ext": state.tau_ext.tolist()}
+    if state.cartesian is not None:
+        data |= {"xyz": state.pose.xyz.tolist(), "quat": state.pose.quat.tolist()}
+    if state.external is not None:
+        data |= {"force": state.wrench.force.tolist(), "torque": state.wrench.torque.tolist()}
+    if state.motion is not None:
+        data |= {"motion": state.motion.id, "progress": state.motion.progress}
+    if state.status is not None:
+        data |= {"mode": state.safety.mode.value, "ready_to_move": state.safety.ready_to_move}
+    return data
+
+
+def confirm(question: str) -> bool:
+    """Ask a person; no terminal means no."""
+    if not sys.stdin.isatty():
+        return False
+    return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")
