@@ -29,4 +29,6 @@ if [ ! -x $venv/bin/python ]; then
     fi
     "$python" -m venv $venv
 fi
+# Old versions of pip can search for a long time for a set of versions that fit.
+$venv/bin/python -m pip install -q --disable-pip-version-check -U "pip>=24"
 $venv/bin/python -m pip install -q --disable-pip-version-check -e ".[$extras]"
