@@ -119,6 +119,9 @@ final class Sampler {
                 continue;
             }
             one.due += one.period;
+            if (one.due <= now) { // subscribed while this thread slept: the past is not for it
+                one.due = now / one.period * one.period + one.period;
+            }
             if (server.clock.nanos() - one.due > TOO_LATE * one.period) {
                 one.due = server.clock.nanos() / one.period * one.period + one.period;
             }
