@@ -1,0 +1,359 @@
+"""The arm against the virtual cabinet: the real application on a real JVM, a simulated robot."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm import Arm, deg, hold, lin_rel, ptp
+from tests.conftest import RunningCabinet
+
+HOME = deg(0, 30, 0, -90, 0, 60, 0)
+#: Takes about three seconds.
+FAR = ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.3)
+
+
+def speed(arm: Arm) -> float:
+    return float(np.abs(arm.state.dq).max())
+
+
+def under_way(arm: Arm) -> None:
+    arm.wait_until(lambda s: np.abs(s.dq).max() > 0.1, timeout=5.0)
+
+
+# ------------------------------------------------------------------------------------- moving
+
+
+def test_a_ptp_arrives(arm: Arm) -> None:
+    target = deg(10, 35, 5, -80, 5, 55, 10)
+    result = arm.move(ptp(target, speed=0.5))
+    assert result.arrived and result.residual <= 1e-4
+    assert result.state is not None
+    assert np.abs(result.state.q - target).max() <= 1e-4
+    assert 0.3 < result.duration < 5.0
+
+
+def test_a_line_and_back_by_its_pose(arm: Arm) -> None:
+    before = arm.wait_for_rest().pose
+    arm.move(lin_rel(z=-0.08, frame="base", speed_mps=0.25))
+    down = arm.wait_for_rest().pose
+    assert np.abs(down.xyz - before.xyz - [0, 0, -0.08]).max() < 5e-4 and down.angle_to(before) < 2e-3
+    arm.move(ha.lin(before, speed_mps=0.25))
+    assert arm.wait_for_rest().pose.distance_to(before) < 5e-4
+
+
+def test_a_batch_tells_where_it_is(arm: Arm) -> None:
+    small = [ptp(HOME + deg(0, 0, 0, 0, 0, 0, angle)) for angle in (5, 10, 0)]
+    handle = arm.start(small)
+    assert handle.wait(timeout=10.0).item == 2
+    assert handle.progress == 1.0 and handle.done
+
+
+def test_a_motion_is_cancelled_under_way(arm: Arm) -> None:
+    handle = arm.start(FAR)
+    under_way(arm)
+    assert handle.started and not handle.done and 0.0 < handle.progress < 0.9
+    handle.cancel()
+    result = handle.wait(timeout=2.0)
+    assert result.cause is ha.Cause.CANCELLED and handle.result is result
+    state = arm.wait_for_rest(timeout=2.0)
+    assert 0.001 < state.q[0] - HOME[0] < np.radians(59)
+
+
+def test_stop_from_another_thread_ends_a_blocking_move(arm: Arm) -> None:
+    timer = threading.Timer(0.6, arm.stop)
+    timer.start()
+    with pytest.raises(ha.MotionAborted) as error:
+        arm.move(FAR)
+    timer.join()
+    assert error.value.cause is ha.Cause.STOPPED and len(error.value.history) >= 40
+    arm.wait_for_rest(timeout=2.0)
+    arm.stop()
+    arm.stop()
+
+
+def test_queue_replace_reject(arm: Arm) -> None:
+    first = arm.start(FAR)
+    under_way(arm)
+    with pytest.raises(ha.ModeConflict, match="running") as error:
+        arm.start(ptp(HOME), when="reject")
+    assert "replace" in str(error.value)
+    waiting = arm.start(ptp(HOME))
+    last = arm.start(ptp(HOME), when="replace")
+    assert last.wait(timeout=10.0).arrived
+    assert first.wait(timeout=1.0).cause is ha.Cause.REPLACED
+    assert waiting.wait(timeout=1.0).cause is ha.Cause.REPLACED
+
+
+def test_motions_can_be_awaited_together(arm: Arm) -> None:
+    async def program() -> list[ha.Result]:
+        near = ptp(HOME + deg(3, 0, 0, 0, 0, 0, 0))
+        return list(await asyncio.gather(*(_await(arm.start(m)) for m in (near, ptp(HOME)))))
+
+    assert all(result.arrived for result in asyncio.run(program()))
+
+
+async def _await(handle: ha.MotionHandle) -> ha.Result:
+    return await handle
+
+
+def test_a_hold_lasts(arm: Arm) -> None:
+    assert arm.move(hold(0.3)).duration == pytest.approx(0.3, abs=0.1)
+
+
+def test_the_ceiling_slows_down(arm: Arm) -> None:
+    target = ptp(HOME + deg(10, 0, 0, 0, 0, 0, 0))
+    fast = arm.move(target).duration
+    arm.speed = 0.1
+    assert arm.move(ptp(HOME)).duration > 1.5 * fast
+
+
+# ------------------------------------------------------------------------------------- refusals
+
+
+def test_refusals_say_why_and_move_nothing(arm: Arm) -> None:
+    before = arm.wait_for_rest().q
+    with pytest.raises(ha.LimitError, match="A2"):
+        arm.move(ptp(deg(0, 130, 0, 0, 0, 0, 0)))
+    with pytest.raises(ha.LimitError, match="finite"):
+        arm.move(ptp([0, 0, 0, 0, 0, 0, float("nan")]))
+    with pytest.raises((ha.LimitError, ha.MotionAborted), match="(?i)can not plan|not reachable|limit"):
+        arm.move(lin_rel(z=3.0))
+    with pytest.raises(ha.LimitError, match=r"\[0, 1\]"):
+        arm.set_override(1.5)
+    with pytest.raises(ha.LimitError, match="rate"):
+        arm.subscribe(rate=5000.0)
+    assert np.abs(arm.wait_for_rest().q - before).max() < 1e-4
+    assert arm.move(ptp(HOME)).arrived
+
+
+def test_the_second_controller_hears_who_controls(arm: Arm, cabinet: RunningCabinet) -> None:
+    with pytest.raises(ha.NotInControl, match=str(os.getpid())):
+        ha.connect(cabinet.target, name="second")
+    assert arm.in_control
+
+
+def test_an_observer_sees_and_stops_but_does_not_move(arm: Arm, cabinet: RunningCabinet) -> None:
+    with ha.connect(cabinet.target, control=False, name="observer") as observer:
+        assert observer.controller == arm._options.name and not observer.in_control
+        with pytest.raises(ha.NotInControl, match=str(os.getpid())):
+            observer.move(ptp(HOME))
+        handle = arm.start(FAR)
+        under_way(observer)
+        observer.stop()
+        with pytest.raises(ha.MotionAborted):
+            handle.wait(timeout=2.0)
+        handle = arm.start(FAR)
+        under_way(observer)
+    assert not handle.done  # an observer that leaves stops nothing
+    handle.cancel()
+    handle.wait(timeout=2.0)
+
+
+def test_control_is_given_and_taken(arm: Arm, cabinet: RunningCabinet) -> None:
+    with ha.connect(cabinet.target, control=False, name="other") as other:
+        arm.release_control()
+        other.take_control()
+        with pytest.raises(ha.NotInControl, match="other"):
+            arm.move(ptp(HOME))
+        assert other.move(ptp(HOME)).arrived
+        other.release_control()
+        arm.take_control()
+        assert arm.move(ptp(HOME)).arrived
+
+
+# ------------------------------------------------------------------------------------- state
+
+
+def test_states_come_at_the_subscribed_rate(arm: Arm) -> None:
+    arm.subscribe(rate=500.0)
+    states = arm.states(duration=1.0)
+    stamps = np.array([state.stamp for state in states])
+    assert states.lost == 0 and 430 < len(stamps) <= 510
+    assert (np.diff(stamps) > 0).all() and np.median(np.diff(stamps)) == 2e6
+    ages = [state.age for state in arm.states(duration=0.5)]
+    assert -0.001 < np.median(ages) < 0.01
+
+
+def test_arrays_are_read_only_and_consistent(arm: Arm) -> None:
+    state = arm.wait_for_rest()
+    for values in (state.q, state.q_cmd, state.dq, state.tau, state.tau_ext, state.tau_cmd):
+        assert values.shape == (7,) and not values.flags.writeable
+    assert state.wrench.force.shape == (3,)
+    assert state.safety.ready_to_move and state.motion is not None and not state.motion.active
+
+
+def test_requests_while_states_stream_and_the_arm_moves(arm: Arm) -> None:
+    arm.subscribe(rate=1000.0)
+    handle = arm.start(ptp(HOME + deg(20, 0, 0, 0, 0, 0, 0), speed=0.3))
+    for _ in range(300):
+        arm.set_override(1.0)
+    assert handle.wait(timeout=5.0).arrived
+
+
+# ------------------------------------------------------------------------------------- leaving
+
+
+def test_leaving_the_block_leaves_the_arm_at_rest(cabinet: RunningCabinet) -> None:
+    with ha.connect(cabinet.target) as arm:
+        handle = arm.start(FAR)
+        under_way(arm)
+    with pytest.raises((ha.MotionAborted, ha.ConnectionLost)):
+        handle.wait(timeout=1.0)
+    with ha.connect(cabinet.target, control=False) as observer:
+        state = observer.state
+        assert state.motion is not None and not state.motion.active
+        assert not np.abs(state.dq[np.isfinite(state.dq)]).max() > 0.01
+        assert observer.controller == ""
+
+
+PROGRAM = """
+    import sys, heptarm as ha
+    from heptarm import deg, ptp
+    arm = ha.connect(sys.argv[1], name="script", on_disconnect=sys.argv[2])
+    arm.move(ptp(deg(0, 30, 0, -90, 0, 60, 0)))
+    handle = arm.start(ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.3))
+    arm.wait_until(lambda s: abs(s.dq).max() > 0.1)
+    try:
+        print(arm._cabinet.pid if arm._cabinet else "moving", flush=True)
+        handle.wait()
+        print("arrived", flush=True)
+    except KeyboardInterrupt:
+        print("interrupted at", arm.wait_for_rest().q[0], flush=True)
+        raise
+"""
+
+
+def script(tmp_path: Path, target: str, on_disconnect: str = "stop") -> tuple[subprocess.Popen[str], str]:
+    """A program of its own in the middle of a motion, and what it said."""
+    file = tmp_path / "program.py"
+    file.write_text(textwrap.dedent(PROGRAM))
+    process = subprocess.Popen(
+        [sys.executable, str(file), target, on_disconnect],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    return process, line(process.stdout)
+
+
+def line(stream: IO[str] | None) -> str:
+    assert stream is not None
+    return stream.readline().strip()
+
+
+def end(process: subprocess.Popen[str]) -> tuple[str, str]:
+    out, errors = process.communicate(timeout=15.0)
+    return out, errors
+
+
+def test_ctrl_c_stops_the_arm(cabinet: RunningCabinet, tmp_path: Path) -> None:
+    process, said = script(tmp_path, cabinet.target)
+    assert said == "moving"
+    process.send_signal(signal.SIGINT)
+    out, errors = end(process)
+    assert "interrupted" in out and "KeyboardInterrupt" in errors and process.returncode != 0
+    assert float(out.split()[-1]) < np.radians(55)
+    with ha.connect(cabinet.target) as arm:
+        assert speed(arm) < 0.01
+
+
+def test_a_killed_controller_is_stopped_and_replaced(cabinet: RunningCabinet, tmp_path: Path) -> None:
+    with ha.connect(cabinet.target, control=False) as observer:
+        for _ in range(2):
+            process, said = script(tmp_path, cabinet.target)
+            assert said == "moving"
+            assert observer.controller == "script"
+            process.kill()
+            killed = time.monotonic()
+            observer.wait_until(lambda s: np.abs(s.dq).max() < 0.01 and not s.motion.active, timeout=3.0)
+            assert time.monotonic() - killed < 1.0
+            end(process)
+            with ha.connect(cabinet.target) as arm:
+                assert arm.move(ptp(HOME)).arrived
+
+
+def test_a_lost_controller_may_let_its_motion_finish(cabinet: RunningCabinet, tmp_path: Path) -> None:
+    process, said = script(tmp_path, cabinet.target, "finish")
+    assert said == "moving"
+    process.kill()
+    end(process)
+    with ha.connect(cabinet.target, control=False) as observer:
+        target = deg(60, 30, 0, -90, 0, 60, 0)
+        observer.wait_until(lambda s: np.abs(s.q - target).max() < 1e-3, timeout=6.0)
+
+
+# ------------------------------------------------------------------------------------- private
+
+
+def alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return Path(f"/proc/{pid}/stat").read_text().split(") ")[1][0] != "Z"
+
+
+def gone(pid: int, seconds: float = 6.0) -> bool:
+    deadline = time.monotonic() + seconds
+    while alive(pid) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return not alive(pid)
+
+
+def test_a_private_simulator_comes_and_goes_with_its_arm(private_target: str) -> None:
+    threads = set(threading.enumerate())
+    with ha.connect(private_target) as arm:
+        assert arm._cabinet is not None
+        pid = arm._cabinet.pid
+        assert alive(pid) and arm.is_virtual and arm.robot.name == "iiwa14"
+        began = time.monotonic()
+        result = arm.move(ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.3))
+        assert result.arrived and time.monotonic() - began < 0.6 * result.duration
+        assert arm._link is not None and arm._link.offset.rate == pytest.approx(5.0, rel=0.1)
+        assert -0.01 < np.median([state.age for state in arm.states(duration=0.3)]) < 0.05
+    assert gone(pid)
+    left = {thread.name for thread in set(threading.enumerate()) - threads if thread.is_alive()}
+    assert "heptarm-link" not in left
+
+
+def test_a_private_simulator_ends_with_a_killed_program(private_target: str, tmp_path: Path) -> None:
+    process, said = script(tmp_path, private_target)
+    pid = int(said)
+    assert alive(pid)
+    process.kill()
+    end(process)
+    assert gone(pid)
+
+
+def test_a_simulator_that_dies_is_a_lost_connection(private_target: str) -> None:
+    arm = ha.connect(private_target)
+    assert arm._cabinet is not None
+    handle = arm.start(ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.05))
+    os.kill(arm._cabinet.pid, signal.SIGKILL)
+    with pytest.raises(ha.ConnectionLost):
+        handle.wait(timeout=5.0)
+    with pytest.raises(ha.ConnectionLost):
+        arm.move(ptp(HOME))
+    arm.close()
+
+
+def test_a_simulator_that_does_not_start_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setenv("JAVA_HOME", "/nonexistent")
+    monkeypatch.setenv("PYTHONPATH", "/nonexistent")
+    monkeypatch.setattr(sys, "executable", "/bin/false")
+    with pytest.raises(ha.ConnectFailed, match="did not start"):
+        ha.connect("sim://iiwa14")
