@@ -263,6 +263,7 @@ def end(process: subprocess.Popen[str]) -> tuple[str, str]:
 def test_ctrl_c_stops_the_arm(cabinet: RunningCabinet, tmp_path: Path) -> None:
     process, said = script(tmp_path, cabinet.target)
     assert said == "moving"
+    time.sleep(0.2)  # it has said so, now it waits
     process.send_signal(signal.SIGINT)
     out, errors = end(process)
     assert "interrupted" in out, (out, errors)
