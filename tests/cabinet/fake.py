@@ -1,0 +1,108 @@
+"""The cabinet's core on a fake robot, in a plain JVM without the Sunrise API."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+from pathlib import Path
+from types import TracebackType
+
+ROOT = Path(__file__).resolve().parents[2]
+_JAVA = Path(__file__).parent / "java"
+_OUT = ROOT / "build" / "cabinet" / "fake"
+
+sys.path.insert(0, str(ROOT / "cabinet"))
+
+import build  # noqa: E402
+import toolchain  # noqa: E402
+
+
+def classes() -> str:
+    """Class path of the core and the fake robot, compiled where they have changed."""
+    core = next(jar for jar in build.build() if jar.name == "heptarm-core.jar")
+    sources = sorted(_JAVA.rglob("*.java"))
+    digest = hashlib.sha256(core.read_bytes() + b"".join(path.read_bytes() for path in sources)).hexdigest()
+    folder = _OUT / digest[:16]
+    if not (folder / "done").exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        javac = [toolchain.find_jdk().javac, "--release", "17", "-d", str(folder), "-classpath", str(core)]
+        subprocess.run([*javac, *map(str, sources)], check=True)
+        (folder / "done").touch()
+    return f"{core}:{folder}"
+
+
+class FakeCabinet:
+    """The core as a process.
+
+    Args:
+        rate: cabinet seconds per second.
+        key: pre-shared key.
+        allow: allow-list.
+        heartbeat: of the server [s].
+        getter: what each reading of the robot costs [s].
+        log: file for its log.
+    """
+
+    def __init__(
+        self,
+        *,
+        log: Path,
+        rate: float = 1.0,
+        key: str = "",
+        allow: str = "",
+        heartbeat: float = 0.5,
+        getter: float = 0.0,
+    ) -> None:
+        self.log = log
+        options = ["-Xmx64m", "-Xss512k", "-XX:+UseSerialGC", "-XX:TieredStopAtLevel=1", "-cp", classes()]
+        values = [str(rate), key, allow, str(heartbeat), str(getter)]
+        with log.open("w") as file:
+            self.process = subprocess.Popen(
+                [toolchain.find_jdk().java, *options, "heptarm.fake.FakeCabinet", *values],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=file,
+                text=True,
+            )
+        self.port = int(self._line())
+
+    def _line(self) -> str:
+        assert self.process.stdout is not None
+        return self.process.stdout.readline().strip()
+
+    def _say(self, text: str) -> str:
+        assert self.process.stdin is not None
+        self.process.stdin.write(f"{text}\n")
+        self.process.stdin.flush()
+        return self._line()
+
+    def threads(self) -> list[str]:
+        """Names of the server's threads."""
+        return sorted(self._say("threads").split())
+
+    def close(self) -> list[str]:
+        """Closes the server; returns the names of the threads that it leaves."""
+        left = self._say("close").split()
+        assert self.process.wait(timeout=10) == 0
+        return left
+
+    def is_alive(self) -> bool:
+        return self.process.poll() is None
+
+    def errors(self) -> list[str]:
+        """Errors that the server has logged."""
+        return [line for line in self.log.read_text().splitlines() if line.startswith("error")]
+
+    def __enter__(self) -> FakeCabinet:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.process.poll() is None:
+            self.process.kill()
+            self.process.wait()
+        for pipe in (self.process.stdin, self.process.stdout):
+            if pipe is not None:
+                pipe.close()

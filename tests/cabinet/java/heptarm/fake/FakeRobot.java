@@ -1,0 +1,287 @@
+package heptarm.fake;
+
+import java.util.ArrayDeque;
+import java.util.Arrays;
+
+import heptarm.core.Clock;
+import heptarm.core.Job;
+import heptarm.core.Models;
+import heptarm.core.Refusal;
+import heptarm.core.Robot;
+import heptarm.wire.Code;
+import heptarm.wire.FrameInfo;
+import heptarm.wire.Hold;
+import heptarm.wire.Item;
+import heptarm.wire.Mode;
+import heptarm.wire.OperationMode;
+import heptarm.wire.PoseState;
+import heptarm.wire.Ptp;
+import heptarm.wire.Redundancy;
+import heptarm.wire.RobotInfo;
+import heptarm.wire.SafetyBits;
+import heptarm.wire.SafetyState;
+import heptarm.wire.SignalInfo;
+import heptarm.wire.ToolInfo;
+import heptarm.wire.WrenchState;
+
+/**
+ * Seven axes without dynamics: each motion runs at one speed, a cancelled one rests at once.
+ *
+ * <p>A PTP whose A7 is 1.25 rad fails when it is planned, one whose A7 is 1.5 rad fails on the way: errors to order.
+ */
+final class FakeRobot implements Robot, Runnable {
+    static final double SPEED = 1.0;
+    static final double FAILS_AT_PLANNING = 1.25;
+    static final double FAILS_ON_THE_WAY = 1.5;
+    private static final long TICK_NS = 2000000L;
+
+    private final Clock clock;
+    private final long getterNanos;
+    private final double[] q = new double[7];
+    private final ArrayDeque<FakeJob> jobs = new ArrayDeque<>();
+    private final RobotInfo info;
+    private volatile double override = 1.0;
+    private volatile boolean paused;
+
+    FakeRobot(Clock clock, long getterNanos) {
+        this.clock = clock;
+        this.getterNanos = getterNanos;
+        double[] limit = {2.96, 2.09, 2.96, 2.09, 2.96, 2.09, 3.05};
+        double[] low = new double[7];
+        for (int i = 0; i < 7; i++) {
+            low[i] = -limit[i];
+        }
+        this.info = Models.describe("LBR_iiwa_14_R820_1", low, limit);
+    }
+
+    private final class FakeJob implements Job {
+        final double[] target;
+        final double seconds;
+        final Job.Listener listener;
+        boolean started;
+        boolean cancelled;
+        double left;
+
+        FakeJob(double[] target, double seconds, Job.Listener listener) {
+            this.target = target;
+            this.seconds = seconds;
+            this.left = seconds;
+            this.listener = listener;
+        }
+
+        @Override
+        public void cancel() {
+            synchronized (jobs) {
+                cancelled = true;
+            }
+        }
+    }
+
+    @Override
+    public void run() {
+        try {
+            long next = clock.nanos();
+            while (true) {
+                next = clock.sleepUntil(next + TICK_NS);
+                tick(TICK_NS * 1e-9 * (paused ? 0.0 : override));
+            }
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
+        }
+    }
+
+    private void tick(double dt) {
+        FakeJob job;
+        boolean begins = false;
+        Job.Ended ended = null;
+        synchronized (jobs) {
+            job = jobs.peek();
+            if (job == null) {
+                return;
+            }
+            if (job.cancelled) {
+                ended = Job.Ended.CANCELLED;
+            } else {
+                begins = !job.started;
+                job.started = true;
+                ended = move(job, dt);
+            }
+            if (ended != null) {
+                jobs.poll();
+            }
+        }
+        if (begins) {
+            job.listener.started();
+        }
+        if (ended == Job.Ended.FAILED) {
+            job.listener.finished(ended, Code.EXECUTION_FAILED, "the drive of A7 tripped");
+        } else if (ended != null) {
+            job.listener.finished(ended, 0, "");
+        }
+    }
+
+    private Job.Ended move(FakeJob job, double dt) {
+        if (job.target == null) {
+            job.left -= dt;
+            return job.left <= 0 ? Job.Ended.DONE : null;
+        }
+        boolean arrived = true;
+        for (int i = 0; i < 7; i++) {
+            double step = Math.max(-SPEED * dt, Math.min(SPEED * dt, job.target[i] - q[i]));
+            q[i] += step;
+            arrived &= q[i] == job.target[i];
+        }
+        if (job.target[6] == FAILS_ON_THE_WAY && q[6] > 0.1) {
+            return Job.Ended.FAILED;
+        }
+        return arrived ? Job.Ended.DONE : null;
+    }
+
+    /** Each getter of a cabinet costs. */
+    private void pay() {
+        if (getterNanos > 0) {
+            try {
+                clock.sleepUntil(clock.nanos() + getterNanos);
+            } catch (InterruptedException e) {
+                Thread.currentThread().interrupt();
+            }
+        }
+    }
+
+    @Override
+    public Job start(Item item, Mode mode, Job.Listener listener) throws Refusal {
+        double[] target = item.motion instanceof Ptp ? ((Ptp) item.motion).q : null;
+        if (target != null && target[6] == FAILS_AT_PLANNING) {
+            throw new Refusal(Code.UNREACHABLE, "Can not plan motion: not reachable");
+        }
+        double seconds = item.motion instanceof Hold ? ((Hold) item.motion).duration : 0.0;
+        FakeJob job = new FakeJob(target, Double.isNaN(seconds) ? 1e9 : seconds, listener);
+        synchronized (jobs) {
+            jobs.add(job);
+        }
+        return job;
+    }
+
+    @Override
+    public void check(Item item, String path) throws Refusal {
+        if (!(item.motion instanceof Ptp || item.motion instanceof Hold)) {
+            throw new Refusal(Code.UNSUPPORTED, path + "motion", item.motion.getClass().getSimpleName(), "Ptp, Hold", "not here");
+        }
+    }
+
+    @Override
+    public void readJoints(double[] measured, double[] commanded) {
+        pay();
+        synchronized (jobs) {
+            System.arraycopy(q, 0, measured, 0, 7);
+            System.arraycopy(q, 0, commanded, 0, 7);
+        }
+    }
+
+    @Override
+    public void readTorques(double[] measured, double[] external, double[] commanded) {
+        pay();
+        Arrays.fill(commanded, Double.NaN);
+    }
+
+    @Override
+    public PoseState readPose(long stamp) {
+        pay();
+        double[] xyz = {0.5, 0.0, 0.5};
+        double[] quat = {0.0, 0.0, 0.0, 1.0};
+        return new PoseState(stamp, xyz, quat, xyz, quat, new Redundancy(0.0, 2, 0));
+    }
+
+    @Override
+    public WrenchState readWrench(long stamp) {
+        pay();
+        return new WrenchState(stamp, new double[3], new double[3], new double[3], new double[3]);
+    }
+
+    @Override
+    public SafetyState readSafety(long stamp) {
+        pay();
+        return new SafetyState(stamp, SafetyBits.READY_TO_MOVE | (paused ? SafetyBits.PAUSED : 0), OperationMode.AUT);
+    }
+
+    @Override
+    public void readProgress(double[] progressAndRemaining) {
+        Arrays.fill(progressAndRemaining, Double.NaN);
+    }
+
+    @Override
+    public void stop() {
+        synchronized (jobs) {
+            for (FakeJob job : jobs) {
+                job.cancelled = true;
+            }
+        }
+    }
+
+    @Override
+    public void pause() {
+        paused = true;
+    }
+
+    @Override
+    public void resume() {
+        paused = false;
+    }
+
+    @Override
+    public void setOverride(double value) {
+        override = value;
+    }
+
+    @Override
+    public double override() {
+        return override;
+    }
+
+    @Override
+    public void recover() throws Refusal {
+        throw new Refusal(Code.NEEDS_OPERATOR, "release the emergency stop");
+    }
+
+    @Override
+    public void show(int severity, String text) {
+        if ("crash".equals(text)) {
+            throw new IllegalStateException("an error of the cabinet's API");
+        }
+    }
+
+    @Override
+    public RobotInfo info() {
+        return info;
+    }
+
+    @Override
+    public String cabinet() {
+        return "fake";
+    }
+
+    @Override
+    public boolean isVirtual() {
+        return true;
+    }
+
+    @Override
+    public String[] capabilities() {
+        return new String[] {"ptp", "hold"};
+    }
+
+    @Override
+    public ToolInfo[] tools() {
+        return new ToolInfo[0];
+    }
+
+    @Override
+    public FrameInfo[] frames() {
+        return new FrameInfo[0];
+    }
+
+    @Override
+    public SignalInfo[] signals() {
+        return new SignalInfo[0];
+    }
+}

@@ -1,0 +1,144 @@
+"""A client made of a socket and frames: it can say what a real client never would."""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import socket
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, TypeVar
+
+from heptarm.wire import messages as wire
+from heptarm.wire.frames import Frame, FrameReader, pack
+
+M = TypeVar("M")
+NONCE = bytes(range(32))
+
+
+class Closed(Exception):
+    """The cabinet has closed the connection."""
+
+
+class Peer:
+    """One connection. Everything that comes is kept in `seen`, with the frame that brought it."""
+
+    def __init__(self, port: int, *, hello: bool = True, name: str = "peer", key: str = "") -> None:
+        self.socket = socket.create_connection(("127.0.0.1", port), timeout=5)
+        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self.reader = FrameReader()
+        self.seen: list[tuple[Frame, Any]] = []
+        self._next = 0
+        self._request = 0
+        self._seq = 0
+        if hello:
+            self.welcome = self.greet(name=name, key=key)
+
+    def greet(self, *, name: str = "peer", key: str = "", major: int = wire.MAJOR) -> wire.Welcome:
+        self.send(wire.Hello(major=major, minor=0, name=name, version="0", nonce=NONCE))
+        message = self.next()
+        if isinstance(message, wire.Challenge):
+            proof = hmac.new(key.encode(), message.nonce + NONCE, hashlib.sha256).digest()
+            self.send(wire.Proof(mac=proof))
+            message = self.next()
+        assert isinstance(message, wire.Welcome), message
+        return message
+
+    def pack(self, message: Any, request: int = 0) -> bytes:
+        self._seq += 1
+        return pack(message.TYPE, message.encode(), seq=self._seq - 1, request=request)
+
+    def send(self, message: Any, request: int = 0) -> None:
+        self.socket.sendall(self.pack(message, request))
+
+    def ask(self, message: Any) -> Any:
+        """Sends a request; returns its answer."""
+        self._request += 1
+        self.send(message, self._request)
+        return self.answer(self._request)
+
+    def answer(self, request: int) -> Any:
+        wanted = request
+        return self.wait(lambda frame, _: frame.request == wanted, since=0)
+
+    def next(self, timeout: float = 5.0) -> Any:
+        """The next message that was not returned by `next` before."""
+        self._fill(self._next + 1, timeout)
+        self._next += 1
+        return self.seen[self._next - 1][1]
+
+    def wait_for(self, kind: type[M], where: Callable[[M], bool] = lambda _: True, timeout: float = 5.0) -> M:
+        """The first message of a kind, also one that has come already."""
+        found: M = self.wait(lambda _, message: isinstance(message, kind) and where(message), timeout=timeout)
+        return found
+
+    def wait(self, where: Callable[[Frame, Any], bool], *, since: int = 0, timeout: float = 5.0) -> Any:
+        deadline = time.monotonic() + timeout
+        index = since
+        while True:
+            self._fill(index + 1, deadline - time.monotonic())
+            if where(*self.seen[index]):
+                return self.seen[index][1]
+            index += 1
+
+    def all(self, kind: type[M]) -> list[M]:
+        return [message for _, message in self.seen if isinstance(message, kind)]
+
+    def read_for(self, seconds: float) -> None:
+        """Reads whatever comes for a while."""
+        deadline = time.monotonic() + seconds
+        while (left := deadline - time.monotonic()) > 0:
+            try:
+                self._fill(len(self.seen) + 1, left)
+            except TimeoutError:
+                return
+
+    def is_closed(self, timeout: float = 5.0) -> bool:
+        """Whether the cabinet closes the connection in time."""
+        try:
+            while True:
+                self._fill(len(self.seen) + 1, timeout)
+        except Closed:
+            return True
+        except TimeoutError:
+            return False
+
+    def _fill(self, count: int, timeout: float) -> None:
+        deadline = time.monotonic() + timeout
+        while len(self.seen) < count:
+            frame = self.reader.read()
+            if frame is not None:
+                self.seen.append((frame, wire.MESSAGES[frame.type].decode(frame.body)))
+                continue
+            left = deadline - time.monotonic()
+            if left <= 0:
+                raise TimeoutError(f"nothing came; so far {[type(m).__name__ for _, m in self.seen[-10:]]}")
+            self.socket.settimeout(left)
+            try:
+                data = self.socket.recv(65536)
+            except ConnectionError:
+                data = b""
+            if not data:
+                raise Closed
+            self.reader.feed(data)
+
+    def close(self) -> None:
+        self.socket.close()
+
+    def __enter__(self) -> Peer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def ptp(*q: float) -> wire.Item:
+    """A PTP to seven joint positions; the last ones may be left out."""
+    return wire.Item(motion=wire.Ptp(q=(*q, *(0.0,) * (7 - len(q)))))
+
+
+def run(*items: wire.Item, when: wire.When = wire.When.QUEUE) -> wire.Run:
+    return wire.Run(items=items, when=when)

@@ -1,0 +1,104 @@
+"""The octet stream: any split or merge is legal, and a client that does not read holds up nobody."""
+
+from __future__ import annotations
+
+import random
+import socket
+import time
+from collections.abc import Callable
+
+import pytest
+
+from heptarm.wire import messages as wire
+from heptarm.wire.codes import Code
+from tests.cabinet.fake import FakeCabinet
+from tests.cabinet.peer import Peer, ptp, run
+
+Connect = Callable[..., Peer]
+
+
+@pytest.mark.parametrize("size", [1, 7, 25, 26, 27, 1000])
+def test_frames_may_be_cut_anywhere(connect: Connect, size: int) -> None:
+    peer = connect()
+    stream = b"".join(peer.pack(wire.Ping(sent=k)) + peer.pack(wire.Stop(), 100 + k) for k in range(20))
+    for at in range(0, len(stream), size):
+        peer.socket.sendall(stream[at : at + size])
+        if size < 10 and at % 100 == 0:
+            time.sleep(0.0005)
+    assert isinstance(peer.answer(119), wire.Accepted)
+    assert [pong.sent for pong in peer.all(wire.Pong)] == list(range(20))
+    assert [frame.request for frame, _ in peer.seen if frame.request] == [100 + k for k in range(20)]
+
+
+def test_frames_are_numbered_without_a_gap(connect: Connect) -> None:
+    peer = connect()
+    peer.ask(wire.Subscribe(groups=wire.Groups.JOINTS, rate=500.0))
+    for _ in range(50):
+        peer.ask(wire.Stop())
+    assert [frame.seq for frame, _ in peer.seen] == list(range(len(peer.seen)))
+
+
+def test_a_body_of_the_largest_size_is_taken_and_a_larger_one_is_not(connect: Connect) -> None:
+    peer = connect()
+    body = b"\0" * wire.MAX_BODY
+    peer.socket.sendall(wire.HEADER.pack(wire.MAGIC, wire.MAJOR, 0, 900, len(body), 0, 1, 0) + body)
+    assert peer.answer(1).code == Code.UNKNOWN_MESSAGE
+    peer.socket.sendall(wire.HEADER.pack(wire.MAGIC, wire.MAJOR, 0, 900, len(body) + 1, 0, 2, 0))
+    assert peer.wait_for(wire.Goodbye).code == Code.BAD_FRAME
+
+
+def test_a_client_that_does_not_read_is_closed_and_holds_up_nobody(make: Callable[..., FakeCabinet]) -> None:
+    cabinet = make()
+    every = wire.Groups(63)
+    with Peer(cabinet.port, hello=False) as slow, Peer(cabinet.port, name="quick") as quick:
+        slow.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        slow.greet(name="slow")
+        slow.send(wire.Subscribe(groups=every, rate=1000.0), 1)
+        quick.ask(wire.Subscribe(groups=every, rate=200.0))
+        deadline = time.monotonic() + 15.0
+        worst = 0.0
+        while "ha-reader-1" in cabinet.threads():
+            assert time.monotonic() < deadline
+            began = time.monotonic()
+            assert isinstance(quick.ask(wire.Stop()), wire.Accepted)
+            worst = max(worst, time.monotonic() - began)
+            time.sleep(0.05)
+        assert worst < 0.2
+        before = len(quick.all(wire.State))
+        quick.read_for(1.0)
+        assert len(quick.all(wire.State)) - before > 150
+        stamps = [state.joints.stamp for state in quick.all(wire.State) if state.joints is not None]
+        assert stamps == sorted(set(stamps))
+
+
+def test_requests_without_reading_the_answers_end_that_client_only(make: Callable[..., FakeCabinet]) -> None:
+    cabinet = make()
+    with Peer(cabinet.port) as rude, Peer(cabinet.port) as other:
+        burst = b"".join(rude.pack(wire.Stop(), 1 + k) for k in range(1000))
+        rude.socket.settimeout(10)
+        with pytest.raises(OSError):
+            for _ in range(2000):
+                rude.socket.sendall(burst)
+        assert isinstance(other.ask(wire.Stop()), wire.Accepted)
+    assert cabinet.errors() == []
+
+
+def test_a_program_of_a_thousand_items_in_one_frame(connect: Connect) -> None:
+    peer = connect()
+    peer.ask(wire.TakeControl(watchdog=10.0))
+    accepted = peer.ask(run(*[ptp(0.0001 * (k % 2)) for k in range(1000)]))
+    assert isinstance(accepted, wire.Accepted)
+    finished = peer.wait_for(wire.MotionFinished, timeout=20)
+    assert (finished.id, finished.item, finished.cause) == (accepted.id, 999, wire.Cause.FINISHED)
+    assert [event.item for event in peer.all(wire.ItemReached)] == list(range(999))
+    peer.ask(wire.ReleaseControl())
+
+
+def test_answers_come_in_the_order_of_the_requests(connect: Connect) -> None:
+    peer = connect()
+    peer.ask(wire.Subscribe(groups=wire.Groups(63), rate=1000.0))
+    numbers = random.Random(1).sample(range(1, 2**32), 300)
+    for number in numbers:
+        peer.send(wire.Stop(), number)
+    peer.answer(numbers[-1])
+    assert [frame.request for frame, message in peer.seen[1:] if frame.request > 1] == numbers
