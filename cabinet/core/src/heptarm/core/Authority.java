@@ -11,13 +11,17 @@ final class Authority {
     private Client holder;
     private double watchdog;
     private OnLost onLost;
+    private boolean leaving;
 
     Authority(Server server) {
         this.server = server;
     }
 
     synchronized void take(Client client, double watchdogSeconds, OnLost whenLost) throws Refusal {
-        if (holder != null && holder != client) {
+        if (!client.isOpen()) {
+            throw new Refusal(Code.NOT_IN_CONTROL, "the connection of " + client.name() + " has ended");
+        }
+        if (holder != null && (holder != client || leaving)) {
             throw new Refusal(Code.CONTROL_TAKEN, "controller", holder.name(), "",
                     holder.name() + " (session " + holder.session + ") controls this robot");
         }
@@ -32,23 +36,30 @@ final class Authority {
 
     void release(Client client) {
         synchronized (this) {
-            if (holder != client) {
+            if (holder != client || leaving) {
                 return;
             }
-            holder = null;
+            leaving = true;
         }
         server.executor.endAll(Cause.STOPPED, "control was released");
-        server.broadcast(new ControlChanged("", 0, client.name() + " released control"));
+        free(client.name() + " released control");
+    }
+
+    /** Control is free only when everything of its holder was ended, so that nothing of the next one's is. */
+    private synchronized void free(String why) {
+        server.broadcast(new ControlChanged("", 0, why));
+        holder = null;
+        leaving = false;
     }
 
     /** The controller is gone or silent. */
     void lost(Client client, String why) {
         OnLost what;
         synchronized (this) {
-            if (holder != client) {
+            if (holder != client || leaving) {
                 return;
             }
-            holder = null;
+            leaving = true;
             what = onLost;
         }
         if (what == OnLost.STOP) {
@@ -56,11 +67,11 @@ final class Authority {
             server.robot.stop();
         }
         server.log.warn(client.name() + " lost control: " + why);
-        server.broadcast(new ControlChanged("", 0, client.name() + " was lost: " + why));
+        free(client.name() + " was lost: " + why);
     }
 
     synchronized boolean holds(Client client) {
-        return holder == client;
+        return holder == client && !leaving;
     }
 
     synchronized Client holder() {

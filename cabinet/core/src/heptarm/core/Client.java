@@ -20,6 +20,7 @@ import heptarm.wire.Protocol;
 final class Client {
     private static final int MAX_EVENTS = 4096;
     private static final int MAX_STATES = 64;
+    private static final long LINGER_MS = 500;
     private static final int SEQ = 10;
 
     final int session;
@@ -33,12 +34,13 @@ final class Client {
     private final ArrayDeque<byte[]> events = new ArrayDeque<byte[]>();
     private final ArrayDeque<byte[]> states = new ArrayDeque<byte[]>();
     private boolean writing;
-    private boolean ending;
+    private volatile boolean ending;
     private long dropped;
 
     private int seq;
     private Thread reader;
     private Thread writer;
+    private final long born;
     private volatile boolean gone;
     private volatile long heard;
     private volatile long sent;
@@ -51,8 +53,9 @@ final class Client {
         this.in = socket.getInputStream();
         this.out = socket.getOutputStream();
         this.handshake = new Handshake(server, this);
-        this.heard = server.clock.nanos();
-        this.sent = heard;
+        this.born = server.clock.nanos();
+        this.heard = born;
+        this.sent = born;
     }
 
     void start() {
@@ -81,7 +84,17 @@ final class Client {
     }
 
     boolean isOpen() {
-        return handshake.isOpen() && !gone;
+        return handshake.isOpen() && !ending && !gone;
+    }
+
+    /** Whether the client has not said who it is yet. */
+    boolean isNew() {
+        return !handshake.isOpen() && !ending;
+    }
+
+    /** Cabinet time at which the client connected. */
+    long born() {
+        return born;
     }
 
     /** Cabinet time of the last octets from the client. */
@@ -123,10 +136,6 @@ final class Client {
                 heard = server.clock.nanos();
                 filled += count;
                 int used = frames(buffer, filled);
-                if (used < 0) {
-                    why = "it sent octets that are no frame";
-                    break;
-                }
                 filled -= used;
                 if (used > 0 && filled > 0) {
                     System.arraycopy(buffer, used, buffer, 0, filled);
@@ -142,14 +151,19 @@ final class Client {
         }
     }
 
-    /** Handles all whole frames of the buffer; returns the octets used, -1 if the stream is not ours. */
+    /**
+     * Handles all whole frames of the buffer; returns the octets used.
+     *
+     * <p>Of a connection that is ending all octets are read and thrown away: closing a socket with unread octets would
+     * throw away the last words to the client.
+     */
     private int frames(byte[] data, int filled) {
         int pos = 0;
-        while (filled - pos >= Protocol.HEADER && !gone) {
+        while (filled - pos >= Protocol.HEADER && !ending && !gone) {
             int length = int32(data, pos + 6);
             if (((data[pos] & 0xFF) << 8 | data[pos + 1] & 0xFF) != Protocol.MAGIC || length < 0 || length > Protocol.MAX_BODY) {
-                goodbye(Code.BAD_FRAME, "these octets are not a heptarm frame");
-                return -1;
+                goodbye(Code.BAD_FRAME, "it sent octets that are not a heptarm frame");
+                return filled;
             }
             if (filled - pos < Protocol.HEADER + length) {
                 break;
@@ -159,12 +173,12 @@ final class Client {
             long request = int32(data, pos + 14) & 0xFFFFFFFFL;
             if (handshake.isOpen()) {
                 server.dispatcher.handle(this, type, request, data, pos + Protocol.HEADER, length);
-            } else if (!handshake.handle(version, type, data, pos + Protocol.HEADER, length)) {
-                return -1;
+            } else {
+                handshake.handle(version, type, data, pos + Protocol.HEADER, length);
             }
             pos += Protocol.HEADER + length;
         }
-        return pos;
+        return ending ? filled : pos;
     }
 
     private static int int32(byte[] data, int at) {
@@ -176,13 +190,26 @@ final class Client {
     /** Sends an answer at once from the reader's thread if nothing is in the way, otherwise through the outbox. */
     void answer(Message message, long request) {
         byte[] frame = server.frame(message.type(), message.body(), request);
+        boolean full = false;
         synchronized (outbox) {
-            if (writing || !events.isEmpty() || ending) {
-                events.add(frame);
-                outbox.notify();
+            if (ending) {
                 return;
             }
-            writing = true;
+            if (writing || !events.isEmpty()) {
+                full = events.size() >= MAX_EVENTS;
+                if (!full) {
+                    events.add(frame);
+                    outbox.notify();
+                    return;
+                }
+            }
+            if (!full) {
+                writing = true;
+            }
+        }
+        if (full) {
+            leave("it does not read its answers");
+            return;
         }
         try {
             write(frame);
@@ -203,7 +230,7 @@ final class Client {
         boolean full;
         synchronized (outbox) {
             full = events.size() >= MAX_EVENTS;
-            if (!full) {
+            if (!full && !ending) {
                 events.add(server.frame(type, body, 0));
                 outbox.notify();
             }
@@ -228,10 +255,14 @@ final class Client {
     /** Says why and ends the connection when that is written. */
     void goodbye(int code, String text) {
         synchronized (outbox) {
+            if (ending) {
+                return;
+            }
             events.add(server.frame(Goodbye.TYPE, new Goodbye(code, text).body(), 0));
             ending = true;
             outbox.notify();
         }
+        server.retire(this, text);
     }
 
     /** Ends a connection that never became a session. */
@@ -272,11 +303,25 @@ final class Client {
                     }
                 }
             }
+            linger();
             leave("the session was ended");
         } catch (IOException e) {
             leave("the connection broke (" + e.getMessage() + ")");
         } catch (InterruptedException e) {
             leave("the cabinet application ends");
+        }
+    }
+
+    /** Says that nothing more comes, and waits a while for the client to end its side. */
+    private void linger() throws IOException, InterruptedException {
+        if (gone) {
+            return;
+        }
+        socket.shutdownOutput();
+        synchronized (outbox) {
+            if (!gone) {
+                outbox.wait(LINGER_MS);
+            }
         }
     }
 
@@ -309,6 +354,9 @@ final class Client {
             server.log.warn("closing " + address() + ": " + e);
         }
         server.left(this, why);
+        if (dropped > 0) {
+            server.log.info(dropped + " states were dropped for " + name() + ", who read too slowly");
+        }
     }
 
     void join() {

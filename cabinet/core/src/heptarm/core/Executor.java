@@ -104,6 +104,9 @@ final class Executor {
         List<Program> replaced = new ArrayList<Program>();
         Program program;
         synchronized (this) {
+            if (closed) {
+                throw new Refusal(Code.SHUTTING_DOWN, "the cabinet application ends");
+            }
             boolean busy = running != null || !queue.isEmpty();
             if (run.when == When.REJECT && busy) {
                 throw new Refusal(Code.BUSY, "when", "reject", "", "motion " + (running != null ? running.id : queue.peek().id)
@@ -223,10 +226,16 @@ final class Executor {
                     }
                     program.end(Cause.FAILED, "");
                 }
+                List<Program> behind = new ArrayList<Program>();
                 synchronized (this) {
                     running = null;
+                    if (program.cause == Cause.FAILED) { // the robot is not where what waits would begin
+                        behind.addAll(queue);
+                        queue.clear();
+                    }
                 }
                 tell(program, residual());
+                end(behind, Cause.DROPPED, "motion " + program.id + " before it failed");
             }
         } catch (InterruptedException e) {
             Thread.currentThread().interrupt();

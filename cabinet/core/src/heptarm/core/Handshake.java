@@ -46,10 +46,18 @@ final class Handshake {
         return name;
     }
 
-    /** One frame before the session stands; false: the connection ends. */
-    boolean handle(int version, int type, byte[] data, int offset, int length) {
+    /** One frame before the session stands; anything but the right one ends the connection with a reason. */
+    void handle(int version, int type, byte[] data, int offset, int length) {
+        try {
+            step(version, type, data, offset, length);
+        } catch (Refusal e) {
+            refuse(e.code, e.getMessage());
+        }
+    }
+
+    private void step(int version, int type, byte[] data, int offset, int length) throws Refusal {
         if (version != Protocol.MAJOR) {
-            return refuse(Code.WRONG_VERSION, versions(version + ".x"));
+            throw new Refusal(Code.WRONG_VERSION, versions(version + ".x"));
         }
         Message message;
         try {
@@ -58,39 +66,39 @@ final class Handshake {
                 message.validate("");
             }
         } catch (WireException e) {
-            return refuse(Code.BAD_BODY, "message " + type + ": " + e.getMessage());
+            throw new Refusal(Code.BAD_BODY, "message " + type + ": " + e.getMessage());
         } catch (Violation e) {
-            return refuse(e.code, e.getMessage());
+            throw new Refusal(e.code, e.getMessage());
         }
         if (message instanceof Hello && hello == null) {
-            return greet((Hello) message);
+            greet((Hello) message);
+        } else if (message instanceof Proof && nonce != null) {
+            prove((Proof) message);
+        } else {
+            throw new Refusal(Code.UNEXPECTED_MESSAGE, "message " + type + " before the session stands; say Hello first");
         }
-        if (message instanceof Proof && nonce != null) {
-            return prove((Proof) message);
-        }
-        return refuse(Code.UNEXPECTED_MESSAGE, "message " + type + " before the session stands; say Hello first");
     }
 
-    private boolean greet(Hello message) {
+    private void greet(Hello message) throws Refusal {
         hello = message;
         name = message.name.length() == 0 ? "a client" : message.name;
         if (message.major != Protocol.MAJOR) {
-            return refuse(Code.WRONG_VERSION, versions(message.major + "." + message.minor));
+            throw new Refusal(Code.WRONG_VERSION, versions(message.major + "." + message.minor));
         }
         if (server.config.key.length() == 0) {
-            return welcome();
+            welcome();
+            return;
         }
         nonce = new byte[32];
         RANDOM.nextBytes(nonce);
         client.answer(new Challenge(nonce), 0);
-        return true;
     }
 
-    private boolean prove(Proof proof) {
+    private void prove(Proof proof) throws Refusal {
         if (!MessageDigest.isEqual(mac(nonce, hello.nonce), proof.mac)) {
-            return refuse(Code.WRONG_KEY, "the pre-shared key is wrong");
+            throw new Refusal(Code.WRONG_KEY, "the pre-shared key is wrong");
         }
-        return welcome();
+        welcome();
     }
 
     private static String versions(String theirs) {
@@ -109,7 +117,7 @@ final class Handshake {
         }
     }
 
-    private boolean welcome() {
+    private void welcome() {
         Robot robot = server.robot;
         byte[] proof = nonce == null ? new byte[0] : mac(hello.nonce, nonce);
         Welcome welcome = new Welcome(Protocol.MAJOR, Protocol.MINOR, client.session, Config.VERSION, robot.cabinet(),
@@ -117,12 +125,10 @@ final class Handshake {
                 ALL_GROUPS, server.config.maxRate, server.config.heartbeat, server.authority.name(), proof);
         open = true;
         client.answer(welcome, 0);
-        return true;
     }
 
-    boolean refuse(int code, String text) {
+    void refuse(int code, String text) {
         client.answer(new heptarm.wire.Refusal(code, text, Protocol.MAJOR, Protocol.MINOR), 0);
         client.endAfterWriting();
-        return false;
     }
 }

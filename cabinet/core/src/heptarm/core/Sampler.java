@@ -60,8 +60,7 @@ final class Sampler {
 
     void close() {
         closed = true;
-        thread.interrupt();
-        Threads.join(thread);
+        Threads.end(thread);
     }
 
     void subscribe(Client client, int groups, double rate) {

@@ -71,24 +71,24 @@ public final class Server {
     }
 
     /** Stops motion, says goodbye to all clients, closes the port, ends all threads. */
-    public void close() {
+    public synchronized void close() {
         if (closed) {
             return;
         }
         closed = true;
         executor.close();
         robot.stop();
-        for (Client client : clients) {
-            client.goodbye(Code.SHUTTING_DOWN, "the cabinet application ends");
-        }
         try {
             socket.close();
         } catch (IOException e) {
             log.error("closing the port", e);
         }
+        Threads.join(acceptor);
+        for (Client client : clients) {
+            client.goodbye(Code.SHUTTING_DOWN, "the cabinet application ends");
+        }
         watchdog.close();
         sampler.close();
-        Threads.join(acceptor);
         for (Client client : clients) {
             client.join();
         }
@@ -113,6 +113,7 @@ public final class Server {
             } catch (IOException e) {
                 if (!closed) {
                     log.warn("a connection was not accepted: " + e);
+                    Threads.pause(); // the reason, such as too many open files, will not go away at once
                 }
             } catch (RuntimeException e) {
                 log.error("accepting a connection", e);
@@ -127,6 +128,11 @@ public final class Server {
     /** A client's connection has ended. */
     void left(Client client, String why) {
         clients.remove(client);
+        retire(client, why);
+    }
+
+    /** A client gets nothing more, and controls nothing any more. */
+    void retire(Client client, String why) {
         sampler.forget(client);
         if (authority.holds(client)) {
             authority.lost(client, why);

@@ -34,8 +34,7 @@ final class Watchdog {
 
     void close() {
         closed = true;
-        thread.interrupt();
-        Threads.join(thread);
+        Threads.end(thread);
     }
 
     private void work() {
@@ -67,8 +66,8 @@ final class Watchdog {
             long began = client.writeBegan();
             if (began != 0 && (now - began) * scale > STUCK) {
                 client.leave("it does not read what it asked for");
-            } else if (!client.isOpen()) {
-                if (silence > HANDSHAKE) {
+            } else if (client.isNew()) {
+                if ((now - client.born()) * scale > HANDSHAKE) { // counted from its start: octets now and then are no Hello
                     client.leave("it never said Hello");
                 }
             } else if (silence > SILENT_HEARTBEATS * server.config.heartbeat) {
