@@ -1,8 +1,8 @@
 """Prints the figures that heptarm promises, one JSON object a line.
 
-    python -m bench                 all of them
-    python -m bench --only NAME     one
-    python -m bench --list          their names
+python -m bench                 all of them
+python -m bench --only NAME     one
+python -m bench --list          their names
 """
 
 from __future__ import annotations

@@ -45,7 +45,9 @@ def garbage(target: tuple[str, int], frames: int, seed: int = 3) -> int:
     """Send frames that are random, mutated, cut, or of wrong types; returns how many were sent."""
     chance = random.Random(seed)
     seeds = _seeds()
-    hello = _frame(messages.Hello.TYPE, messages.Hello(major=messages.MAJOR, minor=0, name="garbage").encode(), 0)
+    hello = _frame(
+        messages.Hello.TYPE, messages.Hello(major=messages.MAJOR, minor=0, name="garbage").encode(), 0
+    )
     sent = 0
     while sent < frames:
         with socket.create_connection(target, timeout=5) as peer:
@@ -62,7 +64,9 @@ def garbage(target: tuple[str, int], frames: int, seed: int = 3) -> int:
                 while peer.recv(65536):
                     pass
             except OSError:
-                sent += 1  # the cabinet has closed this connection, as it should after octets that are no frame
+                sent += (
+                    1  # the cabinet has closed this connection, as it should after octets that are no frame
+                )
     return sent
 
 

@@ -34,7 +34,9 @@ def start_up() -> Iterator[Figure]:
             with ha.connect(cabinet.target, state_rate=1000) as arm:
                 arm.move([ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), ha.lin_rel(z=-0.1, frame="base")])
             memory.append(cabinet.memory())
-    yield Figure("ready", "A13", max(times), "s", limit=4.0, detail={"median": round(float(np.median(times)), 2)})
+    yield Figure(
+        "ready", "A13", max(times), "s", limit=4.0, detail={"median": round(float(np.median(times)), 2)}
+    )
     yield Figure("memory", "A13", max(memory), "MB", limit=350)
 
 

@@ -33,23 +33,28 @@ def lost_client() -> Iterator[Figure]:
     random = np.random.default_rng(2)
     times = []
     taken = 0
-    with Cabinet() as cabinet:
-        with ha.connect(cabinet.target, control=False, state_rate=500) as observer:
-            for index in range(TIMES):
-                goal = 1.2 if index % 2 else -1.2
-                client = subprocess.Popen([sys.executable, "-c", _CLIENT, cabinet.target, str(goal)], stdout=subprocess.PIPE, text=True)
-                assert client.stdout is not None
-                client.stdout.readline()
-                observer.wait_until(lambda s: float(np.abs(s.dq).max()) > 0.1, timeout=10)
-                time.sleep(random.uniform(0.0, 0.5))
-                killed = time.monotonic()
-                os.kill(client.pid, signal.SIGKILL)
-                client.wait()
-                observer.wait_until(lambda s: not s.motion.active and float(np.abs(s.dq).max()) < 5e-3, timeout=10)
-                times.append(time.monotonic() - killed)
-                with ha.connect(cabinet.target) as arm:
-                    arm.move(ha.lin_rel(z=0.01 if index % 2 else -0.01, frame="base"))
-                    taken += 1
+    with Cabinet() as cabinet, ha.connect(cabinet.target, control=False, state_rate=500) as observer:
+        for index in range(TIMES):
+            goal = 1.2 if index % 2 else -1.2
+            client = subprocess.Popen(
+                [sys.executable, "-c", _CLIENT, cabinet.target, str(goal)],
+                stdout=subprocess.PIPE,
+                text=True,
+            )
+            assert client.stdout is not None
+            client.stdout.readline()
+            observer.wait_until(lambda s: float(np.abs(s.dq).max()) > 0.1, timeout=10)
+            time.sleep(random.uniform(0.0, 0.5))
+            killed = time.monotonic()
+            os.kill(client.pid, signal.SIGKILL)
+            client.wait()
+            observer.wait_until(
+                lambda s: not s.motion.active and float(np.abs(s.dq).max()) < 5e-3, timeout=10
+            )
+            times.append(time.monotonic() - killed)
+            with ha.connect(cabinet.target) as arm:
+                arm.move(ha.lin_rel(z=0.01 if index % 2 else -0.01, frame="base"))
+                taken += 1
     detail = {"times": TIMES, "median": round(float(np.median(times)), 3)}
     yield Figure("lost_client_rest", "A14", max(times), "s", limit=0.5 + WATCHDOG, detail=detail)
     yield Figure("lost_client_retaken", "A14", taken, "times", limit=TIMES, least=True)

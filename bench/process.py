@@ -21,7 +21,16 @@ class Cabinet:
         self._stats = Path(self._folder.name) / "stats.json"
         began = time.monotonic()
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "heptarm.virtual.cabinet", "--port", "0", "--stats", str(self._stats), *options],
+            [
+                sys.executable,
+                "-m",
+                "heptarm.virtual.cabinet",
+                "--port",
+                "0",
+                "--stats",
+                str(self._stats),
+                *options,
+            ],
             stdout=subprocess.PIPE,
             text=True,
         )
@@ -57,7 +66,9 @@ class Cabinet:
     def __enter__(self) -> Cabinet:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         if self.process.poll() is None:
             self.end()
         self._folder.cleanup()

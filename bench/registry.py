@@ -11,8 +11,8 @@ from typing import Any
 class Figure:
     """One measured number beside what is promised.
 
-    `limit` bounds `ratio` where there is a reference, otherwise `value`; "at least" figures carry `least=True`. A figure
-    without a limit is reported only.
+    `limit` bounds `ratio` where there is a reference, otherwise `value`; "at least" figures carry
+    `least=True`. A figure without a limit is reported only.
     """
 
     name: str
@@ -60,7 +60,9 @@ class Benchmark:
 BENCHMARKS: dict[str, Benchmark] = {}
 
 
-def benchmark(name: str, line: str) -> Callable[[Callable[[], Iterator[Figure]]], Callable[[], Iterator[Figure]]]:
+def benchmark(
+    name: str, line: str
+) -> Callable[[Callable[[], Iterator[Figure]]], Callable[[], Iterator[Figure]]]:
     """Register a benchmark under a name."""
 
     def register(function: Callable[[], Iterator[Figure]]) -> Callable[[], Iterator[Figure]]:

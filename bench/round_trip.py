@@ -25,7 +25,9 @@ def round_trip() -> Iterator[Figure]:
     ours: list[int] = []
     floor: list[int] = []
     echo = subprocess.Popen(
-        ["java", "-Xmx32m", "-XX:+UseSerialGC", str(Path(__file__).parent / "java" / "Echo.java")], stdout=subprocess.PIPE, text=True
+        ["java", "-Xmx32m", "-XX:+UseSerialGC", str(Path(__file__).parent / "java" / "Echo.java")],
+        stdout=subprocess.PIPE,
+        text=True,
     )
     try:
         assert echo.stdout is not None
@@ -51,7 +53,15 @@ def round_trip() -> Iterator[Figure]:
         "echo_p99_us": round(float(np.percentile(floor_us, 99)), 1),
         "requests": len(ours),
     }
-    yield Figure("round_trip", "A11", float(np.median(ours_us)), "us", reference=float(np.median(floor_us)), limit=2.0, detail=detail)
+    yield Figure(
+        "round_trip",
+        "A11",
+        float(np.median(ours_us)),
+        "us",
+        reference=float(np.median(floor_us)),
+        limit=2.0,
+        detail=detail,
+    )
 
 
 def _request(arm: ha.Arm) -> int:

@@ -10,7 +10,10 @@ command = [sys.executable, "-m", "heptarm.virtual.cabinet", "--port", "0", "--pa
 cabinet = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 target = f"sim://127.0.0.1:{json.loads(cabinet.stdout.readline())['port']}"
 
-with ha.connect(target, name="controller") as arm, ha.connect(target, control=False, name="observer") as observer:
+with (
+    ha.connect(target, name="controller") as arm,
+    ha.connect(target, control=False, name="observer") as observer,
+):
     print("the observer sees that", observer.controller, "is in control")
     handle = arm.start(ha.ptp(ha.deg(90, 30, 0, -90, 0, 60, 0)), speed=0.3)
     observer.wait_until(lambda state: state.q[0] > 0.2)

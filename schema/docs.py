@@ -13,7 +13,9 @@ def _table(fields: list[Field]) -> list[str]:
         note = one.doc + ("; NaN keeps the default" if one.nan and "NaN" not in one.doc else "")
         if one.has_default:
             note += f"; default {one.default}"
-        lines.append(f"| `{one.name}` | `{one.type.text}` | {one.unit} | {one.range_text} | {note.lstrip('; ')} |")
+        lines.append(
+            f"| `{one.name}` | `{one.type.text}` | {one.unit} | {one.range_text} | {note.lstrip('; ')} |"
+        )
     return [*lines, ""]
 
 
@@ -57,8 +59,15 @@ def protocol(spec: Spec) -> str:
     for message in spec.messages.values():
         lines += [f"### {message.name}", "", f"Id {message.id}, {message.kind}. {message.doc}", ""]
         if message.groups:
-            lines += ["A u16 mask of the groups, then each group whose bit is set, in this order:", "", "| bit | group |", "|---|---|"]
-            lines += [f"| {number} | `{bit}`: [{kind}](#{kind.lower()}) |" for bit, number, kind in message.groups] + [""]
+            lines += [
+                "A u16 mask of the groups, then each group whose bit is set, in this order:",
+                "",
+                "| bit | group |",
+                "|---|---|",
+            ]
+            lines += [
+                f"| {number} | `{bit}`: [{kind}](#{kind.lower()}) |" for bit, number, kind in message.groups
+            ] + [""]
         else:
             lines += _table(message.fields)
     lines += ["## Structs", ""]
@@ -70,8 +79,18 @@ def protocol(spec: Spec) -> str:
         lines += [f"| {tag} | {member} |" for tag, member in union.members] + [""]
     lines += ["## Enumerations", ""]
     for enum in spec.enums.values():
-        lines += [f"### {enum.name}", "", f"{enum.doc} `{enum.base}`.", "", f"| {'bit' if enum.flags else 'value'} | name | meaning |", "|---|---|---|"]
-        lines += [f"| {value['bit' if enum.flags else 'value']} | {value['name']} | {value.get('doc', '')} |" for value in enum.values] + [""]
+        lines += [
+            f"### {enum.name}",
+            "",
+            f"{enum.doc} `{enum.base}`.",
+            "",
+            f"| {'bit' if enum.flags else 'value'} | name | meaning |",
+            "|---|---|---|",
+        ]
+        lines += [
+            f"| {value['bit' if enum.flags else 'value']} | {value['name']} | {value.get('doc', '')} |"
+            for value in enum.values
+        ] + [""]
     return "\n".join(lines)
 
 
@@ -85,5 +104,8 @@ def errors(spec: Spec) -> str:
         "| code | name | Python error | what it means | what to do |",
         "|---|---|---|---|---|",
     ]
-    lines += [f"| {e['code']} | `{e['name']}` | `{e['class']}` | {e['title']} | {e['advice']} |" for e in spec.errors]
+    lines += [
+        f"| {e['code']} | `{e['name']}` | `{e['class']}` | {e['title']} | {e['advice']} |"
+        for e in spec.errors
+    ]
     return "\n".join([*lines, ""])

@@ -1,7 +1,7 @@
 """Writes the Python codec, the Java codec, the golden vectors and the protocol pages from the schema.
 
-    python schema/generate.py           write
-    python schema/generate.py --check   fail if anything that is committed differs from the schema
+python schema/generate.py           write
+python schema/generate.py --check   fail if anything that is committed differs from the schema
 """
 
 from __future__ import annotations

@@ -121,8 +121,8 @@ class Body:
             assert t.of is not None
             self.write += [
                 f"out.append(codec.put_count(len(self.{name})))",
-                f"for item in self.{name}:",
-                f"    {self._write_one(t.of, 'item')}",
+                f"for one_{name} in self.{name}:",
+                f"    {self._write_one(t.of, f'one_{name}')}",
             ]
             self.read += [
                 "size, pos = codec.read_count(data, pos)",
@@ -182,8 +182,8 @@ class Body:
                 self.check.append(f"codec.check_length({size}, {path}, {one.min_len}, {one.max_len})")
             if t.kind == "list" and t.of is not None and t.of.kind in ("struct", "union"):
                 self.check += [
-                    f"for index, item in enumerate(self.{name}):",
-                    f'    item._check(f"{{path}}{name}[{{index}}].")',
+                    f"for index, its_{name} in enumerate(self.{name}):",
+                    f'    its_{name}._check(f"{{path}}{name}[{{index}}].")',
                 ]
         elif t.kind == "opt":
             self.check += [f"if self.{name} is not None:", f'    self.{name}._check(path + "{name}.")']
@@ -244,7 +244,11 @@ def _state(message: Message) -> list[str]:
     lines += ["        out.append(_MASK.pack(mask))"]
     for bit, _, _ in message.groups:
         lines += [f"        if self.{bit} is not None:", f"            self.{bit}._write(out)"]
-    lines += ["", "    @classmethod", f"    def _read(cls, data: bytes, pos: int) -> tuple[{message.name}, int]:"]
+    lines += [
+        "",
+        "    @classmethod",
+        f"    def _read(cls, data: bytes, pos: int) -> tuple[{message.name}, int]:",
+    ]
     known = sum(1 << number for _, number, _ in message.groups)
     lines += [
         "        mask = codec.unpack(_MASK, data, pos)[0]",
@@ -268,13 +272,23 @@ def _state(message: Message) -> list[str]:
 def messages(spec: Spec) -> str:
     p = spec.protocol
     lines = [HEAD]
-    lines += [f"MAJOR = {p['major']}", f"MINOR = {p['minor']}", f"PORT = {p['port']}", f"MAGIC = {p['magic']:#06x}"]
+    lines += [
+        f"MAJOR = {p['major']}",
+        f"MINOR = {p['minor']}",
+        f"PORT = {p['port']}",
+        f"MAGIC = {p['magic']:#06x}",
+    ]
     layout = "".join(PRIMITIVES[one["type"]] for one in spec.header)
     lines += [f"MAX_BODY = {p['max_body']}", f'HEADER = Struct(">{layout}")', '_MASK = Struct(">H")', ""]
     for enum in spec.enums.values():
-        lines += ["", f"class {enum.name}(enum.{'IntFlag' if enum.flags else 'IntEnum'}):", f'    """{_doc(enum.doc)}"""', ""]
+        lines += [
+            "",
+            f"class {enum.name}(enum.{'IntFlag' if enum.flags else 'IntEnum'}):",
+            f'    """{_doc(enum.doc)}"""',
+            "",
+        ]
         if enum.flags:
-            lines += [f"    NONE = 0"]
+            lines += ["    NONE = 0"]
         for value in enum.values:
             number = 1 << value["bit"] if enum.flags else value["value"]
             lines += [f"    {value['name'].upper()} = {number}"]
@@ -285,15 +299,33 @@ def messages(spec: Spec) -> str:
             continue
         struct = spec.structs[name]
         body = Body(spec, name, struct.fields)
-        lines += ["", *body.layouts, "", "", "@dataclass(frozen=True, slots=True, kw_only=True)", f"class {name}:"]
+        lines += [
+            "",
+            *body.layouts,
+            "",
+            "",
+            "@dataclass(frozen=True, slots=True, kw_only=True)",
+            f"class {name}:",
+        ]
         lines += [f'    """{_doc(struct.doc)}"""', ""]
         lines += _fields(spec, struct.fields) + _methods(name, body, struct.fields) + [""]
     for message in spec.messages.values():
         body = Body(spec, message.name, message.fields)
-        lines += ["", *body.layouts, "", "", "@dataclass(frozen=True, slots=True, kw_only=True)", f"class {message.name}:"]
+        lines += [
+            "",
+            *body.layouts,
+            "",
+            "",
+            "@dataclass(frozen=True, slots=True, kw_only=True)",
+            f"class {message.name}:",
+        ]
         lines += [f'    """{_doc(message.doc)}"""', ""]
         lines += [f"    TYPE: ClassVar[int] = {message.id}", f'    KIND: ClassVar[str] = "{message.kind}"']
-        lines += [f'    SOURCE: ClassVar[str] = "{message.source}"', f'    ROLE: ClassVar[str] = "{message.role}"', ""]
+        lines += [
+            f'    SOURCE: ClassVar[str] = "{message.source}"',
+            f'    ROLE: ClassVar[str] = "{message.role}"',
+            "",
+        ]
         if message.groups:
             lines += _state(message)
         else:
@@ -312,19 +344,54 @@ def _union(spec: Spec, name: str) -> list[str]:
     lines += [f"    {member}: {tag}," for tag, member in union.members] + ["}", ""]
     lines += ["", f"def _write_{name}(value: {name}, out: list[bytes]) -> None:"]
     lines += [f"    out.append(bytes((_{name}_TAGS[type(value)],)))", "    value._write(out)", ""]
-    lines += ["", f"def _read_{name}(data: bytes, pos: int) -> tuple[{name}, int]:", "    tag, pos = codec.read_tag(data, pos)"]
+    lines += [
+        "",
+        f"def _read_{name}(data: bytes, pos: int) -> tuple[{name}, int]:",
+        "    tag, pos = codec.read_tag(data, pos)",
+    ]
     for tag, member in union.members:
         lines += [f"    if tag == {tag}:", f"        return {member}._read(data, pos)"]
-    lines += [f'    raise DecodeError(f"{name} has tag {{tag}}; legal are {[tag for tag, _ in union.members]}")', ""]
+    lines += [
+        f'    raise DecodeError(f"{name} has tag {{tag}}; legal are {[tag for tag, _ in union.members]}")',
+        "",
+    ]
     return lines
 
 
 def codes(spec: Spec) -> str:
-    lines = ['"""Generated by schema/generate.py from schema/errors.toml. Do not edit."""', "", "from __future__ import annotations", ""]
-    lines += ["import enum", "from typing import NamedTuple", "", "", "class Code(enum.IntEnum):", '    """Why something was refused or ended."""', ""]
+    lines = [
+        '"""Generated by schema/generate.py from schema/errors.toml. Do not edit."""',
+        "",
+        "from __future__ import annotations",
+        "",
+    ]
+    lines += [
+        "import enum",
+        "from typing import NamedTuple",
+        "",
+        "",
+        "class Code(enum.IntEnum):",
+        '    """Why something was refused or ended."""',
+        "",
+    ]
     lines += [f"    {error['name'].upper()} = {error['code']}" for error in spec.errors]
-    lines += ["", "", "class Meaning(NamedTuple):", '    """A code in words, and the Python error that it becomes."""', ""]
-    lines += ["    error: str", "    title: str", "    advice: str", "", "", "MEANINGS: dict[int, Meaning] = {"]
+    lines += [
+        "",
+        "",
+        "class Meaning(NamedTuple):",
+        '    """A code in words, and the Python error that it becomes."""',
+        "",
+    ]
+    lines += [
+        "    error: str",
+        "    title: str",
+        "    advice: str",
+        "",
+        "",
+        "MEANINGS: dict[int, Meaning] = {",
+    ]
     for error in spec.errors:
-        lines += [f"    {error['code']}: Meaning({error['class']!r}, {error['title']!r}, {error['advice']!r}),"]
+        lines += [
+            f"    {error['code']}: Meaning({error['class']!r}, {error['title']!r}, {error['advice']!r}),"
+        ]
     return "\n".join([*lines, "}", ""])

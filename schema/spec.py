@@ -60,7 +60,9 @@ class Field:
     @property
     def range_text(self) -> str:
         if self.type.kind in ("str", "list", "bytes"):
-            return f"{self.min_len} to {self.max_len} long" if (self.min_len, self.max_len) != (0, 65535) else ""
+            return (
+                f"{self.min_len} to {self.max_len} long" if (self.min_len, self.max_len) != (0, 65535) else ""
+            )
         if self.norm is not None:
             return "unit norm"
         if not self.ranged:
@@ -146,7 +148,20 @@ def load(folder: Path = HERE) -> Spec:
         raise ValueError(f"unknown type {text!r}")
 
     def parse_field(entry: dict[str, Any]) -> Field:
-        known = {"name", "type", "doc", "unit", "min", "max", "min_open", "nan", "norm", "min_len", "max_len", "default"}
+        known = {
+            "name",
+            "type",
+            "doc",
+            "unit",
+            "min",
+            "max",
+            "min_open",
+            "nan",
+            "norm",
+            "min_len",
+            "max_len",
+            "default",
+        }
         if extra := set(entry) - known:
             raise ValueError(f"field {entry['name']}: unknown attributes {extra}")
         return Field(
@@ -167,8 +182,12 @@ def load(folder: Path = HERE) -> Spec:
 
     enums = {n: Enum(n, e.get("base", "u8"), e["doc"], e["values"]) for n, e in raw["enum"].items()}
     enums |= {n: Enum(n, e["base"], e["doc"], e["values"], flags=True) for n, e in raw["flags"].items()}
-    structs = {n: Struct(n, s["doc"], [parse_field(f) for f in s["fields"]]) for n, s in raw["struct"].items()}
-    unions = {n: Union(n, u["doc"], [(m["tag"], m["type"]) for m in u["members"]]) for n, u in raw["union"].items()}
+    structs = {
+        n: Struct(n, s["doc"], [parse_field(f) for f in s["fields"]]) for n, s in raw["struct"].items()
+    }
+    unions = {
+        n: Union(n, u["doc"], [(m["tag"], m["type"]) for m in u["members"]]) for n, u in raw["union"].items()
+    }
     messages = {}
     for name, entry in raw["message"].items():
         groups = []

@@ -76,7 +76,12 @@ def run(*, target: str | None, plot: Path, as_json: bool) -> int:
     if as_json:
         for one in steps:
             emit(
-                {"motion": one.name, "duration_s": one.end - one.begin, "residual_rad": one.residual, "cause": one.cause}
+                {
+                    "motion": one.name,
+                    "duration_s": one.end - one.begin,
+                    "residual_rad": one.residual,
+                    "cause": one.cause,
+                }
                 | {"text": one.text, "as_designed": one.as_designed}
             )
     else:
@@ -91,17 +96,32 @@ def _timed(arm: Arm, name: str, wanted: Cause, work: Callable[[], Result]) -> St
     begin = arm.state.stamp * 1e-9
     result = work()
     state = arm.wait_for_rest()
-    return Step(name, result.cause.value, result.text, begin, state.stamp * 1e-9, result.residual, result.cause is wanted)
+    return Step(
+        name,
+        result.cause.value,
+        result.text,
+        begin,
+        state.stamp * 1e-9,
+        result.residual,
+        result.cause is wanted,
+    )
 
 
 def _ptp(arm: Arm) -> Step:
-    return _timed(arm, "PTP to joint positions", Cause.FINISHED, lambda: arm.move(ptp(deg(20, 35, 0, -80, 0, 65, 20)), speed=0.6))
+    return _timed(
+        arm,
+        "PTP to joint positions",
+        Cause.FINISHED,
+        lambda: arm.move(ptp(deg(20, 35, 0, -80, 0, 65, 20)), speed=0.6),
+    )
 
 
 def _lin(arm: Arm) -> Step:
     start = arm.wait_for_rest()
     goal = Pose.of(start.pose.xyz + [0.0, -0.25, 0.10], start.pose.quat)
-    return _timed(arm, "LIN to a pose", Cause.FINISHED, lambda: arm.move(lin(goal, near=start.q, speed_mps=0.25)))
+    return _timed(
+        arm, "LIN to a pose", Cause.FINISHED, lambda: arm.move(lin(goal, near=start.q, speed_mps=0.25))
+    )
 
 
 def _lin_rel(arm: Arm) -> Step:
@@ -124,12 +144,18 @@ def _refused(arm: Arm) -> Step:
     try:
         arm.move(ptp(deg(0, 150, 0, -90, 0, 60, 0)))
     except CommandRejected as error:
-        return Step("PTP beyond a joint limit", "refused", error.text, now, arm.state.stamp * 1e-9, float("nan"), True)
-    return Step("PTP beyond a joint limit", "accepted", "it should have been refused", now, now, float("nan"), False)
+        return Step(
+            "PTP beyond a joint limit", "refused", error.text, now, arm.state.stamp * 1e-9, float("nan"), True
+        )
+    return Step(
+        "PTP beyond a joint limit", "accepted", "it should have been refused", now, now, float("nan"), False
+    )
 
 
 def _home(arm: Arm) -> Step:
-    return _timed(arm, "PTP home", Cause.FINISHED, lambda: arm.move(ptp(deg(0, 0, 0, -90, 0, 90, 0)), speed=0.6))
+    return _timed(
+        arm, "PTP home", Cause.FINISHED, lambda: arm.move(ptp(deg(0, 0, 0, -90, 0, 90, 0)), speed=0.6)
+    )
 
 
 def _table(steps: list[Step]) -> Table:
@@ -152,7 +178,9 @@ def _draw(recorder: _Recorder, steps: list[Step], path: Path, title: str) -> Non
     plt: Any = require("matplotlib.pyplot", extra="viz")
     times = np.array(recorder.times) - recorder.times[0]
     q, q_cmd = np.degrees(np.array(recorder.q)), np.degrees(np.array(recorder.q_cmd))
-    figure, (upper, lower) = plt.subplots(2, 1, figsize=(11, 7), sharex=True, height_ratios=(3, 1), layout="constrained")
+    figure, (upper, lower) = plt.subplots(
+        2, 1, figsize=(11, 7), sharex=True, height_ratios=(3, 1), layout="constrained"
+    )
     colours = plt.get_cmap("tab10").colors
     for axis in range(7):
         upper.plot(times, q_cmd[:, axis], color=colours[axis], linewidth=3.5, alpha=0.3)

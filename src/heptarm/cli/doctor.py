@@ -55,7 +55,12 @@ def run(*, target: str | None, as_json: bool) -> int:
 
 def _table(verdicts: list[Verdict]) -> Table:
     style = {"ok": "[green]ok[/]", "note": "[yellow]note[/]", "bad": "[red]bad[/]"}
-    table = Table(title=f"heptarm {__version__}, protocol {MAJOR}.{MINOR}", title_justify="left", box=None, pad_edge=False)
+    table = Table(
+        title=f"heptarm {__version__}, protocol {MAJOR}.{MINOR}",
+        title_justify="left",
+        box=None,
+        pad_edge=False,
+    )
     for name in ("", "what", "found", "what to do"):
         table.add_column(name, overflow="fold")
     for verdict in verdicts:
@@ -70,9 +75,18 @@ def _python() -> Verdict:
 
 def _extras() -> Verdict:
     needed = {"sim": ("mujoco", "ruckig", "jpype"), "viz": ("viser", "matplotlib")}
-    missing = [extra for extra, modules in needed.items() if any(importlib.util.find_spec(m) is None for m in modules)]
+    missing = [
+        extra
+        for extra, modules in needed.items()
+        if any(importlib.util.find_spec(m) is None for m in modules)
+    ]
     if missing:
-        return Verdict("extras", "note", f"not installed: {', '.join(missing)}", f"pip install 'heptarm[{','.join(missing)}]'")
+        return Verdict(
+            "extras",
+            "note",
+            f"not installed: {', '.join(missing)}",
+            f"pip install 'heptarm[{','.join(missing)}]'",
+        )
     return Verdict("extras", "ok", "sim and viz are installed")
 
 
@@ -82,7 +96,9 @@ def _java() -> Verdict:
 
         return Verdict("Java", "ok", jvm.library())
     except ImportError as error:
-        return Verdict("Java", "note", str(error), "only the virtual cabinet needs it: pip install 'heptarm[sim]'")
+        return Verdict(
+            "Java", "note", str(error), "only the virtual cabinet needs it: pip install 'heptarm[sim]'"
+        )
 
 
 def _jars() -> Verdict:
@@ -99,7 +115,9 @@ def _priority() -> Verdict:
         os.sched_setscheduler(0, before, os.sched_param(0))
     except (OSError, AttributeError) as error:
         remedy = "add 'USER - rtprio 60' to /etc/security/limits.conf and log in again"
-        return Verdict("real time", "note", f"no real-time priority ({error}); loops may be late under load", remedy)
+        return Verdict(
+            "real time", "note", f"no real-time priority ({error}); loops may be late under load", remedy
+        )
     return Verdict("real time", "ok", "real-time priority is allowed")
 
 
@@ -109,7 +127,12 @@ def _port() -> Verdict:
         try:
             probe.bind(("127.0.0.1", PORT))
         except OSError:
-            return Verdict("port", "note", f"{PORT} is taken here", f"heptarm doctor --target sim://127.0.0.1:{PORT} looks at who has it")
+            return Verdict(
+                "port",
+                "note",
+                f"{PORT} is taken here",
+                f"heptarm doctor --target sim://127.0.0.1:{PORT} looks at who has it",
+            )
     return Verdict("port", "ok", f"{PORT} is free for heptarm sim")
 
 
@@ -120,7 +143,7 @@ def _target(target: str) -> Iterator[Verdict]:
             socket.create_connection((parsed.host, parsed.port), timeout=3).close()
             yield Verdict("network", "ok", f"{parsed.host}:{parsed.port} accepts connections")
         except OSError as error:
-            remedy = "is the cabinet application (or heptarm sim) running, and is this machine in the cabinet's network?"
+            remedy = "is the cabinet application (or heptarm sim) running? is this machine in its network?"
             yield Verdict("network", "bad", f"{parsed.host}:{parsed.port} does not answer ({error})", remedy)
             return
     try:
@@ -129,7 +152,11 @@ def _target(target: str) -> Iterator[Verdict]:
         yield Verdict("session", "bad", error.text, error.hint)
         return
     with arm:
-        yield Verdict("session", "ok", f"{arm.robot.title}{' (virtual)' if arm.is_virtual else ''}, cabinet application {arm.software}")
+        yield Verdict(
+            "session",
+            "ok",
+            f"{arm.robot.title}{' (virtual)' if arm.is_virtual else ''}, cabinet application {arm.software}",
+        )
         yield _round_trip(arm)
         yield _age(arm)
         yield _safety(arm)
@@ -146,7 +173,9 @@ def _round_trip(arm: Arm) -> Verdict:
     median, late = np.percentile(times, [50, 99])
     found = f"{median:.0f} us median, {late:.0f} us 99 %"
     if median > _SLOW_US:
-        return Verdict("round trip", "note", found, "use a cable and a direct connection; look for load on both machines")
+        return Verdict(
+            "round trip", "note", found, "use a cable and a direct connection; look for load on both machines"
+        )
     return Verdict("round trip", "ok", found)
 
 
@@ -164,7 +193,9 @@ def _safety(arm: Arm) -> Verdict:
     found = f"{safety.mode.value.upper()}, {'ready' if safety.ready_to_move else 'not ready'} to move"
     if safety.ready_to_move:
         return Verdict("safety", "ok", found)
-    remedy = "release the emergency stop" if safety.emergency_stop else "acknowledge the messages on the smartPAD and press Start"
+    remedy = (
+        "release the emergency stop"
+        if safety.emergency_stop
+        else "acknowledge the messages on the smartPAD and press Start"
+    )
     return Verdict("safety", "note", found, remedy)
-
-

@@ -18,7 +18,9 @@ def run(*, out: Path, as_json: bool) -> int:
         CommandRejected: the folder is not empty.
     """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise CommandRejected(f"{out} is not an empty folder", parameter="out", hint="name a new folder with --out")
+        raise CommandRejected(
+            f"{out} is not an empty folder", parameter="out", hint="name a new folder with --out"
+        )
     sources = _resources.cabinet_sources()
     for part in ("core", "app"):
         shutil.copytree(sources / part / "src", out / "src", dirs_exist_ok=True)

@@ -12,7 +12,9 @@ from cyclopts import App, Group, Parameter
 from heptarm import __version__
 from heptarm.errors import HeptarmError
 
-app = App(name="heptarm", help="Control a KUKA LBR iiwa, with or without a robot on the desk.", version=__version__)
+app = App(
+    name="heptarm", help="Control a KUKA LBR iiwa, with or without a robot on the desk.", version=__version__
+)
 move_app = App(name="move", help="Move the arm and wait until it rests.")
 app.command(move_app)
 
@@ -25,11 +27,15 @@ Target = Annotated[
         help="What to connect to: ADDRESS[:PORT], sim://HOST:PORT or sim://iiwa14. Default: HEPTARM_TARGET.",
     ),
 ]
-Json = Annotated[bool, Parameter(name="--json", group=_COMMON, negative="", help="Print one JSON object a line.")]
+Json = Annotated[
+    bool, Parameter(name="--json", group=_COMMON, negative="", help="Print one JSON object a line.")
+]
 Degrees = Annotated[bool, Parameter(name="--deg", negative="", help="Angles are degrees.")]
 Speed = Annotated[float, Parameter(name="--speed", help="Fraction of the full speed, (0, 1].")]
 Yes = Annotated[bool, Parameter(name="--yes", negative="", help="Do not ask before a real robot moves.")]
-DryRun = Annotated[bool, Parameter(name="--dry-run", negative="", help="Check and show the motion, move nothing.")]
+DryRun = Annotated[
+    bool, Parameter(name="--dry-run", negative="", help="Check and show the motion, move nothing.")
+]
 
 
 @app.command
@@ -49,7 +55,15 @@ def sim(
     from heptarm.cli import sim as work
 
     return work.run(
-        model=model, host=host, port=port, speed=speed, view=view, view_port=view_port, key=key, verbose=verbose, as_json=json
+        model=model,
+        host=host,
+        port=port,
+        speed=speed,
+        view=view,
+        view_port=view_port,
+        key=key,
+        verbose=verbose,
+        as_json=json,
     )
 
 

@@ -39,7 +39,9 @@ def run(motion: Motion, *, target: str | None, speed: float, yes: bool, dry_run:
         HeptarmError: refused, or ended under way.
     """
     with connect(target, control=not dry_run) as arm:
-        program.items((motion,), arm.robot, speed)  # refuses here what would be refused anyway, before any question
+        program.items(
+            (motion,), arm.robot, speed
+        )  # refuses here what would be refused anyway, before any question
         if dry_run:
             text = f"{motion} at {speed:.0%} speed is within the limits of the {arm.robot.title}; nothing was moved"
             emit({"ok": True, "text": text}) if as_json else print(text)
@@ -49,9 +51,12 @@ def run(motion: Motion, *, target: str | None, speed: float, yes: bool, dry_run:
         result = arm.move(motion, speed=speed)
         state = arm.wait_for_rest()
     if as_json:
-        emit({"cause": result.cause.value, "duration_s": result.duration, "residual_rad": result.residual} | state_data(state))
+        emit(
+            {"cause": result.cause.value, "duration_s": result.duration, "residual_rad": result.residual}
+            | state_data(state)
+        )
     else:
-        joints = " ".join(f"{v:.2f}" for v in np.degrees(state.q) + 0.0)
+        joints = " ".join(f"{v:.2f}" for v in np.degrees(state.q).round(2) + 0.0)
         print(f"{result.cause.value} after {result.duration:.2f} s, residual {result.residual:.1e} rad")
         print(f"joints {joints} deg\nflange {state.pose}")
     return 0

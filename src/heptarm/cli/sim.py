@@ -41,7 +41,17 @@ def run(
         target = f"sim://{host}:{ready['port']}"
         if view:
             viewer = stack.enter_context(
-                _child([sys.executable, "-m", "heptarm.virtual.view", "--target", target, "--port", str(view_port)])
+                _child(
+                    [
+                        sys.executable,
+                        "-m",
+                        "heptarm.virtual.view",
+                        "--target",
+                        target,
+                        "--port",
+                        str(view_port),
+                    ]
+                )
             )
             ready["view"] = _ready(viewer, "the view does not start")["url"]
         if as_json:
@@ -57,12 +67,14 @@ def run(
             return 0
 
 
-class _child(subprocess.Popen[str]):  # noqa: N801  used as a context manager
+class _child(subprocess.Popen[str]):
     """A process that ends when its standard input is closed, and so with us, whatever happens to us."""
 
     def __init__(self, command: list[str]) -> None:
         # a session of its own: Ctrl-C is for us, who then end the children in order
-        super().__init__(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True)
+        super().__init__(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+        )
 
     def __exit__(self, *_: Any) -> None:
         assert self.stdin is not None
@@ -82,5 +94,7 @@ def _ready(child: subprocess.Popen[str], otherwise: str) -> dict[str, Any]:
     except ValueError:
         raise ConnectFailed(f"{otherwise}: {line.strip() or 'see the message above'}") from None
     if not ready.get("ready"):
-        raise ConnectFailed(f"{otherwise}: {ready.get('error')}", hint="choose another port with --port, or 0 for any")
+        raise ConnectFailed(
+            f"{otherwise}: {ready.get('error')}", hint="choose another port with --port, or 0 for any"
+        )
     return ready

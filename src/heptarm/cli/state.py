@@ -30,7 +30,10 @@ def run(*, target: str | None, watch: bool, rate: float, duration: float | None,
 def _show_once(arm: Arm, *, as_json: bool) -> None:
     state = arm.wait_until(lambda seen: not np.isnan(seen.dq).any(), timeout=5.0)
     if as_json:
-        emit({"robot": arm.robot.title, "virtual": arm.is_virtual, "controller": arm.controller} | state_data(state))
+        emit(
+            {"robot": arm.robot.title, "virtual": arm.is_virtual, "controller": arm.controller}
+            | state_data(state)
+        )
     else:
         Console().print(table(arm, state))
 
@@ -57,7 +60,7 @@ def table(arm: Arm, state: State) -> Group:
         ("tau_ext [Nm]", state.tau_ext, 2),
     )
     for name, values, digits in rows:
-        joints.add_row(name, *(f"{v + 0.0:.{digits}f}" for v in values))
+        joints.add_row(Text(name), *(_fixed(v, digits) for v in values))
     x, y, z = state.pose.xyz * 1e3
     a, b, c = np.degrees(state.pose.abc)
     force = " ".join(f"{v:.1f}" for v in state.wrench.force)
@@ -70,3 +73,8 @@ def table(arm: Arm, state: State) -> Group:
         f"age     {state.age * 1e3:.1f} ms",
     )
     return Group(joints, Text("\n".join(lines)))
+
+
+def _fixed(value: float, digits: int) -> str:
+    """Fixed-point text without a negative zero."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"

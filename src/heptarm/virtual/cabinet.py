@@ -2,8 +2,8 @@
 
     python -m heptarm.virtual.cabinet --model iiwa14 --port 30001
 
-Prints one JSON line when clients may connect. It ends on SIGTERM, on SIGINT, and with --parent-pipe when its standard input
-is closed, which happens however its parent ends.
+Prints one JSON line when clients may connect. It ends on SIGTERM, on SIGINT, and with --parent-pipe when its
+standard input is closed, which happens however its parent ends.
 """
 
 from __future__ import annotations
@@ -37,15 +37,21 @@ _HOUSEKEEPING = 0.1
 
 def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     """The command line."""
-    parser = argparse.ArgumentParser(prog="python -m heptarm.virtual.cabinet", description="A virtual KUKA cabinet.")
+    parser = argparse.ArgumentParser(
+        prog="python -m heptarm.virtual.cabinet", description="A virtual KUKA cabinet."
+    )
     parser.add_argument("--model", default="iiwa14", help="iiwa7 or iiwa14")
     parser.add_argument("--host", default="127.0.0.1", help="address to listen on")
     parser.add_argument("--port", type=int, default=30001, help="0: any free port")
-    parser.add_argument("--speed", type=float, default=1.0, help="simulated seconds per second; 0: as fast as it goes")
+    parser.add_argument(
+        "--speed", type=float, default=1.0, help="simulated seconds per second; 0: as fast as it goes"
+    )
     parser.add_argument("--key", default="", help="pre-shared key")
     parser.add_argument("--application", default="", help="class of another application to run")
     parser.add_argument("--data", action="append", default=[], metavar="NAME=VALUE", help="process data")
-    parser.add_argument("--stats", type=Path, help="write the loop's statistics here at the end and on SIGUSR1")
+    parser.add_argument(
+        "--stats", type=Path, help="write the loop's statistics here at the end and on SIGUSR1"
+    )
     parser.add_argument("--parent-pipe", action="store_true", help="end when standard input is closed")
     parser.add_argument("--verbose", action="store_true", help="log to standard error")
     return parser.parse_args(argv)
@@ -93,7 +99,9 @@ class VirtualCabinet:
             if not self.host.isAlive():
                 break
             time.sleep(0.002)
-        raise RuntimeError(f"the cabinet application did not start: {self.host.failure() or 'it gives no reason'}")
+        raise RuntimeError(
+            f"the cabinet application did not start: {self.host.failure() or 'it gives no reason'}"
+        )
 
     def write_stats(self) -> None:
         """Write the loop's statistics to the file that was asked for."""

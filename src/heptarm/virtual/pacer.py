@@ -1,8 +1,8 @@
 """Paces ticks in real time (or N times faster) and counts how well that went.
 
-The loop sleeps to shortly before a tick is due and spins the rest; when it wakes late it catches up, since a tick costs a
-tenth of a millisecond; beyond 20 missed ticks it re-bases and counts that. Real-time priority, locked memory and a short
-timer slack are asked for and, where refused, named in the report.
+The loop sleeps to shortly before a tick is due and spins the rest; when it wakes late it catches up, since a
+tick costs a tenth of a millisecond; beyond 20 missed ticks it re-bases and counts that. Real-time priority,
+locked memory and a short timer slack are asked for and, where refused, named in the report.
 """
 
 from __future__ import annotations
@@ -125,7 +125,11 @@ class Pacer:
         """Percentiles of the last 131,072 ticks, in microseconds."""
         size = min(self._count, _HISTORY)
         return Report(
-            self._count, self._rebased, list(self._refused), _percentiles(self._late[:size]), _percentiles(self._cost[:size])
+            self._count,
+            self._rebased,
+            list(self._refused),
+            _percentiles(self._late[:size]),
+            _percentiles(self._cost[:size]),
         )
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import acos, pi, sin
 
 import numpy as np
 
 from heptarm.model import inverse
+from heptarm.model.kinematics import forward
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.robot import RobotModel
@@ -41,7 +41,7 @@ class CartesianLine:
     def __init__(self, robot: RobotModel, start: Array, target: Pose, tcp: Pose, e1: float | None) -> None:
         self._robot = robot
         self.start = start
-        flange = Pose.from_matrix(np.array(_matrix(robot, start)))
+        flange = Pose.from_matrix(forward(robot, start))
         self.origin, self.target = flange @ tcp, target
         self._to_flange = tcp.inverse()
         self._status = inverse.status_of(robot, start.tolist())
@@ -87,11 +87,3 @@ class CartesianLine:
             continuous=True,
         )
         return np.array(solved)
-
-
-def _matrix(robot: RobotModel, q: Sequence[float]) -> list[list[float]]:
-    (x, y, z), p = inverse.flange(robot, [float(v) for v in q])
-    rows = [[x[i], y[i], z[i], p[i]] for i in range(3)]
-    return [*rows, [0.0, 0.0, 0.0, 1.0]]
-
-

@@ -1,8 +1,8 @@
 """Turns an order into a path and a profile, or refuses it with a text of the kind that Sunrise gives.
 
-KUKA's speed parameters are applied as the cabinet does: relative ones scale each axis' limit before the smallest counts,
-Cartesian ones bound the path. Where the joints could not follow a Cartesian path at the programmed speed, the whole path is
-slowed down.
+KUKA's speed parameters are applied as the cabinet does: relative ones scale each axis' limit before the
+smallest counts, Cartesian ones bound the path. Where the joints could not follow a Cartesian path at the
+programmed speed, the whole path is slowed down.
 """
 
 from __future__ import annotations
@@ -94,7 +94,9 @@ def _joint_target(robot: RobotModel, order: Order, start: Array) -> Array:
                 near=start.tolist(),
             )
         except Unreachable as error:
-            raise PlanError("unreachable", f"Can not plan motion: frame is not reachable: {error.text}") from None
+            raise PlanError(
+                "unreachable", f"Can not plan motion: frame is not reachable: {error.text}"
+            ) from None
     _check_limits(robot, target)
     return target
 
@@ -104,16 +106,23 @@ def _check_limits(robot: RobotModel, q: Array) -> None:
     if outside:
         axes = " ".join(f"A{i + 1}" for i in outside)
         values = ", ".join(
-            f"A{i + 1} = {np.degrees(q[i]):.2f} deg of [{np.degrees(robot.q_min[i]):.0f}, {np.degrees(robot.q_max[i]):.0f}]"
+            f"A{i + 1} = {value:.2f} deg of [{low:.0f}, {high:.0f}]"
             for i in outside
+            for value, low, high in [np.degrees([q[i], robot.q_min[i], robot.q_max[i]])]
         )
-        raise PlanError("joint_limit", f"Can not plan motion: Command Position violates limit {axes} ({values})")
+        raise PlanError(
+            "joint_limit", f"Can not plan motion: Command Position violates limit {axes} ({values})"
+        )
 
 
 def _plan_joints(robot: RobotModel, order: Order, start: Array, end: Array) -> Plan:
     path = JointLine(start, end)
     way = np.maximum(np.abs(path.way), 1e-12)
-    full = Limits(float((robot.dq_max / way).min()), float((robot.ddq_max / way).min()), float((robot.dddq_max / way).min()))
+    full = Limits(
+        float((robot.dq_max / way).min()),
+        float((robot.ddq_max / way).min()),
+        float((robot.dddq_max / way).min()),
+    )
     limits = Limits(
         float((robot.dq_max * order.joint_velocity / way).min()),
         float((robot.ddq_max * order.joint_acceleration / way).min()),
@@ -147,7 +156,9 @@ def _plan_line(robot: RobotModel, order: Order, start: Array) -> Plan:
     if path.length < 1e-7 and path.angle < 1e-7 and e1 is None:
         return Plan(order, start, start, None, None, Limits(1.0, 1.0, 1.0))
     wanted = _cartesian_limits(order, path)
-    possible = _joint_limits(robot, samples, np.array(order.joint_velocity), np.array(order.joint_acceleration))
+    possible = _joint_limits(
+        robot, samples, np.array(order.joint_velocity), np.array(order.joint_acceleration)
+    )
     braking = _joint_limits(robot, samples, np.ones(7), np.ones(7))
     return Plan(order, start, samples[-1], path, travel(wanted.least(possible)), braking)
 
@@ -161,13 +172,15 @@ def _sample(robot: RobotModel, path: CartesianLine) -> Array:
             q = path.at(s, samples[-1])
         except Unreachable as error:
             raise PlanError(
-                "unreachable", f"Can not plan motion: the path is not reachable at {100 * s:.0f} %: {error.text}"
+                "unreachable",
+                f"Can not plan motion: the path is not reachable at {100 * s:.0f} %: {error.text}",
             ) from None
         step = np.abs(q - samples[-1])
         if step.max() > _LARGEST_STEP:
             raise PlanError(
                 "planning",
-                f"Can not plan motion: A{int(step.argmax()) + 1} would have to jump at {100 * s:.0f} % of the path (singularity)",
+                f"Can not plan motion: A{int(step.argmax()) + 1} would have to jump at {100 * s:.0f} % of the path "
+                "(singularity)",
             )
         _check_limits(robot, q)
         samples.append(q)

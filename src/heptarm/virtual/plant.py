@@ -1,7 +1,8 @@
 """The plant: a simulated LBR with its motion controller, one millisecond a tick.
 
-MuJoCo steps the dynamics; planned motions are carried out by a computed-torque law that tracks tightly and knows the model's
-inertia, gravity, friction. The plant needs neither JVM nor clock: whoever calls `tick` owns its time.
+MuJoCo steps the dynamics; planned motions are carried out by a computed-torque law that tracks tightly and
+knows the model's inertia, gravity, friction. The plant needs neither JVM nor clock: whoever calls `tick` owns
+its time.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import mujoco
 import numpy as np
 
 from heptarm.model import inverse
+from heptarm.model.kinematics import flange
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel, robot
 from heptarm.virtual import ring
@@ -161,8 +163,8 @@ class Plant:
     def submit(self, order: Order) -> None:
         """Plan an order from the end of what is queued and append it.
 
-        While the arm brakes, the place it will come to rest at is not known; then the order is planned when its turn comes,
-        and a planning error reaches its listener.
+        While the arm brakes, the place it will come to rest at is not known; then the order is planned when
+        its turn comes, and a planning error reaches its listener.
 
         Raises:
             PlanError: it cannot be planned; nothing has changed.
@@ -192,10 +194,18 @@ class Plant:
         """Go on after a pause."""
         self._paused = False
 
-    def apply_wrench(self, force: Array | tuple[float, ...], torque: Array | tuple[float, ...] = (0, 0, 0), *, duration: float = inf) -> None:
+    def apply_wrench(
+        self,
+        force: Array | tuple[float, ...],
+        torque: Array | tuple[float, ...] = (0, 0, 0),
+        *,
+        duration: float = inf,
+    ) -> None:
         """Push the flange with a force [N] and a torque [Nm], base axes, for a time [s]; zeros end it."""
         self._push_until = self.tick_count * TICK + duration
-        self._push = np.concatenate([np.asarray(force, dtype=np.float64), np.asarray(torque, dtype=np.float64)])
+        self._push = np.concatenate(
+            [np.asarray(force, dtype=np.float64), np.asarray(torque, dtype=np.float64)]
+        )
 
     # ------------------------------------------------------------------------------ the tick
 
@@ -367,7 +377,7 @@ class Plant:
         reals[30:37] = self._tau_ext
         reals[37:44] = self._tau_cmd
         values = q.tolist()
-        (x, y, z), p = inverse.flange(self.robot, values)
+        (x, y, z), p = flange(self.robot, values)
         reals[44:47] = p
         reals[47:51] = _quaternion(x, y, z)
         reals[51:57] = self._wrench

@@ -1,7 +1,7 @@
 """The shared ring: the plant's last 256 states in memory that Java reads without asking Python.
 
-Eight-octet words, native order. Each slot is guarded by a sequence word (odd while it is written), so a reader knows a torn
-slot. The layout here and in heptarm.doubles.Ring (Java) is the same.
+Eight-octet words, native order. Each slot is guarded by a sequence word (odd while it is written), so a
+reader knows a torn slot. The layout here and in heptarm.doubles.Ring (Java) is the same.
 """
 
 from __future__ import annotations

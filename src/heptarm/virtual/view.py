@@ -1,11 +1,12 @@
 """A live 3D view of a cabinet in the browser: a process of its own that observes over the real protocol.
 
-    python -m heptarm.virtual.view --target sim://127.0.0.1:30001
+python -m heptarm.virtual.view --target sim://127.0.0.1:30001
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import signal
@@ -36,7 +37,9 @@ class Scene:
         self._model = mujoco.MjModel.from_xml_path(str(MODELS / f"{model.replace('med', 'iiwa')}.xml"))
         self._data = mujoco.MjData(self._model)
         self._handles = [
-            (index, self._shape(server, index)) for index in range(self._model.ngeom) if self._model.geom_bodyid[index] > 0
+            (index, self._shape(server, index))
+            for index in range(self._model.ngeom)
+            if self._model.geom_bodyid[index] > 0
         ]
         server.scene.add_grid("/floor", width=3.0, height=3.0, cell_size=0.1, section_size=0.5)
         server.scene.add_frame("/base", axes_length=0.15, axes_radius=0.004)
@@ -55,7 +58,10 @@ class Scene:
         material = model.geom_matid[index]
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_MATERIAL, material) if material >= 0 else "silver"
         return server.scene.add_mesh_simple(
-            f"/arm/{index}", np.asarray(mesh.vertices), np.asarray(mesh.faces), color=_COLOURS.get(name, (180, 180, 180))
+            f"/arm/{index}",
+            np.asarray(mesh.vertices),
+            np.asarray(mesh.faces),
+            color=_COLOURS.get(name, (180, 180, 180)),
         )
 
     def show(self, q: Array) -> None:
@@ -71,7 +77,7 @@ class Scene:
 
 
 def _readout(state: Any, title: str) -> str:
-    joints = " ".join(f"{v:.1f}" for v in np.degrees(state.q) + 0.0)
+    joints = " ".join(f"{v:.1f}" for v in np.degrees(state.q).round(1) + 0.0)
     x, y, z = state.pose.xyz * 1e3
     running = f"motion {state.motion.id}, {state.motion.progress:.0%}" if state.motion.active else "at rest"
     ready = "ready" if state.safety.ready_to_move else "**not ready**"
@@ -95,11 +101,12 @@ def main(argv: list[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with connect(options.target, control=False, name="view", state_rate=_RATE) as arm:
-        server = viser.ViserServer(host=options.host, port=options.port, verbose=False)
+        with contextlib.redirect_stdout(sys.stderr):  # standard output is for the line that says where we are
+            server = viser.ViserServer(host=options.host, port=options.port, verbose=False)
         scene = Scene(server, arm.robot.name)
         server.scene.set_up_direction("+z")
-        server.initial_camera.position = (1.7, -1.5, 1.2)
-        server.initial_camera.look_at = (0.1, 0.0, 0.55)
+        server.initial_camera.position = (1.25, -1.1, 1.0)
+        server.initial_camera.look_at = (0.15, 0.0, 0.5)
         text = server.gui.add_markdown("")
         url = f"http://{options.host}:{server.get_port()}"
         print(json.dumps({"ready": True, "url": url}), flush=True)

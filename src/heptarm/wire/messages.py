@@ -708,8 +708,8 @@ class Spline:
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_count(len(self.segments)))
-        for item in self.segments:
-            _write_SplineSegment(item, out)
+        for one_segments in self.segments:
+            _write_SplineSegment(one_segments, out)
         self.dynamics._write(out)
         self.joints._write(out)
 
@@ -727,8 +727,8 @@ class Spline:
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.segments), path + "segments", 1, 1000)
-        for index, item in enumerate(self.segments):
-            item._check(f"{path}segments[{index}].")
+        for index, its_segments in enumerate(self.segments):
+            its_segments._check(f"{path}segments[{index}].")
         self.dynamics._check(path + "dynamics.")
         self.joints._check(path + "joints.")
 
@@ -771,8 +771,8 @@ class JointSpline:
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_count(len(self.points)))
-        for item in self.points:
-            item._write(out)
+        for one_points in self.points:
+            one_points._write(out)
         self.dynamics._write(out)
 
     @classmethod
@@ -788,8 +788,8 @@ class JointSpline:
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.points), path + "points", 1, 1000)
-        for index, item in enumerate(self.points):
-            item._check(f"{path}points[{index}].")
+        for index, its_points in enumerate(self.points):
+            its_points._check(f"{path}points[{index}].")
         self.dynamics._check(path + "dynamics.")
 
 
@@ -1436,8 +1436,8 @@ class Condition:
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_count(len(self.nodes)))
-        for item in self.nodes:
-            _write_ConditionNode(item, out)
+        for one_nodes in self.nodes:
+            _write_ConditionNode(one_nodes, out)
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[Condition, int]:
@@ -1451,8 +1451,8 @@ class Condition:
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.nodes), path + "nodes", 0, 64)
-        for index, item in enumerate(self.nodes):
-            item._check(f"{path}nodes[{index}].")
+        for index, its_nodes in enumerate(self.nodes):
+            its_nodes._check(f"{path}nodes[{index}].")
 
 
 _SetSignal_0 = Struct(">d")
@@ -1641,8 +1641,8 @@ class Item:
             _write_Mode(self.mode, out)
         self.until._write(out)
         out.append(codec.put_count(len(self.triggers)))
-        for item in self.triggers:
-            item._write(out)
+        for one_triggers in self.triggers:
+            one_triggers._write(out)
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[Item, int]:
@@ -1668,8 +1668,8 @@ class Item:
             self.mode._check(path + "mode.")
         self.until._check(path + "until.")
         codec.check_length(len(self.triggers), path + "triggers", 0, 16)
-        for index, item in enumerate(self.triggers):
-            item._check(f"{path}triggers[{index}].")
+        for index, its_triggers in enumerate(self.triggers):
+            its_triggers._check(f"{path}triggers[{index}].")
 
 
 _RobotInfo_0 = Struct(">7d7d7d7d")
@@ -1751,8 +1751,8 @@ class ToolInfo:
         out.append(codec.put_str(self.name))
         out.append(_ToolInfo_0.pack(self.mass, *self.com, *self.inertia))
         out.append(codec.put_count(len(self.frames)))
-        for item in self.frames:
-            item._write(out)
+        for one_frames in self.frames:
+            one_frames._write(out)
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[ToolInfo, int]:
@@ -1776,8 +1776,8 @@ class ToolInfo:
         codec.check_array(self.com, path + "com", -2.0, 2.0, False, False)
         codec.check_array(self.inertia, path + "inertia", -inf, inf, False, False)
         codec.check_length(len(self.frames), path + "frames", 0, 32)
-        for index, item in enumerate(self.frames):
-            item._check(f"{path}frames[{index}].")
+        for index, its_frames in enumerate(self.frames):
+            its_frames._check(f"{path}frames[{index}].")
 
 
 _SignalInfo_0 = Struct(">BBdd")
@@ -2052,8 +2052,8 @@ class IoState:
     def _write(self, out: list[bytes]) -> None:
         out.append(_IoState_0.pack(self.stamp))
         out.append(codec.put_count(len(self.values)))
-        for item in self.values:
-            item._write(out)
+        for one_values in self.values:
+            one_values._write(out)
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[IoState, int]:
@@ -2069,8 +2069,8 @@ class IoState:
         return cls(stamp=stamp, values=values), pos
 
     def _check(self, path: str) -> None:
-        for index, item in enumerate(self.values):
-            item._check(f"{path}values[{index}].")
+        for index, its_values in enumerate(self.values):
+            its_values._check(f"{path}values[{index}].")
 
 
 _ModeState_0 = Struct(">q")
@@ -2288,17 +2288,17 @@ class Welcome:
         out.append(_Welcome_1.pack(self.virtual))
         self.robot._write(out)
         out.append(codec.put_count(len(self.capabilities)))
-        for item in self.capabilities:
-            out.append(codec.put_str(item))
+        for one_capabilities in self.capabilities:
+            out.append(codec.put_str(one_capabilities))
         out.append(codec.put_count(len(self.tools)))
-        for item in self.tools:
-            item._write(out)
+        for one_tools in self.tools:
+            one_tools._write(out)
         out.append(codec.put_count(len(self.frames)))
-        for item in self.frames:
-            item._write(out)
+        for one_frames in self.frames:
+            one_frames._write(out)
         out.append(codec.put_count(len(self.signals)))
-        for item in self.signals:
-            item._write(out)
+        for one_signals in self.signals:
+            one_signals._write(out)
         out.append(_Welcome_2.pack(self.groups, self.max_rate, self.heartbeat))
         out.append(codec.put_str(self.controller))
         out.append(codec.put_bytes(self.mac))
@@ -2351,12 +2351,12 @@ class Welcome:
 
     def _check(self, path: str) -> None:
         self.robot._check(path + "robot.")
-        for index, item in enumerate(self.tools):
-            item._check(f"{path}tools[{index}].")
-        for index, item in enumerate(self.frames):
-            item._check(f"{path}frames[{index}].")
-        for index, item in enumerate(self.signals):
-            item._check(f"{path}signals[{index}].")
+        for index, its_tools in enumerate(self.tools):
+            its_tools._check(f"{path}tools[{index}].")
+        for index, its_frames in enumerate(self.frames):
+            its_frames._check(f"{path}frames[{index}].")
+        for index, its_signals in enumerate(self.signals):
+            its_signals._check(f"{path}signals[{index}].")
         codec.check(self.max_rate, path + "max_rate", -inf, inf, False, False)
         codec.check(self.heartbeat, path + "heartbeat", -inf, inf, False, False)
         codec.check_length(len(self.mac), path + "mac", 0, 32)
@@ -2828,8 +2828,8 @@ class Run:
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_count(len(self.items)))
-        for item in self.items:
-            item._write(out)
+        for one_items in self.items:
+            one_items._write(out)
         out.append(_Run_0.pack(self.when))
 
     @classmethod
@@ -2847,8 +2847,8 @@ class Run:
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.items), path + "items", 1, 1000)
-        for index, item in enumerate(self.items):
-            item._check(f"{path}items[{index}].")
+        for index, its_items in enumerate(self.items):
+            its_items._check(f"{path}items[{index}].")
 
     def encode(self) -> bytes:
         """The body."""
@@ -3316,8 +3316,8 @@ class SetSignals:
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_count(len(self.values)))
-        for item in self.values:
-            item._write(out)
+        for one_values in self.values:
+            one_values._write(out)
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[SetSignals, int]:
@@ -3331,8 +3331,8 @@ class SetSignals:
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.values), path + "values", 1, 64)
-        for index, item in enumerate(self.values):
-            item._check(f"{path}values[{index}].")
+        for index, its_values in enumerate(self.values):
+            its_values._check(f"{path}values[{index}].")
 
     def encode(self) -> bytes:
         """The body."""

@@ -1,0 +1,43 @@
+"""Runs the command line as a user does."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+HEPTARM = [sys.executable, "-m", "heptarm.cli.main"]
+
+
+def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """One command, to its end."""
+    variables = {name: value for name, value in os.environ.items() if name != "HEPTARM_TARGET"} | environment
+    return subprocess.run(
+        [*HEPTARM, *arguments], capture_output=True, text=True, timeout=120, env=variables, check=False
+    )
+
+
+def objects(*arguments: str) -> list[dict[str, Any]]:
+    """The JSON objects that a command prints with --json; it must succeed."""
+    done = run(*arguments, "--json")
+    assert done.returncode == 0, done.stderr
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+@contextmanager
+def sim(*arguments: str) -> Iterator[dict[str, Any]]:
+    """`heptarm sim --json` in the foreground of another process; ended as by Ctrl-C."""
+    process = subprocess.Popen(
+        [*HEPTARM, "sim", "--json", "--port", "0", *arguments], stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert process.stdout is not None
+        yield json.loads(process.stdout.readline())
+    finally:
+        process.send_signal(signal.SIGINT)
+        assert process.wait(timeout=20) == 0

@@ -1,0 +1,147 @@
+"""Every command against a virtual cabinet, as a user types it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from pathlib import Path
+
+import pytest
+
+from tests.cli.running import objects, run, sim
+
+
+@pytest.fixture
+def target(cabinet) -> str:
+    return cabinet.target
+
+
+def test_help_names_every_command() -> None:
+    text = run("--help").stdout
+    for command in ("sim", "state", "move", "stop", "doctor", "install-cabinet", "demo"):
+        assert command in text
+
+
+def test_sim_can_be_connected_to_and_ends_on_ctrl_c() -> None:
+    with sim("--model", "iiwa7") as ready:
+        (state,) = objects("state", "--target", ready["target"])
+        assert state["robot"] == "LBR iiwa 7 R800" and state["virtual"]
+    assert run("state", "--target", ready["target"]).returncode == 1
+
+
+def test_sim_on_a_taken_port_says_so() -> None:
+    with sim() as ready:
+        done = run("sim", "--port", str(ready["port"]))
+        assert done.returncode == 1 and str(ready["port"]) in done.stderr and "--port" in done.stderr
+
+
+def test_state_as_a_table(target: str) -> None:
+    done = run("state", "--target", target)
+    assert done.returncode == 0
+    for word in ("q [deg]", "tau_ext [Nm]", "flange", "ready to move"):
+        assert word in done.stdout
+
+
+def test_state_watched_for_a_while(target: str) -> None:
+    seen = objects("state", "--watch", "--rate", "20", "--duration", "0.5", "--target", target)
+    assert 8 <= len(seen) <= 12
+    assert all(a["stamp_ns"] < b["stamp_ns"] for a, b in itertools.pairwise(seen))
+
+
+def test_move_ptp_in_degrees_with_negative_angles(target: str) -> None:
+    (done,) = objects(
+        "move", "ptp", "10", "30", "0", "-90", "0", "60", "-5", "--deg", "--speed", "0.5", "--target", target
+    )
+    assert done["cause"] == "finished" and done["residual_rad"] < 1e-4
+    assert done["q"][6] == pytest.approx(math.radians(-5), abs=1e-3)
+
+
+def test_move_lin_and_lin_rel(target: str) -> None:
+    objects(
+        "move", "ptp", "0", "30", "0", "-90", "0", "60", "0", "--deg", "--speed", "0.5", "--target", target
+    )
+    (down,) = objects(
+        "move", "lin_rel", "--z", "-0.05", "--frame", "base", "--speed", "0.5", "--target", target
+    )
+    x, y, z = down["xyz"]
+    pose = [f"{v:.6f}" for v in (x, y + 0.05, z)]
+    (side,) = objects("move", "lin", *pose, "180", "0", "180", "--deg", "--speed", "0.5", "--target", target)
+    assert side["xyz"] == pytest.approx([x, y + 0.05, z], abs=2e-4)
+
+
+def test_dry_run_moves_nothing(target: str) -> None:
+    (before,) = objects("state", "--target", target)
+    done = run(
+        "move", "ptp", "50", "30", "0", "-90", "0", "60", "0", "--deg", "--dry-run", "--target", target
+    )
+    (after,) = objects("state", "--target", target)
+    assert done.returncode == 0 and "nothing was moved" in done.stdout
+    assert after["q"] == pytest.approx(before["q"], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("move", "ptp", "0", "150", "0", "-90", "0", "60", "0", "--deg"), ("A2", "150.00", "-120 to 120")),
+        (("move", "ptp", "0", "nan", "0", "-1", "0", "1", "0"), ("nan",)),
+        (("move", "lin_rel", "--x", "3"), ("Can not plan motion",)),
+        (("move", "lin_rel", "--x", "0.01", "--speed", "1.5"), ("speed", "(0, 1]")),
+    ],
+)
+def test_refusals_are_one_sentence_and_exit_code_1(
+    target: str, arguments: tuple[str, ...], words: tuple[str, ...]
+) -> None:
+    done = run(*arguments, "--target", target)
+    assert done.returncode == 1 and done.stdout == ""
+    assert len(done.stderr.strip().splitlines()) == 1 and "Traceback" not in done.stderr
+    for word in words:
+        assert word in done.stderr
+
+
+def test_a_missing_target_shows_examples() -> None:
+    done = run("state")
+    assert done.returncode == 1 and "HEPTARM_TARGET" in done.stderr and "sim://iiwa14" in done.stderr
+
+
+def test_the_target_may_come_from_the_environment(target: str) -> None:
+    assert run("stop", HEPTARM_TARGET=target).stdout.strip() == "the arm is at rest"
+
+
+def test_doctor_looks_at_a_cabinet(target: str) -> None:
+    verdicts = {one["what"]: one for one in objects("doctor", "--target", target)}
+    assert verdicts["session"]["how"] == verdicts["network"]["how"] == verdicts["safety"]["how"] == "ok"
+    assert "us median" in verdicts["round trip"]["found"]
+
+
+def test_doctor_names_what_to_do_when_nobody_answers() -> None:
+    done = run("doctor", "--target", "127.0.0.1:9")
+    assert done.returncode == 1 and "does not answer" in done.stdout.replace("\n", " ")
+
+
+def test_install_cabinet_writes_sources_and_steps_once(tmp_path: Path) -> None:
+    out = tmp_path / "cabinet"
+    (told,) = objects("install-cabinet", "--out", str(out))
+    assert told["protocol"] == "1.0"
+    assert (out / "src/heptarm/app/HeptarmApplication.java").exists()
+    assert (out / "src/heptarm/wire/Messages.java").exists()
+    assert (
+        "heptarm.port" in (out / "RoboticsAPI.data.xml").read_text()
+        and "T1" in (out / "INSTALL.md").read_text()
+    )
+    again = run("install-cabinet", "--out", str(out))
+    assert again.returncode == 1 and "not an empty folder" in again.stderr
+
+
+def test_demo_goes_as_designed_and_saves_a_plot(tmp_path: Path) -> None:
+    plot = tmp_path / "demo.png"
+    steps = objects("demo", "--plot", str(plot))
+    assert [one["cause"] for one in steps] == [
+        "finished",
+        "finished",
+        "finished",
+        "cancelled",
+        "refused",
+        "finished",
+    ]
+    assert all(one["as_designed"] for one in steps)
+    assert plot.read_bytes().startswith(b"\x89PNG") and plot.stat().st_size > 20_000

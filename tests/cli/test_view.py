@@ -1,0 +1,89 @@
+"""The live view in a real browser: the arm is there, and it moves."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from tests.cli.running import sim
+
+pytest.importorskip("viser")
+webdriver = pytest.importorskip("selenium.webdriver")
+
+_OPTIONS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--window-size=1000,750",
+)
+
+
+@pytest.fixture
+def browser(tmp_path: Path) -> Iterator[object]:
+    binary = shutil.which("chromium") or shutil.which("google-chrome")
+    driver = shutil.which("chromedriver")
+    if binary is None or driver is None:
+        pytest.skip("no Chromium here: apt-get install chromium chromium-driver")
+    options = webdriver.ChromeOptions()
+    options.binary_location = binary
+    for option in (*_OPTIONS, f"--user-data-dir={tmp_path / 'profile'}"):
+        options.add_argument(option)
+    running = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
+    yield running
+    running.quit()
+
+
+def _picture(browser: object) -> np.ndarray:
+    from matplotlib.image import imread
+
+    return imread(io.BytesIO(browser.get_screenshot_as_png()), format="png")[..., :3]
+
+
+def _share(picture: np.ndarray, low: tuple[float, ...], high: tuple[float, ...]) -> float:
+    return float(((picture >= low) & (picture <= high)).all(axis=-1).mean())
+
+
+def _orange(picture: np.ndarray) -> float:
+    red, green, blue = picture[..., 0], picture[..., 1], picture[..., 2]
+    return float(((red > 0.5) & (red - blue > 0.35) & (green - blue > 0.05) & (red - green > 0.15)).mean())
+
+
+def _settled(browser: object, patience: float = 60.0) -> np.ndarray:
+    """The picture once the arm is drawn and does not change any more."""
+    deadline = time.monotonic() + patience
+    before = _picture(browser)
+    while time.monotonic() < deadline:
+        time.sleep(1.0)
+        now = _picture(browser)
+        if _orange(now) > 0.002 and np.abs(now - before).mean() < 1e-3:
+            return now
+        before = now
+    raise AssertionError(f"the arm never appeared: {_orange(before):.4f} of the picture is orange")
+
+
+@pytest.mark.browser
+def test_the_view_shows_the_arm_and_follows_it(browser: object, tmp_path: Path) -> None:
+    with sim("--view", "--view-port", "0") as ready:
+        browser.get(ready["view"])
+        first = _settled(browser)
+        browser.save_screenshot(str(tmp_path / "view.png"))
+        assert _share(first, (0.55, 0.55, 0.55), (0.9, 0.9, 0.9)) > 0.005, "no silver links"
+        with ha.connect(ready["target"]) as arm:
+            arm.move(ha.ptp(ha.deg(60, 50, 0, -60, 0, 60, 0)))
+        second = _settled(browser)
+        assert np.abs(second - first).mean() > 5e-3, "the picture did not change after a motion"
+        assert "60.0" in browser.find_element("tag name", "body").text
