@@ -388,6 +388,20 @@ def test_a_callback_hears_of_the_end(peer: Peer) -> None:
         assert heard.wait(1.0)
 
 
+def test_a_callback_may_talk_to_the_cabinet(peer: Peer) -> None:
+    done = threading.Event()
+    peer.runs(1, later(0.05, peer.finished(1)))
+    with peer.arm() as arm:
+
+        def stop(_: ha.MotionHandle) -> None:
+            arm.stop()
+            done.set()
+
+        arm.start(HOME).add_done_callback(stop)
+        assert done.wait(1.0)
+        assert arm.connected
+
+
 def test_ctrl_c_stops_the_arm_and_goes_on(peer: Peer) -> None:
     peer.runs(1, wire.MotionStarted(id=1, item=0))
     peer.expect(wire.Stop, wire.Accepted(id=0), peer.finished(1, wire.Cause.STOPPED))

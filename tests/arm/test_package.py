@@ -26,5 +26,7 @@ def test_importing_costs_nothing_and_connecting_needs_no_simulator() -> None:
         "bad = [m for m in sys.modules if m.startswith(('heptarm.virtual', 'mujoco', 'jpype', 'ruckig'))]\n"
         "assert not bad, bad\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

@@ -9,7 +9,6 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import isfinite
 from types import TracebackType
 from typing import Literal
 
@@ -49,6 +48,7 @@ _STOPS = {kind.name.lower(): kind for kind in wire.StopKind}
 #: Below this speed of every axis the arm counts as being at rest [rad/s].
 _REST = 0.01
 _REST_TIMEOUT = 10.0
+_DAY = 86400.0
 #: Pauses between attempts to reconnect [s].
 _BACK_OFF, _LONGEST_BACK_OFF = 0.1, 2.0
 #: States a stream of all states keeps for a slow loop.
@@ -284,7 +284,7 @@ class Arm:
         rate = self._options.rate
         if rate <= 0:
             raise StaleState("no states are subscribed", hint="arm.subscribe(rate=100)")
-        limit = max(1.0, 10.0 / rate)
+        limit = max(1.0, 10.0 / (rate * self._pace()))
         age = float("inf") if sample is None else (self._clock.nanos() - sample.received) * 1e-9
         if sample is None or age > limit:
             self._not_closed()
@@ -408,7 +408,7 @@ class Arm:
             chosen |= group
         within(rate, "rate", 0.0, self._greeted().max_rate, unit="Hz")
         self._request(wire.Subscribe(groups=chosen, rate=rate))
-        self._linked().expect_states(rate)
+        self._linked().expect_states(rate * self._pace())
         self._options = replace(self._options, rate=rate, groups=tuple(groups))
 
     # ---------------------------------------------------------------------------------- motion
@@ -494,11 +494,12 @@ class Arm:
         before = sum(handle.limit for handle in list(self._handles.values()))
         newest = self.newest()
         override = newest.motion.override if newest is not None and newest.motion is not None else 1.0
-        link = self._link
-        rate = min(max(link.offset.rate if link is not None else 1.0, 0.01), 1.0)
-        return (
-            min((own + before) / max(override, 0.01) / rate, 86400.0) if isfinite(own + before) else 86400.0
-        )
+        total = (own + before) / max(override, 0.01) / min(self._pace(), 1.0)
+        return total if total < _DAY else _DAY
+
+    def _pace(self) -> float:
+        """Cabinet seconds per second of ours."""
+        return max(self._linked().offset.rate, 0.001)
 
     def cancel(self, handle: MotionHandle) -> None:
         """End a program; `MotionHandle.cancel` is the same."""

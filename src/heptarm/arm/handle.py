@@ -107,8 +107,8 @@ class MotionHandle:
             with self._arm.stopping_on_interrupt():
                 return self._future.result(limit)
         except FutureTimeout:
-            if self._future.done():  # it ended with an error that is a TimeoutError
-                raise
+            if self._future.done():  # just now, or with an error that is a TimeoutError
+                return self._future.result()
             raise Timeout(
                 f"motion {self._id} has not ended within {limit:.1f} s",
                 hint="give a longer timeout, or look at arm.state whether the arm may move",

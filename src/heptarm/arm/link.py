@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from _thread import LockType, allocate_lock
+from _thread import LockType, allocate_lock, get_ident
 from collections.abc import Callable
 
 from heptarm.arm.refusals import farewell, refusal, rejection
@@ -96,6 +96,7 @@ class Link:
         self._sending = threading.Lock()
         self._token = threading.Lock()
         self._leading = False
+        self._holder = 0
         self._slots: dict[int, _Slot] = {}
         self._welcome: Welcome | None = None
         self._error: HeptarmError | None = None
@@ -175,7 +176,7 @@ class Link:
         self._watchdog = seconds
 
     def expect_states(self, rate: float) -> None:
-        """Know the subscribed rate [Hz]: from a few hundred on, states must be taken at once."""
+        """Know how many states come per second: from a few hundred on, they must be taken at once."""
         self._aside = _ASIDE if rate <= 250.0 else 0
 
     def request(
@@ -196,14 +197,17 @@ class Link:
         slot = _Slot(on_answer)
         self._say(message, slot)
         deadline = self._clock.nanos() + round(timeout * 1e9)
-        if self._token.acquire(timeout=_TURN):
+        if self._holder == get_ident():  # called from a callback: this thread is the one that reads
+            self._read_until(slot, deadline)
+        elif self._token.acquire(timeout=_TURN):
             try:
                 self._leading = True
-                while slot.answer is None and self._error is None and self._clock.nanos() < deadline:
-                    self._read(wait=True)
+                self._holder = get_ident()
+                self._read_until(slot, deadline)
             finally:
                 self._requested = self._clock.nanos()
                 self._leading = False
+                self._holder = 0
                 self._token.release()
         if slot.answer is None and self._error is None:
             slot.lock.acquire(timeout=max(0.0, (deadline - self._clock.nanos()) * 1e-9))
@@ -253,6 +257,21 @@ class Link:
                 raise
 
     # ------------------------------------------------------------------------------------ reading
+
+    def _read_until(self, slot: _Slot, deadline: int) -> None:
+        while slot.answer is None and self._error is None and self._clock.nanos() < deadline:
+            self._read(wait=True)
+
+    def _read_now(self) -> None:
+        """Take what is there, unless another thread does."""
+        if self._leading or not self._token.acquire(blocking=False):
+            return
+        try:
+            self._holder = get_ident()
+            self._read(wait=False)
+        finally:
+            self._holder = 0
+            self._token.release()
 
     def _read(self, *, wait: bool) -> None:
         """Take what has come and act on it; the caller holds the token."""
@@ -316,17 +335,9 @@ class Link:
                 elif now - self._requested < self._aside:
                     # more requests may follow: an answer should wake its caller alone
                     clock.sleep(_STEP)
-                    if not self._leading and self._token.acquire(blocking=False):
-                        try:
-                            self._read(wait=False)
-                        finally:
-                            self._token.release()
+                    self._read_now()
                 elif transport.wait_readable(rest):
-                    if not self._leading and self._token.acquire(blocking=False):
-                        try:
-                            self._read(wait=False)
-                        finally:
-                            self._token.release()
+                    self._read_now()
                 elif now - self._heard > self._silence():
                     self._lose(
                         ConnectionLost(
@@ -337,6 +348,9 @@ class Link:
                     )
             except HeptarmError as error:
                 self._lose(error)
+            except Exception as error:
+                _log.exception("the link to %s fails", self.peer)
+                self._lose(ConnectionLost(f"an error in the link: {error!r}"))
         if not self._closing:
             _log.info("link to %s ended: %s", self.peer, self._error)
             self._on_lost(self._error)

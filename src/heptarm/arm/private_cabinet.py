@@ -37,11 +37,11 @@ class PrivateCabinet:
 
     host = "127.0.0.1"
 
-    def __init__(self, process: subprocess.Popen[str], port: int, log: deque[str]) -> None:
+    def __init__(self, process: subprocess.Popen[str], port: int, readers: list[threading.Thread]) -> None:
         self.port = port
         self.pid = process.pid
         self._process = process
-        self._log = log
+        self._readers = readers
         atexit.register(self.close)
 
     @classmethod
@@ -66,29 +66,28 @@ class PrivateCabinet:
         )
         words: deque[str] = deque(maxlen=20)
         ready: queue.SimpleQueue[int | None] = queue.SimpleQueue()
-        threads = [
+        readers = [
             threading.Thread(
                 target=_listen, args=(process, ready, words), name="heptarm-sim-out", daemon=True
             ),
             threading.Thread(target=_drain, args=(process, words), name="heptarm-sim-log", daemon=True),
         ]
-        for thread in threads:
-            thread.start()
+        for reader in readers:
+            reader.start()
         try:
             port = ready.get(timeout=timeout)
         except queue.Empty:
             port = None
         except BaseException:
-            _end(process)
+            _end(process, readers)
             raise
         if port is None:
-            _end(process)
-            threads[1].join(1.0)
+            _end(process, readers)
             raise ConnectFailed(
                 f"the virtual cabinet did not start: {' | '.join(words) or 'it said nothing'}",
                 hint="try `python -m heptarm.virtual.cabinet`; it needs pip install 'heptarm[sim]'",
             )
-        return cls(process, port, words)
+        return cls(process, port, readers)
 
     @property
     def is_running(self) -> bool:
@@ -98,7 +97,7 @@ class PrivateCabinet:
     def close(self) -> None:
         """End it; closing twice is legal."""
         atexit.unregister(self.close)
-        _end(self._process)
+        _end(self._process, self._readers)
 
 
 def _listen(process: subprocess.Popen[str], ready: queue.SimpleQueue[int | None], words: deque[str]) -> None:
@@ -121,7 +120,7 @@ def _drain(process: subprocess.Popen[str], words: deque[str]) -> None:
         _log.debug("%s", line.rstrip())
 
 
-def _end(process: subprocess.Popen[str]) -> None:
+def _end(process: subprocess.Popen[str], readers: list[threading.Thread]) -> None:
     """Close its pipe, wait, and kill it if that is not enough."""
     with contextlib.suppress(OSError):  # it may be gone already
         if process.stdin is not None:
@@ -132,3 +131,7 @@ def _end(process: subprocess.Popen[str]) -> None:
         _log.warning("the virtual cabinet (process %d) did not end by itself; killing it", process.pid)
         process.kill()
         process.wait(_END_TIMEOUT)
+    for reader, pipe in zip(readers, (process.stdout, process.stderr), strict=True):
+        reader.join(1.0)
+        if pipe is not None and not reader.is_alive():
+            pipe.close()
