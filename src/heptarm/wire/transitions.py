@@ -50,3 +50,17 @@ def symbol(kind: type[Message]) -> str:
     if kind.KIND == "handshake" or kind.__name__ == "Goodbye":
         return kind.__name__
     return kind.KIND
+
+
+def markdown() -> str:
+    """The table for people; docs/reference/session.md holds it, and a test compares them."""
+    names = [name for row in TRANSITIONS.values() for name in row]
+    columns = list(dict.fromkeys(names))
+    lines = [
+        f"| in state | {' | '.join(columns)} |",
+        f"|---|{'---|' * len(columns)}",
+    ]
+    for state, row in TRANSITIONS.items():
+        cells = (row[name].value if name in row else "" for name in columns)
+        lines.append(f"| **{state.value}** | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
