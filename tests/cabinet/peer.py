@@ -85,14 +85,18 @@ class Peer:
     def all(self, kind: type[M]) -> list[M]:
         return [message for _, message in self.seen if isinstance(message, kind)]
 
-    def read_for(self, seconds: float) -> None:
-        """Reads whatever comes for a while."""
+    def read_for(self, seconds: float, *, silent: bool = False) -> None:
+        """Reads whatever comes for a while; says something now and then unless it is to be silent."""
         deadline = time.monotonic() + seconds
+        spoke = 0.0
         while (left := deadline - time.monotonic()) > 0:
+            if not silent and time.monotonic() > spoke + 0.3:
+                self.send(wire.Pong(sent=0, received=0))
+                spoke = time.monotonic()
             try:
-                self._fill(len(self.seen) + 1, left)
+                self._fill(len(self.seen) + 1, min(left, 0.3))
             except TimeoutError:
-                return
+                continue
 
     def is_closed(self, timeout: float = 5.0) -> bool:
         """Whether the cabinet closes the connection in time."""

@@ -13,7 +13,8 @@ import heptarm.wire.WrenchState;
 /**
  * A robot as the core sees it, in SI. The application implements it on the cabinet's API; tests may do without a cabinet.
  *
- * <p>Reading methods are called by the sampler alone, {@link #start} by the motion thread, all others by any thread.
+ * <p>Reading methods are called by the threads of the sampler, the motions and the watchdog and may take their time,
+ * {@link #start} by the motion thread, all others by any thread.
  */
 public interface Robot {
     RobotInfo info();

@@ -15,14 +15,37 @@ import heptarm.wire.WrenchState;
 /**
  * Samples the robot's state in groups, each with its own stamp, and hands every subscriber its frames when they are due.
  *
- * <p>This is the only thread that reads state, so a slow getter of the robot never stands in the way of a command. It works
- * on the clock's grid: a late wake-up is caught up state by state, unless it is too late by far.
+ * <p>A slow getter of the robot never stands in the way of a command, because this thread reads state and no other one waits
+ * for it. It works on the clock's grid: a late wake-up is caught up state by state, unless it is too late by far. A group
+ * whose reading is slow is read less often than it is pushed; it then comes again with its old stamp.
  */
 final class Sampler {
     /** Time constant of the velocity's low-pass filter [s]. */
     private static final double FILTER = 0.01;
     private static final long IDLE_NS = 20000000L;
     private static final int TOO_LATE = 50;
+
+    /** Readings that cost less [ns] are made whenever they are wanted. */
+    private static final double CHEAP_NS = 200000.0;
+    /** How fast a cost that grows is believed, per reading: a single late one is no reason to read less often. */
+    private static final double GROWTH = 1.05;
+    private static final double GROWTH_NS = 50000.0;
+
+    /** What the reading of a group costs, and when it is next worth it. On a cabinet each getter takes about 2 ms. */
+    private static final class Gauge {
+        final int bit;
+        /** Share of the thread's time that this group may take. */
+        final double share;
+        double cost;
+        long began;
+        long stamp;
+        long next;
+
+        Gauge(int bit, double share) {
+            this.bit = bit;
+            this.share = share;
+        }
+    }
 
     private static final class Subscription {
         final int groups;
@@ -35,6 +58,20 @@ final class Sampler {
             this.due = due;
         }
     }
+
+    // the shares add up to less than one, so that the thread keeps up with a cabinet of any slowness
+    private final Gauge jointsGauge = new Gauge(Groups.JOINTS, 0.4);
+    private final Gauge torquesGauge = new Gauge(Groups.TORQUES, 0.2);
+    private final Gauge poseGauge = new Gauge(Groups.POSE, 0.1);
+    private final Gauge wrenchGauge = new Gauge(Groups.WRENCH, 0.1);
+    private final Gauge motionGauge = new Gauge(Groups.MOTION, 0.05);
+    private final Gauge safetyGauge = new Gauge(Groups.SAFETY, 0.1);
+    private JointState joints;
+    private TorqueState torques;
+    private PoseState pose;
+    private WrenchState wrench;
+    private MotionState motion;
+    private SafetyState safety;
 
     private final Server server;
     private final Map<Client, Subscription> subscriptions = new ConcurrentHashMap<Client, Subscription>();
@@ -129,28 +166,57 @@ final class Sampler {
         }
     }
 
+    /** Reads the groups that are wanted and worth their cost now; of the others the newest samples stay. */
     private State sample(long now, int groups) {
-        JointState joints = (groups & Groups.JOINTS) != 0 ? joints(now) : null;
-        TorqueState torques = null;
-        if ((groups & Groups.TORQUES) != 0) {
+        Robot robot = server.robot;
+        if (begin(jointsGauge, groups, now)) {
+            joints = joints(jointsGauge.stamp);
+            end(jointsGauge);
+        }
+        if (begin(torquesGauge, groups, now)) {
             double[] measured = new double[7];
             double[] external = new double[7];
             double[] commanded = new double[7];
-            server.robot.readTorques(measured, external, commanded);
-            torques = new TorqueState(now, measured, external, commanded);
+            robot.readTorques(measured, external, commanded);
+            torques = new TorqueState(torquesGauge.stamp, measured, external, commanded);
+            end(torquesGauge);
         }
-        PoseState pose = (groups & Groups.POSE) != 0 ? server.robot.readPose(now) : null;
-        WrenchState wrench = (groups & Groups.WRENCH) != 0 ? server.robot.readWrench(now) : null;
-        MotionState motion = null;
-        if ((groups & Groups.MOTION) != 0) {
+        if (begin(poseGauge, groups, now)) {
+            pose = robot.readPose(poseGauge.stamp);
+            end(poseGauge);
+        }
+        if (begin(wrenchGauge, groups, now)) {
+            wrench = robot.readWrench(wrenchGauge.stamp);
+            end(wrenchGauge);
+        }
+        if (begin(motionGauge, groups, now)) {
             double[] progress = {Double.NaN, Double.NaN};
-            server.robot.readProgress(progress);
+            robot.readProgress(progress);
             long[] status = server.executor.status();
-            motion = new MotionState(now, status[0], (int) status[1], (int) status[2], progress[0], progress[1],
-                    server.robot.override());
+            motion = new MotionState(motionGauge.stamp, status[0], (int) status[1], (int) status[2], progress[0], progress[1],
+                    robot.override());
+            end(motionGauge);
         }
-        SafetyState safety = (groups & Groups.SAFETY) != 0 ? server.robot.readSafety(now) : null;
-        return new State(joints, torques, pose, wrench, motion, safety, null, null);
+        if (begin(safetyGauge, groups, now)) {
+            safety = robot.readSafety(safetyGauge.stamp);
+            end(safetyGauge);
+        }
+        return choose(new State(joints, torques, pose, wrench, motion, safety, null, null), groups);
+    }
+
+    private boolean begin(Gauge gauge, int groups, long now) {
+        if ((groups & gauge.bit) == 0 || now < gauge.next) {
+            return false;
+        }
+        gauge.stamp = gauge.next == 0 ? now : server.clock.nanos(); // behind slow readings it is not `now` any more
+        gauge.began = System.nanoTime();
+        return true;
+    }
+
+    private void end(Gauge gauge) {
+        double cost = System.nanoTime() - gauge.began;
+        gauge.cost = Math.min(cost, gauge.cost * GROWTH + GROWTH_NS);
+        gauge.next = gauge.cost < CHEAP_NS ? 0 : gauge.stamp + (long) (gauge.cost * server.clock.rate() / gauge.share);
     }
 
     /** The velocity is a low-pass filtered difference, since the cabinet tells none. */

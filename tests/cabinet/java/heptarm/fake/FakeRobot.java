@@ -138,10 +138,10 @@ final class FakeRobot implements Robot, Runnable {
     }
 
     /** Each getter of a cabinet costs. */
-    private void pay() {
+    private void pay(int getters) {
         if (getterNanos > 0) {
             try {
-                clock.sleepUntil(clock.nanos() + getterNanos);
+                clock.sleepUntil(clock.nanos() + getters * getterNanos);
             } catch (InterruptedException e) {
                 Thread.currentThread().interrupt();
             }
@@ -164,6 +164,9 @@ final class FakeRobot implements Robot, Runnable {
 
     @Override
     public void check(Item item, String path) throws Refusal {
+        if (item.until.nodes.length > 0 || item.triggers.length > 0) {
+            throw new Refusal(Code.UNSUPPORTED, path + "until", "conditions", "", "not here");
+        }
         if (!(item.motion instanceof Ptp || item.motion instanceof Hold)) {
             throw new Refusal(Code.UNSUPPORTED, path + "motion", item.motion.getClass().getSimpleName(), "Ptp, Hold", "not here");
         }
@@ -171,7 +174,7 @@ final class FakeRobot implements Robot, Runnable {
 
     @Override
     public void readJoints(double[] measured, double[] commanded) {
-        pay();
+        pay(2);
         synchronized (jobs) {
             System.arraycopy(q, 0, measured, 0, 7);
             System.arraycopy(q, 0, commanded, 0, 7);
@@ -180,13 +183,13 @@ final class FakeRobot implements Robot, Runnable {
 
     @Override
     public void readTorques(double[] measured, double[] external, double[] commanded) {
-        pay();
+        pay(2);
         Arrays.fill(commanded, Double.NaN);
     }
 
     @Override
     public PoseState readPose(long stamp) {
-        pay();
+        pay(2);
         double[] xyz = {0.5, 0.0, 0.5};
         double[] quat = {0.0, 0.0, 0.0, 1.0};
         return new PoseState(stamp, xyz, quat, xyz, quat, new Redundancy(0.0, 2, 0));
@@ -194,13 +197,13 @@ final class FakeRobot implements Robot, Runnable {
 
     @Override
     public WrenchState readWrench(long stamp) {
-        pay();
+        pay(1);
         return new WrenchState(stamp, new double[3], new double[3], new double[3], new double[3]);
     }
 
     @Override
     public SafetyState readSafety(long stamp) {
-        pay();
+        pay(6);
         return new SafetyState(stamp, SafetyBits.READY_TO_MOVE | (paused ? SafetyBits.PAUSED : 0), OperationMode.AUT);
     }
 

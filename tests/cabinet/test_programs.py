@@ -1,0 +1,216 @@
+"""Programs: their queue, their events, their ends, and what is refused before anything moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import pytest
+
+from heptarm.wire import messages as wire
+from heptarm.wire.codes import Code
+from tests.cabinet.fake import FakeCabinet
+from tests.cabinet.peer import Peer, ptp, run
+
+NAN = math.nan
+Connect = Callable[..., Peer]
+PLANNING, ON_THE_WAY = 1.25, 1.5  # positions of A7 at which the fake robot fails
+
+
+@pytest.fixture
+def peer(connect: Connect) -> Iterator[Peer]:
+    peer = connect()
+    peer.ask(wire.TakeControl(watchdog=10.0))
+    peer.ask(wire.SetOverride(value=1.0))
+    accepted = peer.ask(run(ptp()))
+    peer.wait_for(wire.MotionFinished, lambda e: e.id == accepted.id)
+    yield peer
+    peer.ask(wire.Stop())
+    peer.ask(wire.Resume())
+    peer.ask(wire.SetOverride(value=1.0))
+    peer.ask(wire.ReleaseControl())
+
+
+def finished(peer: Peer, accepted: wire.Accepted) -> wire.MotionFinished:
+    assert isinstance(accepted, wire.Accepted), accepted
+    return peer.wait_for(wire.MotionFinished, lambda e: e.id == accepted.id)
+
+
+def test_events_of_a_program_come_in_order(peer: Peer) -> None:
+    accepted = peer.ask(run(ptp(0.02), ptp(0.04), ptp(0.0)))
+    end = finished(peer, accepted)
+    events = [(type(m).__name__, m.item) for _, m in peer.seen if getattr(m, "id", None) == accepted.id and hasattr(m, "item")]
+    order = [e for e in events if e[0] != "ItemReached"]
+    assert order == [("MotionStarted", 0), ("MotionStarted", 1), ("MotionStarted", 2), ("MotionFinished", 2)]
+    assert [e for e in events if e[0] == "ItemReached"] == [("ItemReached", 0), ("ItemReached", 1)]
+    assert (end.cause, end.code, end.fired) == (wire.Cause.FINISHED, 0, -1)
+    assert end.q[0] == pytest.approx(0.0)
+    assert end.residual == 0.0
+    assert 0.06 < end.duration < 0.5
+
+
+def test_programs_wait_for_each_other(peer: Peer) -> None:
+    accepted = [peer.ask(run(ptp(q))) for q in (0.05, 0.1, 0.0)]
+    for one in accepted:
+        finished(peer, one)
+    ids = [e.id for e in peer.all(wire.MotionFinished)]
+    assert ids[-3:] == [one.id for one in accepted]
+    assert ids == sorted(ids)
+
+
+def test_replace_ends_what_runs_and_what_waits(peer: Peer) -> None:
+    old = [peer.ask(run(ptp(q))) for q in (2.0, -2.0)]
+    peer.wait_for(wire.MotionStarted, lambda e: e.id == old[0].id)
+    new = peer.ask(run(ptp(0.0), when=wire.When.REPLACE))
+    assert finished(peer, new).cause == wire.Cause.FINISHED
+    for one in old:
+        assert finished(peer, one).cause == wire.Cause.REPLACED
+        assert str(new.id) in finished(peer, one).text
+
+
+def test_reject_while_something_runs(peer: Peer) -> None:
+    running = peer.ask(run(ptp(2.0)))
+    rejected = peer.ask(run(ptp(0.0), when=wire.When.REJECT))
+    assert rejected.code == Code.BUSY
+    assert str(running.id) in rejected.text
+    peer.ask(wire.Cancel(id=0))
+    finished(peer, running)
+    assert finished(peer, peer.ask(run(ptp(0.0), when=wire.When.REJECT))).cause == wire.Cause.FINISHED
+
+
+def test_cancel_of_what_waits_leaves_what_runs(peer: Peer) -> None:
+    running, waiting, last = (peer.ask(run(ptp(q))) for q in (0.3, 0.6, 0.0))
+    assert isinstance(peer.ask(wire.Cancel(id=waiting.id)), wire.Accepted)
+    end = finished(peer, waiting)
+    assert (end.cause, end.duration) == (wire.Cause.CANCELLED, 0.0)
+    assert math.isnan(end.residual)
+    assert finished(peer, running).cause == wire.Cause.FINISHED
+    assert finished(peer, last).cause == wire.Cause.FINISHED
+
+
+def test_cancel_under_way(peer: Peer) -> None:
+    accepted = peer.ask(run(ptp(2.0), ptp(-2.0)))
+    peer.wait_for(wire.MotionStarted, lambda e: e.id == accepted.id)
+    peer.ask(wire.Cancel(id=accepted.id))
+    end = finished(peer, accepted)
+    assert end.cause == wire.Cause.CANCELLED
+    assert 0.0 <= end.q[0] < 1.0
+    assert peer.ask(wire.Cancel(id=accepted.id)).code == Code.UNKNOWN_MOTION
+
+
+def test_stop_after_motion_lets_the_running_one_finish(peer: Peer) -> None:
+    running, waiting = (peer.ask(run(ptp(q))) for q in (0.2, 2.0))
+    peer.ask(wire.Stop(kind=wire.StopKind.AFTER_MOTION))
+    assert finished(peer, waiting).cause == wire.Cause.STOPPED
+    assert finished(peer, running).cause == wire.Cause.FINISHED
+
+
+@pytest.mark.parametrize(("a7", "code"), [(PLANNING, Code.UNREACHABLE), (ON_THE_WAY, Code.EXECUTION_FAILED)])
+def test_a_failure_ends_its_program_and_drops_what_waits(peer: Peer, a7: float, code: int) -> None:
+    failing = peer.ask(run(ptp(0.05), ptp(0.05, 0, 0, 0, 0, 0, a7), ptp(0.0)))
+    behind = peer.ask(run(ptp(2.0)))
+    end = finished(peer, failing)
+    assert (end.cause, end.code) == (wire.Cause.FAILED, code)
+    assert end.text
+    dropped = finished(peer, behind)
+    assert dropped.cause == wire.Cause.DROPPED
+    assert str(failing.id) in dropped.text
+    after = finished(peer, peer.ask(run(ptp(0.0))))
+    assert after.cause == wire.Cause.FINISHED
+
+
+def test_pause_and_override_act_at_once(peer: Peer) -> None:
+    accepted = peer.ask(run(ptp(0.1)))
+    peer.ask(wire.Pause())
+    peer.read_for(0.3)
+    assert not [e for e in peer.all(wire.MotionFinished) if e.id == accepted.id]
+    peer.ask(wire.Resume())
+    assert finished(peer, accepted).duration > 0.3
+    assert peer.ask(wire.SetOverride(value=1.5)).code == Code.OUT_OF_RANGE
+    assert peer.ask(wire.SetOverride(value=NAN)).code == Code.NOT_FINITE
+
+
+@pytest.mark.parametrize(
+    ("item", "code", "parameter", "says"),
+    [
+        (ptp(0, 0, 0, NAN), Code.NOT_FINITE, "items[1].motion.q[3]", "NaN"),
+        (ptp(0, 0, 0, -math.inf), Code.NOT_FINITE, "items[1].motion.q[3]", "inf"),
+        (ptp(0, 0, 0, 0, 0, 2.5), Code.JOINT_LIMIT, "items[1].motion.q[5]", "A6"),
+        (wire.Item(motion=wire.Hold(duration=0.0)), Code.OUT_OF_RANGE, "items[1].motion.duration", "0"),
+        (
+            wire.Item(motion=wire.LinRel(offset=wire.Pose(xyz=(0.1, 0.0, 0.0), quat=(0.0, 0.0, 0.0, 2.0)))),
+            Code.NOT_NORMALISED,
+            "items[1].motion.offset.quat",
+            "norm",
+        ),
+        (
+            wire.Item(motion=wire.LinRel(offset=wire.Pose(xyz=(0.1, NAN, 0.0), quat=(0.0, 0.0, 0.0, 1.0)))),
+            Code.NOT_FINITE,
+            "items[1].motion.offset.xyz[1]",
+            "NaN",
+        ),
+        (
+            wire.Item(motion=wire.LinRel(offset=wire.Pose(xyz=(0.1, 0.0, 0.0), quat=(0.0, 0.0, 0.0, 1.0)))),
+            Code.UNSUPPORTED,
+            "items[1].motion",
+            "",
+        ),
+        (
+            wire.Item(motion=wire.Ptp(q=(0.0,) * 7, dynamics=wire.JointDynamics(velocity=(0.5,) * 6 + (1.01,)))),
+            Code.OUT_OF_RANGE,
+            "items[1].motion.dynamics.velocity[6]",
+            "1.01",
+        ),
+        (
+            replace(ptp(), until=wire.Condition(nodes=(wire.JointTorqueOutside(joint=7, low=-1.0, high=1.0),))),
+            Code.OUT_OF_RANGE,
+            "items[1].until.nodes[0].joint",
+            "7",
+        ),
+        (replace(ptp(), frame="x" * 200), Code.BAD_LENGTH, "items[1].frame", "200"),
+    ],
+    ids=lambda v: v if isinstance(v, str) else "",
+)
+def test_a_bad_item_is_refused_by_name_and_nothing_moves(
+    peer: Peer, item: wire.Item, code: int, parameter: str, says: str
+) -> None:
+    before = len(peer.all(wire.MotionStarted))
+    rejected = peer.ask(run(ptp(1.0), item))
+    assert isinstance(rejected, wire.Rejected)
+    assert (rejected.code, rejected.parameter[: len(parameter)]) == (code, parameter)
+    assert says in rejected.text + rejected.value
+    assert finished(peer, peer.ask(run(ptp(0.0)))).q[0] == 0.0
+    assert len(peer.all(wire.MotionStarted)) == before + 1
+
+
+def test_an_empty_program_and_what_is_not_there_are_refused(peer: Peer) -> None:
+    assert peer.ask(run()).code == Code.BAD_LENGTH
+    assert peer.ask(wire.ServoOpen()).code == Code.UNSUPPORTED
+    assert peer.ask(wire.GetProcessData(name="x")).code == Code.UNSUPPORTED
+    assert peer.ask(wire.Recover()).code == Code.NEEDS_OPERATOR
+
+
+def test_an_exception_of_the_robot_is_an_answer(make: Callable[..., FakeCabinet]) -> None:
+    cabinet = make()
+    with Peer(cabinet.port) as peer:
+        peer.ask(wire.TakeControl(watchdog=10.0))
+        rejected = peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="crash"))
+        assert rejected.code == Code.INTERNAL
+        assert "an error of the cabinet's API" in rejected.text
+        assert finished(peer, peer.ask(run(ptp(0.1)))).cause == wire.Cause.FINISHED
+    assert len(cabinet.errors()) == 1
+
+
+def test_the_end_of_the_server_stops_motion_tells_all_and_leaves_no_thread(make: Callable[..., FakeCabinet]) -> None:
+    cabinet = make()
+    with Peer(cabinet.port, name="controller") as peer, Peer(cabinet.port, name="observer") as observer:
+        peer.ask(wire.TakeControl(watchdog=10.0))
+        observer.ask(wire.Subscribe(groups=wire.Groups(63), rate=1000.0))
+        accepted = peer.ask(run(ptp(2.0)))
+        peer.wait_for(wire.MotionStarted)
+        assert cabinet.close() == []
+        assert finished(peer, accepted).cause == wire.Cause.STOPPED
+        for one in (peer, observer):
+            assert one.wait_for(wire.Goodbye).code == Code.SHUTTING_DOWN
+            assert one.is_closed()

@@ -1,0 +1,108 @@
+"""Pushed state: rates, groups, stamps, ages."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from heptarm.wire import messages as wire
+from heptarm.wire.codes import Code
+from tests.cabinet.fake import FakeCabinet
+from tests.cabinet.peer import Peer, ptp, run
+
+Connect = Callable[..., Peer]
+G = wire.Groups
+_FIELDS = {G.JOINTS: "joints", G.TORQUES: "torques", G.POSE: "pose", G.WRENCH: "wrench", G.MOTION: "motion", G.SAFETY: "safety"}
+
+
+def stamps(peer: Peer, group: str) -> np.ndarray:
+    return np.array([getattr(state, group).stamp for state in peer.all(wire.State)])
+
+
+@pytest.mark.parametrize("rate", [50.0, 1000.0])
+def test_states_come_at_the_rate(connect: Connect, rate: float) -> None:
+    peer = connect()
+    peer.ask(wire.Subscribe(groups=G.JOINTS | G.MOTION, rate=rate))
+    peer.read_for(1.0)
+    seen = stamps(peer, "joints")
+    assert len(seen) == pytest.approx(rate, rel=0.1)
+    assert (np.diff(seen) > 0).all()
+    assert np.median(np.diff(seen)) == pytest.approx(1e9 / rate, rel=0.15)
+
+
+def test_only_the_groups_that_were_asked_for(connect: Connect) -> None:
+    peer = connect()
+    for chosen in (G.JOINTS, G.POSE | G.SAFETY, G.TORQUES | G.WRENCH | G.MOTION):
+        peer.ask(wire.Subscribe(groups=chosen, rate=200.0))
+        peer.read_for(0.1)
+        state = peer.all(wire.State)[-1]
+        assert {group for group, field in _FIELDS.items() if getattr(state, field) is not None} == set(chosen)
+    peer.ask(wire.Subscribe(groups=G.JOINTS, rate=0.0))
+    peer.read_for(0.1)
+    count = len(peer.all(wire.State))
+    peer.read_for(0.2)
+    assert len(peer.all(wire.State)) == count
+
+
+def test_a_rate_that_is_too_fast_is_refused(connect: Connect) -> None:
+    rejected = connect().ask(wire.Subscribe(groups=G.JOINTS, rate=1000.5))
+    assert (rejected.code, rejected.parameter) == (Code.OUT_OF_RANGE, "rate")
+
+
+def test_two_clients_with_two_rates(connect: Connect) -> None:
+    fast, slow = connect(), connect()
+    fast.ask(wire.Subscribe(groups=G.JOINTS, rate=500.0))
+    slow.ask(wire.Subscribe(groups=G.JOINTS | G.POSE, rate=20.0))
+    time.sleep(1.0)
+    fast.read_for(0.05)
+    slow.read_for(0.05)
+    assert len(fast.all(wire.State)) == pytest.approx(525, rel=0.15)
+    assert len(slow.all(wire.State)) == pytest.approx(21, abs=3)
+    assert all(state.pose is None for state in fast.all(wire.State))
+
+
+def test_velocity_follows_the_motion(connect: Connect) -> None:
+    peer = connect()
+    peer.ask(wire.TakeControl(watchdog=10.0))
+    peer.ask(wire.Subscribe(groups=G.JOINTS | G.MOTION, rate=200.0))
+    accepted = peer.ask(run(ptp(0.3)))
+    peer.wait_for(wire.MotionFinished, lambda e: e.id == accepted.id)
+    peer.read_for(0.2)
+    moving = [s for s in peer.all(wire.State) if s.motion.motion == accepted.id]
+    assert np.median([s.joints.dq[0] for s in moving[10:]]) == pytest.approx(1.0, abs=0.1)  # the fake robot's speed
+    assert peer.all(wire.State)[-1].joints.dq[0] == pytest.approx(0.0, abs=1e-3)
+    assert peer.all(wire.State)[-1].motion.motion == 0
+    peer.ask(run(ptp(0.0)))
+    peer.wait_for(wire.MotionFinished, lambda e: e.id == accepted.id + 1)
+    peer.ask(wire.ReleaseControl())
+
+
+def test_a_cabinet_with_costly_getters_keeps_the_joints_fresh(make: Callable[..., FakeCabinet]) -> None:
+    """With 2 ms for each reading, all groups at 100 Hz cannot be had: slow ones keep their old stamps, joints go first."""
+    cabinet = make(getter=0.002)
+    with Peer(cabinet.port) as peer:
+        peer.ask(wire.Subscribe(groups=G(63), rate=100.0))
+        peer.read_for(2.0)  # costs are learnt
+        peer.seen.clear()
+        peer.read_for(2.0)
+        assert len(peer.all(wire.State)) > 60
+        fresh = {}
+        for group in _FIELDS.values():
+            assert (np.diff(stamps(peer, group)) >= 0).all()
+            fresh[group] = len(set(stamps(peer, group))) / 2.0
+        assert fresh["joints"] > 30
+        assert 2 < fresh["safety"] < 15
+        assert fresh["pose"] < fresh["joints"]
+        assert isinstance(peer.ask(wire.Stop()), wire.Accepted)
+
+
+def test_states_of_a_fast_clock(make: Callable[..., FakeCabinet]) -> None:
+    cabinet = make(rate=5.0)
+    with Peer(cabinet.port) as peer:
+        peer.ask(wire.Subscribe(groups=G.JOINTS, rate=100.0))
+        peer.read_for(1.0)
+        assert len(stamps(peer, "joints")) == pytest.approx(500, rel=0.15)
+        assert np.median(np.diff(stamps(peer, "joints"))) == pytest.approx(1e7, rel=0.1)
