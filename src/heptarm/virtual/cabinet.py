@@ -47,7 +47,8 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
         "--speed", type=float, default=1.0, help="simulated seconds per second; 0: as fast as it goes"
     )
     parser.add_argument("--key", default="", help="pre-shared key")
-    parser.add_argument("--application", default="", help="class of another application to run")
+    parser.add_argument("--application", default="", help="class of another application; ends with it")
+    parser.add_argument("--classpath", action="append", default=[], help="folder or jar with its classes")
     parser.add_argument("--data", action="append", default=[], metavar="NAME=VALUE", help="process data")
     parser.add_argument(
         "--stats", type=Path, help="write the loop's statistics here at the end and on SIGUSR1"
@@ -67,7 +68,7 @@ class VirtualCabinet:
         self._options = options
         self.plant = Plant(options.model)
         self.pacer = Pacer(self.plant.ring, self.plant.tick, speed=options.speed)
-        jvm.start()
+        jvm.start(options.classpath)
         import jpype
 
         self._system = jpype.JClass("java.lang.System")
@@ -84,6 +85,11 @@ class VirtualCabinet:
         for name, value in data.items():
             self._station.setProcessData(name, value)
         self.host = jpype.JClass("heptarm.doubles.Host")(options.application or jvm.APPLICATION)
+
+    @property
+    def foreign(self) -> bool:
+        """Whether another application than heptarm's runs."""
+        return bool(self._options.application)
 
     def port(self) -> int:
         """The port that the application has opened.
@@ -141,6 +147,9 @@ def _when_orphaned(end: Callable[[], None]) -> None:
 
 
 def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
+    if cabinet.foreign:
+        _accompany(cabinet, failed)
+        return
     try:
         port = cabinet.port()
     except RuntimeError as error:
@@ -151,6 +160,16 @@ def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[s
     ready = {"ready": True, "host": options.host, "port": port, "pid": os.getpid(), "model": options.model}
     print(json.dumps(ready), flush=True)
     _housekeeping(stopping)
+
+
+def _accompany(cabinet: VirtualCabinet, failed: list[str]) -> None:
+    """Run for as long as somebody else's application does."""
+    while cabinet.host.isAlive():
+        time.sleep(0.01)
+    failure = cabinet.host.failure()
+    if failure is not None:
+        failed.append(str(failure))
+    cabinet.pacer.stop()
 
 
 def main(argv: list[str] | None = None) -> int:

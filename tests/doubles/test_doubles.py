@@ -1,0 +1,97 @@
+"""An application written as a Sunrise programmer writes one runs on the doubles, on a real JVM, over the plant."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from heptarm import _resources
+
+HERE = Path(__file__).parent
+
+SAID = (
+    "initialize = LBR_iiwa_14_R820_1",
+    "ptp = true",
+    "linRel down 100 mm = true",
+    "lin back = true",
+    "linRel moves along the flange's own axes = true",
+    "moveAsync returns before the motion has ended = true",
+    "queued motions run in order = true",
+    "await with a time-out = true",
+    "cancel brakes on the path = true",
+    "positionHold = true",
+    "a joint limit throws = true",
+    "a bad parameter throws = true",
+    "unknown process data throws = true",
+    "an asynchronous error reaches the handler = true",
+    "the application goes on = true",
+    "and moves = true",
+    "dispose = true",
+)
+
+
+def _compile(source: Path, out: Path) -> None:
+    if shutil.which("javac") is None:
+        pytest.skip("no javac here")
+    classpath = ":".join(str(jar) for jar in _resources.jars())
+    command = ["javac", "-proc:none", "--release", "17", "-cp", classpath, "-d", str(out), str(source)]
+    subprocess.run(command, check=True)
+
+
+def _run(application: str, classes: Path, *data: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "heptarm.virtual.cabinet", "--application", application]
+    command += ["--classpath", str(classes)]
+    for one in data:
+        command += ["--data", one]
+    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+
+def test_a_sunrise_application_behaves_as_on_a_cabinet(tmp_path: Path) -> None:
+    _compile(HERE / "java" / "Sample.java", tmp_path)
+    said = tmp_path / "said.txt"
+    done = _run("sample.Sample", tmp_path, f"sample.file={said}")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert tuple(said.read_text().splitlines()) == SAID
+
+
+def test_without_a_handler_an_asynchronous_error_ends_the_application(tmp_path: Path) -> None:
+    source = tmp_path / "Careless.java"
+    source.write_text(
+        """
+        package sample;
+        import static com.kuka.roboticsAPI.motionModel.BasicMotions.linRel;
+        import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
+        import com.kuka.roboticsAPI.deviceModel.LBR;
+        import javax.inject.Inject;
+        public class Careless extends RoboticsAPIApplication {
+            @Inject private LBR lbr;
+            public void run() throws Exception {
+                lbr.moveAsync(linRel(5000, 0, 0));
+                Thread.sleep(20000);
+            }
+        }
+        """
+    )
+    _compile(source, tmp_path)
+    done = _run("sample.Careless", tmp_path)
+    assert done.returncode == 1
+    assert "InterruptedException" in done.stdout
+
+
+def test_an_application_that_does_not_exist_is_named(tmp_path: Path) -> None:
+    done = _run("sample.Missing", tmp_path)
+    assert done.returncode != 0
+    assert "sample.Missing" in done.stdout + done.stderr
+
+
+def test_the_jar_of_doubles_says_what_it_is() -> None:
+    import zipfile
+
+    (jar,) = (jar for jar in _resources.jars() if "doubles" in jar.name)
+    assert "not-for-robots" in jar.name
+    manifest = zipfile.ZipFile(jar).read("META-INF/MANIFEST.MF").decode().replace("\r\n ", "")
+    assert "Never deploy" in manifest
