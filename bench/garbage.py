@@ -52,38 +52,41 @@ def garbage(target: tuple[str, int], frames: int, seed: int = 3) -> int:
     while sent < frames:
         with socket.create_connection(target, timeout=5) as peer:
             peer.settimeout(5)
-            if chance.random() < 0.8:
+            greeted = chance.random() < 0.8
+            if greeted:
                 peer.sendall(hello)
             try:
-                for _ in range(_PER_CONNECTION):
-                    peer.sendall(_one(chance, seeds))
+                # what follows octets that are no frame, or a refused greeting, is thrown away and would prove nothing
+                for _ in range(_PER_CONNECTION if greeted else 2):
+                    octets, is_frame = _one(chance, seeds)
+                    peer.sendall(octets)
                     sent += 1
-                    if sent >= frames:
+                    if sent >= frames or not is_frame:
                         break
                 peer.shutdown(socket.SHUT_WR)
                 while peer.recv(65536):
                     pass
             except OSError:
-                sent += (
-                    1  # the cabinet has closed this connection, as it should after octets that are no frame
-                )
+                continue  # the cabinet has closed this connection
     return sent
 
 
-def _one(chance: random.Random, seeds: list[tuple[int, bytes]]) -> bytes:
+def _one(chance: random.Random, seeds: list[tuple[int, bytes]]) -> tuple[bytes, bool]:
     number, body = chance.choice(seeds)
     kind = chance.random()
     if kind < 0.005:
-        return chance.randbytes(chance.randrange(1, 200))
+        return b"\0" + chance.randbytes(chance.randrange(30, 200)), False
     if kind < 0.2:
-        return _frame(chance.randrange(200), chance.randbytes(chance.randrange(0, 300)), chance.randrange(5))
+        return _frame(
+            chance.randrange(200), chance.randbytes(chance.randrange(0, 300)), chance.randrange(5)
+        ), True
     changed = bytearray(body)
     for _ in range(chance.randrange(1, 6)):
         if changed:
             changed[chance.randrange(len(changed))] = chance.randrange(256)
     if kind < 0.4:
         changed = changed[: chance.randrange(len(changed) + 1)]
-    return _frame(number, bytes(changed), chance.randrange(1, 2**32))
+    return _frame(number, bytes(changed), chance.randrange(1, 2**32)), True
 
 
 @benchmark("garbage", "A15")

@@ -38,7 +38,10 @@ def test_second_controller_is_told_who_holds_control(connect: Connect, controlle
     controller.ask(wire.ReleaseControl())
     assert second.wait_for(wire.ControlChanged).controller == ""
     assert isinstance(second.ask(wire.TakeControl(watchdog=10.0)), wire.Accepted)
-    assert controller.wait_for(wire.ControlChanged, lambda e: e.controller == "second").session == second.welcome.session
+    assert (
+        controller.wait_for(wire.ControlChanged, lambda e: e.controller == "second").session
+        == second.welcome.session
+    )
     assert controller.ask(run(ptp(0.1))).code == Code.NOT_IN_CONTROL
     second.ask(wire.ReleaseControl())
     controller.ask(wire.TakeControl(watchdog=10.0))
@@ -46,7 +49,15 @@ def test_second_controller_is_told_who_holds_control(connect: Connect, controlle
 
 @pytest.mark.parametrize(
     "request_",
-    [run(ptp(0.1)), wire.Cancel(id=0), wire.Pause(), wire.Resume(), wire.SetOverride(value=0.5), wire.ReleaseControl(), wire.Recover()],
+    [
+        run(ptp(0.1)),
+        wire.Cancel(id=0),
+        wire.Pause(),
+        wire.Resume(),
+        wire.SetOverride(value=0.5),
+        wire.ReleaseControl(),
+        wire.Recover(),
+    ],
     ids=lambda m: type(m).__name__,
 )
 def test_an_observer_may_not_command(connect: Connect, controller: Peer, request_: object) -> None:
@@ -81,7 +92,9 @@ def test_release_stops_what_runs_and_what_waits(connect: Connect) -> None:
 
 
 @pytest.mark.parametrize("rate", [1.0, 10.0])
-def test_a_silent_controller_loses_control_in_its_watchdog_time(make: Callable[..., FakeCabinet], rate: float) -> None:
+def test_a_silent_controller_loses_control_in_its_watchdog_time(
+    make: Callable[..., FakeCabinet], rate: float
+) -> None:
     """The watchdog counts the client's seconds, however fast the cabinet's clock runs."""
     cabinet = make(rate=rate)
     with Peer(cabinet.port, name="observer") as observer, Peer(cabinet.port, name="silent") as silent:

@@ -64,7 +64,12 @@ def test_a_second_hello_is_refused_and_the_session_goes_on(connect: Connect) -> 
 
 
 @pytest.mark.parametrize(
-    "octets", [b"GET / HTTP/1.1\r\nHost: cabinet\r\n\r\n", b"\x00" * 64, struct.pack(">HBBHI", 0x4837, 1, 0, 37, 2**31) + b"\0" * 16]
+    "octets",
+    [
+        b"GET / HTTP/1.1\r\nHost: cabinet\r\n\r\n",
+        b"\x00" * 64,
+        struct.pack(">HBBHI", 0x4837, 1, 0, 37, 2**31) + b"\0" * 16,
+    ],
 )
 @pytest.mark.parametrize("greeted", ["greeted", "not greeted"])
 def test_octets_that_are_no_frame_end_that_connection_with_a_reason(

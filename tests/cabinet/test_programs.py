@@ -40,7 +40,11 @@ def finished(peer: Peer, accepted: wire.Accepted) -> wire.MotionFinished:
 def test_events_of_a_program_come_in_order(peer: Peer) -> None:
     accepted = peer.ask(run(ptp(0.02), ptp(0.04), ptp(0.0)))
     end = finished(peer, accepted)
-    events = [(type(m).__name__, m.item) for _, m in peer.seen if getattr(m, "id", None) == accepted.id and hasattr(m, "item")]
+    events = [
+        (type(m).__name__, m.item)
+        for _, m in peer.seen
+        if getattr(m, "id", None) == accepted.id and hasattr(m, "item")
+    ]
     order = [e for e in events if e[0] != "ItemReached"]
     assert order == [("MotionStarted", 0), ("MotionStarted", 1), ("MotionStarted", 2), ("MotionFinished", 2)]
     assert [e for e in events if e[0] == "ItemReached"] == [("ItemReached", 0), ("ItemReached", 1)]
@@ -157,13 +161,17 @@ def test_pause_and_override_act_at_once(peer: Peer) -> None:
             "",
         ),
         (
-            wire.Item(motion=wire.Ptp(q=(0.0,) * 7, dynamics=wire.JointDynamics(velocity=(0.5,) * 6 + (1.01,)))),
+            wire.Item(
+                motion=wire.Ptp(q=(0.0,) * 7, dynamics=wire.JointDynamics(velocity=(0.5,) * 6 + (1.01,)))
+            ),
             Code.OUT_OF_RANGE,
             "items[1].motion.dynamics.velocity[6]",
             "1.01",
         ),
         (
-            replace(ptp(), until=wire.Condition(nodes=(wire.JointTorqueOutside(joint=7, low=-1.0, high=1.0),))),
+            replace(
+                ptp(), until=wire.Condition(nodes=(wire.JointTorqueOutside(joint=7, low=-1.0, high=1.0),))
+            ),
             Code.OUT_OF_RANGE,
             "items[1].until.nodes[0].joint",
             "7",
@@ -202,7 +210,9 @@ def test_an_exception_of_the_robot_is_an_answer(make: Callable[..., FakeCabinet]
     assert len(cabinet.errors()) == 1
 
 
-def test_the_end_of_the_server_stops_motion_tells_all_and_leaves_no_thread(make: Callable[..., FakeCabinet]) -> None:
+def test_the_end_of_the_server_stops_motion_tells_all_and_leaves_no_thread(
+    make: Callable[..., FakeCabinet],
+) -> None:
     cabinet = make()
     with Peer(cabinet.port, name="controller") as peer, Peer(cabinet.port, name="observer") as observer:
         peer.ask(wire.TakeControl(watchdog=10.0))

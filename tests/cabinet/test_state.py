@@ -15,7 +15,14 @@ from tests.cabinet.peer import Peer, ptp, run
 
 Connect = Callable[..., Peer]
 G = wire.Groups
-_FIELDS = {G.JOINTS: "joints", G.TORQUES: "torques", G.POSE: "pose", G.WRENCH: "wrench", G.MOTION: "motion", G.SAFETY: "safety"}
+_FIELDS = {
+    G.JOINTS: "joints",
+    G.TORQUES: "torques",
+    G.POSE: "pose",
+    G.WRENCH: "wrench",
+    G.MOTION: "motion",
+    G.SAFETY: "safety",
+}
 
 
 def stamps(peer: Peer, group: str) -> np.ndarray:
@@ -72,7 +79,9 @@ def test_velocity_follows_the_motion(connect: Connect) -> None:
     peer.wait_for(wire.MotionFinished, lambda e: e.id == accepted.id)
     peer.read_for(0.2)
     moving = [s for s in peer.all(wire.State) if s.motion.motion == accepted.id]
-    assert np.median([s.joints.dq[0] for s in moving[10:]]) == pytest.approx(1.0, abs=0.1)  # the fake robot's speed
+    assert np.median([s.joints.dq[0] for s in moving[10:]]) == pytest.approx(
+        1.0, abs=0.1
+    )  # the fake robot's speed
     assert peer.all(wire.State)[-1].joints.dq[0] == pytest.approx(0.0, abs=1e-3)
     assert peer.all(wire.State)[-1].motion.motion == 0
     peer.ask(run(ptp(0.0)))

@@ -1,0 +1,47 @@
+"""Random and mutated frames: the server lives, nothing inside it fails, nothing is left behind, the next client works."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from bench.garbage import garbage
+from heptarm.wire import messages as wire
+from tests.cabinet.fake import FakeCabinet
+from tests.cabinet.peer import Peer, ptp, run
+
+FRAMES = int(os.environ.get("GARBAGE_FRAMES", "5000"))
+
+
+def _resident(process: int) -> float:
+    text = Path(f"/proc/{process}/status").read_text()
+    return next(int(line.split()[1]) for line in text.splitlines() if line.startswith("VmRSS")) / 1024
+
+
+@pytest.mark.parametrize("frames", [FRAMES, pytest.param(100_000, marks=pytest.mark.slow)])
+def test_random_and_mutated_frames(make: Callable[..., FakeCabinet], frames: int) -> None:
+    cabinet = make()
+    idle = cabinet.threads()
+    with Peer(cabinet.port, name="watcher") as watcher:
+        assert garbage(("127.0.0.1", cabinet.port), frames, seed=11) >= frames
+        assert isinstance(watcher.ask(wire.Stop()), wire.Accepted)  # it was served, and pinged, all the time
+        deadline = time.monotonic() + 5.0
+        while not isinstance(watcher.ask(wire.TakeControl(watchdog=5.0)), wire.Accepted):
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        watcher.ask(wire.SetOverride(value=1.0))
+        watcher.ask(wire.Resume())
+        accepted = watcher.ask(run(ptp(0.02)))
+        finished = watcher.wait_for(wire.MotionFinished, lambda e: e.id == accepted.id)
+        assert finished.cause == wire.Cause.FINISHED
+    assert cabinet.errors() == []
+    assert _resident(cabinet.process.pid) < 160  # a heap of 64 MB and the JVM itself
+    deadline = time.monotonic() + 5.0
+    while cabinet.threads() != idle:
+        assert time.monotonic() < deadline, cabinet.threads()
+        time.sleep(0.05)
+    assert cabinet.close() == []
