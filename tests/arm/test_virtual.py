@@ -18,6 +18,8 @@ import pytest
 
 import heptarm as ha
 from heptarm import Arm, deg, hold, lin_rel, ptp
+from heptarm.arm.private_cabinet import PrivateCabinet
+from heptarm.arm.target import Target
 from tests.conftest import RunningCabinet
 
 HOME = deg(0, 30, 0, -90, 0, 60, 0)
@@ -273,6 +275,22 @@ def test_ctrl_c_stops_the_arm(cabinet: RunningCabinet, tmp_path: Path) -> None:
         assert speed(arm) < 0.01
 
 
+def test_ctrl_c_amid_requests_breaks_nothing(arm: Arm) -> None:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        for count in range(40):
+            timer = threading.Timer(0.002 + count * 1e-4, os.kill, (os.getpid(), signal.SIGINT))
+            with pytest.raises(KeyboardInterrupt):
+                timer.start()
+                while True:
+                    arm.set_override(1.0)
+            timer.join()
+            assert arm.connected
+            arm.stop()
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def test_a_killed_controller_is_stopped_and_replaced(cabinet: RunningCabinet, tmp_path: Path) -> None:
     with ha.connect(cabinet.target, control=False) as observer:
         for _ in range(2):
@@ -296,6 +314,23 @@ def test_a_lost_controller_may_let_its_motion_finish(cabinet: RunningCabinet, tm
     with ha.connect(cabinet.target, control=False) as observer:
         target = deg(60, 30, 0, -90, 0, 60, 0)
         observer.wait_until(lambda s: np.abs(s.q - target).max() < 1e-3, timeout=6.0)
+
+
+# ------------------------------------------------------------------------------------- the key
+
+
+def test_the_key_opens_the_cabinet() -> None:
+    cabinet = PrivateCabinet.start(Target(model="iiwa7", options=(("key", "sesame"),)))
+    target = f"{cabinet.host}:{cabinet.port}"
+    try:
+        with ha.connect(target, key="sesame") as arm:
+            assert arm.robot.name == "iiwa7"
+        with pytest.raises(ha.ConnectFailed, match="key is wrong"):
+            ha.connect(target, key="barley")
+        with pytest.raises(ha.ConnectFailed, match="asks for a pre-shared key"):
+            ha.connect(target)
+    finally:
+        cabinet.close()
 
 
 # ------------------------------------------------------------------------------------- private

@@ -3,8 +3,9 @@
 Who reads the connection? While a caller waits for an answer, the caller reads itself: that saves two changes of
 threads, half of a round trip. At all other times the thread "heptarm-link" reads. It waits for the connection to
 become readable without taking anything, so a caller need not wake it to take its place; `_token` says who may take.
-A caller's thread may be interrupted anywhere (Ctrl-C). If that happens after octets were taken and before they
-were understood, nobody knows where the next frame begins: then the link is given up, and the cabinet stops the arm.
+A caller's thread may be interrupted anywhere. Ctrl-C is held back meanwhile; should another exception come from
+outside after octets were taken and before they were understood, nobody knows where the next frame begins: then the
+link is given up, and the cabinet stops the arm.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from _thread import LockType, allocate_lock, get_ident
 from collections.abc import Callable
 
 from heptarm.arm.refusals import farewell, refusal, rejection
+from heptarm.arm.shield import Shield
 from heptarm.errors import ConnectFailed, ConnectionLost, HeptarmError, RemoteProtocolError, Timeout
 from heptarm.io.clock import Clock
 from heptarm.io.transport import Transport
@@ -195,20 +197,24 @@ class Link:
             Timeout: no answer in time.
         """
         slot = _Slot(on_answer)
-        self._say(message, slot)
         deadline = self._clock.nanos() + round(timeout * 1e9)
-        if self._holder == get_ident():  # called from a callback: this thread is the one that reads
-            self._read_until(slot, deadline)
-        elif self._token.acquire(timeout=_TURN):
-            try:
-                self._leading = True
-                self._holder = get_ident()
-                self._read_until(slot, deadline)
-            finally:
-                self._requested = self._clock.nanos()
-                self._leading = False
-                self._holder = 0
-                self._token.release()
+        shield = Shield()
+        try:
+            self._say(message, slot)
+            if self._holder == get_ident():  # called from a callback: this thread is the one that reads
+                self._read_until(slot, deadline, shield)
+            elif self._token.acquire(timeout=_TURN):
+                try:
+                    self._leading = True
+                    self._holder = get_ident()
+                    self._read_until(slot, deadline, shield)
+                finally:
+                    self._requested = self._clock.nanos()
+                    self._leading = False
+                    self._holder = 0
+                    self._token.release()
+        finally:
+            shield.down()
         if slot.answer is None and self._error is None:
             slot.lock.acquire(timeout=max(0.0, (deadline - self._clock.nanos()) * 1e-9))
         answer = slot.answer
@@ -258,8 +264,10 @@ class Link:
 
     # ------------------------------------------------------------------------------------ reading
 
-    def _read_until(self, slot: _Slot, deadline: int) -> None:
-        while slot.answer is None and self._error is None and self._clock.nanos() < deadline:
+    def _read_until(self, slot: _Slot, deadline: int, shield: Shield) -> None:
+        while slot.answer is None and self._error is None and not shield.pending:
+            if self._clock.nanos() > deadline:
+                return
             self._read(wait=True)
 
     def _read_now(self) -> None:
