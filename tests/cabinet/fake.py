@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import subprocess
 import sys
 from pathlib import Path
 from types import TracebackType
 
 ROOT = Path(__file__).resolve().parents[2]
-_JAVA = Path(__file__).parent / "java"
 _OUT = ROOT / "build" / "cabinet" / "fake"
 
 sys.path.insert(0, str(ROOT / "cabinet"))
@@ -18,18 +18,19 @@ import build  # noqa: E402
 import toolchain  # noqa: E402
 
 
-def classes() -> str:
-    """Class path of the core and the fake robot, compiled where they have changed."""
-    core = next(jar for jar in build.build() if jar.name == "heptarm-core.jar")
-    sources = sorted(_JAVA.rglob("*.java"))
-    digest = hashlib.sha256(core.read_bytes() + b"".join(path.read_bytes() for path in sources)).hexdigest()
-    folder = _OUT / digest[:16]
-    if not (folder / "done").exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        javac = [toolchain.find_jdk().javac, "--release", "17", "-d", str(folder), "-classpath", str(core)]
+def classes(folder: str = "java") -> str:
+    """Class path of the cabinet's jars and the test's own classes, compiled where they have changed."""
+    jars = [jar for jar in build.build() if folder != "java" or jar.name == "heptarm-core.jar"]
+    sources = sorted((Path(__file__).parent / folder).rglob("*.java"))
+    octets = b"".join(path.read_bytes() for path in (*jars, *sources))
+    out = _OUT / hashlib.sha256(octets).hexdigest()[:16]
+    path = os.pathsep.join(str(jar) for jar in jars)
+    if not (out / "done").exists():
+        out.mkdir(parents=True, exist_ok=True)
+        javac = [toolchain.find_jdk().javac, "--release", "17", "-d", str(out), "-classpath", path]
         subprocess.run([*javac, *map(str, sources)], check=True)
-        (folder / "done").touch()
-    return f"{core}:{folder}"
+        (out / "done").touch()
+    return f"{path}{os.pathsep}{out}"
 
 
 class FakeCabinet:

@@ -1,4 +1,4 @@
-"""Random and mutated frames: the server lives, nothing inside it fails, nothing is left behind, the next client works."""
+"""Random and mutated frames: the server lives, nothing in it fails, nothing is left behind, the next client works."""
 
 from __future__ import annotations
 

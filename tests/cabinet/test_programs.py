@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -15,7 +16,11 @@ from tests.cabinet.peer import Peer, ptp, run
 
 NAN = math.nan
 Connect = Callable[..., Peer]
-PLANNING, ON_THE_WAY = 1.25, 1.5  # positions of A7 at which the fake robot fails
+PLANNING, ON_THE_WAY, SLOWLY = (
+    1.25,
+    1.5,
+    1.0,
+)  # positions of A7 at which the fake robot fails, or plans slowly
 
 
 @pytest.fixture
@@ -101,6 +106,18 @@ def test_cancel_under_way(peer: Peer) -> None:
     assert end.cause == wire.Cause.CANCELLED
     assert 0.0 <= end.q[0] < 1.0
     assert peer.ask(wire.Cancel(id=accepted.id)).code == Code.UNKNOWN_MOTION
+
+
+def test_stop_does_not_wait_for_the_planning(peer: Peer) -> None:
+    accepted = peer.ask(run(ptp(0.0, 0, 0, 0, 0, 0, SLOWLY), ptp(1.0)))
+    peer.read_for(0.1)
+    began = time.monotonic()
+    assert isinstance(peer.ask(wire.Stop()), wire.Accepted)
+    assert time.monotonic() - began < 0.1
+    end = finished(peer, accepted)
+    assert end.cause == wire.Cause.STOPPED
+    assert end.q == (0.0,) * 7
+    assert not [e for e in peer.all(wire.MotionStarted) if e.id == accepted.id]
 
 
 def test_stop_after_motion_lets_the_running_one_finish(peer: Peer) -> None:

@@ -90,7 +90,7 @@ def test_velocity_follows_the_motion(connect: Connect) -> None:
 
 
 def test_a_cabinet_with_costly_getters_keeps_the_joints_fresh(make: Callable[..., FakeCabinet]) -> None:
-    """With 2 ms for each reading, all groups at 100 Hz cannot be had: slow ones keep their old stamps, joints go first."""
+    """At 2 ms a reading, not all groups can be had at 100 Hz: slow ones keep their old stamps, joints go first."""
     cabinet = make(getter=0.002)
     with Peer(cabinet.port) as peer:
         peer.ask(wire.Subscribe(groups=G(63), rate=100.0))

@@ -25,14 +25,13 @@ final class Convert {
         double w = pose.quat[3];
         double r00 = 1 - 2 * (y * y + z * z);
         double r10 = 2 * (x * y + w * z);
-        double level = Math.hypot(r00, r10);
-        double b = Math.atan2(2 * (w * y - x * z), level);
         double a = Math.atan2(r10, r00);
-        double c = Math.atan2(2 * (y * z + w * x), 1 - 2 * (x * x + y * y));
-        if (level < 1e-12) { // gimbal lock: c is taken as 0
-            a = Math.atan2(-2 * (x * y - w * z), 1 - 2 * (x * x + z * z));
-            c = 0.0;
-        }
+        double ca = Math.cos(a);
+        double sa = Math.sin(a);
+        // b and c from what is left when a is taken off: where a is ill-defined (b near 90 degrees) they make up for it
+        double b = Math.atan2(2 * (w * y - x * z), ca * r00 + sa * r10);
+        double c = Math.atan2(sa * 2 * (x * z + w * y) - ca * 2 * (y * z - w * x),
+                ca * (1 - 2 * (x * x + z * z)) - sa * 2 * (x * y - w * z));
         return Transformation.ofRad(pose.xyz[0] / MM, pose.xyz[1] / MM, pose.xyz[2] / MM, a, b, c);
     }
 

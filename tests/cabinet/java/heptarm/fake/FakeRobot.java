@@ -27,12 +27,15 @@ import heptarm.wire.WrenchState;
 /**
  * Seven axes without dynamics: each motion runs at one speed, a cancelled one rests at once.
  *
- * <p>A PTP whose A7 is 1.25 rad fails when it is planned, one whose A7 is 1.5 rad fails on the way: errors to order.
+ * <p>Errors to order: a PTP whose A7 is 1.25 rad fails when it is planned, one with 1.5 rad fails on the way, and one with
+ * 1.0 rad is planned for half a second.
  */
 final class FakeRobot implements Robot, Runnable {
     static final double SPEED = 1.0;
     static final double FAILS_AT_PLANNING = 1.25;
     static final double FAILS_ON_THE_WAY = 1.5;
+    static final double PLANS_SLOWLY = 1.0;
+    private static final long SLOWLY_NS = 500000000L;
     private static final long TICK_NS = 2000000L;
 
     private final Clock clock;
@@ -140,11 +143,15 @@ final class FakeRobot implements Robot, Runnable {
     /** Each getter of a cabinet costs. */
     private void pay(int getters) {
         if (getterNanos > 0) {
-            try {
-                clock.sleepUntil(clock.nanos() + getters * getterNanos);
-            } catch (InterruptedException e) {
-                Thread.currentThread().interrupt();
-            }
+            sleep(getters * getterNanos);
+        }
+    }
+
+    private void sleep(long nanos) {
+        try {
+            clock.sleepUntil(clock.nanos() + nanos);
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
         }
     }
 
@@ -153,6 +160,9 @@ final class FakeRobot implements Robot, Runnable {
         double[] target = item.motion instanceof Ptp ? ((Ptp) item.motion).q : null;
         if (target != null && target[6] == FAILS_AT_PLANNING) {
             throw new Refusal(Code.UNREACHABLE, "Can not plan motion: not reachable");
+        }
+        if (target != null && target[6] == PLANS_SLOWLY) {
+            sleep(SLOWLY_NS);
         }
         double seconds = item.motion instanceof Hold ? ((Hold) item.motion).duration : 0.0;
         FakeJob job = new FakeJob(target, Double.isNaN(seconds) ? 1e9 : seconds, listener);
