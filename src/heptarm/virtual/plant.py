@@ -32,6 +32,9 @@ TICK = 1e-3
 #: Bandwidth of the position controller [rad/s] and its damping ratio.
 BANDWIDTH = 90.0
 DAMPING = 1.0
+#: Integral action: what a lasting load would bend the arm by is taken back, up to this angle [rad].
+INTEGRAL = 0.2 * BANDWIDTH
+INTEGRAL_REACH = 0.01
 
 #: A motion is done when every measured joint is this near to its command [rad] and this slow [rad/s] ...
 SETTLED = 5e-5
@@ -134,6 +137,7 @@ class Plant:
         self._mass = np.zeros((self.model.nv, self.model.nv))
         self._jp = np.zeros((3, self.model.nv))
         self._jr = np.zeros((3, self.model.nv))
+        self._lasting = np.zeros(7)
         self._tau = np.zeros(7)
         self._tau_ext = np.zeros(7)
         self._tau_cmd = np.zeros(7)
@@ -223,7 +227,10 @@ class Plant:
         self._external()
         mujoco.mj_fullM(m, d, self._mass)
         wanted = (after - 2 * now + before) * 1e6
-        wanted += BANDWIDTH * BANDWIDTH * (now - self._q)
+        error = now - self._q
+        self._lasting += INTEGRAL * TICK * error
+        np.clip(self._lasting, -INTEGRAL_REACH, INTEGRAL_REACH, out=self._lasting)
+        wanted += BANDWIDTH * BANDWIDTH * (error + self._lasting)
         wanted += 2 * DAMPING * BANDWIDTH * ((after - before) * 500.0 - self._dq)
         torque = self._mass[:7, :7] @ wanted + self._bias - self._passive
         np.clip(torque, -self._limit, self._limit, out=torque)

@@ -1,0 +1,107 @@
+"""The shared ring is never seen torn, and the pacer keeps time."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import threading
+
+import numpy as np
+
+from heptarm.virtual import ring
+from heptarm.virtual.plant import Plant
+from tests.virtual.driving import ready
+
+
+def test_a_slot_holds_the_state_of_its_tick() -> None:
+    plant = ready()
+    plant.step(300)
+    slot = plant.ring.read(300)
+    assert slot is not None
+    assert np.array_equal(slot[2:9], plant.snapshot.q) and np.array_equal(slot[9:16], plant.snapshot.q_cmd)
+    assert slot.view(np.int64)[ring.TIME] == 300_000_000 == plant.time_ns
+    assert slot.view(np.int64)[ring.FLAGS] & ring.READY
+
+
+def test_overwritten_and_torn_slots_read_as_none() -> None:
+    plant = ready()
+    plant.step(300)
+    assert plant.ring.read(300 - ring.SLOTS) is None and plant.ring.read(301) is None
+    plant.ring.ints[300 % ring.SLOTS, ring.SEQ] = 2 * 300 + 1  # as while it is written
+    assert plant.ring.read(300) is None
+
+
+def test_somebody_is_woken_only_when_their_time_has_come() -> None:
+    plant, woken = ready(), []
+    plant.on_wake = woken.append
+    plant.step(10)
+    assert woken == []
+    plant.ring.header[ring.WAKE] = 15_000_000
+    plant.step(4)
+    assert woken == []
+    plant.step(1)
+    assert woken == [15_000_000]
+
+
+def test_a_reader_never_sees_a_torn_slot_while_the_plant_ticks() -> None:
+    plant = ready()
+    stop, wrong, read = threading.Event(), [], [0]
+
+    def look() -> None:
+        while not stop.is_set():
+            tick = int(plant.ring.header[ring.NEWEST])
+            slot = plant.ring.read(tick)
+            if slot is not None:
+                read[0] += 1
+                if slot.view(np.int64)[ring.TIME] != tick * 1_000_000:
+                    wrong.append(tick)
+
+    reader = threading.Thread(target=look)
+    reader.start()
+    plant.step(3000)
+    stop.set()
+    reader.join()
+    assert read[0] > 100 and not wrong
+
+
+_PACE = """
+import sys, threading, time
+from heptarm.virtual.pacer import Pacer
+from heptarm.virtual.plant import Plant
+plant = Plant()
+pacer = Pacer(plant.ring, plant.tick, speed=float(sys.argv[1]))
+threading.Timer(0.5, pacer.stop).start()
+began = time.monotonic()
+pacer.run()
+report = pacer.report
+print(report.ticks / (time.monotonic() - began), report.tick_us["p50"], report.lateness_us["p50"])
+"""
+
+
+def _pace(speed: float) -> list[float]:
+    command = [sys.executable, "-c", _PACE, str(speed)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
+    return [float(word) for word in done.stdout.split()]
+
+
+def test_the_pacer_keeps_the_pace_that_was_asked_for() -> None:
+    per_second, tick, _ = _pace(1.0)
+    assert 900 < per_second < 1100 and tick > 0.0
+    assert 3500 < _pace(4.0)[0] < 4500
+    assert _pace(0.0)[0] > 1500  # as fast as it goes
+
+
+def test_a_plant_needs_no_jvm() -> None:
+    code = (
+        "import sys; from heptarm.virtual.plant import Plant; Plant().step(5); print('jpype' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout.strip() == "False"
+
+
+def test_models_are_two() -> None:
+    assert (
+        Plant("iiwa7").robot.title == "LBR iiwa 7 R800" and Plant("iiwa14").robot.title == "LBR iiwa 14 R820"
+    )
