@@ -227,6 +227,41 @@ def test_an_exception_of_the_robot_is_an_answer(make: Callable[..., FakeCabinet]
     assert len(cabinet.errors()) == 1
 
 
+def test_readings_that_fail_for_a_while_end_nothing(make: Callable[..., FakeCabinet]) -> None:
+    cabinet = make()
+    with Peer(cabinet.port) as peer:
+        peer.ask(wire.TakeControl(watchdog=10.0))
+        peer.ask(wire.Subscribe(groups=wire.Groups(63), rate=100.0))
+        peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="blind"))
+        end = finished(peer, peer.ask(run(ptp(0.05))))
+        assert end.cause == wire.Cause.FINISHED
+        assert math.isnan(end.residual)
+        peer.read_for(0.6)
+        count = len(peer.all(wire.State))
+        peer.read_for(0.3)
+        assert len(peer.all(wire.State)) - count > 20
+        end = finished(peer, peer.ask(run(ptp(0.0))))
+        assert (end.cause, end.residual) == (wire.Cause.FINISHED, 0.0)
+    assert 1 <= len(cabinet.errors()) <= 4  # sampler, watchdog, end of the motion: once each
+
+
+def test_control_becomes_free_even_if_the_robot_cannot_be_stopped(make: Callable[..., FakeCabinet]) -> None:
+    cabinet = make()
+    with Peer(cabinet.port, name="next") as after:
+        with Peer(cabinet.port, name="first") as peer:
+            peer.ask(wire.TakeControl(watchdog=10.0))
+            accepted = peer.ask(run(ptp(2.0)))
+            peer.wait_for(wire.MotionStarted)
+            peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="jammed"))
+            rejected = peer.ask(wire.Stop())
+            assert rejected.code == Code.INTERNAL  # whoever stops must know that it did not help
+        after.wait_for(wire.ControlChanged, lambda e: e.controller == "" and "lost" in e.text)
+        assert isinstance(after.ask(wire.TakeControl(watchdog=10.0)), wire.Accepted)
+        after.read_for(0.6)
+        assert isinstance(after.ask(wire.Stop()), wire.Accepted)
+        assert finished(after, accepted).cause in (wire.Cause.STOPPED, wire.Cause.LOST)
+
+
 def test_the_end_of_the_server_stops_motion_tells_all_and_leaves_no_thread(
     make: Callable[..., FakeCabinet],
 ) -> None:

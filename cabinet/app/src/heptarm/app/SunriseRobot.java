@@ -16,6 +16,7 @@ import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
 import com.kuka.roboticsAPI.geometricModel.Frame;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.geometricModel.math.Vector;
 import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
 import com.kuka.roboticsAPI.motionModel.ErrorHandlingAction;
@@ -115,17 +116,19 @@ final class SunriseRobot implements Robot, IErrorHandler {
     }
 
     public PoseState readPose(long stamp) {
-        Frame measured = lbr.getCurrentCartesianPosition(flange);
-        Frame commanded = lbr.getCommandedCartesianPosition(flange);
+        // relative to the robot's own base: the world's axes are others when it hangs from a wall
+        Frame measured = lbr.getCurrentCartesianPosition(flange, lbr.getRootFrame());
+        Frame commanded = lbr.getCommandedCartesianPosition(flange, lbr.getRootFrame());
         IRedundancyCollection collection = measured.getRedundancyInformationForDevice(lbr);
         Redundancy redundancy = new Redundancy(Double.NaN, -1, -1);
         if (collection instanceof LBRE1Redundancy) {
             LBRE1Redundancy e1 = (LBRE1Redundancy) collection;
             redundancy = new Redundancy(e1.getE1(), e1.getStatus(), e1.getTurn());
         }
-        return new PoseState(stamp, Convert.xyz(measured.transformationFromWorld()),
-                Convert.quaternion(measured.transformationFromWorld()), Convert.xyz(commanded.transformationFromWorld()),
-                Convert.quaternion(commanded.transformationFromWorld()), redundancy);
+        Transformation pose = measured.getTransformationFromParent();
+        Transformation wanted = commanded.getTransformationFromParent();
+        return new PoseState(stamp, Convert.xyz(pose), Convert.quaternion(pose), Convert.xyz(wanted), Convert.quaternion(wanted),
+                redundancy);
     }
 
     public WrenchState readWrench(long stamp) {

@@ -41,8 +41,11 @@ final class Authority {
             }
             leaving = true;
         }
-        server.executor.endAll(Cause.STOPPED, "control was released");
-        free(client.name() + " released control");
+        try {
+            server.executor.endAll(Cause.STOPPED, "control was released");
+        } finally {
+            free(client.name() + " released control");
+        }
     }
 
     /** Control is free only when everything of its holder was ended, so that nothing of the next one's is. */
@@ -62,12 +65,17 @@ final class Authority {
             leaving = true;
             what = onLost;
         }
-        if (what == OnLost.STOP) {
-            server.executor.endAll(Cause.LOST, client.name() + " was lost: " + why);
-            server.robot.stop();
-        }
         server.log.warn(client.name() + " lost control: " + why);
-        free(client.name() + " was lost: " + why);
+        try {
+            if (what == OnLost.STOP) {
+                server.executor.endAll(Cause.LOST, client.name() + " was lost: " + why);
+                server.robot.stop();
+            }
+        } catch (RuntimeException e) {
+            server.log.error("stopping the robot", e);
+        } finally {
+            free(client.name() + " was lost: " + why);
+        }
     }
 
     synchronized boolean holds(Client client) {

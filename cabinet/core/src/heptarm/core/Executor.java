@@ -70,7 +70,11 @@ final class Executor {
                 notifyAll();
             }
             for (int i = all.size() - 1; i >= 0; i--) {
-                all.get(i).cancel(); // from the last, so that none of them begins while the others are cancelled
+                try {
+                    all.get(i).cancel(); // from the last, so that none of them begins while the others are cancelled
+                } catch (RuntimeException e) {
+                    server.log.error("cancelling item " + i + " of motion " + id, e);
+                }
             }
         }
 
@@ -179,7 +183,7 @@ final class Executor {
                 waiting = program != running;
             }
             if (waiting && program.began == 0) {
-                tell(program, Double.NaN);
+                tell(program, false);
             }
         }
     }
@@ -234,7 +238,7 @@ final class Executor {
                         queue.clear();
                     }
                 }
-                tell(program, residual());
+                tell(program, true);
                 end(behind, Cause.DROPPED, "motion " + program.id + " before it failed");
             }
         } catch (InterruptedException e) {
@@ -284,20 +288,20 @@ final class Executor {
         }
     }
 
-    private double residual() {
+    private void tell(Program program, boolean moved) {
         double[] q = new double[7];
         double[] commanded = new double[7];
-        server.robot.readJoints(q, commanded);
-        double worst = 0.0;
-        for (int i = 0; i < 7; i++) {
-            worst = Math.max(worst, Math.abs(q[i] - commanded[i]));
+        double residual = moved ? 0.0 : Double.NaN;
+        try {
+            server.robot.readJoints(q, commanded);
+            for (int i = 0; moved && i < 7; i++) {
+                residual = Math.max(residual, Math.abs(q[i] - commanded[i]));
+            }
+        } catch (RuntimeException e) { // the end is told in any case
+            server.log.error("reading the joints at the end of motion " + program.id, e);
+            java.util.Arrays.fill(q, Double.NaN);
+            residual = Double.NaN;
         }
-        return worst;
-    }
-
-    private void tell(Program program, double residual) {
-        double[] q = new double[7];
-        server.robot.readJoints(q, new double[7]);
         Cause cause;
         String text;
         synchronized (program) {

@@ -115,13 +115,18 @@ final class Sampler {
     }
 
     private void work() {
+        boolean failing = false;
         try {
             while (!closed) {
                 long now = server.clock.sleepUntil(next());
                 try {
                     serve(now);
+                    failing = false;
                 } catch (RuntimeException e) {
-                    server.log.error("reading the robot's state", e);
+                    if (!failing) { // once, not fifty times a second: a cabinet's log is slow
+                        server.log.error("reading the robot's state", e);
+                    }
+                    failing = true;
                     server.clock.sleepUntil(server.clock.nanos() + IDLE_NS);
                 }
             }

@@ -77,7 +77,11 @@ public final class Server {
         }
         closed = true;
         executor.close();
-        robot.stop();
+        try {
+            robot.stop();
+        } catch (RuntimeException e) { // the port and the threads end all the same
+            log.error("stopping the robot", e);
+        }
         try {
             socket.close();
         } catch (IOException e) {

@@ -40,6 +40,7 @@ final class Watchdog {
     private void work() {
         long next = server.clock.nanos();
         int round = 0;
+        boolean failing = false;
         try {
             while (!closed) {
                 next = Math.max(next + PERIOD_NS, server.clock.nanos());
@@ -48,9 +49,13 @@ final class Watchdog {
                     look();
                     if (++round % SAFETY_EVERY == 0) {
                         lookAtSafety();
+                        failing = false;
                     }
                 } catch (RuntimeException e) {
-                    server.log.error("watching", e);
+                    if (!failing) {
+                        server.log.error("watching", e);
+                    }
+                    failing = true;
                 }
             }
         } catch (InterruptedException e) {

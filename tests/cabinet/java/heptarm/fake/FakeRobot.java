@@ -28,7 +28,7 @@ import heptarm.wire.WrenchState;
  * Seven axes without dynamics: each motion runs at one speed, a cancelled one rests at once.
  *
  * <p>Errors to order: a PTP whose A7 is 1.25 rad fails when it is planned, one with 1.5 rad fails on the way, and one with
- * 1.0 rad is planned for half a second.
+ * 1.0 rad is planned for half a second. After the message "blind" readings fail for a while, after "jammed" cancelling does.
  */
 final class FakeRobot implements Robot, Runnable {
     static final double SPEED = 1.0;
@@ -45,6 +45,8 @@ final class FakeRobot implements Robot, Runnable {
     private final RobotInfo info;
     private volatile double override = 1.0;
     private volatile boolean paused;
+    private volatile long blindUntil;
+    private volatile long jammedUntil;
 
     FakeRobot(Clock clock, long getterNanos) {
         this.clock = clock;
@@ -74,6 +76,7 @@ final class FakeRobot implements Robot, Runnable {
 
         @Override
         public void cancel() {
+            fail(jammedUntil);
             synchronized (jobs) {
                 cancelled = true;
             }
@@ -140,8 +143,15 @@ final class FakeRobot implements Robot, Runnable {
         return arrived ? Job.Ended.DONE : null;
     }
 
+    private void fail(long until) {
+        if (clock.nanos() < until) {
+            throw new IllegalStateException("the controller did not respond");
+        }
+    }
+
     /** Each getter of a cabinet costs. */
     private void pay(int getters) {
+        fail(blindUntil);
         if (getterNanos > 0) {
             sleep(getters * getterNanos);
         }
@@ -224,6 +234,7 @@ final class FakeRobot implements Robot, Runnable {
 
     @Override
     public void stop() {
+        fail(jammedUntil);
         synchronized (jobs) {
             for (FakeJob job : jobs) {
                 job.cancelled = true;
@@ -258,6 +269,13 @@ final class FakeRobot implements Robot, Runnable {
 
     @Override
     public void show(int severity, String text) {
+        long until = clock.nanos() + SLOWLY_NS;
+        if ("blind".equals(text)) {
+            blindUntil = until;
+        }
+        if ("jammed".equals(text)) {
+            jammedUntil = until;
+        }
         if ("crash".equals(text)) {
             throw new IllegalStateException("an error of the cabinet's API");
         }

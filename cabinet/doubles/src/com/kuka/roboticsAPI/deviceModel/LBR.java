@@ -97,7 +97,10 @@ public class LBR extends Robot {
 
     /** Pose of a frame on the robot in the world, with the redundancy of the arm. */
     public Frame getCurrentCartesianPosition(AbstractFrame frameOnRobot) {
-        Frame frame = new Frame(frameOnRobot.transformationFromWorld());
+        return withRedundancy(new Frame(frameOnRobot.transformationFromWorld()));
+    }
+
+    private Frame withRedundancy(Frame frame) {
         long redundancy = station.ring.integer(Ring.REDUNDANCY);
         frame.setRedundancyInformation(this,
                 new LBRE1Redundancy(station.ring.number(Ring.E1), (int) (redundancy & 0xFF), (int) (redundancy >> 8 & 0xFF)));
@@ -105,12 +108,17 @@ public class LBR extends Robot {
     }
 
     public Frame getCurrentCartesianPosition(ObjectFrame frameOnRobot, AbstractFrame reference) {
-        return new Frame(reference, reference.transformationTo(frameOnRobot));
+        return withRedundancy(new Frame(reference, reference.transformationTo(frameOnRobot)));
     }
 
     public Frame getCommandedCartesianPosition(ObjectFrame frameOnRobot) {
         Transformation commanded = arm.flange(numbers(Ring.Q_CMD, AXES));
         return new Frame(frameOnRobot == flange ? commanded : commanded.compose(flange.transformationTo(frameOnRobot)));
+    }
+
+    public Frame getCommandedCartesianPosition(ObjectFrame frameOnRobot, AbstractFrame reference) {
+        Frame commanded = getCommandedCartesianPosition(frameOnRobot);
+        return new Frame(reference, reference.transformationFromWorld().invert().compose(commanded.transformationFromWorld()));
     }
 
     public ForceSensorData getExternalForceTorque(AbstractFrame measureFrame) {
