@@ -9,7 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from heptarm.arm.arm import Arm, Options
+from heptarm.arm.arm import Arm
+from heptarm.arm.connection import Connection, Options
 from heptarm.errors import ConnectionLost
 from heptarm.io.clock import RealClock
 from heptarm.io.memory import MemoryTransport, memory_pair
@@ -116,7 +117,7 @@ class Peer:
 
     def arm(self, *, control: bool = True, **options: Any) -> Arm:
         settings = {"timeout": 2.0, "rate": 200.0, "groups": ("joints", "motion", "safety")} | options
-        arm = Arm(self.dial, Options(**settings), clock=RealClock())  # type: ignore[arg-type]
+        arm = Arm(Connection(self.dial, Options(**settings), clock=RealClock()))  # type: ignore[arg-type]
         try:
             arm.open(control=control)
         except BaseException:

@@ -471,10 +471,10 @@ def test_silence_is_noticed() -> None:
 def test_heartbeats_go_both_ways() -> None:
     peer = Peer(heartbeat=0.2)
     with peer.arm(rate=0.0) as arm:
-        count = arm._link.offset.count  # type: ignore[union-attr]
+        count = arm._connection.link.offset.count  # type: ignore[union-attr]
         peer.tell(wire.Ping(sent=77))
         time.sleep(0.4)
-        assert arm._link.offset.count >= count + 5  # type: ignore[union-attr]
+        assert arm._connection.link.offset.count >= count + 5  # type: ignore[union-attr]
         assert wire.Pong in {type(m) for m in peer.seen}
         with pytest.raises(ha.StaleState):
             _ = arm.state

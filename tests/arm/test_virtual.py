@@ -149,7 +149,7 @@ def test_the_second_controller_hears_who_controls(arm: Arm, cabinet: RunningCabi
 
 def test_an_observer_sees_and_stops_but_does_not_move(arm: Arm, cabinet: RunningCabinet) -> None:
     with ha.connect(cabinet.target, control=False, name="observer") as observer:
-        assert observer.controller == arm._options.name and not observer.in_control
+        assert observer.controller == arm._connection.options.name and not observer.in_control
         with pytest.raises(ha.NotInControl, match=str(os.getpid())):
             observer.move(ptp(HOME))
         handle = arm.start(FAR)
@@ -230,7 +230,7 @@ PROGRAM = """
     handle = arm.start(ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.3))
     arm.wait_until(lambda s: abs(s.dq).max() > 0.1)
     try:
-        print(arm._cabinet.pid if arm._cabinet else "moving", flush=True)
+        print(arm._connection.cabinet.pid if arm._connection.cabinet else "moving", flush=True)
         handle.wait()
         print("arrived", flush=True)
     except KeyboardInterrupt:
@@ -354,13 +354,13 @@ def gone(pid: int, seconds: float = 6.0) -> bool:
 def test_a_private_simulator_comes_and_goes_with_its_arm(private_target: str) -> None:
     threads = set(threading.enumerate())
     with ha.connect(private_target) as arm:
-        assert arm._cabinet is not None
-        pid = arm._cabinet.pid
+        assert arm._connection.cabinet is not None
+        pid = arm._connection.cabinet.pid
         assert alive(pid) and arm.is_virtual and arm.robot.name == "iiwa14"
         began = time.monotonic()
         result = arm.move(ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.3))
         assert result.arrived and time.monotonic() - began < 0.6 * result.duration
-        assert arm._link is not None and arm._link.offset.rate == pytest.approx(5.0, rel=0.1)
+        assert arm._connection.link.offset.rate == pytest.approx(5.0, rel=0.1)
         assert -0.01 < np.median([state.age for state in arm.states(duration=0.3)]) < 0.05
     assert gone(pid)
     left = {thread.name for thread in set(threading.enumerate()) - threads if thread.is_alive()}
@@ -378,9 +378,9 @@ def test_a_private_simulator_ends_with_a_killed_program(private_target: str, tmp
 
 def test_a_simulator_that_dies_is_a_lost_connection(private_target: str) -> None:
     arm = ha.connect(private_target)
-    assert arm._cabinet is not None
+    assert arm._connection.cabinet is not None
     handle = arm.start(ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.05))
-    os.kill(arm._cabinet.pid, signal.SIGKILL)
+    os.kill(arm._connection.cabinet.pid, signal.SIGKILL)
     with pytest.raises(ha.ConnectionLost):
         handle.wait(timeout=5.0)
     with pytest.raises(ha.ConnectionLost):

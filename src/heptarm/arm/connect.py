@@ -7,7 +7,8 @@ import os
 import socket
 from typing import Literal
 
-from heptarm.arm.arm import GROUPS, Arm, Options
+from heptarm.arm.arm import Arm
+from heptarm.arm.connection import GROUPS, Connection, Options
 from heptarm.arm.private_cabinet import PrivateCabinet
 from heptarm.arm.target import parse_target, target_from_env
 from heptarm.errors import ShapeError
@@ -74,7 +75,7 @@ def connect(
         return tcp.connect(host, port, timeout=options.timeout)
 
     try:
-        arm = Arm(dial, options, clock=RealClock(), cabinet=private)
+        arm = Arm(Connection(dial, options, clock=RealClock(), cabinet=private))
         try:
             arm.open(control=control)
         except BaseException:

@@ -18,7 +18,7 @@ from heptarm.wire.codes import MEANINGS
 from heptarm.wire.messages import ItemReached, Message, MotionFinished, MotionStarted
 
 if TYPE_CHECKING:
-    from heptarm.arm.arm import Arm
+    from heptarm.arm.connection import Connection
 
 #: Ends that are results; all others are errors.
 _GOOD = (Cause.FINISHED, Cause.CANCELLED, Cause.CONDITION, Cause.REPLACED)
@@ -30,8 +30,8 @@ class MotionHandle:
     It can be awaited in asyncio. Its id is the cabinet's.
     """
 
-    def __init__(self, arm: Arm, count: int, limit: float) -> None:
-        self._arm = arm
+    def __init__(self, connection: Connection, count: int, limit: float) -> None:
+        self._connection = connection
         self._count = count
         self._limit = limit
         self._id = 0
@@ -78,7 +78,7 @@ class MotionHandle:
             return (
                 1.0 if self.result is not None and self.result.cause is Cause.FINISHED else self._share(0.0)
             )
-        state = self._arm.newest()
+        state = self._connection.newest()
         seen = None if state is None else state.motion
         if seen is None or seen.id != self._id or seen.item != max(self._item, 0) or isnan(seen.progress):
             return self._share(0.0)
@@ -104,7 +104,7 @@ class MotionHandle:
         """
         limit = self._limit if timeout is None else timeout
         try:
-            with self._arm.stopping_on_interrupt():
+            with self._connection.stopping_on_interrupt():
                 return self._future.result(limit)
         except FutureTimeout:
             if self._future.done():  # just now, or with an error that is a TimeoutError
@@ -116,7 +116,7 @@ class MotionHandle:
 
     def cancel(self) -> None:
         """End it: a running motion brakes on its path, a waiting one is dropped. Cancelling twice is legal."""
-        self._arm.cancel(self)
+        self._connection.cancel(self)
 
     def add_done_callback(self, callback: Callable[[MotionHandle], None]) -> None:
         """Call `callback(handle)` when it has ended; from the link's thread, so it must not block."""
@@ -152,7 +152,7 @@ class MotionHandle:
         )
 
     def _finish(self, message: MotionFinished) -> None:
-        result = self._arm.result_of(message)
+        result = self._connection.result_of(message)
         if result.cause in _GOOD:
             if not self._future.done():
                 self._future.set_result(result)
@@ -170,7 +170,7 @@ class MotionHandle:
             error = error_of(message.code, text)  # found while planning: nothing has moved
         else:
             error = MotionAborted(
-                text, result=result, history=self._arm.history(), code=message.code, hint=hint
+                text, result=result, history=self._connection.history(), code=message.code, hint=hint
             )
         self._end(error)
 
