@@ -1,0 +1,106 @@
+"""States: the newest, the last ones, and streams, on a clock that stands until it is told."""
+
+from __future__ import annotations
+
+import pytest
+
+from heptarm.arm.feed import HISTORY, Feed, Queue, Sample, States
+from heptarm.arm.reading import read_robot, read_state
+from heptarm.errors import ConnectFailed, ConnectionLost, HeptarmError, RemoteProtocolError
+from heptarm.io.clock import StepClock
+from heptarm.values.state import State
+from heptarm.wire.clock_offset import ClockOffset
+from heptarm.wire.messages import RobotInfo
+from tests.wire.pairs import ROBOT
+
+
+def streams(
+    feed: Feed, clock: StepClock, *, rate: float | None, duration: float | None = None, size: int = 10
+) -> States:
+    return States(
+        feed,
+        clock,
+        build=lambda sample: State(sampled=sample.number),
+        check=lambda: ENDED[0],
+        rate=rate,
+        duration=duration,
+        size=size,
+    )
+
+
+ENDED: list[HeptarmError | None] = [None]
+
+
+@pytest.fixture(autouse=True)
+def fresh() -> None:
+    ENDED[0] = None
+
+
+def test_history_is_bounded() -> None:
+    feed = Feed(StepClock())
+    for number in range(2 * HISTORY):
+        feed.push(b"%d" % number, number)
+    assert [sample.number for sample in feed.history()] == list(range(HISTORY + 1, 2 * HISTORY + 1))
+    assert feed.newest == Sample(2 * HISTORY, b"%d" % (2 * HISTORY - 1), 2 * HISTORY - 1)
+
+
+def test_every_state_in_order() -> None:
+    clock, feed = StepClock(), Feed(StepClock())
+    states = streams(feed, clock, rate=None)
+    for number in range(5):
+        feed.push(b"", number)
+    assert [next(states).sampled for _ in range(5)] == [1, 2, 3, 4, 5] and states.lost == 0
+    states.close()
+    feed.push(b"", 9)
+    assert not feed._queues
+
+
+def test_a_full_queue_drops_the_oldest() -> None:
+    queue = Queue(3)
+    for number in range(10):
+        queue.put(Sample(number, b"", 0))
+    assert queue.lost == 7
+    assert [queue.get(0).number for _ in range(3)] == [7, 8, 9]  # type: ignore[union-attr]
+    assert queue.get(0) is None
+    queue.put(Sample(11, b"", 0))
+    assert queue.get(0) is not None and queue.get(0) is None
+
+
+def test_a_paced_stream_skips_and_never_repeats() -> None:
+    clock = StepClock()
+    feed = Feed(clock)
+    feed.push(b"", 0)
+    states = streams(feed, clock, rate=10.0)
+    assert next(states).sampled == 1
+    for _ in range(7):
+        feed.push(b"", 0)
+    began = clock.nanos()
+    assert next(states).sampled == 8  # the newest of seven
+    assert clock.nanos() - began == 100_000_000
+
+
+def test_the_end_of_a_stream() -> None:
+    clock = StepClock()
+    feed = Feed(clock)
+    feed.push(b"", 0)
+    assert len(list(streams(feed, clock, rate=10.0, duration=0.0))) == 0
+    states = streams(feed, clock, rate=10.0)
+    next(states)
+    ENDED[0] = ConnectionLost("gone")
+    with pytest.raises(ConnectionLost, match="gone"):
+        for _ in range(100):
+            clock.step(0.1)
+            next(states)
+
+
+@pytest.mark.parametrize("body", [b"", b"\xff\xff", b"\x00\x01" + bytes(20), b"\x00\x04" + bytes(200)])
+def test_octets_that_are_no_state(body: bytes) -> None:
+    with pytest.raises(RemoteProtocolError, match="state"):
+        read_state(body, ClockOffset(), lambda: 0)
+
+
+def test_the_robot_has_the_limits_that_the_cabinet_names() -> None:
+    model = read_robot(ROBOT)
+    assert model.q_max[0] == 2.9 and model.d_se == 0.42 and not model.q_max.flags.writeable
+    with pytest.raises(ConnectFailed, match="kr6"):
+        read_robot(RobotInfo(model="kr6", title="", q_min=(0,), q_max=(0,), dq_max=(0,), tau_max=(0,)))

@@ -1,0 +1,136 @@
+"""From motions to the wire."""
+
+from __future__ import annotations
+
+from math import isnan
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import heptarm as ha
+from heptarm import Pose, deg, hold, lin, lin_rel, ptp
+from heptarm.arm.program import is_endless, items, listed, longest
+from heptarm.model.inverse import redundancy
+from heptarm.values.motion import Motion
+from heptarm.values.robot import robot
+from heptarm.wire import messages as wire
+
+ROBOT = robot("iiwa14")
+POSE = Pose.xyz_abc(0.5, 0.1, 0.4, *deg(180, 0, 180))
+
+
+def one(motion: Motion, ceiling: float = 1.0) -> wire.Item:
+    (item,) = items([motion], ROBOT, ceiling)
+    item._check("")
+    return item
+
+
+def test_joint_targets() -> None:
+    item = one(ptp(deg(0, 10, 20, 30, 40, 50, 60), speed=0.4, blend_rel=0.5), 0.3)
+    assert isinstance(item.motion, wire.Ptp) and item.frame == ""
+    assert item.motion.q == pytest.approx(np.radians(np.arange(0, 70, 10)))
+    assert item.motion.dynamics.velocity == (0.3,) * 7 and isnan(item.motion.dynamics.jerk[0])
+    assert item.motion.blending.relative == 0.5
+
+
+def test_poses_with_what_decides_between_arm_positions() -> None:
+    near = deg(10, 20, 5, -60, 5, 50, 5)
+    item = one(ptp(POSE, near=near, moving="gripper/tip"))
+    assert isinstance(item.motion, wire.PtpPose) and item.frame == "gripper/tip"
+    wanted = redundancy(ROBOT, near.tolist())
+    assert (item.motion.redundancy.e1, item.motion.redundancy.status) == (wanted.e1, wanted.status)
+    item = one(lin(POSE, redundancy=ha.Redundancy(e1=0.3, status=2)))
+    assert isinstance(item.motion, wire.Lin)
+    assert (item.motion.redundancy.e1, item.motion.redundancy.status, item.motion.redundancy.turn) == (
+        0.3,
+        2,
+        -1,
+    )
+    item = one(lin(POSE))
+    assert isinstance(item.motion, wire.Lin) and isnan(item.motion.redundancy.e1)
+    assert item.motion.target.xyz == (0.5, 0.1, 0.4)
+
+
+def test_relative_lines() -> None:
+    item = one(lin_rel(z=0.1, frame="base", speed_mps=0.05, joint_speed=0.9), 0.5)
+    assert isinstance(item.motion, wire.LinRel) and item.motion.reference == "base"
+    assert item.motion.offset.xyz == (0.0, 0.0, 0.1)
+    assert item.motion.dynamics.velocity == 0.05 and item.motion.joints.velocity == (0.5,) * 7
+    relative = one(lin_rel(z=0.1)).motion
+    assert isinstance(relative, wire.LinRel) and relative.reference == ""
+
+
+def test_holds() -> None:
+    item = one(hold(2.5))
+    assert isinstance(item.motion, wire.Hold) and item.motion.duration == 2.5
+    endless = one(hold()).motion
+    assert isinstance(endless, wire.Hold) and isnan(endless.duration)
+    assert is_endless([hold()]) and not is_endless([hold(1.0), ptp(np.zeros(7))])
+
+
+def test_limits_of_the_connected_robot() -> None:
+    with pytest.raises(ha.LimitError, match="A4"):
+        one(ptp(deg(0, 0, 0, 121, 0, 0, 0)))
+    with pytest.raises(ha.LimitError, match="near|A6"):
+        one(ptp(POSE, near=deg(0, 0, 0, 0, 0, 130, 0)))
+
+
+def test_the_longest_time_is_generous_but_finite() -> None:
+    slow, fast = (longest([ptp(np.zeros(7), speed=s)], ROBOT, 1.0) for s in (0.01, 1.0))
+    assert 15 < fast < 60 < slow < 10_000
+    assert longest([ptp(np.zeros(7))], ROBOT, 0.01) == pytest.approx(slow)
+    assert longest([lin_rel(z=0.1, speed_mps=0.001)], ROBOT, 1.0) > 3000
+    assert longest([hold(10.0)], ROBOT, 1.0) == pytest.approx(45.0)
+    assert longest([hold()], ROBOT, 1.0) == float("inf")
+
+
+def test_lists() -> None:
+    motion = ptp(np.zeros(7))
+    assert listed(motion) == (motion,) and listed([motion, motion]) == (motion, motion)
+    for wrong in ([], "ptp", [motion, 3], None, [motion] * 1001):
+        with pytest.raises(ha.ShapeError):
+            listed(wrong)  # type: ignore[arg-type]
+
+
+fraction = st.floats(0.001, 1.0)
+maybe = st.none() | fraction
+axes = st.tuples(*(st.floats(float(a), float(b)) for a, b in zip(ROBOT.q_min, ROBOT.q_max, strict=True)))
+angles = st.floats(-10.0, 10.0)
+poses = st.builds(Pose.xyz_abc, *[st.floats(-1.5, 1.5)] * 3, *[angles] * 3)
+motions = st.one_of(
+    st.builds(
+        ptp,
+        axes,
+        speed=maybe,
+        acceleration=maybe,
+        jerk=maybe,
+        blend_rel=st.floats(0, 1),
+        blend_m=st.floats(0, 2),
+    ),
+    st.builds(ptp, poses, near=st.none() | axes, speed=maybe),
+    st.builds(lin, poses, speed_mps=maybe, speed_radps=maybe, joint_speed=maybe, blend_rad=st.floats(0, 6.3)),
+    st.builds(
+        lin_rel,
+        *[st.floats(-1, 1)] * 3,
+        *[angles] * 3,
+        jerk_mps3=maybe,
+        frame=st.sampled_from(["tool", "base"]),
+    ),
+    st.builds(hold, st.floats(0.001, 1e6)),
+)
+
+
+@given(st.lists(motions, min_size=1, max_size=4), fraction)
+def test_whatever_the_values_allow_the_protocol_carries(program: list[Motion], ceiling: float) -> None:
+    run = wire.Run(items=items(program, ROBOT, ceiling))
+    run.validate()
+    assert len(run.items) == len(wire.Run.decode(run.encode()).items) == len(program)
+    for item in run.items:
+        limits = getattr(
+            item.motion, "dynamics" if isinstance(item.motion, wire.Ptp | wire.PtpPose) else "joints", None
+        )
+        if limits is not None:
+            assert all(v <= ceiling for v in limits.velocity)
+    assert longest(program, ROBOT, ceiling) > 0
