@@ -11,9 +11,9 @@ import sys
 from pathlib import Path
 
 import docs
-import examples
 import java
 import python
+import sample_bodies
 import spec as schema
 
 ROOT = schema.HERE.parent
@@ -29,7 +29,7 @@ def outputs() -> dict[Path, str]:
         wire / "codes.py": python.codes(spec),
         pages / "protocol.md": docs.protocol(spec),
         pages / "errors.md": docs.errors(spec),
-        schema.HERE / "golden" / "vectors.json": json.dumps(examples.golden(spec), indent=1) + "\n",
+        schema.HERE / "golden" / "vectors.json": json.dumps(sample_bodies.golden(spec), indent=1) + "\n",
     }
     return result | {JAVA / name: text for name, text in java.files(spec).items()}
 

@@ -8,7 +8,7 @@ import typing
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import examples
+import sample_bodies
 import spec as schema
 from heptarm.wire import messages as wire
 from heptarm.wire.messages import MESSAGES, Message
@@ -39,7 +39,7 @@ def _cases() -> Iterator[tuple[Message, str, int]]:
         if message.groups:
             continue
         for index in range(6):  # different examples reach different members of the unions
-            good = MESSAGES[message.id].decode(examples.body(SPEC, name, f"range-{index}"))
+            good = MESSAGES[message.id].decode(sample_bodies.body(SPEC, name, f"range-{index}"))
             for path, bad, code in _spoilt(good, message.fields):
                 yield bad, path, code
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import examples
+import sample_bodies
 import spec as schema
 from heptarm.wire.codec import DecodeError
 from heptarm.wire.messages import MESSAGES
@@ -21,7 +21,7 @@ NAMES = sorted(SPEC.messages)
 
 @given(name=st.sampled_from(NAMES), seed=st.integers(0, 2**32), size=st.integers(0, 5))
 def test_a_legal_body_comes_back(name: str, seed: int, size: int) -> None:
-    body = examples.body(SPEC, name, str(seed), size)
+    body = sample_bodies.body(SPEC, name, str(seed), size)
     message = MESSAGES[SPEC.messages[name].id].decode(body)
     assert message.encode() == body
     message.validate()
@@ -31,7 +31,7 @@ def test_a_legal_body_comes_back(name: str, seed: int, size: int) -> None:
 def test_a_damaged_body_is_refused_or_read_but_nothing_else(
     name: str, seed: int, data: st.DataObject
 ) -> None:
-    body = bytearray(examples.body(SPEC, name, str(seed)))
+    body = bytearray(sample_bodies.body(SPEC, name, str(seed)))
     for _ in range(data.draw(st.integers(0, 4))):
         if body:
             body[data.draw(st.integers(0, len(body) - 1))] = data.draw(st.integers(0, 255))
@@ -48,7 +48,7 @@ def _damaged(count: int) -> list[tuple[int, bytes]]:
     bodies = []
     for index in range(count):
         name = chance.choice(NAMES)
-        body = bytearray(examples.body(SPEC, name, f"damaged-{index}"))
+        body = bytearray(sample_bodies.body(SPEC, name, f"damaged-{index}"))
         for _ in range(chance.randrange(4)):
             if body:
                 body[chance.randrange(len(body))] = chance.randrange(256)
@@ -62,7 +62,7 @@ def _damaged(count: int) -> list[tuple[int, bytes]]:
 def test_java_agrees_with_python_byte_for_byte(kind: str, recode: Callable[..., list[str]]) -> None:
     if kind == "legal":
         bodies = [
-            (SPEC.messages[name].id, examples.body(SPEC, name, f"legal-{index}"))
+            (SPEC.messages[name].id, sample_bodies.body(SPEC, name, f"legal-{index}"))
             for index in range(40)
             for name in NAMES
         ]
