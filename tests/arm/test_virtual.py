@@ -306,6 +306,20 @@ def test_a_killed_controller_is_stopped_and_replaced(cabinet: RunningCabinet, tm
                 assert arm.move(ptp(HOME)).arrived
 
 
+def test_a_frozen_controller_loses_control_and_learns_it(cabinet: RunningCabinet, tmp_path: Path) -> None:
+    with ha.connect(cabinet.target, control=False) as observer:
+        process, said = script(tmp_path, cabinet.target)
+        assert said == "moving"
+        process.send_signal(signal.SIGSTOP)
+        frozen = time.monotonic()
+        observer.wait_until(lambda s: np.abs(s.dq).max() < 0.01 and not s.motion.active, timeout=3.0)
+        assert 0.3 < time.monotonic() - frozen < 1.2  # the watchdog time is 0.5 s
+        assert observer.controller == ""
+        process.send_signal(signal.SIGCONT)
+        _, errors = end(process)
+        assert "ConnectionLost" in errors and "its controller was lost" in errors
+
+
 def test_a_lost_controller_may_let_its_motion_finish(cabinet: RunningCabinet, tmp_path: Path) -> None:
     process, said = script(tmp_path, cabinet.target, "finish")
     assert said == "moving"
