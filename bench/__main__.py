@@ -11,7 +11,16 @@ import argparse
 import json
 import sys
 
-from bench import garbage, life, lost_client, motion, round_trip, state_push  # noqa: F401  they register themselves
+from bench import (  # noqa: F401  they register themselves
+    fri_codec,
+    garbage,
+    inverse,
+    life,
+    lost_client,
+    motion,
+    round_trip,
+    state_push,
+)
 from bench.registry import BENCHMARKS
 
 
