@@ -30,6 +30,13 @@ public class HeptarmApplication extends RoboticsAPIApplication {
                 text("heptarm.key", ""), text("heptarm.allow", ""), number("heptarm.heartbeat", 0.5),
                 number("heptarm.max_rate", 200.0));
         server = new Server(new SunriseRobot(lbr, getApplicationControl(), log), config, Clocks.find(), log);
+        try {
+            UserKeys.publish(this, server, log);
+        } catch (LinkageError e) { // an old cabinet; everything else works without them
+            log.warn("this cabinet has no user keys: " + e);
+        } catch (RuntimeException e) {
+            log.error("publishing the user keys", e);
+        }
     }
 
     private String text(String name, String otherwise) {

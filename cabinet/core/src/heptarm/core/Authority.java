@@ -34,7 +34,7 @@ final class Authority {
         }
     }
 
-    void release(Client client) {
+    void release(Client client, String why) {
         synchronized (this) {
             if (holder != client || leaving) {
                 return;
@@ -42,9 +42,9 @@ final class Authority {
             leaving = true;
         }
         try {
-            server.executor.endAll(Cause.STOPPED, "control was released");
+            server.executor.endAll(Cause.STOPPED, why);
         } finally {
-            free(client.name() + " released control");
+            free(why);
         }
     }
 

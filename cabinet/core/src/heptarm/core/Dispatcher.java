@@ -94,7 +94,7 @@ final class Dispatcher {
             TakeControl wish = (TakeControl) message;
             server.authority.take(client, wish.watchdog, wish.on_lost);
         } else if (message instanceof ReleaseControl) {
-            server.authority.release(client);
+            server.authority.release(client, client.name() + " released control");
         } else if (message instanceof Pause) {
             server.robot.pause();
         } else if (message instanceof Resume) {

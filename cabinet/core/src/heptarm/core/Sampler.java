@@ -26,7 +26,7 @@ final class Sampler {
     private static final int TOO_LATE = 50;
 
     /** Readings that cost less [ns] are made whenever they are wanted. */
-    private static final double CHEAP_NS = 200000.0;
+    private static final double CHEAP_NS = 500000.0;
     /** How fast a cost that grows is believed, per reading: a single late one is no reason to read less often. */
     private static final double GROWTH = 1.05;
     private static final double GROWTH_NS = 50000.0;

@@ -9,6 +9,7 @@ import java.util.List;
 import java.util.concurrent.CopyOnWriteArrayList;
 import java.util.concurrent.atomic.AtomicInteger;
 
+import heptarm.wire.Cause;
 import heptarm.wire.Code;
 import heptarm.wire.Encoder;
 import heptarm.wire.Message;
@@ -95,6 +96,20 @@ public final class Server {
         sampler.close();
         for (Client client : clients) {
             client.join();
+        }
+    }
+
+    /** A person beside the robot stops whatever moves. */
+    public void stop(String why) {
+        executor.endAll(Cause.STOPPED, why);
+        robot.stop();
+    }
+
+    /** A person beside the robot takes control away from whoever has it; what runs is stopped. */
+    public void revokeControl(String why) {
+        Client holder = authority.holder();
+        if (holder != null) {
+            authority.release(holder, "control was " + why);
         }
     }
 

@@ -19,6 +19,7 @@ public final class Desk implements IApplicationData, IApplicationControl {
     private static volatile Desk current;
 
     public final ITaskLogger logger = new JulLogger();
+    public final Pad pad = new Pad();
     private final Station station;
     private final Runnable terminate;
     private volatile IErrorHandler errorHandler;

@@ -10,6 +10,7 @@ import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplicationState;
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.uiModel.IApplicationUI;
 import com.kuka.task.ITaskLogger;
 
 /** Runs one application as the cabinet does: inject, initialize, run, and dispose whatever happens. */
@@ -31,8 +32,8 @@ public final class Host {
     }
 
     private void inject(Station station) throws IllegalAccessException {
-        Object[] offers = {station.robot, station.controller, desk, desk.logger};
-        Class<?>[] types = {LBR.class, Controller.class, IApplicationData.class, ITaskLogger.class};
+        Object[] offers = {station.robot, station.controller, desk, desk.logger, desk.pad};
+        Class<?>[] types = {LBR.class, Controller.class, IApplicationData.class, ITaskLogger.class, IApplicationUI.class};
         for (Class<?> c = application.getClass(); c != RoboticsAPIApplication.class; c = c.getSuperclass()) {
             for (Field field : c.getDeclaredFields()) {
                 if (!field.isAnnotationPresent(Inject.class)) {

@@ -2,6 +2,7 @@ package com.kuka.roboticsAPI.applicationModel;
 
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.deviceModel.Device;
+import com.kuka.roboticsAPI.uiModel.IApplicationUI;
 import com.kuka.task.ITaskLogger;
 
 import heptarm.doubles.Desk;
@@ -32,6 +33,10 @@ public abstract class RoboticsAPIApplication {
 
     public IApplicationControl getApplicationControl() {
         return desk;
+    }
+
+    public IApplicationUI getApplicationUI() {
+        return desk.pad;
     }
 
     public Controller getController(String name) {

@@ -1,0 +1,8 @@
+package com.kuka.roboticsAPI.uiModel.userKeys;
+
+/** Four keys beside the smartPAD's screen; they appear when the bar is published and a person selects it. */
+public interface IUserKeyBar {
+    IUserKey addUserKey(int slot, IUserKeyListener listener, boolean ignoreEvents);
+
+    void publish();
+}

@@ -1,0 +1,117 @@
+package heptarm.doubles;
+
+import java.util.ArrayList;
+import java.util.List;
+import java.util.concurrent.CopyOnWriteArrayList;
+
+import com.kuka.roboticsAPI.uiModel.IApplicationUI;
+import com.kuka.roboticsAPI.uiModel.userKeys.IUserKey;
+import com.kuka.roboticsAPI.uiModel.userKeys.IUserKeyBar;
+import com.kuka.roboticsAPI.uiModel.userKeys.IUserKeyListener;
+import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyAlignment;
+import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyEvent;
+import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyLED;
+import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyLEDSize;
+
+/** The smartPAD's user keys, pressed by whoever plays the operator. */
+public final class Pad implements IApplicationUI {
+    private static final int SLOTS = 4;
+
+    private final List<Bar> bars = new CopyOnWriteArrayList<>();
+
+    @Override
+    public IUserKeyBar createUserKeyBar(String name) {
+        return new Bar(name);
+    }
+
+    /** Presses and releases a key of a published bar; false if there is none, or it is disabled. */
+    public boolean press(String bar, int slot) {
+        for (Bar one : bars) {
+            if (one.name.equals(bar)) {
+                return one.press(slot);
+            }
+        }
+        return false;
+    }
+
+    /** What stands on a key of a published bar; null if there is none. */
+    public String text(String bar, int slot) {
+        for (Bar one : bars) {
+            for (Key key : one.keys) {
+                if (one.name.equals(bar) && key.slot == slot) {
+                    return key.text;
+                }
+            }
+        }
+        return null;
+    }
+
+    private final class Bar implements IUserKeyBar {
+        private final String name;
+        private final List<Key> keys = new ArrayList<>();
+
+        Bar(String name) {
+            this.name = name;
+        }
+
+        @Override
+        public IUserKey addUserKey(int slot, IUserKeyListener listener, boolean ignoreEvents) {
+            if (slot < 0 || slot >= SLOTS) {
+                throw new IllegalArgumentException("slot " + slot + " of a user key bar; there are " + SLOTS);
+            }
+            if (bars.contains(this)) {
+                throw new IllegalStateException("the bar " + name + " is published already");
+            }
+            Key key = new Key(slot, listener);
+            keys.add(key);
+            return key;
+        }
+
+        @Override
+        public void publish() {
+            bars.add(this);
+        }
+
+        boolean press(int slot) {
+            for (Key key : keys) {
+                if (key.slot == slot && key.enabled) {
+                    key.listener.onKeyEvent(key, UserKeyEvent.KeyDown);
+                    key.listener.onKeyEvent(key, UserKeyEvent.KeyUp);
+                    return true;
+                }
+            }
+            return false;
+        }
+    }
+
+    private static final class Key implements IUserKey {
+        private final int slot;
+        private final IUserKeyListener listener;
+        private volatile String text = "";
+        private volatile boolean enabled = true;
+
+        Key(int slot, IUserKeyListener listener) {
+            this.slot = slot;
+            this.listener = listener;
+        }
+
+        @Override
+        public void setText(UserKeyAlignment alignment, String value) {
+            text = value;
+        }
+
+        @Override
+        public void setLED(UserKeyAlignment alignment, UserKeyLED led, UserKeyLEDSize size) {
+        }
+
+        @Override
+        public void setEnabled(boolean value) {
+            enabled = value;
+        }
+
+        @Override
+        public int getSlot() {
+            return slot;
+        }
+    }
+}
