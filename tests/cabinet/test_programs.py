@@ -16,11 +16,8 @@ from tests.cabinet.peer import Peer, ptp, run
 
 NAN = math.nan
 Connect = Callable[..., Peer]
-PLANNING, ON_THE_WAY, SLOWLY = (
-    1.25,
-    1.5,
-    1.0,
-)  # positions of A7 at which the fake robot fails, or plans slowly
+# positions of A7 at which the fake robot fails, plans slowly, or lacks a class
+PLANNING, ON_THE_WAY, SLOWLY, LACKING = 1.25, 1.5, 1.0, 0.75
 
 
 @pytest.fixture
@@ -216,6 +213,17 @@ def test_an_empty_program_and_what_is_not_there_are_refused(peer: Peer) -> None:
     assert peer.ask(wire.Recover()).code == Code.NEEDS_OPERATOR
 
 
+def test_so_many_motions_may_wait_and_no_more(peer: Peer) -> None:
+    thousand = run(*[ptp(0.1 * (k % 2)) for k in range(1000)])
+    answers = [peer.ask(thousand) for _ in range(22)]
+    assert isinstance(answers[19], wire.Accepted)
+    assert answers[21].code == Code.QUEUE_FULL
+    assert "20000" in answers[21].text
+    peer.ask(wire.Cancel(id=0))
+    for one in answers[:20]:
+        finished(peer, one)
+
+
 def test_an_exception_of_the_robot_is_an_answer(make: Callable[..., FakeCabinet]) -> None:
     cabinet = make()
     with Peer(cabinet.port) as peer:
@@ -223,8 +231,13 @@ def test_an_exception_of_the_robot_is_an_answer(make: Callable[..., FakeCabinet]
         rejected = peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="crash"))
         assert rejected.code == Code.INTERNAL
         assert "an error of the cabinet's API" in rejected.text
+        lacking = peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="lacking"))
+        assert lacking.code == Code.INTERNAL
+        end = finished(peer, peer.ask(run(ptp(0.1, 0, 0, 0, 0, 0, LACKING))))
+        assert (end.cause, end.code) == (wire.Cause.FAILED, Code.INTERNAL)
+        assert "com/kuka/Option" in end.text
         assert finished(peer, peer.ask(run(ptp(0.1)))).cause == wire.Cause.FINISHED
-    assert len(cabinet.errors()) == 1
+    assert len(cabinet.errors()) == 3
 
 
 def test_readings_that_fail_for_a_while_end_nothing(make: Callable[..., FakeCabinet]) -> None:

@@ -25,7 +25,7 @@ public class HeptarmApplication extends RoboticsAPIApplication {
 
     @Override
     public void initialize() {
-        Log log = new TaskLog(getLogger());
+        Log log = new TaskLog(getLogger(), number("heptarm.verbosity", 1) < 1);
         Config config = new Config(text("heptarm.bind", "0.0.0.0"), (int) number("heptarm.port", Protocol.PORT),
                 text("heptarm.key", ""), text("heptarm.allow", ""), number("heptarm.heartbeat", 0.5),
                 number("heptarm.max_rate", 200.0));

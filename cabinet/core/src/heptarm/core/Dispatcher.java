@@ -66,9 +66,15 @@ final class Dispatcher {
         } catch (Refusal e) {
             refuse(client, request, e);
         } catch (RuntimeException e) {
-            server.log.error("message " + type + " of " + client.name(), e);
-            refuse(client, request, new Refusal(Code.INTERNAL, String.valueOf(e)));
+            fail(client, type, request, e);
+        } catch (LinkageError e) { // a class that this cabinet lacks
+            fail(client, type, request, e);
         }
+    }
+
+    private void fail(Client client, int type, long request, Throwable e) {
+        server.log.error("message " + type + " of " + client.name(), e);
+        refuse(client, request, new Refusal(Code.INTERNAL, String.valueOf(e)));
     }
 
     private void refuse(Client client, long request, Refusal why) {

@@ -17,6 +17,7 @@ import heptarm.wire.When;
 /** Carries out programs one after the other, each as one batch of jobs, and tells everybody what becomes of them. */
 final class Executor {
     private static final int MAX_QUEUED = 1000;
+    private static final int MAX_ITEMS = 20000;
 
     private final Server server;
     private final ArrayDeque<Program> queue = new ArrayDeque<Program>();
@@ -118,6 +119,14 @@ final class Executor {
             }
             if (queue.size() >= MAX_QUEUED) {
                 throw new Refusal(Code.QUEUE_FULL, MAX_QUEUED + " programs are waiting already");
+            }
+            int items = run.items.length;
+            for (Program waiting : queue) {
+                items += waiting.run.items.length;
+            }
+            if (items > MAX_ITEMS && run.when != When.REPLACE) {
+                throw new Refusal(Code.QUEUE_FULL, "items", Integer.toString(run.items.length), "",
+                        "at most " + MAX_ITEMS + " motions may wait; with these there would be " + items);
             }
             if (run.when == When.REPLACE) {
                 replaced.addAll(queue);
@@ -221,7 +230,9 @@ final class Executor {
                 }
                 try {
                     carryOut(program);
-                } catch (RuntimeException e) {
+                } catch (InterruptedException e) {
+                    throw e;
+                } catch (Throwable e) { // also a class that this cabinet lacks: the next program will want this thread
                     server.log.error("motion " + program.id, e);
                     synchronized (program) {
                         program.cause = Cause.FAILED;

@@ -28,13 +28,15 @@ import heptarm.wire.WrenchState;
  * Seven axes without dynamics: each motion runs at one speed, a cancelled one rests at once.
  *
  * <p>Errors to order: a PTP whose A7 is 1.25 rad fails when it is planned, one with 1.5 rad fails on the way, and one with
- * 1.0 rad is planned for half a second. After the message "blind" readings fail for a while, after "jammed" cancelling does.
+ * 1.0 rad is planned for half a second. One with 0.75 rad needs an option that
+ * the cabinet lacks. After the message "blind" readings fail for a while, after "jammed" cancelling does.
  */
 final class FakeRobot implements Robot, Runnable {
     static final double SPEED = 1.0;
     static final double FAILS_AT_PLANNING = 1.25;
     static final double FAILS_ON_THE_WAY = 1.5;
     static final double PLANS_SLOWLY = 1.0;
+    static final double LACKS_A_CLASS = 0.75;
     private static final long SLOWLY_NS = 500000000L;
     private static final long TICK_NS = 2000000L;
 
@@ -171,6 +173,9 @@ final class FakeRobot implements Robot, Runnable {
         if (target != null && target[6] == FAILS_AT_PLANNING) {
             throw new Refusal(Code.UNREACHABLE, "Can not plan motion: not reachable");
         }
+        if (target != null && target[6] == LACKS_A_CLASS) {
+            throw new NoClassDefFoundError("com/kuka/Option");
+        }
         if (target != null && target[6] == PLANS_SLOWLY) {
             sleep(SLOWLY_NS);
         }
@@ -275,6 +280,9 @@ final class FakeRobot implements Robot, Runnable {
         }
         if ("jammed".equals(text)) {
             jammedUntil = until;
+        }
+        if ("lacking".equals(text)) {
+            throw new NoClassDefFoundError("com/kuka/Option");
         }
         if ("crash".equals(text)) {
             throw new IllegalStateException("an error of the cabinet's API");
