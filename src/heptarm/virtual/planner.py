@@ -8,11 +8,11 @@ programmed speed, the whole path is slowed down.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isnan, sqrt
+from math import inf, isnan, sqrt
 
 import numpy as np
 
-from heptarm.errors import Unreachable
+from heptarm.errors import CommandRejected, Unreachable
 from heptarm.model import inverse
 from heptarm.model.kinematics import forward
 from heptarm.values.arrays import Array
@@ -64,8 +64,16 @@ def plan(robot: RobotModel, order: Order, start: Array) -> Plan:
     """Plan an order from rest at `start`, shape (7,) [rad].
 
     Raises:
-        PlanError: a joint limit, an unreachable pose, or a path that cannot be led.
+        PlanError: a joint limit, an unreachable pose, a path that cannot be led, or values that make no sense.
     """
+    try:
+        return _plan(robot, order, start)
+    except CommandRejected as error:
+        raise PlanError("planning", f"Can not plan motion: {error}") from None
+
+
+def _plan(robot: RobotModel, order: Order, start: Array) -> Plan:
+    _check_speeds(order)
     if order.kind == "hold":
         return Plan(order, start, start, None, None, Limits(1.0, 1.0, 1.0))
     if order.kind == "ptp":
@@ -73,6 +81,17 @@ def plan(robot: RobotModel, order: Order, start: Array) -> Plan:
     if order.kind in ("lin", "lin_rel"):
         return _plan_line(robot, order, start)
     raise PlanError("planning", f"Can not plan motion: no motion of kind {order.kind!r}")
+
+
+def _check_speeds(order: Order) -> None:
+    """Refuse speeds that no profile can have; the upper end is the caller's business."""
+    fractions = (*order.joint_velocity, *order.joint_acceleration, *order.joint_jerk)
+    if not all(0.0 < value <= 1.0 for value in fractions):
+        raise PlanError("planning", "Can not plan motion: relative speeds are greater than 0 and at most 1")
+    line = (order.cart_velocity, order.cart_acceleration, order.cart_jerk)
+    turn = (order.ori_velocity, order.ori_acceleration, order.ori_jerk)
+    if not all(isnan(value) or 0.0 < value < inf for value in (*line, *turn)):
+        raise PlanError("planning", "Can not plan motion: Cartesian speeds are finite and greater than 0")
 
 
 def _pose(values: tuple[float, ...]) -> Pose:

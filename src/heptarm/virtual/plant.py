@@ -17,14 +17,16 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from heptarm.errors import Unreachable
 from heptarm.model import inverse
 from heptarm.model.kinematics import flange
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel, robot
 from heptarm.virtual import ring
 from heptarm.virtual.order import Order, PlanError
+from heptarm.virtual.path import CartesianLine, JointLine
 from heptarm.virtual.planner import Plan, plan
-from heptarm.virtual.profile import Profile, brake
+from heptarm.virtual.profile import Limits, Profile, brake, change
 
 TICK_NS = 1_000_000
 TICK = 1e-3
@@ -42,8 +44,11 @@ SETTLED_SPEED = 1e-3
 #: ... or after this many ticks.
 SETTLE_TICKS = 500
 
-#: Slew of the application override and of pausing [1/s].
-OVERRIDE_SLEW = 4.0
+#: How fast the application override and pausing change the speed: [1/s], [1/s²], [1/s³].
+OVERRIDE_SLEW = Limits(4.0, 40.0, 800.0)
+
+#: A set-point that asks for more than this many times an axis' speed is not followed.
+OVERSPEED = 1.2
 
 MODELS = Path(__file__).parent / "models"
 HOME = (0.0, 0.0, 0.0, -np.pi / 2, 0.0, np.pi / 2, 0.0)
@@ -81,11 +86,26 @@ class Snapshot:
 class _Run:
     """An order under way."""
 
-    __slots__ = ("braking", "cancelled", "ended", "plan", "profile", "settling", "started", "time")
+    __slots__ = (
+        "braking",
+        "cancelled",
+        "ended",
+        "failure",
+        "path",
+        "plan",
+        "profile",
+        "serial",
+        "settling",
+        "started",
+        "time",
+    )
 
-    def __init__(self, planned: Plan | None, order: Order) -> None:
+    def __init__(self, planned: Plan, serial: int) -> None:
         self.plan = planned
-        self.profile: Profile | None = planned.profile if planned else None
+        self.serial = serial
+        self.path: JointLine | CartesianLine | None = planned.path
+        self.profile: Profile | None = planned.profile
+        self.failure = ""
         self.time = 0.0
         self.braking = False
         self.cancelled = False
@@ -114,16 +134,22 @@ class Plant:
         self._site = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SITE, "flange")
         self._views()
         self._command = [self._q.copy() for _ in range(3)]  # set-points of the last, this and the next tick
-        self._scale = 1.0
+        self._scale = self._goal = 1.0
+        self._slew: Profile | None = None  # of the scale, while it changes
+        self._slew_time = 0.0
+        self._pace = 1.0
         self._paused = False
         self._push: Array | None = None
         self._push_until = inf
-        self._lock = threading.Lock()
-        self._inbox: deque[tuple[Order, Plan | None]] = deque()
-        self._cancels: deque[int | None] = deque()
+        self._planning = threading.Lock()  # one caller plans at a time; the tick never waits for it
+        self._lock = threading.Lock()  # held for a few instructions only
+        self._serial = 0  # of the newest accepted order
+        self._inbox: deque[tuple[int, Order, Plan | None]] = deque()
+        self._cancels: deque[tuple[int, int | None]] = deque()  # newest order at that time, which one
         self._run: _Run | None = None
         self._tail: Array | None = None  # where the last accepted order ends; None: not known
         self._open = 0  # accepted orders that have not ended
+        self._cancel_count = 0
         self._write(0, 0.0, nan)
 
     def _views(self) -> None:
@@ -142,6 +168,7 @@ class Plant:
         self._tau_ext = np.zeros(7)
         self._tau_cmd = np.zeros(7)
         self._wrench = np.zeros(6)
+        self._pulled = d.xfrc_applied
 
     # ------------------------------------------------------------------------------ orders, from any thread
 
@@ -173,18 +200,25 @@ class Plant:
         Raises:
             PlanError: it cannot be planned; nothing has changed.
         """
-        with self._lock:
-            start = self._command[2].copy() if self._open == 0 else self._tail
+        with self._planning:
+            with self._lock:
+                start = self._command[2].copy() if self._open == 0 else self._tail
+                cancels = self._cancel_count
             planned = None if start is None else plan(self.robot, order, start)
-            self._tail = None if planned is None else planned.end
-            self._open += 1
-            self._inbox.append((order, planned))
+            with self._lock:
+                if cancels != self._cancel_count:
+                    planned = None  # where the arm comes to rest is not known any more
+                self._tail = None if planned is None else planned.end
+                self._open += 1
+                self._serial += 1
+                self._inbox.append((self._serial, order, planned))
 
     def cancel(self, order_id: int | None = None) -> None:
         """Cancel an order (None: all): the running one brakes on its path, waiting ones are dropped."""
         with self._lock:
             self._tail = None
-            self._cancels.append(order_id)
+            self._cancel_count += 1
+            self._cancels.append((self._serial, order_id))
 
     def stop(self) -> None:
         """Cancel everything."""
@@ -240,6 +274,10 @@ class Plant:
         # the sensors sit behind the gear: rotor inertia and gear friction are not in them
         self._tau = torque - self._armature * self._acc + self._passive
         self._tau_ext = self._applied + self._constraint
+        if (
+            self._pulled.any()
+        ):  # somebody else pulls at bodies, as a viewer does: what the model cannot explain
+            self._tau_ext = self._mass[:7, :7] @ self._acc + self._bias - self._passive - torque
         self.tick_count += 1
         self._estimate()
         self._write(self._run_id(), progress, remaining)
@@ -248,10 +286,12 @@ class Plant:
         """Shift the set-points and compute the next one; returns progress and remaining time."""
         command = self._command
         while self._cancels:
-            self._cancel_now(self._cancels.popleft())
-        goal = 0.0 if self._paused else self.ring.reals[ring.OVERRIDE]
-        step = OVERRIDE_SLEW * TICK
-        self._scale += min(step, max(-step, goal - self._scale))
+            self._cancel_now(*self._cancels.popleft())
+        goal = 0.0 if self._paused else min(1.0, max(0.0, float(self.ring.reals[ring.OVERRIDE])))
+        before = self._scale
+        if goal != self._goal or self._slew is not None:
+            self._rescale(goal)
+        self._pace = 0.5 * (before + self._scale)  # trapezoidal, so that speed is scale times the profile's
         run = self._run
         if run is None:
             run = self._next()
@@ -260,17 +300,26 @@ class Plant:
             return 0.0, nan
         if not run.started:
             run.started = True
-            if run.plan is not None and run.plan.order.listener is not None:
+            if run.plan.order.listener is not None:
                 run.plan.order.listener.started()
         return self._follow(run)
 
+    def _rescale(self, goal: float) -> None:
+        """Change the scale of time towards the override, without a jerk."""
+        if goal != self._goal or self._slew is None:
+            state = (self._scale, 0.0, 0.0) if self._slew is None else self._slew.at(self._slew_time)
+            self._goal, self._slew, self._slew_time = goal, change(state, goal, OVERRIDE_SLEW), 0.0
+        self._slew_time += TICK
+        self._scale = min(1.0, max(0.0, self._slew.at(self._slew_time)[0]))
+        if self._slew_time >= self._slew.duration:
+            self._scale, self._slew = goal, None
+
     def _follow(self, run: _Run) -> tuple[float, float]:
         planned = run.plan
-        assert planned is not None
         if run.ended:
             return self._settle(run)
-        run.time += TICK if run.braking else TICK * self._scale
-        if planned.path is None or run.profile is None:
+        run.time += TICK if run.braking else TICK * self._pace
+        if run.path is None or run.profile is None:
             if run.cancelled or run.time >= planned.duration or planned.order.kind != "hold":
                 run.ended = True
             return min(1.0, run.time / planned.duration), planned.duration - run.time
@@ -279,20 +328,52 @@ class Plant:
             run.ended = True
         s = min(max(s, 0.0), 1.0)
         # at the very end take the planned joints: the path's samples may end a rounding error beside them
-        self._command[2] = planned.end if s == 1.0 else planned.path.at(s, self._command[2])
-        return s, run.profile.duration - run.time
+        if s == 1.0 and run.path is planned.path:
+            self._command[2] = planned.end
+        else:
+            self._lead(run, s)
+        return (nan if run.failure else s), run.profile.duration - run.time
+
+    def _lead(self, run: _Run, s: float) -> None:
+        """Set the next set-point; one that no axis could follow ends the motion."""
+        assert run.path is not None
+        here = self._command[2]
+        try:
+            there = run.path.at(s, here)
+        except Unreachable as error:
+            self._fail(run, f"the path is not reachable: {error.text}")
+            return
+        speed = np.abs(there - here) / (self.robot.dq_max * TICK)
+        if speed.max() > OVERSPEED and not run.failure:
+            self._fail(run, f"Command Velocity violates limit A{int(speed.argmax()) + 1} (singularity)")
+            return
+        self._command[2] = there
+
+    def _fail(self, run: _Run, text: str) -> None:
+        """Brake every axis by itself, off the path: straight on from where the last set-points led."""
+        run.failure, run.braking, run.ended = text, True, False
+        here = self._command[2]
+        speed = np.clip((here - self._command[0]) / TICK, -self.robot.dq_max, self.robot.dq_max)
+        run.path = JointLine(here.copy(), here + speed)
+        full = float(np.abs(speed).max())
+        if full < 1e-9:
+            run.path, run.ended = None, True
+            return
+        limits = Limits(2.0, float(self.robot.ddq_max.min()) / full, float(self.robot.dddq_max.min()) / full)
+        run.profile, run.time = brake((0.0, 1.0, 0.0), limits), 0.0
 
     def _settle(self, run: _Run) -> tuple[float, float]:
         run.settling += 1
         at_rest = float(np.abs(self._q - self._command[2]).max()) <= SETTLED
         at_rest = at_rest and float(np.abs(self._dq).max()) <= SETTLED_SPEED
         if at_rest or run.settling >= SETTLE_TICKS:
-            self._end("cancelled" if run.cancelled else "done", "")
-        return (nan if run.cancelled else 1.0), 0.0
+            cause = "error" if run.failure else "cancelled" if run.cancelled else "done"
+            self._end(cause, run.failure)
+        return (nan if run.cancelled or run.failure else 1.0), 0.0
 
     def _end(self, cause: str, text: str) -> None:
         run = self._run
-        assert run is not None and run.plan is not None
+        assert run is not None
         self._run = None
         self._closed(run.plan.order, cause, text)
 
@@ -304,7 +385,7 @@ class Plant:
 
     def _next(self) -> _Run | None:
         while self._inbox:
-            order, planned = self._inbox.popleft()
+            serial, order, planned = self._inbox.popleft()
             here = self._command[2]
             if planned is None or float(np.abs(planned.start - here).max()) > 1e-9:
                 try:
@@ -313,37 +394,41 @@ class Plant:
                     self._closed(order, "error", str(error))
                     continue
                 with self._lock:
-                    if not self._inbox:
+                    if serial == self._serial:
                         self._tail = planned.end
-            self._run = _Run(planned, order)
+            self._run = _Run(planned, serial)
             return self._run
         return None
 
-    def _cancel_now(self, order_id: int | None) -> None:
+    def _cancel_now(self, newest: int, order_id: int | None) -> None:
+        """Carry out a cancellation; orders accepted after it are not concerned."""
         run = self._run
-        if run is not None and run.plan is not None and order_id in (None, run.plan.order.id):
+        if run is not None and run.serial <= newest and order_id in (None, run.plan.order.id):
             self._brake(run)
-        kept: list[tuple[Order, Plan | None]] = []
-        while self._inbox:
-            order, _ = self._inbox.popleft()
-            if order_id in (None, order.id):
-                self._closed(order, "cancelled", "")
-            else:
-                kept.append((order, None))
-        self._inbox.extend(kept)
+        dropped: list[Order] = []
+        with self._lock:
+            for _ in range(len(self._inbox)):
+                serial, order, _plan = self._inbox.popleft()
+                if serial <= newest and order_id in (None, order.id):
+                    dropped.append(order)
+                else:
+                    self._inbox.append((serial, order, None))
+        for order in dropped:
+            self._closed(order, "cancelled", "")
 
     def _brake(self, run: _Run) -> None:
-        planned = run.plan
-        assert planned is not None
-        if run.cancelled:
+        if run.cancelled or run.failure:
             return
         run.cancelled = True
-        if run.ended or run.profile is None or planned.path is None:
-            run.ended = run.ended or planned.path is None
+        if run.ended or run.profile is None or run.path is None:
+            run.ended = run.ended or run.path is None
             return
         s, velocity, acceleration = run.profile.at(run.time)
-        scale = self._scale
-        run.profile = brake((s, velocity * scale, acceleration * scale * scale), planned.braking)
+        scale, rate = self._scale, 0.0
+        if self._slew is not None:
+            rate = self._slew.at(self._slew_time)[1]
+        state = (s, velocity * scale, acceleration * scale * scale + velocity * rate)
+        run.profile = brake(state, run.plan.braking)
         run.time, run.braking = 0.0, True
 
     # ------------------------------------------------------------------------------ torques and state
@@ -368,7 +453,7 @@ class Plant:
         self._wrench = np.linalg.solve(j @ j.T + 1e-6 * np.eye(6), j @ self._tau_ext)
 
     def _run_id(self) -> int:
-        return 0 if self._run is None or self._run.plan is None else self._run.plan.order.id
+        return 0 if self._run is None else self._run.plan.order.id
 
     def _write(self, order: int, progress: float, remaining: float) -> None:
         k, r = self.tick_count, self.ring

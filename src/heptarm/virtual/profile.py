@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ruckig import ControlInterface, InputParameter, Result, Ruckig, Trajectory
+from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Trajectory
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,17 +27,30 @@ class Limits:
         )
 
 
+#: Where two kinds of profile meet exactly, as for 0.2 rad at 10 rad/s² and 100 rad/s³, Ruckig may find
+#: neither; with a little less acceleration it is not on the edge any more.
+_SHARES = (1.0, 0.9999, 0.999, 0.99)
+
+
 class Profile:
     """s over time."""
 
     __slots__ = ("_trajectory", "duration")
 
     def __init__(self, parameters: InputParameter) -> None:
-        trajectory = Trajectory(1)
-        if Ruckig(1).calculate(parameters, trajectory) not in (Result.Working, Result.Finished):
-            raise ValueError("no profile for these limits")
-        self._trajectory = trajectory
-        self.duration = float(trajectory.duration)
+        acceleration = parameters.max_acceleration[0]
+        for share in _SHARES:
+            parameters.max_acceleration = [acceleration * share]
+            trajectory = Trajectory(1)
+            try:
+                result = Ruckig(1).calculate(parameters, trajectory)
+            except RuckigError:
+                continue
+            if result in (Result.Working, Result.Finished):
+                self._trajectory = trajectory
+                self.duration = float(trajectory.duration)
+                return
+        raise ValueError("no profile for these limits")
 
     def at(self, time: float) -> tuple[float, float, float]:
         """s, ds/dt, d²s/dt² at a time [s]; beyond the end it keeps its last values."""
@@ -58,8 +71,13 @@ def _parameters(state: tuple[float, float, float], limits: Limits) -> InputParam
 
 def travel(limits: Limits) -> Profile:
     """From rest at 0 to rest at 1."""
-    parameters = _parameters((0.0, 0.0, 0.0), limits)
-    parameters.target_position = [1.0]
+    return change((0.0, 0.0, 0.0), 1.0, limits)
+
+
+def change(state: tuple[float, float, float], goal: float, limits: Limits) -> Profile:
+    """From a state (value, rate, its rate) to rest at a goal."""
+    parameters = _parameters(state, limits)
+    parameters.target_position = [goal]
     parameters.target_velocity = [0.0]
     parameters.target_acceleration = [0.0]
     return Profile(parameters)
