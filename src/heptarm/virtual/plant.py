@@ -18,7 +18,6 @@ import mujoco
 import numpy as np
 
 from heptarm.errors import Unreachable
-from heptarm.model import inverse
 from heptarm.model.kinematics import flange
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel, robot
@@ -26,6 +25,7 @@ from heptarm.virtual import ring
 from heptarm.virtual.order import Order, PlanError
 from heptarm.virtual.path import CartesianLine, JointLine
 from heptarm.virtual.planner import Plan, plan
+from heptarm.virtual.posture import posture
 from heptarm.virtual.profile import Limits, Profile, brake, change
 
 TICK_NS = 1_000_000
@@ -159,7 +159,8 @@ class Plant:
         self._constraint, self._applied = d.qfrc_constraint[:7], d.qfrc_applied[:7]
         self._ctrl = d.ctrl[:7]
         self._armature = self.model.dof_armature[:7].copy()
-        self._limit = self.robot.tau_max
+        self._limit, self._least = self.robot.tau_max, -self.robot.tau_max
+        self._leap = OVERSPEED * self.robot.dq_max * TICK
         self._mass = np.zeros((self.model.nv, self.model.nv))
         self._jp = np.zeros((3, self.model.nv))
         self._jr = np.zeros((3, self.model.nv))
@@ -263,11 +264,13 @@ class Plant:
         wanted = (after - 2 * now + before) * 1e6
         error = now - self._q
         self._lasting += INTEGRAL * TICK * error
-        np.clip(self._lasting, -INTEGRAL_REACH, INTEGRAL_REACH, out=self._lasting)
+        np.minimum(self._lasting, INTEGRAL_REACH, out=self._lasting)  # np.clip takes three times as long
+        np.maximum(self._lasting, -INTEGRAL_REACH, out=self._lasting)
         wanted += BANDWIDTH * BANDWIDTH * (error + self._lasting)
         wanted += 2 * DAMPING * BANDWIDTH * ((after - before) * 500.0 - self._dq)
         torque = self._mass[:7, :7] @ wanted + self._bias - self._passive
-        np.clip(torque, -self._limit, self._limit, out=torque)
+        np.minimum(torque, self._limit, out=torque)
+        np.maximum(torque, self._least, out=torque)
         self._ctrl[:] = torque
         mujoco.mj_step2(m, d)
         self._tau_cmd = torque
@@ -343,9 +346,9 @@ class Plant:
         except Unreachable as error:
             self._fail(run, f"the path is not reachable: {error.text}")
             return
-        speed = np.abs(there - here) / (self.robot.dq_max * TICK)
-        if speed.max() > OVERSPEED and not run.failure:
-            self._fail(run, f"Command Velocity violates limit A{int(speed.argmax()) + 1} (singularity)")
+        leap = np.abs(there - here) > self._leap
+        if leap.any() and not run.failure:
+            self._fail(run, f"Command Velocity violates limit A{int(leap.argmax()) + 1} (singularity)")
             return
         self._command[2] = there
 
@@ -483,8 +486,7 @@ class Plant:
         words[ring.ORDER] = order
         reals[ring.PROGRESS] = progress
         reals[ring.REMAINING] = remaining
-        status = inverse.status_of(self.robot, values)
-        reals[ring.E1] = inverse.arm_angle(self.robot, values, bool(status & 1))
+        reals[ring.E1], status = posture(self.robot, values)
         turn = sum((v < 0) << i for i, v in enumerate(values))
         words[ring.REDUNDANCY] = status | turn << 8
         words[ring.SEQ] = 2 * k + 2
