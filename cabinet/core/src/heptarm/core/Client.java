@@ -189,7 +189,7 @@ final class Client {
 
     /** Sends an answer at once from the reader's thread if nothing is in the way, otherwise through the outbox. */
     void answer(Message message, long request) {
-        byte[] frame = server.frame(message.type(), message.body(), request);
+        byte[] frame = server.frame(message, request);
         boolean full = false;
         synchronized (outbox) {
             if (ending) {
@@ -231,7 +231,7 @@ final class Client {
         synchronized (outbox) {
             full = events.size() >= MAX_EVENTS;
             if (!full && !ending) {
-                events.add(server.frame(type, body, 0));
+                events.add(server.frame(type, body));
                 outbox.notify();
             }
         }
@@ -258,7 +258,7 @@ final class Client {
             if (ending) {
                 return;
             }
-            events.add(server.frame(Goodbye.TYPE, new Goodbye(code, text).body(), 0));
+            events.add(server.frame(new Goodbye(code, text), 0));
             ending = true;
             outbox.notify();
         }
@@ -331,9 +331,10 @@ final class Client {
         frame[SEQ + 1] = (byte) (number >>> 16);
         frame[SEQ + 2] = (byte) (number >>> 8);
         frame[SEQ + 3] = (byte) number;
-        writeBegan = server.clock.nanos();
+        long now = server.clock.nanos();
+        writeBegan = now;
         out.write(frame);
-        sent = server.clock.nanos();
+        sent = now;
         writeBegan = 0;
     }
 

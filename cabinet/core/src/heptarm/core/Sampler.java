@@ -167,7 +167,7 @@ final class Sampler {
                 one.due = server.clock.nanos() / one.period * one.period + one.period;
             }
             State chosen = one.groups == wanted ? all : choose(all, one.groups);
-            entry.getKey().state(server.frame(State.TYPE, chosen.body(), 0));
+            entry.getKey().state(server.frame(chosen, 0));
         }
     }
 

@@ -23,6 +23,10 @@ import heptarm.wire.Protocol;
 public final class Server {
     static final int MAX_CLIENTS = 16;
 
+    private static final int LENGTH = 6;
+    /** Octets that most frames fit into, so that they are written without growing. */
+    private static final int ROOM = 1024;
+
     final Robot robot;
     final Config config;
     final Clock clock;
@@ -169,19 +173,39 @@ public final class Server {
     }
 
     /** A frame without its sequence number, which the client's connection fills in. */
-    byte[] frame(int type, byte[] body, long request) {
-        Encoder out = new Encoder(Protocol.HEADER + body.length);
+    byte[] frame(Message message, long request) {
+        Encoder out = begin(message.type(), request, ROOM);
+        message.write(out);
+        return measured(out.toBytes());
+    }
+
+    /** The same with a body that was written before, for many clients. */
+    byte[] frame(int type, byte[] body) {
+        byte[] whole = new byte[Protocol.HEADER + body.length];
+        System.arraycopy(begin(type, 0, Protocol.HEADER).data(), 0, whole, 0, Protocol.HEADER);
+        System.arraycopy(body, 0, whole, Protocol.HEADER, body.length);
+        return measured(whole);
+    }
+
+    private Encoder begin(int type, long request, int room) {
+        Encoder out = new Encoder(room);
         out.putU16(Protocol.MAGIC);
         out.putU8(Protocol.MAJOR);
         out.putU8(0);
         out.putU16(type);
-        out.putU32(body.length);
+        out.putU32(0);
         out.putU32(0);
         out.putU32(request);
         out.putI64(clock.nanos());
-        byte[] whole = new byte[Protocol.HEADER + body.length];
-        System.arraycopy(out.data(), 0, whole, 0, Protocol.HEADER);
-        System.arraycopy(body, 0, whole, Protocol.HEADER, body.length);
-        return whole;
+        return out;
+    }
+
+    /** Fills in the length of the body. */
+    private static byte[] measured(byte[] frame) {
+        int length = frame.length - Protocol.HEADER;
+        for (int i = 0; i < 4; i++) {
+            frame[LENGTH + i] = (byte) (length >>> 24 - 8 * i);
+        }
+        return frame;
     }
 }
