@@ -34,6 +34,28 @@ SAID = (
 )
 
 
+QUEUEING = (
+    "process data have their types = true",
+    "nothing is active after a move = true",
+    "listener = [Executing, motionStarted, motionFinished, Finished, containerFinished]",
+    "two are active = true",
+    "a cancelled one in the queue is no error = true",
+    "a pause stops time = true",
+    "and resuming ends the motion = true",
+    "a frame in a frame = true",
+    "an exception stops the motion = true",
+    "no asynchronous error = true",
+)
+
+PROJECT = """
+<persistence><processDataContainer>
+<processData dataType="java.lang.Integer" id="sample.count" defaultValue="1" value="3"/>
+<processData dataType="java.lang.Double" id="sample.gain" defaultValue="0.25"/>
+<processData dataType="java.lang.Boolean" id="sample.open" value="true"/>
+</processDataContainer></persistence>
+"""
+
+
 def _compile(source: Path, out: Path) -> None:
     if shutil.which("javac") is None:
         pytest.skip("no javac here")
@@ -42,11 +64,20 @@ def _compile(source: Path, out: Path) -> None:
     subprocess.run(command, check=True)
 
 
-def _run(application: str, classes: Path, *data: str) -> subprocess.CompletedProcess[str]:
+def _command(application: str, classes: Path, *data: str) -> list[str]:
     command = [sys.executable, "-m", "heptarm.virtual.cabinet", "--application", application]
     command += ["--classpath", str(classes)]
     for one in data:
         command += ["--data", one]
+    return command
+
+
+def _run(
+    application: str, classes: Path, *data: str, project: Path | None = None
+) -> subprocess.CompletedProcess[str]:
+    command = _command(application, classes, *data)
+    if project is not None:
+        command += ["--project", str(project)]
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
 
 
@@ -56,6 +87,59 @@ def test_a_sunrise_application_behaves_as_on_a_cabinet(tmp_path: Path) -> None:
     done = _run("sample.Sample", tmp_path, f"sample.file={said}")
     assert done.returncode == 0, done.stdout + done.stderr
     assert tuple(said.read_text().splitlines()) == SAID
+
+
+def test_queue_listeners_pause_and_an_error_of_the_application(tmp_path: Path) -> None:
+    _compile(HERE / "java" / "Queueing.java", tmp_path)
+    said, project = tmp_path / "said.txt", tmp_path / "data.xml"
+    project.write_text(PROJECT)
+    done = _run("sample.Queueing", tmp_path, f"sample.file={said}", "sample.count=7", project=project)
+    assert tuple(said.read_text().splitlines()) == QUEUEING, done.stderr
+    assert done.returncode == 1
+    assert "an error of the application" in done.stdout
+
+
+def test_deselecting_an_application_is_no_failure(tmp_path: Path) -> None:
+    source = tmp_path / "Endless.java"
+    source.write_text(
+        """
+        package sample;
+        import static com.kuka.roboticsAPI.motionModel.BasicMotions.positionHold;
+        import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
+        import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplicationState;
+        import com.kuka.roboticsAPI.deviceModel.LBR;
+        import javax.inject.Inject;
+        public class Endless extends RoboticsAPIApplication {
+            @Inject private LBR lbr;
+            public void run() throws Exception {
+                System.out.println("running");
+                lbr.move(positionHold(null, -1, null));
+            }
+            @Override
+            public void onApplicationStateChanged(RoboticsAPIApplicationState state) {
+                System.out.println(state);
+            }
+            @Override
+            public void dispose() {
+                System.out.println("disposed");
+                super.dispose();
+            }
+        }
+        """
+    )
+    _compile(source, tmp_path)
+    with subprocess.Popen(_command("sample.Endless", tmp_path), stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "running\n"
+        process.terminate()
+        assert process.stdout.read().splitlines() == ["STOPPING", "disposed"]
+        assert process.wait(timeout=10) == 0
+
+
+def test_bad_process_data_end_the_start_with_a_reason(tmp_path: Path) -> None:
+    done = _run("sample.Missing", tmp_path, "heptarm.port=abc")
+    assert done.returncode == 2
+    assert "abc" in done.stdout
 
 
 def test_without_a_handler_an_asynchronous_error_ends_the_application(tmp_path: Path) -> None:

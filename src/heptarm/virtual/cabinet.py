@@ -21,6 +21,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from heptarm.virtual import processdata
 from heptarm.virtual.pacer import Pacer
 from heptarm.virtual.plant import Plant
 
@@ -49,6 +50,7 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--key", default="", help="pre-shared key")
     parser.add_argument("--application", default="", help="class of another application; ends with it")
     parser.add_argument("--classpath", action="append", default=[], help="folder or jar with its classes")
+    parser.add_argument("--project", type=Path, help="RoboticsAPI.data.xml with process data")
     parser.add_argument("--data", action="append", default=[], metavar="NAME=VALUE", help="process data")
     parser.add_argument(
         "--stats", type=Path, help="write the loop's statistics here at the end and on SIGUSR1"
@@ -58,10 +60,30 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
+def process_data(options: argparse.Namespace) -> dict[str, processdata.Value]:
+    """Process data: the project's, then what the command line says; a value keeps the type that the project gives it.
+
+    Raises:
+        ValueError: a value does not fit its type, or the file is none.
+    """
+    data: dict[str, processdata.Value] = {"heptarm.max_rate": 1000.0, "heptarm.key": ""}
+    if options.project is not None:
+        data |= processdata.read(options.project)
+    data |= {"heptarm.bind": options.host, "heptarm.port": options.port}
+    if options.key:
+        data["heptarm.key"] = options.key
+    for pair in options.data:
+        name, equals, text = pair.partition("=")
+        if not equals:
+            raise ValueError(f"--data {pair}: NAME=VALUE is expected")
+        data[name] = processdata.like(data.get(name), text)
+    return data
+
+
 class VirtualCabinet:
     """Plant, JVM and application of one process."""
 
-    def __init__(self, options: argparse.Namespace) -> None:
+    def __init__(self, options: argparse.Namespace, data: dict[str, processdata.Value]) -> None:
         # the JVM is started by the main thread before anything else wakes up
         from heptarm.virtual import jvm
 
@@ -75,15 +97,8 @@ class VirtualCabinet:
         if not options.verbose:
             jpype.JClass("java.util.logging.LogManager").getLogManager().reset()
         self._station = jvm.open_station(self.plant)
-        data = {
-            "heptarm.bind": options.host,
-            "heptarm.port": str(options.port),
-            "heptarm.key": options.key,
-            "heptarm.max_rate": "1000",
-        }
-        data |= dict(pair.split("=", 1) for pair in options.data)
         for name, value in data.items():
-            self._station.setProcessData(name, value)
+            self._station.setProcessData(name, jvm.boxed(value))
         self.host = jpype.JClass("heptarm.doubles.Host")(options.application or jvm.APPLICATION)
 
     @property
@@ -148,7 +163,7 @@ def _when_orphaned(end: Callable[[], None]) -> None:
 
 def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
     if cabinet.foreign:
-        _accompany(cabinet, failed)
+        _accompany(cabinet, stopping, failed)
         return
     try:
         port = cabinet.port()
@@ -162,12 +177,13 @@ def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[s
     _housekeeping(stopping)
 
 
-def _accompany(cabinet: VirtualCabinet, failed: list[str]) -> None:
+def _accompany(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
     """Run for as long as somebody else's application does."""
     while cabinet.host.isAlive():
         time.sleep(0.01)
     failure = cabinet.host.failure()
-    if failure is not None:
+    # an application that we end ourselves may well end by the exception of its interruption
+    if failure is not None and not stopping.is_set():
         failed.append(str(failure))
     cabinet.pacer.stop()
 
@@ -176,7 +192,12 @@ def main(argv: list[str] | None = None) -> int:
     """Run a virtual cabinet until it is told to end."""
     options = arguments(argv)
     logging.basicConfig(level=logging.INFO if options.verbose else logging.WARNING, stream=sys.stderr)
-    cabinet = VirtualCabinet(options)
+    try:
+        data = process_data(options)
+    except (ValueError, OSError) as error:
+        print(json.dumps({"ready": False, "error": str(error)}), flush=True)
+        return 2
+    cabinet = VirtualCabinet(options, data)
     stopping = threading.Event()
     failed: list[str] = []
 

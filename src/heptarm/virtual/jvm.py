@@ -86,6 +86,13 @@ def start(classpath: Sequence[str | Path] = ()) -> None:
     )
 
 
+def boxed(value: str | int | float | bool) -> Any:
+    """A value as the Java object that an application finds in its process data."""
+    kinds = {bool: "java.lang.Boolean", int: "java.lang.Integer", float: "java.lang.Double"}
+    kind = kinds.get(type(value))
+    return jpype.JString(value) if kind is None else jpype.JClass(kind).valueOf(value)
+
+
 class _Listener:
     """A Java listener as the plant's."""
 

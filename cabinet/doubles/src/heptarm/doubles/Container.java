@@ -42,7 +42,8 @@ public final class Container implements IMotionContainer, MotionListener {
     public void started() {
         change(ExecutionState.Executing, null);
         if (listener != null) {
-            station.dispatch.execute(() -> listener.motionStarted(motion));
+            tell(() -> listener.onStateChanged(this, ExecutionState.Executing));
+            tell(() -> listener.motionStarted(motion));
         }
     }
 
@@ -53,12 +54,21 @@ public final class Container implements IMotionContainer, MotionListener {
         if (!change(last, last == ExecutionState.Error ? text : null)) {
             return;
         }
+        tell(() -> ending.ended(this));
+        if (listener != null) {
+            tell(() -> listener.motionFinished(motion));
+            tell(() -> listener.onStateChanged(this, last));
+            tell(() -> listener.containerFinished(this));
+        }
+    }
+
+    /** An exception of the application's listener must not keep others from being told. */
+    private void tell(Runnable news) {
         station.dispatch.execute(() -> {
-            ending.ended(this);
-            if (listener != null) {
-                listener.motionFinished(motion);
-                listener.onStateChanged(this, last);
-                listener.containerFinished(this);
+            try {
+                news.run();
+            } catch (RuntimeException e) {
+                Desk.current().logger.error("a listener ended with an error", e);
             }
         });
     }

@@ -20,10 +20,12 @@ public final class Host {
     private final RoboticsAPIApplication application;
     private final Thread thread;
     private final Desk desk;
+    private final Plant plant;
     private volatile Throwable failure;
 
     public Host(String className) throws ReflectiveOperationException {
         Station station = Station.current();
+        plant = station.plant;
         desk = new Desk(station, this::terminate);
         application = (RoboticsAPIApplication) Class.forName(className).getDeclaredConstructor().newInstance();
         inject(station);
@@ -63,14 +65,30 @@ public final class Host {
         } catch (Throwable e) { // as on the cabinet: whatever it was, the application is disposed
             failure = e;
             desk.logger.error("the application ended with an error", e);
+            plant.cancelAll();
         } finally {
+            dispose();
+        }
+    }
+
+    private void dispose() {
+        try {
             application.dispose();
+        } catch (RuntimeException e) {
+            desk.logger.error("dispose() ended with an error", e);
+            if (failure == null) {
+                failure = e;
+            }
         }
     }
 
     private void terminate() {
-        application.onApplicationStateChanged(RoboticsAPIApplicationState.STOPPING);
-        thread.interrupt();
+        try {
+            application.onApplicationStateChanged(RoboticsAPIApplicationState.STOPPING);
+        } finally {
+            plant.cancelAll();
+            thread.interrupt();
+        }
     }
 
     /** Deselects the application, as a person at the smartPAD does; true if it ended in time. */

@@ -101,9 +101,10 @@ public class LBR extends Robot {
     }
 
     private Frame withRedundancy(Frame frame) {
-        long redundancy = station.ring.integer(Ring.REDUNDANCY);
+        double[] both = numbers(Ring.E1, 2);
+        long redundancy = Double.doubleToRawLongBits(both[1]);
         frame.setRedundancyInformation(this,
-                new LBRE1Redundancy(station.ring.number(Ring.E1), (int) (redundancy & 0xFF), (int) (redundancy >> 8 & 0xFF)));
+                new LBRE1Redundancy(both[0], (int) (redundancy & 0xFF), (int) (redundancy >> 8 & 0xFF)));
         return frame;
     }
 
@@ -204,7 +205,15 @@ public class LBR extends Robot {
         synchronized (open) {
             open.put(container, asynchronous);
         }
-        String error = station.plant.submit(order);
+        String error;
+        try {
+            error = station.plant.submit(order);
+        } catch (RuntimeException e) {
+            synchronized (open) {
+                open.remove(container);
+            }
+            throw e;
+        }
         if (error != null) {
             container.finished("error", error);
         }
@@ -232,8 +241,12 @@ public class LBR extends Robot {
 
     /** Number of motions that run or wait. */
     public int activeContainers() {
+        int count = 0;
         synchronized (open) {
-            return open.size();
+            for (Container container : open.keySet()) {
+                count += container.isFinished() ? 0 : 1;
+            }
         }
+        return count;
     }
 }
