@@ -1,8 +1,9 @@
 """Paces ticks in real time (or N times faster) and counts how well that went.
 
 The loop sleeps to shortly before a tick is due and spins the rest; when it wakes late it catches up, since a
-tick costs a tenth of a millisecond; beyond 20 missed ticks it re-bases and counts that. Real-time priority,
-locked memory and a short timer slack are asked for and, where refused, named in the report.
+tick costs a tenth of a millisecond; beyond 20 missed ticks it re-bases and counts that. Real-time priority
+and a short timer slack are asked for and, where refused, named in the report. Memory is not locked: that would
+make all that the JVM has only reserved real.
 """
 
 from __future__ import annotations
@@ -24,10 +25,15 @@ from heptarm.virtual.ring import ANCHOR, NEWEST, RATE, Ring
 CATCH_UP = 20
 #: Wake this long before a tick is due and spin [ns]; small, since a spinning real-time thread starves the machine.
 SPIN_NS = 60_000
+#: At most this share of a period is spun.
+SPIN_SHARE = 0.1
+#: No real-time priority above this speed: a loop that never sleeps is thrown off the processor for 50 ms a second.
+REAL_TIME_SPEED = 5.0
+#: A loop that cannot keep up sleeps this long whenever it re-bases [s], so that others run.
+BREATH = 2e-4
 PRIORITY = 50
 
 _PR_SET_TIMERSLACK = 29
-_MCL_CURRENT_AND_FUTURE = 3
 _HISTORY = 1 << 17
 
 
@@ -43,7 +49,7 @@ class Report:
 
 
 def ask_for_real_time() -> list[str]:
-    """Ask for SCHED_FIFO, locked memory and 1 ns timer slack; returns what was refused, in words."""
+    """Ask for SCHED_FIFO and 1 ns timer slack; returns what was refused, in words."""
     refused = []
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
@@ -89,12 +95,16 @@ class Pacer:
     def run(self) -> None:
         """Tick until stopped."""
         sys.setswitchinterval(2e-4)
-        self._refused = ask_for_real_time()
+        if 0.0 < self._speed <= REAL_TIME_SPEED:
+            self._refused = ask_for_real_time()
+        else:
+            self._refused = [f"no real-time priority at this speed; it ends at {REAL_TIME_SPEED:g}"]
         gc.collect()
         gc.freeze()
         gc.disable()
         self._ring.reals[RATE] = self._speed
         now_ns, period, header = time.monotonic_ns, self._period, self._ring.header
+        spin = min(SPIN_NS, int(SPIN_SHARE * period))
         done = int(header[NEWEST])  # ticks of plant time that have passed before the loop
         due = now_ns() + period
         header[ANCHOR] = due - (done + 1) * period
@@ -103,13 +113,14 @@ class Pacer:
             if period == 0:
                 due = now
             elif now < due:
-                if due - now > SPIN_NS:
-                    time.sleep((due - now - SPIN_NS) * 1e-9)
+                if due - now > spin:
+                    time.sleep((due - now - spin) * 1e-9)
                 while now_ns() < due:
                     pass
             elif now - due > CATCH_UP * period:
                 self._rebased += 1
-                due = now
+                time.sleep(BREATH)
+                due = now_ns()
                 header[ANCHOR] = due - (int(header[NEWEST]) + 1) * period
             begin = now_ns()
             self._tick()
