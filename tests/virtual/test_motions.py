@@ -162,3 +162,24 @@ def test_the_same_commands_give_the_same_states_bit_by_bit() -> None:
         )
         tracks.append(run(plant, *orders))
     assert np.array_equal(tracks[0].q, tracks[1].q) and np.array_equal(tracks[0].dq, tracks[1].dq)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.3])
+def test_a_lin_keeps_every_axis_speed_acceleration_and_jerk(share: float) -> None:
+    plant = ready()
+    robot = plant.robot
+    offset = numbers(Pose.xyz_abc(-0.1, 0.4, 0.1, a=0.4))
+    order = Order(
+        1,
+        "lin_rel",
+        offset=offset,
+        reference=(0, 0, 0, 1),
+        joint_jerk=(share,) * 7,
+        cart_velocity=3.0,
+        cart_acceleration=50.0,
+        cart_jerk=900.0,
+    )
+    track = run(plant, order)
+    assert (np.abs(np.diff(track.q_cmd, axis=0)) * 1e3 <= robot.dq_max * 1.01).all()
+    assert (np.abs(track.acceleration) <= robot.ddq_max * 1.02).all()
+    assert (np.abs(np.diff(track.acceleration, axis=0)) * 1e3 <= share * robot.dddq_max * 1.1).all()

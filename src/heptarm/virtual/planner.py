@@ -175,11 +175,34 @@ def _plan_line(robot: RobotModel, order: Order, start: Array) -> Plan:
     if path.length < 1e-7 and path.angle < 1e-7 and e1 is None:
         return Plan(order, start, start, None, None, Limits(1.0, 1.0, 1.0))
     wanted = _cartesian_limits(order, path)
-    possible = _joint_limits(
-        robot, samples, np.array(order.joint_velocity), np.array(order.joint_acceleration)
-    )
-    braking = _joint_limits(robot, samples, np.ones(7), np.ones(7))
-    return Plan(order, start, samples[-1], path, travel(wanted.least(possible)), braking)
+    shares = [np.array(x) for x in (order.joint_velocity, order.joint_acceleration, order.joint_jerk)]
+    possible = _joint_limits(robot, samples, *shares)
+    braking = _joint_limits(robot, samples, np.ones(7), np.ones(7), np.ones(7))
+    profile = _gently(robot, order, samples, wanted.least(possible))
+    return Plan(order, start, samples[-1], path, profile, braking)
+
+
+def _gently(robot: RobotModel, order: Order, samples: Array, limits: Limits) -> Profile:
+    """The profile for these limits, slowed down as a whole where an axis' jerk would be too great.
+
+    The jerk of q(s(t)) goes with the cube of time's scale; it has one part each from q', q'' and the third derivative.
+    """
+    profile = travel(limits)
+    times = np.linspace(0.0, profile.duration, _SAMPLES)
+    s, speed, acceleration = np.array([profile.at(t) for t in times.tolist()]).T
+    jerk = np.gradient(acceleration, times)
+    step = 1.0 / (_SAMPLES - 1)
+    first = np.gradient(samples, step, axis=0)
+    second = np.gradient(first, step, axis=0)
+    third = np.gradient(second, step, axis=0)
+    at = np.clip(np.rint(s / step).astype(int), 0, _SAMPLES - 1)
+    joints = first[at] * jerk[:, None] + 3 * second[at] * (speed * acceleration)[:, None]
+    joints += third[at] * (speed**3)[:, None]
+    excess = float((np.abs(joints) / (robot.dddq_max * np.array(order.joint_jerk))).max())
+    if excess <= 1.0:
+        return profile
+    k = excess ** (1 / 3)
+    return travel(Limits(limits.velocity / k, limits.acceleration / k**2, limits.jerk / k**3))
 
 
 def _sample(robot: RobotModel, path: CartesianLine) -> Array:
@@ -219,7 +242,9 @@ def _cartesian_limits(order: Order, path: CartesianLine) -> Limits:
     return by_line.least(by_turn)
 
 
-def _joint_limits(robot: RobotModel, samples: Array, velocity: Array, acceleration: Array) -> Limits:
+def _joint_limits(
+    robot: RobotModel, samples: Array, velocity: Array, acceleration: Array, jerk: Array
+) -> Limits:
     """Limits of s that keep every axis within its own along the samples."""
     step = 1.0 / (_SAMPLES - 1)
     slope = np.abs(np.gradient(samples, step, axis=0)).max(axis=0)
@@ -230,5 +255,5 @@ def _joint_limits(robot: RobotModel, samples: Array, velocity: Array, accelerati
     return Limits(
         min(by_speed, by_curve),
         _RESERVE * float((robot.ddq_max * acceleration / slope).min()),
-        _RESERVE * float((robot.dddq_max / slope).min()),
+        _RESERVE * float((robot.dddq_max * jerk / slope).min()),
     )
