@@ -179,6 +179,17 @@ def test_control_is_given_and_taken(arm: Arm, cabinet: RunningCabinet) -> None:
 # ------------------------------------------------------------------------------------- state
 
 
+def test_pause_and_override_end_with_their_controller(cabinet: RunningCabinet) -> None:
+    with ha.connect(cabinet.target) as first:
+        first.set_override(0.1)
+        first.pause()
+        first.wait_until(lambda state: state.safety.paused, timeout=5)
+    with ha.connect(cabinet.target) as second:
+        state = second.wait_until(lambda state: not state.safety.paused, timeout=5)
+        assert state.motion is not None and state.motion.override == 1.0
+        assert second.move(hold(0.1)).arrived
+
+
 def test_states_come_at_the_subscribed_rate(arm: Arm) -> None:
     arm.subscribe(rate=500.0)
     states = arm.states(duration=1.0)

@@ -26,6 +26,11 @@ final class Authority {
                     holder.name() + " (session " + holder.session + ") controls this robot");
         }
         boolean changed = holder == null;
+        if (changed && server.executor.status()[0] == 0) {
+            // a pause and the override belong to a controller; the next one begins without them
+            server.robot.resume();
+            server.robot.setOverride(1.0);
+        }
         holder = client;
         watchdog = watchdogSeconds;
         onLost = whenLost;
