@@ -110,7 +110,7 @@ def test_stop_does_not_wait_for_the_planning(peer: Peer) -> None:
     peer.read_for(0.1)
     began = time.monotonic()
     assert isinstance(peer.ask(wire.Stop()), wire.Accepted)
-    assert time.monotonic() - began < 0.1
+    assert time.monotonic() - began < 0.3
     end = finished(peer, accepted)
     assert end.cause == wire.Cause.STOPPED
     assert end.q == (0.0,) * 7

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 import numpy as np
@@ -25,6 +24,18 @@ _FIELDS = {
 }
 
 
+def patiently(peer: Peer, seconds: float, check: Callable[[], None], tries: int = 5) -> None:
+    """Reads for a while, then checks; again, with fresh states, where the machine was busy with something else."""
+    for attempt in range(tries):
+        peer.seen.clear()
+        peer.read_for(seconds)
+        try:
+            return check()
+        except AssertionError:
+            if attempt + 1 == tries:
+                raise
+
+
 def stamps(peer: Peer, group: str) -> np.ndarray:
     return np.array([getattr(state, group).stamp for state in peer.all(wire.State)])
 
@@ -33,11 +44,14 @@ def stamps(peer: Peer, group: str) -> np.ndarray:
 def test_states_come_at_the_rate(connect: Connect, rate: float) -> None:
     peer = connect()
     peer.ask(wire.Subscribe(groups=G.JOINTS | G.MOTION, rate=rate))
-    peer.read_for(1.0)
-    seen = stamps(peer, "joints")
-    assert len(seen) == pytest.approx(rate, rel=0.1)
-    assert (np.diff(seen) > 0).all()
-    assert np.median(np.diff(seen)) == pytest.approx(1e9 / rate, rel=0.15)
+
+    def check() -> None:
+        seen = stamps(peer, "joints")
+        assert (np.diff(seen) > 0).all()
+        assert len(seen) == pytest.approx(rate, rel=0.1)
+        assert np.median(np.diff(seen)) == pytest.approx(1e9 / rate, rel=0.15)
+
+    patiently(peer, 1.0, check)
 
 
 def test_only_the_groups_that_were_asked_for(connect: Connect) -> None:
@@ -63,11 +77,17 @@ def test_two_clients_with_two_rates(connect: Connect) -> None:
     fast, slow = connect(), connect()
     fast.ask(wire.Subscribe(groups=G.JOINTS, rate=500.0))
     slow.ask(wire.Subscribe(groups=G.JOINTS | G.POSE, rate=20.0))
-    time.sleep(1.0)
-    fast.read_for(0.05)
-    slow.read_for(0.05)
-    assert len(fast.all(wire.State)) == pytest.approx(525, rel=0.15)
-    assert len(slow.all(wire.State)) == pytest.approx(21, abs=3)
+
+    def check() -> None:
+        slow.read_for(0.02)
+        count = len(slow.all(wire.State))
+        slow.seen.clear()
+        assert len(fast.all(wire.State)) == pytest.approx(500, rel=0.1)
+        assert count == pytest.approx(20, abs=3)
+
+    slow.read_for(0.02)
+    slow.seen.clear()
+    patiently(fast, 1.0, check)
     assert all(state.pose is None for state in fast.all(wire.State))
 
 
@@ -95,16 +115,18 @@ def test_a_cabinet_with_costly_getters_keeps_the_joints_fresh(make: Callable[...
     with Peer(cabinet.port) as peer:
         peer.ask(wire.Subscribe(groups=G(63), rate=100.0))
         peer.read_for(2.0)  # costs are learnt
-        peer.seen.clear()
-        peer.read_for(2.0)
-        assert len(peer.all(wire.State)) > 60
-        fresh = {}
-        for group in _FIELDS.values():
-            assert (np.diff(stamps(peer, group)) >= 0).all()
-            fresh[group] = len(set(stamps(peer, group))) / 2.0
-        assert fresh["joints"] > 30
-        assert 2 < fresh["safety"] < 15
-        assert fresh["pose"] < fresh["joints"]
+
+        def check() -> None:
+            assert len(peer.all(wire.State)) > 60
+            fresh = {}
+            for group in _FIELDS.values():
+                assert (np.diff(stamps(peer, group)) >= 0).all()
+                fresh[group] = len(set(stamps(peer, group))) / 2.0
+            assert fresh["joints"] > 30
+            assert 2 < fresh["safety"] < 15
+            assert fresh["pose"] < fresh["joints"]
+
+        patiently(peer, 2.0, check)
         assert isinstance(peer.ask(wire.Stop()), wire.Accepted)
 
 
@@ -112,6 +134,9 @@ def test_states_of_a_fast_clock(make: Callable[..., FakeCabinet]) -> None:
     cabinet = make(rate=5.0)
     with Peer(cabinet.port) as peer:
         peer.ask(wire.Subscribe(groups=G.JOINTS, rate=100.0))
-        peer.read_for(1.0)
-        assert len(stamps(peer, "joints")) == pytest.approx(500, rel=0.15)
-        assert np.median(np.diff(stamps(peer, "joints"))) == pytest.approx(1e7, rel=0.1)
+
+        def check() -> None:
+            assert len(stamps(peer, "joints")) == pytest.approx(500, rel=0.15)
+            assert np.median(np.diff(stamps(peer, "joints"))) == pytest.approx(1e7, rel=0.1)
+
+        patiently(peer, 1.0, check)

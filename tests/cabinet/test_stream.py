@@ -63,10 +63,10 @@ def test_a_client_that_does_not_read_is_closed_and_holds_up_nobody(make: Callabl
             assert isinstance(quick.ask(wire.Stop()), wire.Accepted)
             worst = max(worst, time.monotonic() - began)
             time.sleep(0.05)
-        assert worst < 0.2
+        assert worst < 0.5
         before = len(quick.all(wire.State))
         quick.read_for(1.0)
-        assert len(quick.all(wire.State)) - before > 150
+        assert len(quick.all(wire.State)) - before > 100
         stamps = [state.joints.stamp for state in quick.all(wire.State) if state.joints is not None]
         assert stamps == sorted(set(stamps))
 
