@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -22,12 +24,31 @@ def _resident(process: int) -> float:
     return next(int(line.split()[1]) for line in text.splitlines() if line.startswith("VmRSS")) / 1024
 
 
+@contextlib.contextmanager
+def _reading(peer: Peer) -> Iterator[None]:
+    """Reads and answers in a thread meanwhile: a slow machine takes longer than the cabinet waits for a silent client."""
+    enough = threading.Event()
+
+    def read() -> None:
+        while not enough.is_set():
+            peer.read_for(0.3)
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    try:
+        yield
+    finally:
+        enough.set()
+        reader.join()
+
+
 @pytest.mark.parametrize("frames", [FRAMES, pytest.param(100_000, marks=pytest.mark.slow)])
 def test_random_and_mutated_frames(make: Callable[..., FakeCabinet], frames: int) -> None:
     cabinet = make()
     idle = cabinet.threads()
     with Peer(cabinet.port, name="watcher") as watcher:
-        assert garbage(("127.0.0.1", cabinet.port), frames, seed=11) >= frames
+        with _reading(watcher):
+            assert garbage(("127.0.0.1", cabinet.port), frames, seed=11) >= frames
         assert isinstance(watcher.ask(wire.Stop()), wire.Accepted)  # it was served, and pinged, all the time
         deadline = time.monotonic() + 5.0
         while not isinstance(watcher.ask(wire.TakeControl(watchdog=5.0)), wire.Accepted):
