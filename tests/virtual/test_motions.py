@@ -60,7 +60,7 @@ def test_a_ptp_to_a_pose_takes_the_arm_position_that_was_named() -> None:
     goal = np.array((0.3, 0.4, 0.2, -1.1, 0.1, 0.8, 0.2))
     from heptarm.model.inverse import redundancy
 
-    named = redundancy(plant.robot, goal)
+    named = redundancy(plant.robot, goal.tolist())
     target = Pose.from_matrix(forward(plant.robot, goal))
     wanted = (named.e1, named.status, named.turn)
     run(plant, Order(1, "ptp", pose=numbers(target), redundancy=wanted))

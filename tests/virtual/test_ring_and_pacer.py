@@ -32,7 +32,8 @@ def test_overwritten_and_torn_slots_read_as_none() -> None:
 
 
 def test_somebody_is_woken_only_when_their_time_has_come() -> None:
-    plant, woken = ready(), []
+    plant = ready()
+    woken: list[int] = []
     plant.on_wake = woken.append
     plant.step(10)
     assert woken == []
