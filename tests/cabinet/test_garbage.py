@@ -26,7 +26,7 @@ def _resident(process: int) -> float:
 
 @contextlib.contextmanager
 def _reading(peer: Peer) -> Iterator[None]:
-    """Reads and answers in a thread meanwhile: a slow machine takes longer than the cabinet waits for a silent client."""
+    """Reads and answers meanwhile: a slow machine takes longer than the cabinet waits for a silent client."""
     enough = threading.Event()
 
     def read() -> None:
