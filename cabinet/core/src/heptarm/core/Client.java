@@ -211,6 +211,22 @@ final class Client {
             leave("it does not read its answers");
             return;
         }
+        writeClaimed(frame);
+    }
+
+    /** Claims the connection: what others have for the client waits until {@link #writeClaimed}. False: it ends. */
+    boolean claim() {
+        synchronized (outbox) {
+            if (writing || ending) {
+                return false;
+            }
+            writing = true;
+            return true;
+        }
+    }
+
+    /** Writes a frame over the claimed connection and gives it back. */
+    void writeClaimed(byte[] frame) {
         try {
             write(frame);
         } catch (IOException e) {

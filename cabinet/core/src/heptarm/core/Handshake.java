@@ -17,6 +17,10 @@ import heptarm.wire.Messages;
 import heptarm.wire.Proof;
 import heptarm.wire.Protocol;
 import heptarm.wire.Violation;
+import heptarm.wire.FrameInfo;
+import heptarm.wire.RobotInfo;
+import heptarm.wire.SignalInfo;
+import heptarm.wire.ToolInfo;
 import heptarm.wire.Welcome;
 import heptarm.wire.WireException;
 
@@ -120,11 +124,20 @@ final class Handshake {
     private void welcome() {
         Robot robot = server.robot;
         byte[] proof = nonce == null ? new byte[0] : mac(hello.nonce, nonce);
-        Welcome welcome = new Welcome(Protocol.MAJOR, Protocol.MINOR, client.session, Config.VERSION, robot.cabinet(),
-                robot.isVirtual(), robot.info(), robot.capabilities(), robot.tools(), robot.frames(), robot.signals(),
-                ALL_GROUPS, server.config.maxRate, server.config.heartbeat, server.authority.name(), proof);
-        open = true;
-        client.answer(welcome, 0);
+        RobotInfo info = robot.info();
+        String cabinet = robot.cabinet();
+        String[] capabilities = robot.capabilities();
+        ToolInfo[] tools = robot.tools();
+        FrameInfo[] frames = robot.frames();
+        SignalInfo[] signals = robot.signals();
+        boolean isVirtual = robot.isVirtual();
+        if (!client.claim()) {
+            return; // the cabinet application ends
+        }
+        open = true; // events of others gather from here on; the welcome still comes first and knows all before them
+        client.writeClaimed(server.frame(new Welcome(Protocol.MAJOR, Protocol.MINOR, client.session, Config.VERSION, cabinet,
+                isVirtual, info, capabilities, tools, frames, signals, ALL_GROUPS, server.config.maxRate,
+                server.config.heartbeat, server.authority.name(), proof), 0));
     }
 
     void refuse(int code, String text) {
