@@ -18,9 +18,7 @@ import jpype
 import jpype.nio
 
 from heptarm import _resources
-from heptarm.errors import MissingExtra, Unreachable
-from heptarm.model import inverse
-from heptarm.values.pose import Pose
+from heptarm.errors import MissingExtra
 from heptarm.virtual.order import Order, PlanError
 from heptarm.virtual.plant import Plant
 
@@ -148,10 +146,6 @@ def open_station(plant: Plant) -> Any:
         """The plant as Java sees it."""
 
         @jpype.JOverride  # type: ignore[untyped-decorator]
-        def model(self) -> str:
-            return robot.name
-
-        @jpype.JOverride  # type: ignore[untyped-decorator]
         def title(self) -> str:
             return robot.title
 
@@ -186,22 +180,6 @@ def open_station(plant: Plant) -> Any:
         @jpype.JOverride  # type: ignore[untyped-decorator]
         def links(self) -> Any:
             return jpype.JArray(jpype.JDouble)([robot.d_bs, robot.d_se, robot.d_ew, robot.d_wf])
-
-        @jpype.JOverride  # type: ignore[untyped-decorator]
-        def inverse(self, pose: Any, redundancy: Any, near: Any) -> Any:
-            values = [float(v) for v in pose]
-            e1, status = float(redundancy[0]), int(redundancy[1])
-            try:
-                q = inverse.solve(
-                    robot,
-                    Pose.of(values[:3], values[3:]),
-                    e1=None if e1 != e1 else e1,
-                    status=None if status < 0 else status,
-                    near=None if near is None else [float(v) for v in near],
-                )
-            except Unreachable:
-                return None
-            return jpype.JArray(jpype.JDouble)(q.tolist())
 
     memory = jpype.nio.convertToDirectBuffer(plant.ring.memory)
     station = jpype.JClass("heptarm.doubles.Station").open(memory, Proxy())

@@ -277,9 +277,8 @@ class Plant:
         # the sensors sit behind the gear: rotor inertia and gear friction are not in them
         self._tau = torque - self._armature * self._acc + self._passive
         self._tau_ext = self._applied + self._constraint
-        if (
-            self._pulled.any()
-        ):  # somebody else pulls at bodies, as a viewer does: what the model cannot explain
+        if self._pulled.any():
+            # somebody else pulls at bodies, as a viewer does: what the model cannot explain
             self._tau_ext = self._mass[:7, :7] @ self._acc + self._bias - self._passive - torque
         self.tick_count += 1
         self._estimate()
