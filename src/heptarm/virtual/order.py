@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from math import nan
 from typing import Protocol
 
+from heptarm.values.mode import Mode
+
 Seven = tuple[float, ...]
 _FULL: Seven = (1.0,) * 7
 
@@ -38,7 +40,7 @@ class Order:
 
     Attributes:
         id: chosen by the caller, unique.
-        kind: "ptp", "lin", "lin_rel" or "hold".
+        kind: "ptp", "lin", "lin_rel", "hold", or a servo motion: "servo" or "direct".
         joints: target of a ptp [rad]; None: `pose` is the target.
         pose: target of the moved frame in the base: x y z [m], quaternion x y z w.
         redundancy: E1 [rad] (NaN: keep), Status and Turn (-1: keep).
@@ -48,6 +50,10 @@ class Order:
         joint_velocity: fractions of each axis' maximum, as the next two.
         cart_velocity: [m/s]; then [m/s²], [m/s³]; orientation [rad/s], [rad/s²], [rad/s³].
         duration: of a hold [s]; NaN: until cancelled.
+        mode: control mode; None: position.
+        minimum_time: no trajectory to a servo target is shorter [s].
+        goal_timeout: a servo motion ends so long after its target was reached and no other came [s].
+        speed_timeout: how long a servo target's velocity is kept after it was passed [s].
         listener: hears of start and end.
     """
 
@@ -69,4 +75,13 @@ class Order:
     ori_acceleration: float = nan
     ori_jerk: float = nan
     duration: float = nan
+    mode: Mode | None = None
+    minimum_time: float = 0.02
+    goal_timeout: float = 30.0
+    speed_timeout: float = 0.1
     listener: Listener | None = field(default=None, compare=False)
+
+    @property
+    def is_servo(self) -> bool:
+        """Whether it follows targets that come while it runs."""
+        return self.kind in ("servo", "direct")

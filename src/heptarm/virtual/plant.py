@@ -1,8 +1,7 @@
 """The plant: a simulated LBR with its motion controller, one millisecond a tick.
 
-MuJoCo steps the dynamics; planned motions are carried out by a computed-torque law that tracks tightly and
-knows the model's inertia, gravity, friction. The plant needs neither JVM nor clock: whoever calls `tick` owns
-its time.
+MuJoCo steps the dynamics; planned motions and servo motions give the set-points, a control law the torques. The
+plant needs neither JVM nor clock: whoever calls `tick` owns its time.
 """
 
 from __future__ import annotations
@@ -21,22 +20,19 @@ from heptarm.errors import Unreachable
 from heptarm.model.kinematics import flange
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel, robot
+from heptarm.values.mode import JointImpedance, Mode
 from heptarm.virtual import ring
+from heptarm.virtual.law import JointSpring, Law, PositionLaw, Sensed
+from heptarm.virtual.load import Load
 from heptarm.virtual.order import Order, PlanError
 from heptarm.virtual.path import CartesianLine, JointLine
 from heptarm.virtual.planner import Plan, plan
 from heptarm.virtual.posture import posture
 from heptarm.virtual.profile import Limits, Profile, brake, change
+from heptarm.virtual.servo import DirectFollower, Follower, ServoTerms, SmartFollower
 
 TICK_NS = 1_000_000
 TICK = 1e-3
-
-#: Bandwidth of the position controller [rad/s] and its damping ratio.
-BANDWIDTH = 90.0
-DAMPING = 1.0
-#: Integral action: what a lasting load would bend the arm by is taken back, up to this angle [rad].
-INTEGRAL = 0.2 * BANDWIDTH
-INTEGRAL_REACH = 0.01
 
 #: A motion is done when every measured joint is this near to its command [rad] and this slow [rad/s] ...
 SETTLED = 5e-5
@@ -47,6 +43,8 @@ SETTLE_TICKS = 500
 #: How fast the application override and pausing change the speed: [1/s], [1/s²], [1/s³].
 OVERRIDE_SLEW = Limits(4.0, 40.0, 800.0)
 
+#: Set-points this far behind a limit are rounding errors [rad].
+ON_LIMIT = 1e-9
 #: A set-point that asks for more than this many times an axis' speed is not followed.
 OVERSPEED = 1.2
 
@@ -91,6 +89,7 @@ class _Run:
         "cancelled",
         "ended",
         "failure",
+        "follower",
         "path",
         "plan",
         "profile",
@@ -112,6 +111,7 @@ class _Run:
         self.ended = False
         self.settling = 0
         self.started = False
+        self.follower: Follower | None = None
 
 
 class Plant:
@@ -131,21 +131,24 @@ class Plant:
         self.ring = ring.Ring()
         self.tick_count = 0
         self.on_wake: Callable[[int], None] | None = None
-        self._site = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SITE, "flange")
         self._views()
+        self._load = Load(self.model, self.data)
         self._command = [self._q.copy() for _ in range(3)]  # set-points of the last, this and the next tick
+        self._law: Law = PositionLaw()
+        self._sensed = Sensed(
+            self._q, self._dq, self._mass[:7, :7], self._bias, self._passive, self._q, self._q, self._q
+        )
         self._scale = self._goal = 1.0
         self._slew: Profile | None = None  # of the scale, while it changes
         self._slew_time = 0.0
         self._pace = 1.0
         self._paused = False
-        self._push: Array | None = None
-        self._push_until = inf
         self._planning = threading.Lock()  # one caller plans at a time; the tick never waits for it
         self._lock = threading.Lock()  # held for a few instructions only
         self._serial = 0  # of the newest accepted order
         self._inbox: deque[tuple[int, Order, Plan | None]] = deque()
         self._cancels: deque[tuple[int, int | None]] = deque()  # newest order at that time, which one
+        self._changes: deque[tuple[int, Mode]] = deque()  # of the control mode of an order
         self._run: _Run | None = None
         self._tail: Array | None = None  # where the last accepted order ends; None: not known
         self._open = 0  # accepted orders that have not ended
@@ -156,20 +159,14 @@ class Plant:
         d = self.data
         self._q, self._dq, self._acc = d.qpos[:7], d.qvel[:7], d.qacc[:7]
         self._bias, self._passive = d.qfrc_bias[:7], d.qfrc_passive[:7]
-        self._constraint, self._applied = d.qfrc_constraint[:7], d.qfrc_applied[:7]
         self._ctrl = d.ctrl[:7]
         self._armature = self.model.dof_armature[:7].copy()
         self._limit, self._least = self.robot.tau_max, -self.robot.tau_max
         self._leap = OVERSPEED * self.robot.dq_max * TICK
+        self._lowest, self._highest = self.robot.q_min - ON_LIMIT, self.robot.q_max + ON_LIMIT
         self._mass = np.zeros((self.model.nv, self.model.nv))
-        self._jp = np.zeros((3, self.model.nv))
-        self._jr = np.zeros((3, self.model.nv))
-        self._lasting = np.zeros(7)
         self._tau = np.zeros(7)
-        self._tau_ext = np.zeros(7)
         self._tau_cmd = np.zeros(7)
-        self._wrench = np.zeros(6)
-        self._pulled = d.xfrc_applied
 
     # ------------------------------------------------------------------------------ orders, from any thread
 
@@ -241,10 +238,12 @@ class Plant:
         duration: float = inf,
     ) -> None:
         """Push the flange with a force [N] and a torque [Nm], base axes, for a time [s]; zeros end it."""
-        self._push_until = self.tick_count * TICK + duration
-        self._push = np.concatenate(
-            [np.asarray(force, dtype=np.float64), np.asarray(torque, dtype=np.float64)]
-        )
+        wrench = np.concatenate([np.asarray(force, dtype=np.float64), np.asarray(torque, dtype=np.float64)])
+        self._load.push(wrench, self.tick_count * TICK + duration)
+
+    def change_mode(self, order_id: int, mode: Mode) -> None:
+        """Change the parameters of a running order's control mode; of another order or kind it does nothing."""
+        self._changes.append((order_id, mode))
 
     # ------------------------------------------------------------------------------ the tick
 
@@ -257,18 +256,12 @@ class Plant:
         """One millisecond: set-point, control law, dynamics, state."""
         m, d = self.model, self.data
         progress, remaining = self._advance()
-        before, now, after = self._command
         mujoco.mj_step1(m, d)
-        self._external()
+        self._load.apply(self.tick_count * TICK)
         mujoco.mj_fullM(m, d, self._mass)
-        wanted = (after - 2 * now + before) * 1e6
-        error = now - self._q
-        self._lasting += INTEGRAL * TICK * error
-        np.minimum(self._lasting, INTEGRAL_REACH, out=self._lasting)  # np.clip takes three times as long
-        np.maximum(self._lasting, -INTEGRAL_REACH, out=self._lasting)
-        wanted += BANDWIDTH * BANDWIDTH * (error + self._lasting)
-        wanted += 2 * DAMPING * BANDWIDTH * ((after - before) * 500.0 - self._dq)
-        torque = self._mass[:7, :7] @ wanted + self._bias - self._passive
+        sensed = self._sensed
+        sensed.before, sensed.now, sensed.after = self._command
+        torque = self._law.torque(sensed)
         np.minimum(torque, self._limit, out=torque)
         np.maximum(torque, self._least, out=torque)
         self._ctrl[:] = torque
@@ -276,12 +269,8 @@ class Plant:
         self._tau_cmd = torque
         # the sensors sit behind the gear: rotor inertia and gear friction are not in them
         self._tau = torque - self._armature * self._acc + self._passive
-        self._tau_ext = self._applied + self._constraint
-        if self._pulled.any():
-            # somebody else pulls at bodies, as a viewer does: what the model cannot explain
-            self._tau_ext = self._mass[:7, :7] @ self._acc + self._bias - self._passive - torque
+        self._load.measure(self._mass[:7, :7] @ self._acc + self._bias - self._passive - torque)
         self.tick_count += 1
-        self._estimate()
         self._write(self._run_id(), progress, remaining)
 
     def _advance(self) -> tuple[float, float]:
@@ -289,6 +278,10 @@ class Plant:
         command = self._command
         while self._cancels:
             self._cancel_now(*self._cancels.popleft())
+        while self._changes:
+            order_id, mode = self._changes.popleft()
+            if order_id == self._run_id() and not self._law.is_stiff:
+                self._switch(mode)
         goal = 0.0 if self._paused else min(1.0, max(0.0, float(self.ring.reals[ring.OVERRIDE])))
         before = self._scale
         if goal != self._goal or self._slew is not None:
@@ -297,6 +290,9 @@ class Plant:
         run = self._run
         if run is None:
             run = self._next()
+            if run is None and not self._law.is_stiff:
+                self._switch(None)
+            command = self._command
         command[0], command[1] = command[1], command[2]
         if run is None:
             return 0.0, nan
@@ -320,6 +316,8 @@ class Plant:
         planned = run.plan
         if run.ended:
             return self._settle(run)
+        if run.follower is not None:
+            return self._serve(run, run.follower)
         run.time += TICK if run.braking else TICK * self._pace
         if run.path is None or run.profile is None:
             if run.cancelled or run.time >= planned.duration or planned.order.kind != "hold":
@@ -345,7 +343,11 @@ class Plant:
         except Unreachable as error:
             self._fail(run, f"the path is not reachable: {error.text}")
             return
-        leap = np.abs(there - here) > self._leap
+        self._go(run, there)
+
+    def _go(self, run: _Run, there: Array) -> None:
+        """Take a set-point unless an axis could not follow it."""
+        leap = np.abs(there - self._command[2]) > self._leap
         if leap.any() and not run.failure:
             self._fail(run, f"Command Velocity violates limit A{int(leap.argmax()) + 1} (singularity)")
             return
@@ -353,7 +355,7 @@ class Plant:
 
     def _fail(self, run: _Run, text: str) -> None:
         """Brake every axis by itself, off the path: straight on from where the last set-points led."""
-        run.failure, run.braking, run.ended = text, True, False
+        run.failure, run.braking, run.ended, run.follower = text, True, False, None
         here = self._command[2]
         speed = np.clip((here - self._command[0]) / TICK, -self.robot.dq_max, self.robot.dq_max)
         run.path = JointLine(here.copy(), here + speed)
@@ -366,7 +368,7 @@ class Plant:
 
     def _settle(self, run: _Run) -> tuple[float, float]:
         run.settling += 1
-        at_rest = float(np.abs(self._q - self._command[2]).max()) <= SETTLED
+        at_rest = not self._law.is_stiff or float(np.abs(self._q - self._command[2]).max()) <= SETTLED
         at_rest = at_rest and float(np.abs(self._dq).max()) <= SETTLED_SPEED
         if at_rest or run.settling >= SETTLE_TICKS:
             cause = "error" if run.failure else "cancelled" if run.cancelled else "done"
@@ -388,6 +390,7 @@ class Plant:
     def _next(self) -> _Run | None:
         while self._inbox:
             serial, order, planned = self._inbox.popleft()
+            self._switch(order.mode)
             here = self._command[2]
             if planned is None or float(np.abs(planned.start - here).max()) > 1e-9:
                 try:
@@ -399,6 +402,8 @@ class Plant:
                     if serial == self._serial:
                         self._tail = planned.end
             self._run = _Run(planned, serial)
+            if order.is_servo:
+                self._run.follower = self._follower(order, here)
             return self._run
         return None
 
@@ -422,37 +427,60 @@ class Plant:
         if run.cancelled or run.failure:
             return
         run.cancelled = True
+        rate = 0.0 if self._slew is None else self._slew.at(self._slew_time)[1]
+        if run.follower is not None:
+            run.follower.brake(scale=self._scale, rate=rate)
+            run.braking = True
+            return
         if run.ended or run.profile is None or run.path is None:
             run.ended = run.ended or run.path is None
             return
         s, velocity, acceleration = run.profile.at(run.time)
-        scale, rate = self._scale, 0.0
-        if self._slew is not None:
-            rate = self._slew.at(self._slew_time)[1]
+        scale = self._scale
         state = (s, velocity * scale, acceleration * scale * scale + velocity * rate)
         run.profile = brake(state, run.plan.braking)
         run.time, run.braking = 0.0, True
 
-    # ------------------------------------------------------------------------------ torques and state
+    # ------------------------------------------------------------------------------ servo motions and modes
 
-    def _external(self) -> None:
-        if self._push is None:
-            return
-        if self.tick_count * TICK >= self._push_until or not self._push.any():
-            self._push = None
-            self._applied[:] = 0.0
-            return
-        mujoco.mj_jacSite(self.model, self.data, self._jp, self._jr, self._site)
-        self._applied[:] = self._jp[:, :7].T @ self._push[:3] + self._jr[:, :7].T @ self._push[3:]
+    def _serve(self, run: _Run, follower: Follower) -> tuple[float, float]:
+        """Lead the set-point to the newest target."""
+        target = self.ring.target()
+        order = run.plan.order
+        if target is not None and target.order == order.id and not run.cancelled:
+            follower.aim(target.q, target.dq)
+        there = follower.advance(TICK if run.braking else TICK * self._pace)
+        run.ended = follower.is_still if run.braking else follower.resting > order.goal_timeout
+        beyond = (there > self._highest) | (there < self._lowest)
+        if beyond.any():
+            self._fail(run, f"Command Position violates limit A{int(beyond.argmax()) + 1}")
+        else:
+            self._go(run, there)
+        return nan, follower.remaining
 
-    def _estimate(self) -> None:
-        """Wrench at the flange from the external torques: least squares, damped near singularities."""
-        if not self._tau_ext.any():
-            self._wrench[:] = 0.0
-            return
-        mujoco.mj_jacSite(self.model, self.data, self._jp, self._jr, self._site)
-        j = np.vstack([self._jp[:, :7], self._jr[:, :7]])
-        self._wrench = np.linalg.solve(j @ j.T + 1e-6 * np.eye(6), j @ self._tau_ext)
+    def _follower(self, order: Order, here: Array) -> Follower:
+        terms = ServoTerms.of(
+            self.robot,
+            velocity=order.joint_velocity,
+            acceleration=order.joint_acceleration,
+            minimum_time=order.minimum_time,
+            speed_timeout=order.speed_timeout,
+        )
+        return (DirectFollower if order.kind == "direct" else SmartFollower)(terms, here)
+
+    def _switch(self, mode: Mode | None) -> None:
+        """Bring the control law of a mode into force; set-points of a yielding arm become what it has yielded to."""
+        law = self._law
+        if isinstance(mode, JointImpedance):
+            if isinstance(law, JointSpring):
+                law.change(mode.stiffness, mode.damping)
+            else:
+                self._law = JointSpring(mode.stiffness, mode.damping)
+        elif not law.is_stiff:
+            self._law = PositionLaw()
+            self._command = [self._q.copy() for _ in range(3)]
+
+    # ------------------------------------------------------------------------------ state
 
     def _run_id(self) -> int:
         return 0 if self._run is None else self._run.plan.order.id
@@ -468,13 +496,13 @@ class Plant:
         reals[9:16] = self._command[2]
         reals[16:23] = self._dq
         reals[23:30] = self._tau
-        reals[30:37] = self._tau_ext
+        reals[30:37] = self._load.torque
         reals[37:44] = self._tau_cmd
         values = q.tolist()
         (x, y, z), p = flange(self.robot, values)
         reals[44:47] = p
         reals[47:51] = _quaternion(x, y, z)
-        reals[51:57] = self._wrench
+        reals[51:57] = self._load.wrench
         flags = ring.READY | ring.BRAKES_OPEN | ring.MASTERED
         if self._paused:
             flags |= ring.PAUSED
@@ -504,9 +532,9 @@ class Plant:
             self._command[2].copy(),
             self._dq.copy(),
             self._tau.copy(),
-            self._tau_ext.copy(),
+            self._load.torque.copy(),
             self._tau_cmd.copy(),
-            self._wrench.copy(),
+            self._load.wrench.copy(),
             self._run_id(),
             float(slot[ring.PROGRESS]),
         )

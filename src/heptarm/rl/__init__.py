@@ -1,0 +1,1 @@
+"""Learning: the task of reaching a point, a batched simulator, PPO, policies without torch."""

@@ -1,0 +1,291 @@
+"""Many arms at once on the shipped model with full dynamics; `mujoco.batch` steps them on a few threads."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected, LimitError, MissingExtra, ShapeError
+from heptarm.rl import simulation
+from heptarm.rl.randomise import NONE, Randomisation
+from heptarm.rl.task import ReachTask
+from heptarm.values.arrays import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What a decision of all arms led to.
+
+    Attributes:
+        observation: what each sees now, after a new episode began where one ended, shape (envs, n).
+        reward: shape (envs,).
+        distance: from flange to target after the decision, shape (envs,) [m].
+        done: which episodes ended, all of them by their length, shape (envs,).
+        final: what those saw last, shape (done.sum(), n).
+    """
+
+    observation: Array
+    reward: Array
+    distance: Array
+    done: npt.NDArray[np.bool_]
+    final: Array
+
+
+class Engine:
+    """Arms that follow commanded joints: the part that another engine may replace.
+
+    Args:
+        task: the task.
+        envs: number of arms.
+        threads: of the engine.
+
+    Attributes:
+        q: measured positions, shape (envs, 7) [rad].
+        dq: measured velocities, shape (envs, 7) [rad/s].
+    """
+
+    def __init__(self, task: ReachTask, *, envs: int, threads: int) -> None:
+        try:
+            from mujoco import batch
+        except ImportError as error:
+            raise MissingExtra(
+                f"training needs mujoco.batch, which MuJoCo {mujoco.__version__} lacks",
+                parameter="mujoco",
+                hint="pip install 'heptarm[rl]'",
+            ) from error
+        self._batch = batch.Batch(simulation.build(task), nsim=envs, nthread=threads)
+        self._inertia = simulation.mass(task)
+        bind = self._batch.bind
+        self.q, self.dq = bind("qpos"), bind("qvel")
+        self._state = {
+            name: bind(name) for name in ("qpos", "qvel", "act", "ctrl", "qacc_warmstart", "xfrc_applied")
+        }
+        self._filter: Any = None
+        self._steps = simulation.SUBSTEPS
+
+    def payload(self, mass: Array) -> None:
+        """Hang unknown masses on the flanges, shape (envs,) [kg]; their weight pulls as a force."""
+        self._batch.expand("body_mass")[:, -1] += mass
+        self._batch.set_const()
+        self._state["xfrc_applied"][:, -1, 2] = -simulation.GRAVITY * mass
+
+    def stiffness(self, values: Array) -> None:
+        """Control the arms by joint impedance of these stiffnesses, shape (envs,) [Nm/rad]."""
+        stiff, damp = simulation.gains(self._inertia, values)
+        self._batch.expand("actuator_gainprm")[:, :, 0] = stiff
+        bias = self._batch.expand("actuator_biasprm")
+        bias[:, :, 1], bias[:, :, 2] = -stiff, -damp
+
+    def bandwidth(self, which: Array, values: Array) -> None:
+        """Set the servo's bandwidth of some arms, shape (n,) [rad/s]."""
+        if self._filter is None:
+            self._filter = self._batch.expand("actuator_dynprm")
+        self._filter[which, :, 0] = 1.0 / values[:, None]
+
+    def place(self, which: Array, q: Array) -> None:
+        """Put some arms at rest at joint positions, shape (n, 7) [rad]."""
+        state = self._state
+        state["qpos"][which] = state["act"][which] = state["ctrl"][which] = q
+        state["qvel"][which] = 0.0
+        state["qacc_warmstart"][which] = 0.0
+
+    def step(self, command: Array) -> None:
+        """Let one decision pass with commanded joints, shape (envs, 7) [rad]."""
+        self._state["ctrl"][:] = command
+        self._batch.step(nstep=self._steps)
+
+    def save(self) -> dict[str, Array]:
+        """Everything that changes, as copies; the drawn robots themselves are in `BatchReach.save`."""
+        entries = {name: np.array(rows) for name, rows in self._state.items()}
+        if self._filter is not None:
+            entries["filter"] = np.array(self._filter[:, :, 0])
+        return entries
+
+    def load(self, entries: dict[str, Array]) -> None:
+        """Go on from `save`."""
+        for name, rows in self._state.items():
+            rows[:] = entries[name]
+        if "filter" in entries:
+            self.bandwidth(np.arange(len(self.q)), entries["filter"][:, 0])
+
+
+class BatchReach:
+    """The task on many simulated arms; episodes that end begin anew by themselves.
+
+    Args:
+        task: the task.
+        envs: number of arms.
+        randomisation: what differs between them.
+        seed: of everything drawn; the same seed gives the same run.
+        threads: of the simulation.
+        starts: "staggered": the first episodes begin somewhere in their time, so that not all end together;
+            "together": all begin at 0.
+        engine: class of the simulation, `Engine` or one with its methods.
+
+    Raises:
+        LimitError: no arms, or no threads.
+        MissingExtra: the installed MuJoCo is too old.
+    """
+
+    def __init__(
+        self,
+        task: ReachTask,
+        *,
+        envs: int = 512,
+        randomisation: Randomisation = NONE,
+        seed: int | np.random.SeedSequence = 0,
+        threads: int = 2,
+        starts: str = "staggered",
+        engine: Any = Engine,
+    ) -> None:
+        for name, value in (("envs", envs), ("threads", threads)):
+            if value < 1:
+                raise LimitError(
+                    f"{name} is {value}; at least 1 is wanted", code=2, parameter=name, value=value
+                )
+        if starts not in ("staggered", "together"):
+            raise CommandRejected(f"starts is {starts!r}; 'staggered' or 'together' is wanted", value=starts)
+        self.task, self.envs, self.randomisation = task, envs, randomisation
+        self._random = np.random.default_rng(seed)
+        self.engine = engine(task, envs=envs, threads=threads)
+        self._all = np.arange(envs)
+        if randomisation.payload[1] > 0:
+            self.engine.payload(randomisation.draw_payload(self._random, envs))
+        if simulation.soft(randomisation.stiffness):
+            self.engine.stiffness(randomisation.draw_stiffness(self._random, envs))
+        self._staggered = starts == "staggered"
+        self.target = np.zeros((envs, 3))
+        self.command = np.zeros((envs, 7))
+        self.held = np.zeros((envs, 3, 3)) if task.action == "cartesian" else None
+        self.age = np.zeros(envs, dtype=np.int64)
+        self._latency = np.zeros(envs, dtype=np.int64)
+        self._late = np.zeros((randomisation.latency[1] + 1, envs, 7))  # commands, the newest first
+        self._noise = np.ones((envs, 7))
+        self.reset()
+
+    @property
+    def q(self) -> Array:
+        """Measured positions, shape (envs, 7) [rad]."""
+        result: Array = np.asarray(self.engine.q)
+        return result
+
+    def reset(self, targets: npt.ArrayLike | None = None) -> Array:
+        """Begin an episode everywhere.
+
+        Args:
+            targets: shape (envs, 3) [m]; None: drawn.
+
+        Returns:
+            The observations, shape (envs, n).
+
+        Raises:
+            ShapeError: targets of another shape, or not finite.
+        """
+        self._begin(self._all)
+        if self._staggered:
+            self.age[:] = self._random.integers(0, self.task.steps, self.envs)
+        if targets is not None:
+            given = np.asarray(targets, dtype=np.float64)
+            if given.shape != (self.envs, 3) or not np.isfinite(given).all():
+                raise ShapeError(
+                    f"targets has shape {given.shape}; {(self.envs, 3)}, all finite, is wanted",
+                    parameter="targets",
+                )
+            self.target[:] = given
+        return self.observe()
+
+    def _begin(self, which: Array) -> None:
+        count = len(which)
+        draw, task = self.randomisation, self.task
+        q = task.starts(self._random, count)
+        self.target[which] = task.targets(self._random, count)
+        self.command[which] = q
+        self._late[:, which] = q
+        self.age[which] = 0
+        self._latency[which] = draw.draw_latency(self._random, count)
+        self.engine.bandwidth(which, draw.draw_bandwidth(self._random, count))
+        self.engine.place(which, q)
+        if self.held is not None:
+            self.held[which] = task.hold(q)
+
+    def observe(self) -> Array:
+        """What the policy sees now, shape (envs, n)."""
+        return self.task.observe(self.engine.q, self.engine.dq * self._noise, self.target)
+
+    def step(self, action: npt.ArrayLike) -> Step:
+        """One decision of every arm.
+
+        Args:
+            action: shape (envs, actions), clipped to +-1.
+
+        Raises:
+            ShapeError: another shape, or not finite.
+        """
+        task, engine = self.task, self.engine
+        given = np.asarray(action, dtype=np.float64)
+        if given.shape != (self.envs, task.action_size) or not np.isfinite(given).all():
+            raise ShapeError(
+                f"action has shape {given.shape}; {(self.envs, task.action_size)}, all finite, is wanted",
+                parameter="action",
+            )
+        self.command = task.advance(self.command, engine.q, given, self.held)
+        if len(self._late) > 1:
+            self._late[1:] = self._late[:-1]
+        self._late[0] = self.command
+        engine.step(self._late[self._latency, self._all])
+        noise = self.randomisation.velocity_noise
+        if noise:
+            self._noise = self._random.uniform(1.0 - noise, 1.0 + noise, (self.envs, 7))
+        distance = task.distance(engine.q, self.target)
+        self.age += 1
+        observation = self.observe()
+        done = self.age >= task.steps
+        final = observation[done]
+        if done.any():
+            which = np.flatnonzero(done)
+            self._begin(which)
+            observation[done] = task.observe(engine.q[which], engine.dq[which], self.target[which])
+        return Step(observation, task.reward(distance), distance, done, final)
+
+    # ------------------------------------------------------------------------------ interrupted training
+
+    def save(self) -> dict[str, Any]:
+        """Everything needed to go on as if nothing had happened; arrays and one text."""
+        arrays = {
+            "target": self.target,
+            "command": self.command,
+            "age": self.age,
+            "latency": self._latency,
+            "late": self._late,
+            "noise": self._noise,
+        }
+        if self.held is not None:
+            arrays["held"] = self.held
+        return {
+            **{name: np.array(rows) for name, rows in arrays.items()},
+            **{f"engine.{name}": rows for name, rows in self.engine.save().items()},
+            "random": json.dumps(self._random.bit_generator.state),
+        }
+
+    def load(self, entries: dict[str, Any]) -> None:
+        """Go on from `save` of a simulation made with the same arguments.
+
+        Raises:
+            ShapeError: it was of another number of arms.
+        """
+        if np.shape(entries["target"]) != self.target.shape:
+            raise ShapeError(f"the saved simulation has {len(entries['target'])} arms, this one {self.envs}")
+        self.target[:], self.age[:] = entries["target"], entries["age"]
+        self.command = np.array(entries["command"])
+        self._latency[:], self._late[:] = entries["latency"], entries["late"]
+        self._noise = np.array(entries["noise"])
+        if self.held is not None:
+            self.held[:] = entries["held"]
+        prefix = "engine."
+        self.engine.load({k[len(prefix) :]: v for k, v in entries.items() if k.startswith(prefix)})
+        self._random.bit_generator.state = json.loads(entries["random"])

@@ -1,0 +1,118 @@
+"""What differs from robot to robot, drawn anew in training so that a policy does not lean on it.
+
+A precise policy trained without it swings around its target as soon as the robot answers later than the
+simulation did.
+"""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, asdict, dataclass
+from math import inf, isfinite
+from typing import Any
+
+import numpy as np
+
+from heptarm.errors import CommandRejected, LimitError
+from heptarm.values.arrays import Array
+
+#: Most decisions by which a command may be late.
+LATEST = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Randomisation:
+    """Ranges from which each simulated robot draws; a range is (lowest, highest).
+
+    Attributes:
+        latency: decisions by which commands come late, drawn for each episode.
+        bandwidth: of the servo that follows the commands [rad/s], drawn for each episode, log-uniform.
+        velocity_noise: measured velocities are multiplied by 1 +- this, drawn for each decision.
+        payload: mass at the flange that the controller does not know [kg], drawn for each robot.
+        stiffness: of joint impedance [Nm/rad], drawn for each robot, log-uniform; inf: position control.
+
+    Raises:
+        LimitError: a range that is none.
+    """
+
+    _: KW_ONLY
+    latency: tuple[int, int] = (0, 0)
+    bandwidth: tuple[float, float] = (20.0, 20.0)
+    velocity_noise: float = 0.0
+    payload: tuple[float, float] = (0.0, 0.0)
+    stiffness: tuple[float, float] = (inf, inf)
+
+    def __post_init__(self) -> None:
+        bounds = {
+            "latency": (0, LATEST),
+            "bandwidth": (1.0, 200.0),
+            "payload": (0.0, 15.0),
+            "stiffness": (10.0, inf),
+        }
+        for name, (least, most) in bounds.items():
+            low, high = getattr(self, name)
+            if not least <= low <= high <= most:
+                raise LimitError(
+                    f"{name} is ({low}, {high}); two numbers in [{least:g}, {most:g}] are wanted, the lower first",
+                    code=2,
+                    parameter=name,
+                    value=(low, high),
+                    allowed=f"[{least:g}, {most:g}]",
+                )
+        if isfinite(self.stiffness[0]) != isfinite(self.stiffness[1]):
+            raise LimitError(
+                f"stiffness is {self.stiffness}; either both ends are finite, or none",
+                code=2,
+                parameter="stiffness",
+            )
+        if not 0.0 <= self.velocity_noise < 1.0:
+            raise LimitError(
+                f"velocity_noise is {self.velocity_noise}; allowed is [0, 1)",
+                code=2,
+                parameter="velocity_noise",
+                value=self.velocity_noise,
+                allowed="[0, 1)",
+            )
+
+    def draw_latency(self, random: np.random.Generator, count: int) -> np.ndarray[Any, np.dtype[np.int64]]:
+        """Decisions, shape (count,)."""
+        return random.integers(self.latency[0], self.latency[1] + 1, count)
+
+    def draw_bandwidth(self, random: np.random.Generator, count: int) -> Array:
+        """[rad/s], shape (count,)."""
+        return np.exp(random.uniform(*np.log(self.bandwidth), count))
+
+    def draw_payload(self, random: np.random.Generator, count: int) -> Array:
+        """[kg], shape (count,)."""
+        return random.uniform(*self.payload, count)
+
+    def draw_stiffness(self, random: np.random.Generator, count: int) -> Array:
+        """[Nm/rad], shape (count,)."""
+        return np.exp(random.uniform(*np.log(self.stiffness), count))
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a file."""
+        return asdict(self)
+
+
+#: One known robot.
+NONE = Randomisation()
+#: A robot on the desk, its data roughly known.
+MILD = Randomisation(latency=(0, 1), bandwidth=(10.0, 40.0), velocity_noise=0.2, payload=(0.0, 1.0))
+#: Enough for late networks and compliant control.
+STRONG = Randomisation(latency=(0, 3), bandwidth=(5.0, 40.0), velocity_noise=0.5, payload=(0.0, 3.0))
+
+LEVELS = {"none": NONE, "mild": MILD, "strong": STRONG}
+
+
+def level(name: str) -> Randomisation:
+    """The randomisation of that name.
+
+    Raises:
+        CommandRejected: there is none.
+    """
+    try:
+        return LEVELS[name]
+    except KeyError:
+        raise CommandRejected(
+            f"no randomisation {name!r}; there are {', '.join(LEVELS)}", parameter="randomisation", value=name
+        ) from None

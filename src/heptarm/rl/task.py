@@ -1,0 +1,212 @@
+"""The task: bring the flange to a point. Every number of it, and what the policy sees and does.
+
+Training, the Gymnasium environment and deployment all call these functions, so that a policy meets the same
+observation, the same integration of its actions and the same success radius everywhere. State, action and
+reward are those of the libiiwa paper: s = [q, dq, target], a = joint step, r = -distance.
+"""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, asdict, dataclass, fields
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.rl import kinematics
+from heptarm.values.arrays import Array
+from heptarm.values.robot import RobotModel, robot
+
+ACTIONS = ("joint", "cartesian")
+#: Scales of the kinematic feature [m]: the way to the target, coarse, and clipped when near.
+COARSE = 0.2
+FINE = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class ReachTask:
+    """Reach a point with the flange.
+
+    Attributes:
+        robot: name of the robot, "iiwa7" or "iiwa14" (or the Med ones).
+        action: "joint": seven joint steps; "cartesian": a step of the flange along the base's axes, its
+            rotation held.
+        feature: "" for the paper's observation; "kinematic" adds the way from the target to the flange,
+            which is a fixed function of the paper's state.
+        rate: decisions a second [Hz].
+        steps: decisions an episode.
+        home: joint positions around which an episode begins, shape (7,) [rad].
+        spread: half width of the uniform noise on them [rad].
+        centre: of the box of targets, base frame, shape (3,) [m].
+        size: of that box, shape (3,) [m].
+        radius: distance that counts as success [m].
+        joint_step: of the commanded joints at |action| = 1 [rad].
+        cartesian_step: of the commanded flange at |action| = 1 [m].
+        leash: farthest that commanded joints may be from the measured ones [rad].
+
+    Raises:
+        CommandRejected: no such robot, action or feature.
+        LimitError: a number that makes no task.
+    """
+
+    robot: str = "iiwa14"
+    _: KW_ONLY
+    action: str = "joint"
+    feature: str = ""
+    rate: float = 30.0
+    steps: int = 100
+    home: tuple[float, ...] = (0.0, 0.0, 0.0, -pi / 2, 0.0, pi / 2, 0.0)
+    spread: float = 0.125
+    centre: tuple[float, ...] = (0.6, 0.0, 0.4)
+    size: tuple[float, ...] = (0.2, 0.4, 0.4)
+    radius: float = 0.035
+    joint_step: float = 2.5 / 120
+    cartesian_step: float = 0.01
+    leash: float = 0.25
+
+    def __post_init__(self) -> None:
+        self.model  # noqa: B018  raises for an unknown robot
+        for name, choices in (("action", ACTIONS), ("feature", ("", "kinematic"))):
+            if getattr(self, name) not in choices:
+                raise CommandRejected(
+                    f"{name} is {getattr(self, name)!r}; there are {', '.join(map(repr, choices))}",
+                    parameter=name,
+                    value=getattr(self, name),
+                )
+        for name, length in (("home", 7), ("centre", 3), ("size", 3)):
+            object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
+            if len(getattr(self, name)) != length:
+                raise ShapeError(f"{name} is {getattr(self, name)}; {length} numbers are wanted", parameter=name)
+        for name in ("rate", "steps", "radius", "joint_step", "cartesian_step", "leash"):
+            if not 0 < getattr(self, name) < float("inf"):
+                raise LimitError(
+                    f"{name} is {getattr(self, name)}; a positive number is wanted",
+                    code=2,
+                    parameter=name,
+                    value=getattr(self, name),
+                    allowed="(0, inf)",
+                )
+        if not self.spread >= 0:
+            raise LimitError(f"spread is {self.spread}; it is not negative", parameter="spread", code=2)
+
+    @property
+    def model(self) -> RobotModel:
+        """The robot's dimensions and limits."""
+        return robot(self.robot)
+
+    @property
+    def observation_size(self) -> int:
+        """Numbers that the policy sees."""
+        return 23 if self.feature else 17
+
+    @property
+    def action_size(self) -> int:
+        """Numbers that it decides."""
+        return 7 if self.action == "joint" else 3
+
+    # ------------------------------------------------------------------------------ drawing episodes
+
+    def starts(self, random: np.random.Generator, count: int) -> Array:
+        """Joint positions at the start of episodes, shape (count, 7) [rad]."""
+        return np.asarray(self.home) + random.uniform(-self.spread, self.spread, (count, 7))
+
+    def targets(self, random: np.random.Generator, count: int) -> Array:
+        """Targets from the box, base frame, shape (count, 3) [m]."""
+        half = np.asarray(self.size) / 2
+        return np.asarray(self.centre) + random.uniform(-half, half, (count, 3))
+
+    # ------------------------------------------------------------------------------ what a decision is
+
+    def tip(self, q: Array) -> Array:
+        """Positions of the flange, shape (..., 7) [rad] to (..., 3) [m]."""
+        return kinematics.tip(self.model, q)
+
+    def hold(self, q: Array) -> Array:
+        """The rotation that a Cartesian episode keeps: the one it begins with; (..., 7) to (..., 3, 3)."""
+        return kinematics.rotation(self.model, q)
+
+    def observe(self, q: Array, dq: Array, target: Array) -> Array:
+        """What the policy sees.
+
+        Args:
+            q: measured joint positions, shape (..., 7) [rad].
+            dq: measured velocities, shape (..., 7) [rad/s].
+            target: base frame, shape (..., 3) [m].
+
+        Returns:
+            Shape (..., 17): positions scaled to the joint range, a tenth of the velocities, the target. With
+            the feature (..., 23): the way from target to flange over 0.2 m, and over 0.02 m clipped to 1.
+        """
+        model = self.model
+        result = np.empty((*np.shape(q)[:-1], self.observation_size))
+        result[..., :7] = (q - model.q_min) * (2.0 / (model.q_max - model.q_min)) - 1.0
+        result[..., 7:14] = 0.1 * np.asarray(dq)
+        result[..., 14:17] = target
+        if self.feature:
+            way = self.tip(q) - target
+            result[..., 17:20] = way / COARSE
+            result[..., 20:23] = np.clip(way / FINE, -1.0, 1.0)
+        return result
+
+    def advance(self, command: Array, q: Array, action: Array, held: Array | None = None) -> Array:
+        """The next commanded joints: the action is added to the last command, not to what was measured.
+
+        A command that has run away from the arm (a stopped or pushed robot) is kept on a leash.
+
+        Args:
+            command: the last commanded joints, shape (..., 7) [rad].
+            q: measured joints, shape (..., 7) [rad].
+            action: shape (..., 7) or (..., 3), clipped to +-1.
+            held: rotation to keep, shape (..., 3, 3); for "cartesian".
+
+        Returns:
+            Shape (..., 7) [rad].
+
+        Raises:
+            ShapeError: "cartesian" without `held`.
+        """
+        model = self.model
+        bounded = np.clip(action, -1.0, 1.0)
+        if self.action == "joint":
+            wanted = command + self.joint_step * bounded
+        elif held is None:
+            raise ShapeError("a Cartesian action needs the rotation that is held", parameter="held")
+        else:
+            wanted = kinematics.step_towards(model, command, self.cartesian_step * bounded, held)
+            # a Cartesian step may not turn a joint faster than a joint action could twice over
+            wanted = command + np.clip(wanted - command, -2 * self.joint_step, 2 * self.joint_step)
+        wanted = np.minimum(np.maximum(wanted, q - self.leash), q + self.leash)
+        result: Array = np.minimum(np.maximum(wanted, model.q_min), model.q_max)
+        return result
+
+    def distance(self, q: Array, target: Array) -> Array:
+        """From the flange to the target, shape (...,) [m]."""
+        way = self.tip(q) - target
+        result: Array = np.sqrt((way * way).sum(axis=-1))
+        return result
+
+    def reward(self, distance: Array) -> Array:
+        """Of one decision: the negative distance after it, and nothing else."""
+        return -distance
+
+    # ------------------------------------------------------------------------------ in files
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a file; `from_dict` reads it."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, entries: dict[str, Any]) -> ReachTask:
+        """Of `as_dict`.
+
+        Raises:
+            CommandRejected: entries that are not of this task.
+        """
+        unknown = set(entries) - {field.name for field in fields(cls)}
+        if unknown:
+            raise CommandRejected(
+                f"the task has no {', '.join(sorted(unknown))}",
+                hint="the file may be of a newer heptarm",
+            )
+        return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in entries.items()})

@@ -1,0 +1,69 @@
+"""What acts on the arm from outside: pushes, contacts, a viewer's mouse; and the wrench at the flange they amount to."""
+
+from __future__ import annotations
+
+from math import inf
+
+import mujoco
+import numpy as np
+
+from heptarm.values.arrays import Array
+
+TICK = 1e-3
+#: Damping of the least squares near singularities.
+_DAMPED = 1e-6 * np.eye(6)
+
+
+class Load:
+    """External load of a simulated arm.
+
+    Args:
+        model: MuJoCo's model; its first seven joints are the arm's.
+        data: its state.
+
+    Attributes:
+        torque: external load acting on the joints, shape (7,) [Nm].
+        wrench: force and torque acting on the flange, base axes, shape (6,) [N, Nm].
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        self._model, self._data = model, data
+        self._site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "flange")
+        self._jp = np.zeros((3, model.nv))
+        self._jr = np.zeros((3, model.nv))
+        self._applied, self._constraint = data.qfrc_applied[:7], data.qfrc_constraint[:7]
+        self._pulled = data.xfrc_applied
+        self._push: Array | None = None
+        self._until = inf
+        self.torque = np.zeros(7)
+        self.wrench = np.zeros(6)
+
+    def push(self, wrench: Array, until: float) -> None:
+        """Push the flange with a force and a torque, base axes, shape (6,), until a plant time [s]."""
+        self._push, self._until = wrench, until
+
+    def apply(self, time: float) -> None:
+        """Before the dynamics of a tick: turn a push into joint torques."""
+        if self._push is None:
+            return
+        if time >= self._until or not self._push.any():
+            self._push = None
+            self._applied[:] = 0.0
+            return
+        mujoco.mj_jacSite(self._model, self._data, self._jp, self._jr, self._site)
+        self._applied[:] = self._jp[:, :7].T @ self._push[:3] + self._jr[:, :7].T @ self._push[3:]
+
+    def measure(self, inertial: Array) -> None:
+        """After the dynamics of a tick: torques and wrench; zero without any load.
+
+        Args:
+            inertial: M q̈ + h - τ, what the model cannot explain, shape (7,) [Nm].
+        """
+        # pulls at bodies are in no vector of MuJoCo's, but in what the model cannot explain
+        self.torque = inertial if self._pulled.any() else self._applied + self._constraint
+        if not self.torque.any():
+            self.wrench[:] = 0.0
+            return
+        mujoco.mj_jacSite(self._model, self._data, self._jp, self._jr, self._site)
+        j = np.vstack([self._jp[:, :7], self._jr[:, :7]])
+        self.wrench = np.linalg.solve(j @ j.T + _DAMPED, j @ self.torque)
