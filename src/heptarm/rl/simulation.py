@@ -9,14 +9,18 @@ does not know (a payload) pulls as an external force.
 from __future__ import annotations
 
 from math import isfinite
+from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from heptarm import virtual
 from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import Array
-from heptarm.virtual.plant import BANDWIDTH, DAMPING, MODELS
+from heptarm.virtual.law import BANDWIDTH, DAMPING
+
+_MODELS = Path(str(virtual.__file__)).parent / "models"
 
 #: Steps of the engine in a decision.
 SUBSTEPS = 8
@@ -31,7 +35,7 @@ def build(task: ReachTask) -> Any:
     Returns:
         An `mujoco.MjModel`; its seven controls are commanded joints [rad].
     """
-    spec = mujoco.MjSpec.from_file(str(MODELS / f"{task.robot.replace('med', 'iiwa')}.xml"))
+    spec = mujoco.MjSpec.from_file(str(_MODELS / f"{task.robot.replace('med', 'iiwa')}.xml"))
     stiffness, damping = gains(mass(task))
     for index, servo in enumerate(spec.actuators):
         servo.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
@@ -49,7 +53,7 @@ def build(task: ReachTask) -> Any:
 
 def mass(task: ReachTask) -> Array:
     """Inertia that each joint moves at the task's home, shape (7,) [kg m²]."""
-    model = mujoco.MjModel.from_xml_path(str(MODELS / f"{task.robot.replace('med', 'iiwa')}.xml"))
+    model = mujoco.MjModel.from_xml_path(str(_MODELS / f"{task.robot.replace('med', 'iiwa')}.xml"))
     data = mujoco.MjData(model)
     data.qpos[:7] = task.home
     mujoco.mj_forward(model, data)

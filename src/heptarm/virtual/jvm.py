@@ -16,9 +16,13 @@ from typing import Any
 
 import jpype
 import jpype.nio
+import numpy as np
 
 from heptarm import _resources
-from heptarm.errors import MissingExtra
+from heptarm.errors import MissingExtra, Unreachable
+from heptarm.model.inverse import solve
+from heptarm.values.mode import JointImpedance, Mode
+from heptarm.values.pose import Pose
 from heptarm.virtual.order import Order, PlanError
 from heptarm.virtual.plant import Plant
 
@@ -106,22 +110,35 @@ class _Listener:
         self._java.finished(cause, text)
 
 
-def _order(java: Any) -> Order:
-    def numbers(values: Any) -> tuple[float, ...] | None:
-        return None if values is None else tuple(float(v) for v in values[:])
+def _numbers(values: Any) -> tuple[float, ...]:
+    return tuple(float(v) for v in values[:])
 
-    relative = numbers(java.relative) or ()
-    cartesian = numbers(java.cartesian) or ()
-    e1, status, turn = numbers(java.redundancy) or (float("nan"), -1.0, -1.0)
+
+def _numbers_if(values: Any) -> tuple[float, ...] | None:
+    return None if values is None else _numbers(values)
+
+
+def _mode(values: Any) -> Mode | None:
+    """A control mode as heptarm.doubles.MotionOrder describes it."""
+    if values is None:
+        return None
+    numbers = np.array(_numbers(values)[1:])
+    return JointImpedance(numbers[:7], numbers[7:])
+
+
+def _order(java: Any) -> Order:
+    relative, cartesian = _numbers(java.relative), _numbers(java.cartesian)
+    e1, status, turn = _numbers(java.redundancy)
+    minimum_time, goal_timeout, speed_timeout = _numbers(java.timing)
     return Order(
         int(java.id),
         str(java.kind),
-        joints=numbers(java.joints),
-        pose=numbers(java.pose),
+        joints=_numbers_if(java.joints),
+        pose=_numbers_if(java.pose),
         redundancy=(e1, int(status), int(turn)),
-        tcp=numbers(java.tcp) or (),
-        offset=numbers(java.offset),
-        reference=numbers(java.reference),
+        tcp=_numbers(java.tcp),
+        offset=_numbers_if(java.offset),
+        reference=_numbers_if(java.reference),
         joint_velocity=relative[:7],
         joint_acceleration=relative[7:14],
         joint_jerk=relative[14:21],
@@ -132,6 +149,10 @@ def _order(java: Any) -> Order:
         ori_acceleration=cartesian[4],
         ori_jerk=cartesian[5],
         duration=float(java.duration),
+        mode=_mode(java.mode),
+        minimum_time=minimum_time,
+        goal_timeout=goal_timeout,
+        speed_timeout=speed_timeout,
         listener=_Listener(java.listener),
     )
 
@@ -176,6 +197,21 @@ def open_station(plant: Plant) -> Any:
         @jpype.JOverride  # type: ignore[untyped-decorator]
         def resume(self) -> None:
             plant.resume()
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def changeMode(self, order_id: int, values: Any) -> None:
+            mode = _mode(values)
+            if mode is not None:
+                plant.change_mode(int(order_id), mode)
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def inverse(self, pose: Any, near: Any) -> Any:
+            numbers = _numbers(pose)
+            try:
+                found = solve(robot, Pose.of(numbers[:3], numbers[3:]), near=list(_numbers(near)))
+            except Unreachable:
+                return None
+            return jpype.JArray(jpype.JDouble)(found.tolist())
 
         @jpype.JOverride  # type: ignore[untyped-decorator]
         def links(self) -> Any:

@@ -1,4 +1,4 @@
-"""What acts on the arm from outside: pushes, contacts, a viewer's mouse; and the wrench at the flange they amount to."""
+"""What acts on the arm from outside: pushes, contacts, a viewer's mouse; and the wrench at the flange."""
 
 from __future__ import annotations
 

@@ -19,8 +19,8 @@ import numpy as np
 from heptarm.errors import Unreachable
 from heptarm.model.kinematics import flange
 from heptarm.values.arrays import Array
-from heptarm.values.robot import RobotModel, robot
 from heptarm.values.mode import JointImpedance, Mode
+from heptarm.values.robot import RobotModel, robot
 from heptarm.virtual import ring
 from heptarm.virtual.law import JointSpring, Law, PositionLaw, Sensed
 from heptarm.virtual.load import Load

@@ -22,6 +22,7 @@ public final class Container implements IMotionContainer, MotionListener {
     private final Station station;
     private final IMotionContainerListener listener;
     private final Ending ending;
+    private volatile ServoRuntime servo;
     private ExecutionState state = ExecutionState.Scheduled;
     private String error;
 
@@ -33,6 +34,18 @@ public final class Container implements IMotionContainer, MotionListener {
         this.ending = ending;
     }
 
+    /** Whoever waits for the activation of a servo motion hears of it here. */
+    public void serve(ServoRuntime runtime) {
+        servo = runtime;
+    }
+
+    private void activate() {
+        ServoRuntime runtime = servo;
+        if (runtime != null) {
+            runtime.activate();
+        }
+    }
+
     /** Whether this one was accepted before another. */
     public boolean precedes(Container other) {
         return id < other.id;
@@ -41,6 +54,7 @@ public final class Container implements IMotionContainer, MotionListener {
     @Override
     public void started() {
         change(ExecutionState.Executing, null);
+        activate();
         if (listener != null) {
             tell(() -> listener.onStateChanged(this, ExecutionState.Executing));
             tell(() -> listener.motionStarted(motion));
@@ -54,6 +68,7 @@ public final class Container implements IMotionContainer, MotionListener {
         if (!change(last, last == ExecutionState.Error ? text : null)) {
             return;
         }
+        activate();
         tell(() -> ending.ended(this));
         if (listener != null) {
             tell(() -> listener.motionFinished(motion));

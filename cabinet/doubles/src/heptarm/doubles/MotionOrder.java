@@ -22,6 +22,10 @@ public final class MotionOrder {
     public double[] cartesian = {Double.NaN, Double.NaN, Double.NaN, Double.NaN, Double.NaN, Double.NaN};
     /** Of a hold [s]; NaN: until cancelled. */
     public double duration = Double.NaN;
+    /** Control mode; null: position; 1 and stiffness, damping, seven each: joint impedance. */
+    public double[] mode;
+    /** Of a servo motion: shortest trajectory, time-out after the goal, time-out of its speed [s]. */
+    public double[] timing = {0.02, 30.0, 0.1};
     public MotionListener listener;
 
     public MotionOrder(long id, String kind) {

@@ -1,5 +1,8 @@
 package heptarm.doubles;
 
+import com.kuka.connectivity.motionModel.directServo.DirectServo;
+import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
+import com.kuka.connectivity.motionModel.smartServo.SmartServo;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
@@ -17,6 +20,9 @@ import com.kuka.roboticsAPI.motionModel.PositionHold;
 import com.kuka.roboticsAPI.motionModel.RelativeLIN;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 import com.kuka.roboticsAPI.motionModel.SplineMotionCP;
+import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
+import com.kuka.roboticsAPI.motionModel.controlModeModel.JointImpedanceControlMode;
+import com.kuka.roboticsAPI.motionModel.controlModeModel.PositionControlMode;
 
 /** Turns motions of the Sunrise API (millimetres) into the plant's orders (SI). */
 public final class Orders {
@@ -31,6 +37,7 @@ public final class Orders {
         order.tcp = pose(robot.getFlange().transformationTo(moved));
         if (motion instanceof RobotMotion) {
             order.relative = ((RobotMotion<?>) motion).relativeParameters();
+            order.mode = mode(((RobotMotion<?>) motion).getMode());
         }
         if (motion instanceof SplineMotionCP) {
             double[] cartesian = ((SplineMotionCP<?>) motion).cartesianParameters();
@@ -64,10 +71,30 @@ public final class Orders {
         } else if (motion instanceof PositionHold) {
             order = new MotionOrder(id, "hold");
             order.duration = ((PositionHold) motion).seconds();
+        } else if (motion instanceof SmartServo || motion instanceof DirectServo) {
+            order = new MotionOrder(id, motion instanceof SmartServo ? "servo" : "direct");
+            order.timing = ((ServoMotion<?>) motion).timing();
         } else {
             throw new IllegalArgumentException("the virtual cabinet cannot carry out a " + motion.getClass().getName());
         }
         return order;
+    }
+
+    /** A control mode as the plant takes it; null: position. */
+    public static double[] mode(IMotionControlMode mode) {
+        if (mode == null || mode instanceof PositionControlMode) {
+            return null;
+        }
+        if (!(mode instanceof JointImpedanceControlMode)) {
+            throw new IllegalArgumentException("the virtual cabinet has no " + mode.getClass().getName());
+        }
+        double[] stiffness = ((JointImpedanceControlMode) mode).getStiffness();
+        double[] damping = ((JointImpedanceControlMode) mode).getDamping();
+        double[] all = new double[1 + stiffness.length + damping.length];
+        all[0] = 1;
+        System.arraycopy(stiffness, 0, all, 1, stiffness.length);
+        System.arraycopy(damping, 0, all, 1 + stiffness.length, damping.length);
+        return all;
     }
 
     private static void target(MotionOrder order, AbstractFrame frame, LBR robot) {

@@ -18,6 +18,12 @@ public interface Plant {
 
     void resume();
 
+    /** Changes the parameters of a running order's control mode, see {@link MotionOrder#mode}. */
+    void changeMode(long id, double[] mode);
+
+    /** Joint positions [rad] that bring the flange to a pose in the base, nearest to others; null if there are none. */
+    double[] inverse(double[] pose, double[] near);
+
     /** Lengths base-shoulder, shoulder-elbow, elbow-wrist, wrist-flange [m]. */
     double[] links();
 }

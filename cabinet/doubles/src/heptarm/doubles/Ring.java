@@ -37,6 +37,14 @@ public final class Ring {
 
     static final long TICK_NS = 1000000L;
 
+    private static final int BOX_SEQ = 0;
+    private static final int BOX_ORDER = 8;
+    private static final int BOX_KIND = 16;
+    private static final int BOX_Q = 24;
+    private static final int BOX_DQ = 80;
+    private static final long TO_JOINTS = 1;
+    private static final long TO_JOINTS_WITH_VELOCITY = 2;
+
     private static final int WORDS = 64;
     private static final int HEADER = 64;
     private static final int NEWEST = 0;
@@ -52,11 +60,13 @@ public final class Ring {
 
     private final ByteBuffer memory;
     private final int slots;
+    private final int box;
     private final ThreadLocal<long[]> views = ThreadLocal.withInitial(() -> new long[] {-1});
 
     public Ring(ByteBuffer memory) {
         this.memory = memory.order(ByteOrder.nativeOrder());
         this.slots = (int) memory.getLong(8);
+        this.box = HEADER + slots * WORDS * 8;
     }
 
     private long word(int offset) {
@@ -83,6 +93,20 @@ public final class Ring {
     /** Factor on every programmed speed. */
     public void setOverride(double value) {
         LONGS.setRelease(memory, OVERRIDE, Double.doubleToRawLongBits(value));
+    }
+
+    /** Leaves a servo target for the plant's next tick; the newest counts. */
+    public synchronized void post(long order, double[] q, double[] velocity) {
+        long seq = memory.getLong(box + BOX_SEQ);
+        LONGS.setRelease(memory, box + BOX_SEQ, seq + 1);
+        VarHandle.storeStoreFence();
+        memory.putLong(box + BOX_ORDER, order);
+        memory.putLong(box + BOX_KIND, velocity == null ? TO_JOINTS : TO_JOINTS_WITH_VELOCITY);
+        for (int i = 0; i < q.length; i++) {
+            memory.putDouble(box + BOX_Q + 8 * i, q[i]);
+            memory.putDouble(box + BOX_DQ + 8 * i, velocity == null ? 0.0 : velocity[i]);
+        }
+        LONGS.setRelease(memory, box + BOX_SEQ, seq + 2);
     }
 
     /** The calling thread's getters read this tick from now on. */

@@ -7,6 +7,9 @@ import java.util.List;
 import java.util.Map;
 import java.util.concurrent.atomic.AtomicLong;
 
+import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
+import com.kuka.connectivity.motionModel.smartServo.SmartServo;
+import com.kuka.connectivity.motionModel.directServo.DirectServo;
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.controllerModel.sunrise.ISafetyState;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseSafetyState;
@@ -30,11 +33,18 @@ import heptarm.doubles.Desk;
 import heptarm.doubles.MotionOrder;
 import heptarm.doubles.Orders;
 import heptarm.doubles.Ring;
+import heptarm.doubles.ServoRuntime;
 import heptarm.doubles.Station;
 
 /** The robot. Motions of the robot itself move its flange. */
 public class LBR extends Robot {
     private static final int AXES = 7;
+    /** Rounding [rad]. */
+    private static final double ON_LIMIT = 1e-9;
+    /** Of the checks before impedance control: [Nm], [rad/s], elbow's angle [rad]. */
+    private static final double LARGEST_EXTERNAL = 10.0;
+    private static final double AT_REST = 0.01;
+    private static final double SINGULAR = 0.02;
 
     private final Station station;
     private final Arm arm;
@@ -113,7 +123,12 @@ public class LBR extends Robot {
     }
 
     public Frame getCommandedCartesianPosition(ObjectFrame frameOnRobot) {
-        Transformation commanded = arm.flange(numbers(Ring.Q_CMD, AXES));
+        return cartesian(getCommandedJointPosition(), frameOnRobot);
+    }
+
+    /** Where a frame on the robot is when the joints are somewhere; for the simulation. */
+    public Frame cartesian(JointPosition joints, ObjectFrame frameOnRobot) {
+        Transformation commanded = arm.flange(joints.get());
         return new Frame(frameOnRobot == flange ? commanded : commanded.compose(flange.transformationTo(frameOnRobot)));
     }
 
@@ -166,6 +181,29 @@ public class LBR extends Robot {
         return new SunriseSafetyState(station.ring.integer(Ring.FLAGS), getOperationMode());
     }
 
+    /** Refuses joint positions that the robot cannot have, in Sunrise's words; for the simulation. */
+    public void checkLimits(JointPosition joints) {
+        double[] limits = station.plant.limits();
+        for (int i = 0; i < AXES; i++) {
+            double value = joints.get(i);
+            if (!(value >= limits[i] - ON_LIMIT && value <= limits[AXES + i] + ON_LIMIT)) {
+                throw new CommandInvalidException("Command Position violates limit A" + (i + 1) + ": " + value + " rad");
+            }
+        }
+    }
+
+    /** Whether impedance control may begin: at rest, nothing pushes, not stretched out; for the simulation. */
+    public boolean isFitForImpedance() {
+        double[] external = numbers(Ring.TAU_EXT, AXES);
+        double[] speed = numbers(Ring.DQ, AXES);
+        for (int i = 0; i < AXES; i++) {
+            if (Math.abs(external[i]) >= LARGEST_EXTERNAL || Math.abs(speed[i]) > AT_REST) {
+                return false;
+            }
+        }
+        return Math.abs(numbers(Ring.Q, AXES)[3]) > SINGULAR;
+    }
+
     public IMotionContainer move(IMotion motion) {
         return moveFrame(flange, motion, null);
     }
@@ -202,6 +240,9 @@ public class LBR extends Robot {
         MotionOrder order = Orders.of(id, motion, moved, this);
         Container container = new Container(id, motion, station, listener, this::ended);
         order.listener = container;
+        if (motion instanceof ServoMotion) {
+            serve((ServoMotion<?>) motion, container, moved);
+        }
         synchronized (open) {
             open.put(container, asynchronous);
         }
@@ -218,6 +259,15 @@ public class LBR extends Robot {
             container.finished("error", error);
         }
         return container;
+    }
+
+    private void serve(ServoMotion<?> motion, Container container, ObjectFrame moved) {
+        JointPosition start = motion instanceof SmartServo ? ((SmartServo) motion).getStart()
+                : ((DirectServo) motion).getStart();
+        checkLimits(start);
+        ServoRuntime runtime = new ServoRuntime(station, this, container, moved, motion.getMode());
+        container.serve(runtime);
+        motion.accepted(runtime);
     }
 
     /** A failed asynchronous motion takes those behind it with it. */

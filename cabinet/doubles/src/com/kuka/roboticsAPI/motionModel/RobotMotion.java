@@ -82,14 +82,14 @@ public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
         return new double[] {blendingRel, blendingCart, blendingOri};
     }
 
-    static double notNegative(String name, double value) {
+    protected static double notNegative(String name, double value) {
         if (!(value >= 0.0) || Double.isInfinite(value)) {
             throw new IllegalArgumentException(name + " is " + value + "; it must not be negative");
         }
         return value;
     }
 
-    static double positive(String name, double value) {
+    protected static double positive(String name, double value) {
         if (!(value > 0.0) || Double.isInfinite(value)) {
             throw new IllegalArgumentException(name + " is " + value + "; it has to be positive");
         }

@@ -1,0 +1,12 @@
+package com.kuka.connectivity.motionModel.directServo;
+
+import com.kuka.connectivity.motionModel.smartServo.IServoRuntime;
+import com.kuka.roboticsAPI.deviceModel.JointPosition;
+import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+
+/** A running DirectServo. */
+public interface IDirectServoRuntime extends IServoRuntime {
+    long setDestination(JointPosition destination);
+
+    long setDestination(AbstractFrame destination);
+}

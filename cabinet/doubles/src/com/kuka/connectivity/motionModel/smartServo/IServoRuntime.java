@@ -1,0 +1,26 @@
+package com.kuka.connectivity.motionModel.smartServo;
+
+import com.kuka.roboticsAPI.deviceModel.JointPosition;
+import com.kuka.roboticsAPI.geometricModel.Frame;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
+
+/** What all servo motions can do while they run. */
+public interface IServoRuntime {
+    /** Refreshes what the getters tell; a time stamp [ms]. */
+    long updateWithRealtimeSystem();
+
+    boolean stopMotion();
+
+    double getRemainingTime();
+
+    boolean isDestinationReached();
+
+    void changeControlModeSettings(IMotionControlMode mode);
+
+    void setGoalReachedEventHandler(IServoOnGoalReachedEvent handler);
+
+    JointPosition getCurrentJointDestination();
+
+    Frame getCurrentCartesianDestination(ObjectFrame frame);
+}

@@ -1,0 +1,93 @@
+package com.kuka.connectivity.motionModel.smartServo;
+
+import java.util.concurrent.TimeUnit;
+
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
+import com.kuka.roboticsAPI.motionModel.RobotMotion;
+
+import heptarm.doubles.ServoRuntime;
+import heptarm.doubles.Station;
+
+/** A motion that follows destinations given while it runs; {@code T} is its own type, so that setters chain. */
+public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<T> {
+    private static final double EXECUTION_TIME = 0.02;
+    private static final double GOAL_TIMEOUT = 30.0;
+    private static final double SPEED_TIMEOUT = 0.1;
+
+    private double minimumTrajectoryExecutionTime = EXECUTION_TIME;
+    private double timeoutAfterGoalReach = GOAL_TIMEOUT;
+    private double speedTimeoutAfterGoalReach = SPEED_TIMEOUT;
+    private ServoRuntime runtime;
+
+    /** Whether a servo motion under impedance control may begin now: at rest, nothing pushes, not singular, the load data right. */
+    public static boolean validateForImpedanceMode(PhysicalObject object) {
+        LBR robot = Station.current().robot;
+        return robot.isFitForImpedance();
+    }
+
+    public T setMinimumTrajectoryExecutionTime(double seconds) {
+        minimumTrajectoryExecutionTime = positive("minimumTrajectoryExecutionTime", seconds);
+        return self();
+    }
+
+    public T setTimeoutAfterGoalReach(double seconds) {
+        timeoutAfterGoalReach = positive("timeoutAfterGoalReach", seconds);
+        return self();
+    }
+
+    public T setTimeoutAfterGoalReach(long time, TimeUnit unit) {
+        return setTimeoutAfterGoalReach(unit.toNanos(time) * 1e-9);
+    }
+
+    public T setSpeedTimeoutAfterGoalReach(double seconds) {
+        speedTimeoutAfterGoalReach = positive("speedTimeoutAfterGoalReach", seconds);
+        return self();
+    }
+
+    /** A larger acceleration than the robot's own is not simulated. */
+    public T overrideJointAcceleration(double factor) {
+        positive("factor", factor);
+        return self();
+    }
+
+    /** The trace is a file for KUKA's service. */
+    public T useTrace(boolean on) {
+        return self();
+    }
+
+    /** The running motion; waits until it has begun. */
+    public IServoRuntime getRuntime() {
+        return getRuntime(true);
+    }
+
+    /** The running motion; with {@code waitForActivation} it waits until it has begun. */
+    public IServoRuntime getRuntime(boolean waitForActivation) {
+        return running(waitForActivation);
+    }
+
+    /** The same for the simulation. */
+    protected final ServoRuntime running(boolean waitForActivation) {
+        ServoRuntime accepted;
+        synchronized (this) {
+            accepted = runtime;
+        }
+        if (accepted == null) {
+            throw new IllegalStateException("the servo motion was not commanded yet; call moveAsync first");
+        }
+        if (waitForActivation) {
+            accepted.awaitActivation();
+        }
+        return accepted;
+    }
+
+    /** Execution time, time-out after the goal, time-out of its speed [s]; for the simulation. */
+    public double[] timing() {
+        return new double[] {minimumTrajectoryExecutionTime, timeoutAfterGoalReach, speedTimeoutAfterGoalReach};
+    }
+
+    /** The cabinet has accepted the motion; for the simulation. */
+    public synchronized void accepted(ServoRuntime accepted) {
+        runtime = accepted;
+    }
+}

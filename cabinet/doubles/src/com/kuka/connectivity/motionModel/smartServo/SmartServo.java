@@ -1,0 +1,26 @@
+package com.kuka.connectivity.motionModel.smartServo;
+
+import com.kuka.roboticsAPI.deviceModel.JointPosition;
+
+/** Plans a limited trajectory to each destination, far or near; begins at a position that has to be the present one. */
+public class SmartServo extends ServoMotionJP<SmartServo> {
+    private final JointPosition start;
+
+    public SmartServo(JointPosition start) {
+        this.start = new JointPosition(start);
+    }
+
+    @Override
+    public ISmartServoRuntime getRuntime() {
+        return running(true);
+    }
+
+    @Override
+    public ISmartServoRuntime getRuntime(boolean waitForActivation) {
+        return running(waitForActivation);
+    }
+
+    public JointPosition getStart() {
+        return new JointPosition(start);
+    }
+}

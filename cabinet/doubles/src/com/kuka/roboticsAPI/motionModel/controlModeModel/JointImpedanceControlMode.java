@@ -1,0 +1,78 @@
+package com.kuka.roboticsAPI.motionModel.controlModeModel;
+
+import java.util.Arrays;
+
+/** A spring and a damper in every joint [Nm/rad], damping as a ratio. */
+public class JointImpedanceControlMode extends AbstractMotionControlMode {
+    private static final double STIFFNESS = 1000.0;
+    private static final double DAMPING = 0.7;
+
+    private final double[] stiffness;
+    private final double[] damping;
+
+    public JointImpedanceControlMode(int jointCount) {
+        stiffness = new double[jointCount];
+        damping = new double[jointCount];
+        Arrays.fill(stiffness, STIFFNESS);
+        Arrays.fill(damping, DAMPING);
+    }
+
+    public JointImpedanceControlMode(double... stiffness) {
+        this(stiffness.length);
+        setStiffness(stiffness);
+    }
+
+    public JointImpedanceControlMode(JointImpedanceControlMode other) {
+        stiffness = other.stiffness.clone();
+        damping = other.damping.clone();
+    }
+
+    private void set(double[] into, String name, double high, double[] values) {
+        if (values.length != into.length) {
+            throw new IllegalArgumentException(name + " takes " + into.length + " values, not " + values.length);
+        }
+        for (double value : values) {
+            if (!(value >= 0.0 && value <= high)) {
+                throw new IllegalArgumentException(name + " is " + value + "; it has to be in [0, " + high + "]");
+            }
+        }
+        System.arraycopy(values, 0, into, 0, into.length);
+    }
+
+    private double[] all(double value) {
+        double[] values = new double[stiffness.length];
+        Arrays.fill(values, value);
+        return values;
+    }
+
+    public JointImpedanceControlMode setStiffness(double... values) {
+        set(stiffness, "stiffness", Double.MAX_VALUE, values);
+        return this;
+    }
+
+    public JointImpedanceControlMode setStiffnessForAllJoints(double value) {
+        return setStiffness(all(value));
+    }
+
+    public JointImpedanceControlMode setDamping(double... values) {
+        set(damping, "damping", 1.0, values);
+        return this;
+    }
+
+    public JointImpedanceControlMode setDampingForAllJoints(double value) {
+        return setDamping(all(value));
+    }
+
+    public double[] getStiffness() {
+        return stiffness.clone();
+    }
+
+    public double[] getDamping() {
+        return damping.clone();
+    }
+
+    @Override
+    public String toString() {
+        return "JointImpedanceControlMode, stiffness " + Arrays.toString(stiffness) + ", damping " + Arrays.toString(damping);
+    }
+}

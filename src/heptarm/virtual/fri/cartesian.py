@@ -1,0 +1,104 @@
+"""Cartesian poses as FRI writes them, and the joints that reach one at a given A3.
+
+FRI's poses are x y z [mm] and a quaternion w x y z, of the flange in the robot's base; its redundancy value is the
+angle of A3 [rad].
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from heptarm.errors import Unreachable
+from heptarm.fri import messages as m
+from heptarm.model.kinematics import forward, jacobian
+from heptarm.values.arrays import Array
+from heptarm.values.pose import quaternion, rotation
+from heptarm.values.robot import RobotModel
+
+#: What FRI calls the flange.
+NAME = "Flange"
+
+#: A quaternion whose norm is further than this from 1 is none.
+NORM = 1e-3
+#: The joints are found when the pose is met to this [m, rad].
+MET = 1e-9
+STEPS = 8
+#: No step of the search turns a joint further [rad].
+STRIDE = 0.2
+
+
+def transformation(robot: RobotModel, q: tuple[float, ...]) -> m.Transformation:
+    """The flange's pose at joint positions, shape (7,) [rad]."""
+    pose = forward(robot, q)
+    x, y, z, w = quaternion(pose[:3, :3]).tolist()
+    x_mm, y_mm, z_mm = (1e3 * pose[:3, 3]).tolist()
+    return m.Transformation(NAME, (x_mm, y_mm, z_mm, w, x, y, z))
+
+
+def matrix(pose: m.Transformation) -> Array:
+    """The pose as a homogeneous matrix, shape (4, 4) [m].
+
+    Raises:
+        ValueError: a number is not finite, or the quaternion has not the norm 1.
+    """
+    values = np.array(pose.values)
+    norm = sqrt(float(values[3:] @ values[3:])) if np.isfinite(values).all() else 0.0
+    if abs(norm - 1.0) > NORM:
+        raise ValueError(f"Cartesian pose {values.tolist()}: no finite pose with a unit quaternion")
+    w, x, y, z = (values[3:] / norm).tolist()
+    result = np.eye(4)
+    result[:3, :3] = rotation(np.array((x, y, z, w)))
+    result[:3, 3] = 1e-3 * values[:3]
+    return result
+
+
+def apart(first: Array, second: Array) -> tuple[float, float]:
+    """Distance [m] and angle [rad] between two poses, shape (4, 4)."""
+    error = _error(first, second)
+    return float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
+
+
+def _error(goal: Array, here: Array) -> Array:
+    """Translation and rotation vector from `here` to `goal`, base axes, shape (6,); good to second order."""
+    turn = goal[:3, :3] @ here[:3, :3].T
+    axial = 0.5 * np.array((turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]))
+    sine, cosine = float(np.linalg.norm(axial)), 0.5 * (float(np.trace(turn)) - 1.0)
+    scale = np.arctan2(sine, cosine) / sine if sine > 1e-12 else 1.0
+    return np.concatenate([goal[:3, 3] - here[:3, 3], scale * axial])
+
+
+def joints(robot: RobotModel, goal: Array, a3: float, near: Array) -> Array:
+    """Joint positions next to `near` that bring the flange to a pose with A3 at an angle.
+
+    Newton's method on the pose and A3 together: seven equations, seven joints.
+
+    Args:
+        robot: the robot.
+        goal: shape (4, 4) [m].
+        a3: angle of A3 [rad].
+        near: where to begin, shape (7,) [rad]; poses of a session lie close together.
+
+    Returns:
+        Shape (7,) [rad].
+
+    Raises:
+        Unreachable: there is none near by.
+    """
+    q = near.copy()
+    equations = np.zeros((7, 7))
+    equations[6, 2] = 1.0
+    for _ in range(STEPS):
+        wanted = np.append(_error(goal, forward(robot, q)), a3 - q[2])
+        if float(np.abs(wanted).max()) <= MET:
+            return q
+        equations[:6] = jacobian(robot, q)
+        try:
+            step = np.linalg.solve(equations, wanted)
+        except np.linalg.LinAlgError:
+            break
+        q = q + step * min(1.0, STRIDE / max(float(np.abs(step).max()), 1e-12))
+    raise Unreachable(
+        f"no joint position near the present one leads to the Cartesian pose with A3 at {np.degrees(a3):.2f} deg"
+    )
