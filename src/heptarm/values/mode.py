@@ -1,4 +1,4 @@
-"""Control modes: how the arm holds on to its set-points.
+"""Control modes: how the arm holds on to its set-points; frozen values, to be reused and composed.
 
 ::
 
@@ -6,19 +6,55 @@
 
 In position control it does so as stiffly as it can; in an impedance mode like a spring with a damper, so that it
 yields to whoever pushes. Ranges and defaults are those of Sunrise's control modes.
+
+Cartesian directions are in the order x y z, then about x, about y, about z. Where a direction is given by its name,
+rotations bear KUKA's: "a" is about z, "b" about y, "c" about x.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import isnan, nan, pi
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.values.arrays import Array, Value, array, frozen, within
+from heptarm.values.motion import TOOL
 
 #: Largest stiffness of a joint [Nm/rad].
 STIFFEST_JOINT = 5000.0
+#: Largest stiffness along an axis [N/m] and about one [Nm/rad].
+STIFFEST = (5000.0, 300.0)
+#: Defaults of the impedance modes.
+STIFFNESS = (2000.0, 2000.0, 2000.0, 200.0, 200.0, 200.0)
+DAMPING = 0.7
+NULLSPACE_STIFFNESS = 100.0
+#: Largest force [N] or torque [Nm], and largest value of a limit on one.
+STRONGEST = 500.0
+UNLIMITED = 1e6
+#: Highest frequency of an overlaid force [Hz].
+FASTEST = 15.0
+#: Second over first frequency of a Lissajous pattern, and the second one's phase [rad].
+LISSAJOUS_RATIO = 0.4
+LISSAJOUS_PHASE = pi / 2
+
+#: Index of a direction by its name.
+DIRECTIONS = {"x": 0, "y": 1, "z": 2, "c": 3, "b": 4, "a": 5}
+#: The directions of a plane.
+PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+
+_FORCE = ("N", "Nm")
+_WAY = ("m", "rad")
+_SPEED = ("m/s", "rad/s")
+_NO_FORCE = (0.0,) * 6
+_LONGEST_TIME = 1e6
+_LONGEST_NAME = 128
+
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,7 +62,7 @@ class Position(Value):
     """Stiff position control, the default."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, init=False)
 class JointImpedance(Value):
     """A spring and a damper in every joint.
 
@@ -40,21 +76,460 @@ class JointImpedance(Value):
     """
 
     stiffness: Array
-    damping: Array = 0.7  # type: ignore[assignment]
+    damping: Array
 
-    def __post_init__(self) -> None:
-        object.__setattr__(
-            self, "stiffness", per_joint(self.stiffness, "stiffness", STIFFEST_JOINT, "Nm/rad")
+    def __init__(self, stiffness: npt.ArrayLike, *, damping: npt.ArrayLike = DAMPING) -> None:
+        _set(self, "stiffness", _each(stiffness, 7, "stiffness", 0.0, STIFFEST_JOINT, "Nm/rad"))
+        _set(self, "damping", _each(damping, 7, "damping", 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class CartesianImpedance(Value):
+    """A spring and a damper between the moved frame and its set-point, and another that keeps the elbow.
+
+    Args:
+        stiffness: shape (6,); along the axes 0 to 5000 N/m, about them 0 to 300 Nm/rad.
+        damping: damping ratio, one number for all directions or shape (6,), 0.1 to 1.
+        nullspace_stiffness: of the spring that keeps the elbow [Nm/rad], 0 to 5000.
+        nullspace_damping: its damping ratio, 0.3 to 1.
+        additional_force: acts besides the springs, shape (6,) [N, Nm], -500 to 500.
+        max_force: largest force that the control exerts, shape (6,) [N, Nm], 0 to 1e6; NaN or None: unlimited.
+        max_force_stops: reaching it also stops the motion.
+        max_velocity: of the moved frame, shape (6,) [m/s, rad/s], up to 100; a higher one stops the motion; NaN or
+            None: unlimited.
+        max_deviation: from the set-point, shape (6,) [m, rad], up to 100; a larger one stops the motion; NaN or None:
+            unlimited.
+        frame: whose axes the directions are: "tool" (the moved frame's own), "base", or a frame's name.
+
+    Raises:
+        ShapeError: a wrong shape or type.
+        LimitError: a value outside its range.
+        CommandRejected: reaching a force shall stop the motion, but none is given.
+    """
+
+    stiffness: Array
+    damping: Array
+    nullspace_stiffness: float
+    nullspace_damping: float
+    additional_force: Array
+    max_force: Array
+    max_force_stops: bool
+    max_velocity: Array
+    max_deviation: Array
+    frame: str
+
+    def __init__(
+        self,
+        stiffness: npt.ArrayLike = STIFFNESS,
+        *,
+        damping: npt.ArrayLike = DAMPING,
+        nullspace_stiffness: float = NULLSPACE_STIFFNESS,
+        nullspace_damping: float = DAMPING,
+        additional_force: npt.ArrayLike = _NO_FORCE,
+        max_force: npt.ArrayLike | None = None,
+        max_force_stops: bool = False,
+        max_velocity: npt.ArrayLike | None = None,
+        max_deviation: npt.ArrayLike | None = None,
+        frame: str = TOOL,
+    ) -> None:
+        _set(self, "stiffness", _stiffness(stiffness))
+        _set(self, "damping", _each(damping, 6, "damping", 0.1, 1.0))
+        _set(
+            self,
+            "nullspace_stiffness",
+            _one(nullspace_stiffness, "nullspace_stiffness", 0.0, 5000.0, "Nm/rad"),
         )
-        object.__setattr__(self, "damping", per_joint(self.damping, "damping", 1.0, ""))
+        _set(self, "nullspace_damping", _one(nullspace_damping, "nullspace_damping", 0.3, 1.0))
+        _set(
+            self,
+            "additional_force",
+            _six(additional_force, "additional_force", -STRONGEST, STRONGEST, _FORCE),
+        )
+        _set(self, "max_force", _limit(max_force, "max_force", UNLIMITED, _FORCE))
+        _set(self, "max_force_stops", _flag(max_force_stops, "max_force_stops"))
+        _set(self, "max_velocity", _limit(max_velocity, "max_velocity", 100.0, _SPEED, above=True))
+        _set(self, "max_deviation", _limit(max_deviation, "max_deviation", 100.0, _WAY, above=True))
+        _set(self, "frame", _name(frame))
+        if self.max_force_stops and np.isnan(self.max_force).all():
+            raise CommandRejected(
+                "max_force_stops is given without a max_force",
+                code=2,
+                parameter="max_force_stops",
+                hint="give a max_force for the directions meant",
+            )
 
 
-Mode = Position | JointImpedance
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class SineImpedance(Value):
+    """Cartesian impedance with a force laid over it: bias + amplitude * sin(2 pi frequency t + phase).
+
+    The class methods build the four patterns; `timed` bounds one in time. The force rises evenly for `rise_time`, lasts
+    for `hold_time` and falls evenly for `fall_time`; after `total_time` it is gone in any case.
+
+    Args:
+        base: the impedance under it; None: the default one.
+        amplitude: shape (6,) [N, Nm], 0 to 500.
+        frequency: shape (6,) [Hz], 0 to 15.
+        phase: at the beginning, shape (6,) [rad], 0 to 6.3.
+        bias: constant part, shape (6,) [N, Nm], -500 to 500.
+        force_limit: largest overlaid force, shape (6,) [N, Nm], 0 to 1e6; NaN or None: unlimited.
+        position_limit: deviation from the set-point that the overlaid force does not push beyond, shape (6,)
+            [m, rad], 0 to 100; NaN or None: unlimited.
+        total_time: [s], up to 1e6; NaN or None: as the other times say.
+        rise_time: [s], up to 1e6.
+        hold_time: [s], up to 1e6; NaN or None: what `total_time` leaves, without one until the motion ends.
+        fall_time: [s], up to 1e6.
+        stay_active: the motion does not end before the pattern has.
+
+    Raises:
+        ShapeError: a wrong shape or type.
+        LimitError: a value outside its range.
+        CommandRejected: times that contradict each other.
+    """
+
+    base: CartesianImpedance
+    amplitude: Array
+    frequency: Array
+    phase: Array
+    bias: Array
+    force_limit: Array
+    position_limit: Array
+    total_time: float
+    rise_time: float
+    hold_time: float
+    fall_time: float
+    stay_active: bool
+
+    def __init__(
+        self,
+        base: CartesianImpedance | None = None,
+        *,
+        amplitude: npt.ArrayLike = _NO_FORCE,
+        frequency: npt.ArrayLike = (0.0,) * 6,
+        phase: npt.ArrayLike = (0.0,) * 6,
+        bias: npt.ArrayLike = _NO_FORCE,
+        force_limit: npt.ArrayLike | None = None,
+        position_limit: npt.ArrayLike | None = None,
+        total_time: float | None = None,
+        rise_time: float = 0.0,
+        hold_time: float | None = None,
+        fall_time: float = 0.0,
+        stay_active: bool = False,
+    ) -> None:
+        _set(self, "base", _base(base))
+        _set(self, "amplitude", _six(amplitude, "amplitude", 0.0, STRONGEST, _FORCE))
+        _set(self, "frequency", _six(frequency, "frequency", 0.0, FASTEST, ("Hz", "Hz")))
+        _set(self, "phase", _six(phase, "phase", 0.0, 6.3, ("rad", "rad")))
+        _set(self, "bias", _six(bias, "bias", -STRONGEST, STRONGEST, _FORCE))
+        _set(self, "force_limit", _limit(force_limit, "force_limit", UNLIMITED, _FORCE))
+        _set(self, "position_limit", _limit(position_limit, "position_limit", 100.0, _WAY))
+        _set(self, "total_time", _time(total_time, "total_time"))
+        _set(self, "rise_time", _one(rise_time, "rise_time", 0.0, _LONGEST_TIME, "s"))
+        _set(self, "hold_time", _time(hold_time, "hold_time"))
+        _set(self, "fall_time", _one(fall_time, "fall_time", 0.0, _LONGEST_TIME, "s"))
+        _set(self, "stay_active", _flag(stay_active, "stay_active"))
+        ramps = self.rise_time + self.fall_time
+        if ramps > self.total_time:
+            raise CommandRejected(
+                f"rise_time and fall_time take {ramps:g} s; total_time is {self.total_time:g} s",
+                code=2,
+                parameter="total_time",
+                value=self.total_time,
+                hint="give a longer total_time",
+            )
+        if self.stay_active and isnan(self.duration):
+            raise CommandRejected(
+                "stay_active waits for a pattern without an end",
+                code=2,
+                parameter="stay_active",
+                hint="give a total_time or a hold_time",
+            )
+
+    @property
+    def duration(self) -> float:
+        """When the overlaid force is gone [s]; NaN: it lasts as long as the motion."""
+        return float(np.fmin(self.total_time, self.rise_time + self.hold_time + self.fall_time))
+
+    @classmethod
+    def force(
+        cls,
+        *,
+        x: float = 0.0,
+        y: float = 0.0,
+        z: float = 0.0,
+        a: float = 0.0,
+        b: float = 0.0,
+        c: float = 0.0,
+        stiffness: float | None = None,
+        base: CartesianImpedance | None = None,
+    ) -> SineImpedance:
+        """Pattern of a constant force.
+
+        Args:
+            x: force along x [N], as y and z.
+            y: see x.
+            z: see x.
+            a: torque about z [Nm].
+            b: torque about y [Nm].
+            c: torque about x [Nm].
+            stiffness: of the directions in which a force acts [N/m or Nm/rad]; None: the base's.
+            base: the impedance under it; None: the default one.
+
+        Raises:
+            LimitError: a value outside its range.
+        """
+        bias = _six((x, y, z, c, b, a), "bias", -STRONGEST, STRONGEST, _FORCE)
+        return cls(_with(base, stiffness, np.flatnonzero(bias).tolist()), bias=bias)
+
+    @classmethod
+    def sine(
+        cls,
+        direction: str,
+        *,
+        frequency: float,
+        amplitude: float,
+        phase: float = 0.0,
+        bias: float = 0.0,
+        stiffness: float | None = None,
+        base: CartesianImpedance | None = None,
+    ) -> SineImpedance:
+        """Pattern of a force that swings in one direction.
+
+        Args:
+            direction: "x", "y", "z", or a torque: "a" (about z), "b" (about y), "c" (about x).
+            frequency: [Hz], up to 15.
+            amplitude: [N], of a torque [Nm], up to 500.
+            phase: at the beginning [rad].
+            bias: what it swings about [N], of a torque [Nm].
+            stiffness: of that direction [N/m or Nm/rad]; None: the base's.
+            base: the impedance under it; None: the default one.
+
+        Raises:
+            ShapeError: no such direction.
+            LimitError: a value outside its range.
+        """
+        index = _choice(direction, "direction", DIRECTIONS)
+        return cls(
+            _with(base, stiffness, [index]),
+            amplitude=_at([index], [amplitude]),
+            frequency=_at([index], [frequency]),
+            phase=_at([index], [phase]),
+            bias=_at([index], [bias]),
+        )
+
+    @classmethod
+    def lissajous(
+        cls,
+        plane: str,
+        *,
+        frequency: float,
+        amplitude: float,
+        stiffness: float | None = None,
+        base: CartesianImpedance | None = None,
+    ) -> SineImpedance:
+        """Pattern of a force that draws a Lissajous figure; the second axis swings 0.4 times as fast.
+
+        Args:
+            plane: "xy", "xz" or "yz".
+            frequency: along the plane's first axis [Hz], up to 15.
+            amplitude: along both axes [N], up to 500.
+            stiffness: along both axes [N/m]; None: the base's.
+            base: the impedance under it; None: the default one.
+
+        Raises:
+            ShapeError: no such plane.
+            LimitError: a value outside its range.
+        """
+        axes = _choice(plane, "plane", PLANES)
+        first = _one(frequency, "frequency", 0.0, FASTEST, "Hz")
+        return cls(
+            _with(base, stiffness, axes),
+            amplitude=_at(axes, [amplitude, amplitude]),
+            frequency=_at(axes, [first, LISSAJOUS_RATIO * first]),
+            phase=_at(axes, [0.0, LISSAJOUS_PHASE]),
+        )
+
+    @classmethod
+    def spiral(
+        cls,
+        plane: str,
+        *,
+        frequency: float,
+        amplitude: float,
+        total_time: float,
+        stiffness: float | None = None,
+        base: CartesianImpedance | None = None,
+    ) -> SineImpedance:
+        """Pattern of a force that goes round in a spiral: outwards for half of its time, then back.
+
+        Args:
+            plane: "xy", "xz" or "yz".
+            frequency: turns in a second [Hz], up to 15.
+            amplitude: of the outermost turn [N], up to 500.
+            total_time: [s], up to 1e6.
+            stiffness: along both axes [N/m]; None: the base's.
+            base: the impedance under it; None: the default one.
+
+        Raises:
+            ShapeError: no such plane.
+            LimitError: a value outside its range.
+        """
+        axes = _choice(plane, "plane", PLANES)
+        time = _one(total_time, "total_time", 0.0, _LONGEST_TIME, "s", above=True)
+        return cls(
+            _with(base, stiffness, axes),
+            amplitude=_at(axes, [amplitude, amplitude]),
+            frequency=_at(axes, [frequency, frequency]),
+            phase=_at(axes, [pi / 2, 0.0]),
+            total_time=time,
+            rise_time=0.5 * time,
+            fall_time=0.5 * time,
+        )
+
+    def timed(
+        self,
+        *,
+        rise_time: float = 0.0,
+        hold_time: float | None = None,
+        fall_time: float = 0.0,
+        total_time: float | None = None,
+        stay_active: bool = False,
+    ) -> SineImpedance:
+        """The same pattern with these times, see the class.
+
+        Raises:
+            LimitError: a time outside its range.
+            CommandRejected: times that contradict each other.
+        """
+        return replace(
+            self,
+            rise_time=rise_time,
+            hold_time=nan if hold_time is None else hold_time,
+            fall_time=fall_time,
+            total_time=nan if total_time is None else total_time,
+            stay_active=stay_active,
+        )
 
 
-def per_joint(value: npt.ArrayLike, name: str, high: float, unit: str) -> Array:
-    """Seven numbers in [0, high], from one or seven."""
-    result = array(np.full(7, value) if np.ndim(value) == 0 else value, 7, name)
+Mode: TypeAlias = Position | JointImpedance | CartesianImpedance | SineImpedance
+
+
+def _set(value: Value, name: str, content: object) -> None:
+    object.__setattr__(value, name, content)
+
+
+def _one(value: float, name: str, low: float, high: float, unit: str = "", *, above: bool = False) -> float:
+    """A number in [low, high] that has no default to keep."""
+    number = within(value, name, low, high, above=above, unit=unit)
+    if isnan(number):
+        raise LimitError(f"{name} is not given; a number is wanted", code=1, parameter=name, value=value)
+    return number
+
+
+def _each(value: npt.ArrayLike, size: int, name: str, low: float, high: float, unit: str = "") -> Array:
+    """One number for all joints or directions, or one for each."""
+    result = array(np.full(size, value) if np.ndim(value) == 0 else value, size, name)
     for index, entry in enumerate(result.tolist()):
-        within(entry, f"{name}[{index}]", 0.0, high, unit=unit)
-    return frozen(result)
+        within(entry, f"{name}[{index}]", low, high, unit=unit)
+    return result
+
+
+def _six(value: npt.ArrayLike, name: str, low: float, high: float, units: tuple[str, str]) -> Array:
+    """One number for each direction; units along and about an axis."""
+    result = array(value, 6, name)
+    for index, entry in enumerate(result.tolist()):
+        within(entry, f"{name}[{index}]", low, high, unit=units[index // 3])
+    return result
+
+
+def _stiffness(value: npt.ArrayLike) -> Array:
+    if np.ndim(value) == 0:
+        raise ShapeError(
+            f"stiffness is {value!r}; 6 numbers are wanted",
+            parameter="stiffness",
+            value=value,
+            hint="three along the axes [N/m], three about them [Nm/rad]",
+        )
+    result = array(value, 6, "stiffness")
+    for index, entry in enumerate(result.tolist()):
+        unit = "N/m" if index < 3 else "Nm/rad"
+        within(entry, f"stiffness[{index}]", 0.0, STIFFEST[index // 3], unit=unit)
+    return result
+
+
+def _limit(
+    value: npt.ArrayLike | None, name: str, high: float, units: tuple[str, str], *, above: bool = False
+) -> Array:
+    """Limits of six directions; NaN: none."""
+    if value is None:
+        return frozen(np.full(6, nan))
+    result = array(value, 6, name, nan=True)
+    for index, entry in enumerate(result.tolist()):
+        if not isnan(entry):
+            within(entry, f"{name}[{index}]", 0.0, high, above=above, unit=units[index // 3])
+    return result
+
+
+def _time(value: float | None, name: str) -> float:
+    if isinstance(value, float) and isnan(value):
+        return nan
+    return within(value, name, 0.0, _LONGEST_TIME, unit="s")
+
+
+def _flag(value: bool, name: str) -> bool:
+    if not isinstance(value, (bool, np.bool_)):
+        raise ShapeError(f"{name} is {value!r}; True or False is wanted", parameter=name, value=value)
+    return bool(value)
+
+
+def _name(value: str) -> str:
+    if not isinstance(value, str) or not 1 <= len(value.encode()) <= _LONGEST_NAME:
+        raise ShapeError(
+            f"frame is {value!r}; the name of a frame is wanted, up to {_LONGEST_NAME} octets",
+            code=3,
+            parameter="frame",
+            value=value,
+            hint='for example "tool" or "base"',
+        )
+    return value
+
+
+def _base(value: CartesianImpedance | None) -> CartesianImpedance:
+    if value is None:
+        return CartesianImpedance()
+    if not isinstance(value, CartesianImpedance):
+        raise ShapeError(f"base is {value!r}; a CartesianImpedance is wanted", parameter="base", value=value)
+    return value
+
+
+def _choice(name: str, parameter: str, choices: dict[str, _T]) -> _T:
+    if isinstance(name, str) and name in choices:
+        return choices[name]
+    allowed = ", ".join(choices)
+    raise ShapeError(
+        f"{parameter} is {name!r}; allowed is one of {allowed}",
+        parameter=parameter,
+        value=name,
+        allowed=allowed,
+    )
+
+
+def _at(indices: Sequence[int], values: Sequence[float]) -> list[float]:
+    """Six numbers, zero but for some directions."""
+    result = [0.0] * 6
+    for index, value in zip(indices, values, strict=True):
+        result[index] = value
+    return result
+
+
+def _with(
+    base: CartesianImpedance | None, stiffness: float | None, directions: Sequence[int]
+) -> CartesianImpedance:
+    """The impedance with another stiffness in some directions."""
+    under = _base(base)
+    if stiffness is None:
+        return under
+    changed = under.stiffness.tolist()
+    for index in directions:
+        changed[index] = stiffness
+    return replace(under, stiffness=changed)
