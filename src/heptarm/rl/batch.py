@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
@@ -15,6 +15,9 @@ from heptarm.rl import simulation
 from heptarm.rl.randomise import NONE, Randomisation
 from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import Array
+
+#: Numbers of arms.
+Index: TypeAlias = npt.NDArray[np.integer[Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,13 +84,13 @@ class Engine:
         bias = self._batch.expand("actuator_biasprm")
         bias[:, :, 1], bias[:, :, 2] = -stiff, -damp
 
-    def bandwidth(self, which: Array, values: Array) -> None:
+    def bandwidth(self, which: Index, values: Array) -> None:
         """Set the servo's bandwidth of some arms, shape (n,) [rad/s]."""
         if self._filter is None:
             self._filter = self._batch.expand("actuator_dynprm")
         self._filter[which, :, 0] = 1.0 / values[:, None]
 
-    def place(self, which: Array, q: Array) -> None:
+    def place(self, which: Index, q: Array) -> None:
         """Put some arms at rest at joint positions, shape (n, 7) [rad]."""
         state = self._state
         state["qpos"][which] = state["act"][which] = state["ctrl"][which] = q
@@ -199,7 +202,7 @@ class BatchReach:
             self.target[:] = given
         return self.observe()
 
-    def _begin(self, which: Array) -> None:
+    def _begin(self, which: Index) -> None:
         count = len(which)
         draw, task = self.randomisation, self.task
         q = task.starts(self._random, count)

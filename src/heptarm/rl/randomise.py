@@ -7,10 +7,11 @@ simulation did.
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, asdict, dataclass
-from math import inf, isfinite
+from math import inf, isfinite, log
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError
 from heptarm.values.arrays import Array
@@ -73,13 +74,13 @@ class Randomisation:
                 allowed="[0, 1)",
             )
 
-    def draw_latency(self, random: np.random.Generator, count: int) -> np.ndarray[Any, np.dtype[np.int64]]:
+    def draw_latency(self, random: np.random.Generator, count: int) -> npt.NDArray[np.int64]:
         """Decisions, shape (count,)."""
         return random.integers(self.latency[0], self.latency[1] + 1, count)
 
     def draw_bandwidth(self, random: np.random.Generator, count: int) -> Array:
         """[rad/s], shape (count,)."""
-        return np.exp(random.uniform(*np.log(self.bandwidth), count))
+        return _logarithmic(random, self.bandwidth, count)
 
     def draw_payload(self, random: np.random.Generator, count: int) -> Array:
         """[kg], shape (count,)."""
@@ -87,11 +88,16 @@ class Randomisation:
 
     def draw_stiffness(self, random: np.random.Generator, count: int) -> Array:
         """[Nm/rad], shape (count,)."""
-        return np.exp(random.uniform(*np.log(self.stiffness), count))
+        return _logarithmic(random, self.stiffness, count)
 
     def as_dict(self) -> dict[str, Any]:
         """For a file."""
         return asdict(self)
+
+
+def _logarithmic(random: np.random.Generator, bounds: tuple[float, float], count: int) -> Array:
+    low, high = log(bounds[0]), log(bounds[1])
+    return np.exp(random.uniform(low, high, count))
 
 
 #: One known robot.

@@ -77,7 +77,9 @@ class ReachTask:
         for name, length in (("home", 7), ("centre", 3), ("size", 3)):
             object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
             if len(getattr(self, name)) != length:
-                raise ShapeError(f"{name} is {getattr(self, name)}; {length} numbers are wanted", parameter=name)
+                raise ShapeError(
+                    f"{name} is {getattr(self, name)}; {length} numbers are wanted", parameter=name
+                )
         for name in ("rate", "steps", "radius", "joint_step", "cartesian_step", "leash"):
             if not 0 < getattr(self, name) < float("inf"):
                 raise LimitError(
@@ -209,4 +211,5 @@ class ReachTask:
                 f"the task has no {', '.join(sorted(unknown))}",
                 hint="the file may be of a newer heptarm",
             )
-        return cls(**{k: tuple(v) if isinstance(v, list) else v for k, v in entries.items()})
+        given: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entries.items()}
+        return cls(**given)

@@ -1,0 +1,145 @@
+"""A trained policy: a small network in numpy, in one `.npz` file. Nothing here needs torch."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected, HeptarmError, ShapeError
+from heptarm.rl.task import ReachTask
+
+Weights = npt.NDArray[np.float32]
+
+#: Scaled observations are clipped to this.
+CLIP = 5.0
+_FORMAT = 1
+
+
+class Policy:
+    """Decides actions of a task.
+
+    Args:
+        task: the task it was trained for.
+        layers: weights (inputs, outputs) and biases (outputs,) of each layer; ELU between them.
+        mean: of the observations, shape (n,).
+        std: of the observations, shape (n,).
+        facts: how it came about: seed, environment steps, randomisation, versions.
+
+    Raises:
+        ShapeError: layers that do not fit together or to the task.
+    """
+
+    def __init__(
+        self,
+        task: ReachTask,
+        *,
+        layers: list[tuple[npt.ArrayLike, npt.ArrayLike]],
+        mean: npt.ArrayLike,
+        std: npt.ArrayLike,
+        facts: dict[str, Any] | None = None,
+    ) -> None:
+        self.task = task
+        self.facts = dict(facts or {})
+        self.layers = [(_weights(w), _weights(b)) for w, b in layers]
+        self.mean, self.std = _weights(mean), _weights(std)
+        width = task.observation_size
+        if self.mean.shape != (width,) or self.std.shape != (width,) or not (self.std > 0).all():
+            raise ShapeError(
+                f"mean and std have shapes {self.mean.shape} and {self.std.shape}; ({width},) is wanted"
+            )
+        for index, (w, b) in enumerate(self.layers):
+            if w.ndim != 2 or w.shape[0] != width or b.shape != (w.shape[1],):
+                raise ShapeError(
+                    f"layer {index} has shapes {w.shape} and {b.shape}; {width} inputs are wanted"
+                )
+            width = w.shape[1]
+        if width != task.action_size:
+            raise ShapeError(f"the network has {width} outputs; this task has {task.action_size} actions")
+        # the scaling belongs to the first layer, so that it costs nothing; the clip is kept in observation units
+        self._scale = 1.0 / self.std
+
+    def __call__(self, observation: npt.ArrayLike) -> Weights:
+        """The action, without noise.
+
+        Args:
+            observation: shape (..., n), of `ReachTask.observe`.
+
+        Returns:
+            Shape (..., actions), within +-1.
+        """
+        x = (np.asarray(observation, dtype=np.float32) - self.mean) * self._scale
+        np.maximum(x, -CLIP, out=x)
+        np.minimum(x, CLIP, out=x)
+        for w, b in self.layers[:-1]:
+            x = x @ w
+            x += b
+            low = np.minimum(x, 0.0)  # ELU, branch free
+            np.expm1(low, out=low)
+            np.maximum(x, 0.0, out=x)
+            x += low
+        w, b = self.layers[-1]
+        x = x @ w
+        x += b
+        np.maximum(x, -1.0, out=x)
+        np.minimum(x, 1.0, out=x)
+        return x
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write to a `.npz` file; returns its path. A reader never sees half a file.
+
+        Raises:
+            CommandRejected: the name does not end in `.npz`.
+        """
+        target = Path(path)
+        if target.suffix != ".npz":
+            raise CommandRejected(f"{target.name!r} does not end in .npz", parameter="path", value=str(path))
+        about = {"format": _FORMAT, "task": self.task.as_dict(), "facts": self.facts}
+        arrays: dict[str, Any] = {"about": np.array(json.dumps(about)), "mean": self.mean, "std": self.std}
+        for index, (w, b) in enumerate(self.layers):
+            arrays[f"w{index}"], arrays[f"b{index}"] = w, b
+        half = target.with_name(f".{target.name}.{os.getpid()}.part")
+        with half.open("wb") as file:
+            np.savez(file, **arrays)
+        half.replace(target)
+        return target
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Policy:
+        """Read a file of `save`.
+
+        Raises:
+            HeptarmError: it is not there, or not such a file.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                entries = {name: file[name] for name in file.files}
+            about = json.loads(str(entries["about"]))
+            if about["format"] != _FORMAT:
+                raise HeptarmError(f"{path} has format {about['format']}; this heptarm reads {_FORMAT}")
+            count = sum(name.startswith("w") for name in entries)
+            layers = [(entries[f"w{index}"], entries[f"b{index}"]) for index in range(count)]
+            return cls(
+                ReachTask.from_dict(about["task"]),
+                layers=layers,
+                mean=entries["mean"],
+                std=entries["std"],
+                facts=about["facts"],
+            )
+        except FileNotFoundError:
+            raise HeptarmError(f"there is no {path}", hint="`heptarm rl train` makes a policy") from None
+        except (KeyError, ValueError, TypeError, OSError, EOFError, BadZipFile) as error:
+            if isinstance(error, HeptarmError):
+                raise
+            raise HeptarmError(f"{path} is no policy ({error})") from error
+
+
+def _weights(values: npt.ArrayLike) -> Weights:
+    result = np.array(values, dtype=np.float32)
+    result.flags.writeable = False
+    return result

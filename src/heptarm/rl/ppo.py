@@ -1,0 +1,272 @@
+"""Proximal policy optimisation (Schulman et al. 2017) in torch, as small as it can be read.
+
+Two separate networks give the mean action and the value; the action's spread does not depend on the state. The
+learning rate follows the distance that an update moves the policy (Kullback-Leibler divergence), and its
+ceiling falls towards the end.
+"""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, asdict, dataclass
+from itertools import pairwise
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from heptarm.errors import LimitError
+from heptarm.rl.policy import CLIP
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """Numbers of the algorithm.
+
+    Attributes:
+        envs: arms simulated at once.
+        horizon: decisions of each between two updates.
+        epochs: passes over the samples of an update.
+        minibatches: parts that a pass is cut into.
+        rate: ceiling of the learning rate at the beginning.
+        rate_end: share of that ceiling that is left at the end.
+        discount: of a reward one decision later.
+        trace: lambda of the advantage estimate.
+        clip: largest change of an action's likelihood that is rewarded.
+        kl: the learning rate falls above the second, rises below the first.
+        spread: logarithm of the action's deviation at the beginning.
+        hidden: widths of the hidden layers of both networks.
+        value: weight of the value's loss.
+        gradient: largest norm of the gradient.
+        entropy: weight of the entropy bonus.
+        action_cost: costs of an action's square, per decision; part of training, not of the task.
+        reward_scale: factor on the rewards, for the value network's sake.
+
+    Raises:
+        LimitError: a number outside its range.
+    """
+
+    _: KW_ONLY
+    envs: int = 512
+    horizon: int = 16
+    epochs: int = 5
+    minibatches: int = 4
+    rate: float = 1e-3
+    rate_end: float = 0.1
+    discount: float = 0.95
+    trace: float = 0.95
+    clip: float = 0.2
+    kl: tuple[float, float] = (0.004, 0.016)
+    spread: float = -0.5
+    hidden: tuple[int, ...] = (64, 64)
+    value: float = 1.0
+    gradient: float = 1.0
+    entropy: float = 0.0
+    action_cost: float = 0.0
+    reward_scale: float = 5.0
+
+    def __post_init__(self) -> None:
+        positive = ("envs", "horizon", "epochs", "minibatches", "rate", "clip", "value", "gradient")
+        for name in (*positive, "reward_scale"):
+            self._want(name, getattr(self, name) > 0, "a positive number")
+        for name in ("discount", "trace", "rate_end"):
+            self._want(name, 0 <= getattr(self, name) <= 1, "0 to 1")
+        for name in ("entropy", "action_cost"):
+            self._want(name, getattr(self, name) >= 0, "no negative number")
+        object.__setattr__(self, "hidden", tuple(self.hidden))
+        object.__setattr__(self, "kl", tuple(self.kl))
+        self._want("hidden", len(self.hidden) > 0 and min(self.hidden) > 0, "widths of one layer or more")
+        fits = self.envs * self.horizon % self.minibatches == 0
+        self._want("minibatches", fits, f"a divisor of {self.envs} x {self.horizon}")
+
+    def _want(self, name: str, fine: bool, wanted: str) -> None:
+        if not fine:
+            raise LimitError(
+                f"{name} is {getattr(self, name)}; wanted: {wanted}",
+                code=2,
+                parameter=name,
+                value=getattr(self, name),
+                allowed=wanted,
+            )
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a file."""
+        return asdict(self)
+
+
+class Scaler(nn.Module):
+    """Running mean and deviation of the observations (Chan et al. 1979)."""
+
+    def __init__(self, size: int) -> None:
+        super().__init__()
+        self.register_buffer("count", torch.tensor(1e-4, dtype=torch.float64))
+        self.register_buffer("mean", torch.zeros(size, dtype=torch.float64))
+        # sum of squared deviations
+        self.register_buffer("square", torch.full((size,), 1e-4, dtype=torch.float64))
+        self.count: Tensor
+        self.mean: Tensor
+        self.square: Tensor
+
+    @property
+    def std(self) -> Tensor:
+        """Deviation, shape (n,)."""
+        return (self.square / self.count).sqrt().clamp_min(1e-3)
+
+    def add(self, count: Tensor, mean: Tensor, square: Tensor) -> None:
+        """Take in samples by their number, mean and sum of squared deviations."""
+        total = self.count + count
+        away = mean - self.mean
+        self.mean += away * (count / total)
+        self.square += square + away**2 * (self.count * count / total)
+        self.count.copy_(total)
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Scaled observations."""
+        scaled: Tensor = ((x - self.mean.float()) / self.std.float()).clamp(-CLIP, CLIP)
+        return scaled
+
+
+def network(inputs: int, hidden: tuple[int, ...], outputs: int, last: float) -> nn.Sequential:
+    """Layers with ELU between them, orthogonal at the beginning."""
+    parts: list[nn.Module] = []
+    widths = (inputs, *hidden, outputs)
+    for index, (one, other) in enumerate(pairwise(widths)):
+        layer = nn.Linear(one, other)
+        nn.init.orthogonal_(layer.weight, last if index == len(hidden) else 2**0.5)
+        nn.init.zeros_(layer.bias)
+        parts += [layer, nn.ELU()]
+    return nn.Sequential(*parts[:-1])
+
+
+class Agent(nn.Module):
+    """Scaler, policy network, value network."""
+
+    def __init__(self, observations: int, actions: int, settings: Settings) -> None:
+        super().__init__()
+        self.scaler = Scaler(observations)
+        self.policy = network(observations, settings.hidden, actions, 0.01)
+        self.value = network(observations, settings.hidden, 1, 1.0)
+        self.spread = nn.Parameter(torch.full((actions,), settings.spread))
+
+    def likelihood(self, mean: Tensor, action: Tensor) -> Tensor:
+        """Logarithm of the likelihood of actions, but for a constant."""
+        return (-0.5 * ((action - mean) * torch.exp(-self.spread)) ** 2 - self.spread).sum(-1)
+
+
+@dataclass(slots=True)
+class Samples:
+    """Of one update; leading axes (horizon, envs)."""
+
+    seen: Tensor  # scaled observations
+    action: Tensor
+    mean: Tensor
+    likelihood: Tensor
+    value: Tensor
+    advantage: Tensor
+
+
+def advantages(reward: Tensor, value: Tensor, after: Tensor, done: Tensor, settings: Settings) -> Tensor:
+    """Generalised advantage estimates (Schulman et al. 2016), shape (horizon, envs).
+
+    Episodes end by their length only, so the value of what was seen last counts on: `after` holds it where an
+    episode ended, and the value of the next decision elsewhere.
+    """
+    surprise = reward + settings.discount * after - value
+    result = torch.empty_like(surprise)
+    running = torch.zeros_like(surprise[0])
+    fade = settings.discount * settings.trace * (1.0 - done)
+    for index in range(len(surprise) - 1, -1, -1):
+        running = surprise[index] + fade[index] * running
+        result[index] = running
+    return result
+
+
+class Learner:
+    """Updates an agent.
+
+    Args:
+        agent: what learns.
+        settings: the numbers.
+        mean: averages a tensor over all workers; identity for one.
+    """
+
+    def __init__(self, agent: Agent, settings: Settings, mean: Any = None) -> None:
+        self.agent, self.settings = agent, settings
+        self._mean = mean
+        self.rate = settings.rate
+        self._trained = [*agent.policy.parameters(), *agent.value.parameters(), agent.spread]
+        self.optimiser = torch.optim.Adam(self._trained, lr=settings.rate, eps=1e-5, foreach=True)
+
+    def update(self, samples: Samples, shuffle: torch.Generator, progress: float) -> dict[str, float]:
+        """One update.
+
+        Args:
+            samples: what was experienced since the last.
+            shuffle: draws the order of the samples.
+            progress: share of the training that is done, 0 to 1.
+
+        Returns:
+            Mean "kl" and "loss" of the value, the learning "rate", the mean "spread" of the actions.
+        """
+        s, agent = self.settings, self.agent
+        ceiling = s.rate * (1.0 - (1.0 - s.rate_end) * min(1.0, progress))
+        seen, action = samples.seen.flatten(0, 1), samples.action.flatten(0, 1)
+        before, mean = samples.likelihood.flatten(), samples.mean.flatten(0, 1)
+        gain = samples.advantage.flatten()
+        goal = gain + samples.value.flatten()
+        centre = self._shared(gain.mean())
+        deviation = self._shared(((gain - centre) ** 2).mean()).sqrt()
+        gain = (gain - centre) / (deviation + 1e-8)
+        spread = agent.spread.detach().clone()
+        kls, losses = [], []
+        size = len(gain) // s.minibatches
+        for _ in range(s.epochs):
+            order = torch.randperm(len(gain), generator=shuffle).to(gain.device)
+            for part in torch.split(order, size):
+                now = agent.policy(seen[part])
+                ratio = torch.exp(agent.likelihood(now, action[part]) - before[part])
+                better = torch.minimum(
+                    gain[part] * ratio, gain[part] * ratio.clamp(1.0 - s.clip, 1.0 + s.clip)
+                )
+                loss = ((agent.value(seen[part]).squeeze(-1) - goal[part]) ** 2).mean()
+                total = s.value * loss - better.mean() - s.entropy * agent.spread.sum()
+                self.optimiser.zero_grad(set_to_none=True)
+                total.backward()
+                self._share_gradients()
+                nn.utils.clip_grad_norm_(self._trained, s.gradient)
+                with torch.no_grad():
+                    kl = self._shared(divergence(mean[part], spread, now, agent.spread))
+                    kls.append(float(kl))
+                if kls[-1] > s.kl[1]:
+                    self.rate = max(self.rate / 1.5, 1e-5)
+                elif kls[-1] < s.kl[0]:
+                    self.rate = self.rate * 1.5
+                self.rate = min(self.rate, ceiling)
+                self.optimiser.param_groups[0]["lr"] = self.rate
+                self.optimiser.step()
+                losses.append(float(loss.detach()))
+        count = len(kls)
+        return {
+            "kl": sum(kls) / count,
+            "loss": sum(losses) / count,
+            "rate": self.rate,
+            "spread": float(agent.spread.detach().exp().mean()),
+        }
+
+    def _shared(self, value: Tensor) -> Tensor:
+        return value if self._mean is None else self._mean(value)
+
+    def _share_gradients(self) -> None:
+        if self._mean is None:
+            return
+        flat = self._mean(torch.cat([p.grad.flatten() for p in self._trained if p.grad is not None]))
+        for p in self._trained:
+            if p.grad is not None:
+                p.grad.copy_(flat[: p.numel()].view_as(p))
+                flat = flat[p.numel() :]
+
+
+def divergence(mean: Tensor, spread: Tensor, now: Tensor, spread_now: Tensor) -> Tensor:
+    """Mean Kullback-Leibler divergence of the old from the new action distribution."""
+    ratio = torch.exp(2.0 * (spread - spread_now))
+    away = ((mean - now) * torch.exp(-spread_now)) ** 2
+    return (spread_now - spread + 0.5 * (ratio + away - 1.0)).sum(-1).mean()

@@ -1,0 +1,408 @@
+"""Training: simulate, update, and again; with a learning curve, checkpoints and a way to go on."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from dataclasses import KW_ONLY, asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from heptarm.errors import CommandRejected, HeptarmError, LimitError, require
+from heptarm.rl.batch import BatchReach, Engine
+from heptarm.rl.policy import Policy
+from heptarm.rl.randomise import MILD, Randomisation
+from heptarm.rl.task import ReachTask
+
+torch = require("torch", extra="rl")
+
+from heptarm.rl import ppo  # noqa: E402  needs torch
+
+#: Updates between two checkpoints.
+CHECKPOINT = 25
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One update in the learning curve.
+
+    Attributes:
+        steps: environment steps so far, of all workers.
+        seconds: wall time so far, simulation and learning.
+        reward: mean of a decision.
+        distance: mean at the end of the episodes that ended, actions still noisy [m]; NaN: none ended.
+        success: share of those that ended within the task's radius; NaN: none ended.
+        kl: how far the update moved the policy.
+        loss: of the value.
+        rate: learning rate.
+        spread: mean deviation of the actions.
+    """
+
+    steps: int
+    seconds: float
+    reward: float
+    distance: float
+    success: float
+    kl: float
+    loss: float
+    rate: float
+    spread: float
+
+
+@dataclass(frozen=True, slots=True)
+class Trained:
+    """What came of a training.
+
+    Attributes:
+        policy: the policy, as numpy.
+        history: the learning curve.
+        done: all steps were taken; False where `progress` ended it.
+    """
+
+    policy: Policy
+    history: tuple[Row, ...]
+    _: KW_ONLY
+    done: bool = True
+
+    @property
+    def steps(self) -> int:
+        """Environment steps."""
+        return self.history[-1].steps if self.history else 0
+
+    @property
+    def seconds(self) -> float:
+        """Wall time, everything but imports [s]."""
+        return self.history[-1].seconds if self.history else 0.0
+
+    def plot(self, path: str | os.PathLike[str]) -> Path:
+        """Draw the learning curve into a picture; returns its path.
+
+        Raises:
+            MissingExtra: matplotlib is not installed.
+        """
+        figures = require("matplotlib.figure", extra="rl")
+        figure = figures.Figure(figsize=(7, 4), layout="constrained")
+        axes = figure.subplots()
+        rows = [row for row in self.history if np.isfinite(row.distance)]
+        axes.plot([row.steps / 1e6 for row in rows], [1e3 * row.distance for row in rows])
+        axes.set_yscale("log")
+        axes.set_xlabel("environment steps [million]")
+        axes.set_ylabel("distance at the end of an episode, noisy actions [mm]")
+        axes.set_title(f"seed {self.policy.facts.get('seed')}, {self.seconds:.0f} s")
+        axes.grid(which="both", alpha=0.3)
+        figure.savefig(path, dpi=120)
+        return Path(path)
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """Everything that a training is made of; saved with its checkpoints.
+
+    Attributes:
+        task: the task.
+        steps: environment steps, of all workers; rounded up to whole updates.
+        seed: of networks, simulation and shuffling.
+        randomisation: what differs between the simulated robots.
+        settings: numbers of the algorithm.
+    """
+
+    task: ReachTask = field(default_factory=ReachTask)
+    _: KW_ONLY
+    steps: int = 2_200_000
+    seed: int = 0
+    randomisation: Randomisation = MILD
+    settings: ppo.Settings = field(default_factory=ppo.Settings)
+
+    def __post_init__(self) -> None:
+        if self.steps < 1:
+            raise LimitError(f"steps is {self.steps}; at least 1 is wanted", code=2, parameter="steps")
+        if self.seed < 0:
+            raise LimitError(f"seed is {self.seed}; it is not negative", code=2, parameter="seed")
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a file."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, entries: dict[str, Any]) -> Recipe:
+        """Of `as_dict`."""
+        given = dict(entries)
+        given["task"] = ReachTask.from_dict(given["task"])
+        given["randomisation"] = Randomisation(**{k: _tuple(v) for k, v in given["randomisation"].items()})
+        given["settings"] = ppo.Settings(**{k: _tuple(v) for k, v in given["settings"].items()})
+        return cls(**given)
+
+
+def _tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
+
+
+class Training:
+    """A training under way.
+
+    Args:
+        recipe: what to do.
+        team: the workers.
+        threads: of the simulation.
+        engine: class of the simulation's engine.
+    """
+
+    def __init__(self, recipe: Recipe, *, team: Any, threads: int = 2, engine: Any = Engine) -> None:
+        self.recipe, self.team = recipe, team
+        seeds = np.random.SeedSequence([recipe.seed, team.rank])
+        settings = recipe.settings
+        self.random = torch.Generator().manual_seed(int(seeds.generate_state(1)[0]))
+        with torch.random.fork_rng(devices=[]):
+            torch.manual_seed(recipe.seed)  # the same networks everywhere
+            task = recipe.task
+            self.agent = ppo.Agent(task.observation_size, task.action_size, settings).to(team.device)
+        team.align(self.agent)
+        self.learner = ppo.Learner(self.agent, settings, team.mean if team.size > 1 else None)
+        self.arms = BatchReach(
+            task,
+            envs=settings.envs,
+            randomisation=recipe.randomisation,
+            seed=seeds,
+            threads=threads,
+            engine=engine,
+        )
+        self.history: list[Row] = []
+        self.steps = 0
+        self.seconds = 0.0
+
+    @property
+    def done(self) -> bool:
+        """All steps were taken."""
+        return self.steps >= self.recipe.steps
+
+    def update(self) -> Row:
+        """Simulate a horizon and learn from it."""
+        begun = time.perf_counter()
+        samples, facts = self._experience()
+        settings = self.recipe.settings
+        self.steps += settings.horizon * settings.envs * self.team.size
+        facts |= self.learner.update(samples, self.random, self.steps / self.recipe.steps)
+        self.seconds += time.perf_counter() - begun
+        row = Row(steps=self.steps, seconds=self.seconds, **facts)
+        self.history.append(row)
+        return row
+
+    def _experience(self) -> tuple[ppo.Samples, dict[str, float]]:
+        arms, agent, s, device = self.arms, self.agent, self.recipe.settings, self.team.device
+        task = self.recipe.task
+        shape = (s.horizon, s.envs)
+        seen = torch.empty((*shape, task.observation_size), device=device)
+        action = torch.empty((*shape, task.action_size), device=device)
+        mean, likelihood = torch.empty_like(action), torch.empty(shape, device=device)
+        value, after = torch.empty(shape, device=device), torch.empty(shape, device=device)
+        reward, done = torch.empty(shape, device=device), torch.empty(shape, device=device)
+        raw = np.empty((*shape, task.observation_size), dtype=np.float32)
+        ended: list[Any] = []
+        with torch.no_grad():
+            deviation = agent.spread.exp()
+            now = arms.observe().astype(np.float32)
+            for t in range(s.horizon):
+                raw[t] = now
+                seen[t] = agent.scaler(torch.from_numpy(now).to(device))
+                mean[t] = agent.policy(seen[t])
+                noise = torch.randn(action[t].shape, generator=self.random).to(device)
+                action[t] = mean[t] + deviation * noise
+                likelihood[t] = agent.likelihood(mean[t], action[t])
+                value[t] = agent.value(seen[t]).squeeze(-1)
+                decided = action[t].cpu().numpy()
+                step = arms.step(decided)
+                gain = step.reward
+                if s.action_cost:
+                    gain = gain - s.action_cost * (np.clip(decided, -1.0, 1.0) ** 2).sum(-1)
+                reward[t] = torch.from_numpy(np.float32(s.reward_scale) * gain.astype(np.float32)).to(device)
+                done[t] = torch.from_numpy(step.done.astype(np.float32)).to(device)
+                now = step.observation.astype(np.float32)
+                if t > 0:
+                    after[t - 1] = torch.where(done[t - 1] > 0, after[t - 1], value[t])
+                if step.done.any():
+                    last = agent.scaler(torch.from_numpy(step.final.astype(np.float32)).to(device))
+                    after[t, torch.from_numpy(step.done).to(device)] = agent.value(last).squeeze(-1)
+                    ended.append(step.distance[step.done])
+            coming = agent.value(agent.scaler(torch.from_numpy(now).to(device))).squeeze(-1)
+            after[-1] = torch.where(done[-1] > 0, after[-1], coming)
+            advantage = ppo.advantages(reward, value, after, done, s)
+            self._look(raw)
+        samples = ppo.Samples(seen, action, mean, likelihood, value, advantage)
+        return samples, self._facts(float(reward.mean()) / s.reward_scale, ended)
+
+    def _look(self, raw: Any) -> None:
+        """Let the scaler see the observations of all workers."""
+        team, flat = self.team, raw.reshape(-1, raw.shape[-1]).astype(np.float64)
+        moments = torch.from_numpy(np.stack([flat.sum(0), (flat**2).sum(0)])).to(team.device)
+        total, squares = team.total(moments)
+        count = torch.tensor(float(len(flat) * team.size), dtype=torch.float64, device=team.device)
+        mean = total / count
+        self.agent.scaler.add(count, mean, (squares - count * mean**2).clamp_min(0.0))
+
+    def _facts(self, reward: float, ended: list[Any]) -> dict[str, float]:
+        distances = np.concatenate(ended) if ended else np.zeros(0)
+        close = float((distances <= self.recipe.task.radius).sum())
+        sums = torch.tensor(
+            [reward, float(distances.sum()), close, float(len(distances))], dtype=torch.float64
+        ).to(self.team.device)
+        reward, total, close, count = self.team.total(sums).tolist()
+        missing = float("nan")
+        return {
+            "reward": reward / self.team.size,
+            "distance": total / count if count else missing,
+            "success": close / count if count else missing,
+        }
+
+    def policy(self) -> Policy:
+        """The policy as it is now."""
+        agent, recipe = self.agent, self.recipe
+        layers = [
+            (layer.weight.detach().cpu().numpy().T, layer.bias.detach().cpu().numpy())
+            for layer in agent.policy
+            if isinstance(layer, torch.nn.Linear)
+        ]
+        facts = {
+            "seed": recipe.seed,
+            "steps": self.steps,
+            "seconds": round(self.seconds, 2),
+            "workers": self.team.size,
+            "randomisation": recipe.randomisation.as_dict(),
+            "settings": recipe.settings.as_dict(),
+        }
+        scaler = agent.scaler
+        return Policy(
+            recipe.task,
+            layers=layers,
+            mean=scaler.mean.cpu().numpy(),
+            std=scaler.std.cpu().numpy(),
+            facts=facts,
+        )
+
+    # ------------------------------------------------------------------------------ checkpoints
+
+    def save(self, path: Path) -> None:
+        """Write the policy, and beside it what is needed to go on."""
+        if self.team.leads:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self.policy().save(path)
+        state = {
+            "recipe": self.recipe.as_dict(),
+            "workers": self.team.size,
+            "agent": self.agent.state_dict(),
+            "optimiser": self.learner.optimiser.state_dict(),
+            "rate": self.learner.rate,
+            "random": self.random.get_state(),
+            "arms": {
+                k: torch.from_numpy(v) if isinstance(v, np.ndarray) else v
+                for k, v in self.arms.save().items()
+            },
+            "history": [asdict(row) for row in self.history],
+        }
+        target = beside(path, self.team.rank)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        half = target.with_name(f".{target.name}.{os.getpid()}.part")
+        torch.save(state, half)
+        half.replace(target)
+
+    def load(self, state: dict[str, Any]) -> None:
+        """Go on from what `save` wrote."""
+        self.agent.load_state_dict(state["agent"])
+        self.learner.optimiser.load_state_dict(state["optimiser"])
+        self.learner.rate = state["rate"]
+        self.random.set_state(state["random"])
+        self.arms.load({k: v.numpy() if isinstance(v, torch.Tensor) else v for k, v in state["arms"].items()})
+        self.history = [Row(**row) for row in state["history"]]
+        self.steps = self.history[-1].steps if self.history else 0
+        self.seconds = self.history[-1].seconds if self.history else 0.0
+
+
+def beside(path: Path, rank: int = 0) -> Path:
+    """Where the state of a training lies, beside its policy's `.npz`."""
+    return path.with_name(f"{path.stem}.train{rank or ''}.pt")
+
+
+def train(
+    recipe: Recipe | None = None,
+    *,
+    out: str | os.PathLike[str] | None = None,
+    progress: Callable[[Row], object] | None = None,
+    resume: str | os.PathLike[str] | None = None,
+    steps: int | None = None,
+    device: str = "cpu",
+    threads: int = 2,
+    checkpoint: int = CHECKPOINT,
+    engine: Any = Engine,
+) -> Trained:
+    """Train a policy.
+
+    Started by `torchrun`, every worker simulates `settings.envs` arms and all learn one policy; see
+    `heptarm.rl.distributed`.
+
+    Args:
+        recipe: what to train; None: the defaults, or with `resume` what was begun.
+        out: `.npz` file for the policy; what is needed to go on lies beside it.
+        progress: called after each update; returning False ends the training there.
+        resume: policy file of an earlier `out` to go on from; it goes on exactly as if never interrupted.
+        steps: environment steps instead of the recipe's, as to train longer after a `resume`.
+        device: "cpu" or "cuda": where the networks live; the simulation stays on the CPU.
+        threads: of the simulation.
+        checkpoint: updates between two checkpoints.
+        engine: class of the simulation's engine.
+
+    Raises:
+        CommandRejected: arguments that do not go together.
+        HeptarmError: nothing to go on from, or no such file.
+        MissingExtra: torch or `mujoco.batch` is not installed.
+    """
+    path = Path(out) if out is not None else Path(resume) if resume is not None else None
+    if path is not None and path.suffix != ".npz":
+        raise CommandRejected(f"{path.name!r} does not end in .npz", parameter="out", value=str(path))
+    if checkpoint < 1:
+        raise LimitError(f"checkpoint is {checkpoint}; at least 1 is wanted", code=2, parameter="checkpoint")
+    torch.set_num_threads(1)  # more threads only fight with the simulation's
+    from heptarm.rl import distributed
+
+    with distributed.team(device) as team:
+        state = _state(Path(resume), team) if resume is not None else None
+        if state is not None:
+            begun = Recipe.from_dict(state["recipe"])
+            if recipe is not None and replace(recipe, steps=begun.steps) != begun:
+                raise CommandRejected(
+                    "the recipe differs from that of the checkpoint", hint="leave it out, or start anew"
+                )
+            recipe = recipe or begun
+        recipe = recipe or Recipe()
+        if steps is not None:
+            recipe = replace(recipe, steps=steps)
+        training = Training(recipe, team=team, threads=threads, engine=engine)
+        if state is not None:
+            training.load(state)
+        stopped = False
+        while not training.done and not stopped:
+            row = training.update()
+            wish = progress(row) if progress is not None and team.leads else None
+            stopped = team.any(wish is False)
+            if path is not None and (training.done or stopped or len(training.history) % checkpoint == 0):
+                training.save(path)
+        return Trained(training.policy(), tuple(training.history), done=training.done)
+
+
+def _state(path: Path, team: Any) -> dict[str, Any]:
+    file = beside(path, team.rank)
+    try:
+        state: dict[str, Any] = torch.load(file, weights_only=True, map_location="cpu")
+    except FileNotFoundError:
+        raise HeptarmError(
+            f"there is no {file} to go on from", hint="give the .npz file that a training wrote"
+        ) from None
+    except Exception as error:
+        raise HeptarmError(f"{file} cannot be read ({error})") from error
+    if state["workers"] != team.size:
+        raise CommandRejected(
+            f"the checkpoint is of {state['workers']} workers, these are {team.size}",
+            hint=f"start {state['workers']} workers",
+        )
+    return state
