@@ -57,7 +57,9 @@ class Configuration:
     def _check_names(self) -> None:
         if self.signals and not self.version.traits.io:
             raise CommandRejected(
-                f"FRI {self.version.value} has no signals", parameter="signals", hint="they came with FRI 1.14"
+                f"FRI {self.version.value} has no signals",
+                parameter="signals",
+                hint="they came with FRI 1.14",
             )
         names = [signal.name for signal in self.signals]
         for what, found, most in (

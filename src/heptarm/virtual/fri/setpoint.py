@@ -33,13 +33,14 @@ class SetPoint:
         self._ticks = ticks
         self._leap = OVERSPEED * robot.dq_max * TICK
         self._slowing = robot.ddq_max * TICK * TICK
+        self._least, self._most = robot.q_min, robot.q_max
         self._coast = max(COAST, 2 * ticks)
         self.q = start.copy()
         self._speed = np.zeros(7)  # [rad/tick], as all speeds here
         self._from, self._from_speed = self.q, self._speed
         self._goal, self._goal_speed = self.q, self._speed
         self._age = ticks + self._coast  # ticks since the last command
-        self._last: Array | None = None
+        self._last = self.q
 
     @property
     def age(self) -> int:
@@ -49,7 +50,7 @@ class SetPoint:
     def command(self, q: Array, *, after: int) -> None:
         """Take a command, shape (7,) [rad], `after` ticks of its client's time later than the one before."""
         self._from, self._from_speed = self.q, self._speed
-        self._goal_speed = np.zeros(7) if self._last is None else (q - self._last) / after
+        self._goal_speed = (q - self._last) / after
         self._goal = self._last = q
         self._age = 0
 
@@ -62,6 +63,7 @@ class SetPoint:
             wanted = self._goal + (self._age - self._ticks) * self._goal_speed
         else:
             wanted = self.q + self._speed - np.clip(self._speed, -self._slowing, self._slowing)
+        wanted = np.clip(wanted, self._least, self._most)
         step = np.clip(wanted - self.q, -self._leap, self._leap)
         self.q = self.q + step
         self._speed = step
