@@ -27,19 +27,22 @@ import heptarm.wire.Item;
 import heptarm.wire.JointDynamics;
 import heptarm.wire.Lin;
 import heptarm.wire.LinRel;
+import heptarm.wire.Mode;
 import heptarm.wire.Motion;
 import heptarm.wire.Orientation;
 import heptarm.wire.OrientationReference;
 import heptarm.wire.OrientationType;
 import heptarm.wire.Pose;
-import heptarm.wire.PositionMode;
 import heptarm.wire.Ptp;
 import heptarm.wire.PtpPose;
 import heptarm.wire.Redundancy;
+import heptarm.wire.ServoEngine;
+import heptarm.wire.ServoOpen;
 
 /** Turns items of a program into Sunrise motions. What cannot be carried out is refused, never ignored. */
 final class Motions {
-    static final String[] CAPABILITIES = {"ptp", "ptp_pose", "lin", "lin_rel", "hold", "override", "pause"};
+    static final String[] CAPABILITIES = {"ptp", "ptp_pose", "lin", "lin_rel", "hold", "override", "pause",
+        "servo", "servo_direct", "servo_pose", "joint_impedance"};
 
     private static final int JOINTS = 7;
 
@@ -51,12 +54,8 @@ final class Motions {
 
     /** Refuses what this cabinet cannot carry out. */
     void check(Item item, String path) throws Refusal {
-        if (item.frame.length() > 0 && !"flange".equals(item.frame)) {
-            throw new Refusal(Code.UNKNOWN_NAME, path + "frame", item.frame, "flange", "no frame " + item.frame + " can be moved here");
-        }
-        if (item.mode != null && !(item.mode instanceof PositionMode)) {
-            throw unsupported(path + "mode", item.mode.getClass().getSimpleName());
-        }
+        checkFrame(item.frame, path);
+        checkMode(item.mode, path);
         if (item.until.nodes.length > 0) {
             throw unsupported(path + "until", "break conditions");
         }
@@ -86,6 +85,30 @@ final class Motions {
         }
     }
 
+    /** Refuses a servo motion that this cabinet cannot carry out. */
+    void check(ServoOpen open) throws Refusal {
+        checkFrame(open.frame, "");
+        checkMode(open.mode, "");
+        if (open.engine == ServoEngine.LIN) {
+            throw unsupported("engine", "the servo engine \"lin\"");
+        }
+        if (open.until.nodes.length > 0) {
+            throw unsupported("until", "break conditions");
+        }
+    }
+
+    private static void checkFrame(String frame, String path) throws Refusal {
+        if (frame.length() > 0 && !"flange".equals(frame)) {
+            throw new Refusal(Code.UNKNOWN_NAME, path + "frame", frame, "flange", "no frame " + frame + " can be moved here");
+        }
+    }
+
+    private static void checkMode(Mode mode, String path) throws Refusal {
+        if (mode != null && !Modes.isKnown(mode)) {
+            throw unsupported(path + "mode", mode.getClass().getSimpleName());
+        }
+    }
+
     private static Refusal unsupported(String parameter, String what) {
         return new Refusal(Code.UNSUPPORTED, parameter, what, "", "this version of the cabinet application cannot do that yet: " + what);
     }
@@ -110,7 +133,13 @@ final class Motions {
     }
 
     /** The Sunrise motion of a checked item. */
-    IMotion motion(Item item) {
+    IMotion motion(Item item, Mode mode) {
+        RobotMotion<?> motion = motion(item);
+        motion.setMode(Modes.of(mode));
+        return motion;
+    }
+
+    private RobotMotion<?> motion(Item item) {
         Motion motion = item.motion;
         if (motion instanceof Ptp) {
             return joints(ptp(new JointPosition(((Ptp) motion).q)), ((Ptp) motion).dynamics);
@@ -148,7 +177,7 @@ final class Motions {
         return frame;
     }
 
-    private static IMotion joints(RobotMotion<?> motion, JointDynamics dynamics) {
+    private static RobotMotion<?> joints(RobotMotion<?> motion, JointDynamics dynamics) {
         motion.setJointVelocityRel(filled(dynamics.velocity));
         motion.setJointAccelerationRel(filled(dynamics.acceleration));
         motion.setJointJerkRel(filled(dynamics.jerk));

@@ -59,7 +59,7 @@ final class SunriseJob implements Job, IMotionContainerListener {
     }
 
     /** The cabinet speaks in texts only. */
-    private static int code(String text) {
+    static int code(String text) {
         if (text.indexOf("violates limit") >= 0) {
             return Code.JOINT_LIMIT;
         }

@@ -21,7 +21,6 @@ import com.kuka.roboticsAPI.geometricModel.math.Vector;
 import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
 import com.kuka.roboticsAPI.motionModel.ErrorHandlingAction;
 import com.kuka.roboticsAPI.motionModel.IErrorHandler;
-import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.sensorModel.ForceSensorData;
 
@@ -31,6 +30,7 @@ import heptarm.core.Log;
 import heptarm.core.Models;
 import heptarm.core.Refusal;
 import heptarm.core.Robot;
+import heptarm.core.Servo;
 import heptarm.wire.Code;
 import heptarm.wire.FrameInfo;
 import heptarm.wire.Item;
@@ -41,6 +41,7 @@ import heptarm.wire.Redundancy;
 import heptarm.wire.RobotInfo;
 import heptarm.wire.SafetyBits;
 import heptarm.wire.SafetyState;
+import heptarm.wire.ServoOpen;
 import heptarm.wire.SignalInfo;
 import heptarm.wire.ToolInfo;
 import heptarm.wire.WrenchState;
@@ -180,23 +181,43 @@ final class SunriseRobot implements Robot, IErrorHandler {
     public Job start(Item item, Mode mode, Job.Listener listener) throws Refusal {
         SunriseJob job = new SunriseJob(listener);
         try {
-            IMotion motion = motions.motion(item);
-            IMotionContainer container = lbr.moveAsync(motion, job);
-            String failure;
-            synchronized (jobs) {
-                jobs.put(container, job);
-                failure = orphans.remove(container);
-                forgetFinished();
-            }
-            job.set(container);
-            if (failure != null) {
-                job.fail(failure);
-            }
+            adopt(lbr.moveAsync(motions.motion(item, mode), job), job);
         } catch (RuntimeException e) {
             log.warn("a motion was refused by the cabinet: " + e);
             job.fail(e.getMessage());
         }
         return job;
+    }
+
+    public void check(ServoOpen open) throws Refusal {
+        motions.check(open);
+    }
+
+    public Servo servo(ServoOpen open, Job.Listener listener) throws Refusal {
+        SunriseJob job = new SunriseJob(listener);
+        try {
+            SunriseServo servo = SunriseServo.of(open, lbr, job);
+            adopt(lbr.moveAsync(servo.motion(), job), job);
+            return servo;
+        } catch (LinkageError e) {
+            throw new Refusal(Code.UNSUPPORTED, "this cabinet lacks the option Sunrise.Servoing (" + e + ")");
+        } catch (RuntimeException e) {
+            log.warn("a servo motion was refused by the cabinet: " + e);
+            throw new Refusal(Code.EXECUTION_FAILED, String.valueOf(e.getMessage()));
+        }
+    }
+
+    private void adopt(IMotionContainer container, SunriseJob job) {
+        String failure;
+        synchronized (jobs) {
+            jobs.put(container, job);
+            failure = orphans.remove(container);
+            forgetFinished();
+        }
+        job.set(container);
+        if (failure != null) {
+            job.fail(failure);
+        }
     }
 
     /** Under the lock of jobs. */

@@ -172,7 +172,8 @@ final class Client {
             int type = (data[pos + 4] & 0xFF) << 8 | data[pos + 5] & 0xFF;
             long request = int32(data, pos + 14) & 0xFFFFFFFFL;
             if (handshake.isOpen()) {
-                server.dispatcher.handle(this, type, request, data, pos + Protocol.HEADER, length);
+                long stamp = (long) int32(data, pos + 18) << 32 | int32(data, pos + 22) & 0xFFFFFFFFL;
+                server.dispatcher.handle(this, type, request, stamp, data, pos + Protocol.HEADER, length);
             } else {
                 handshake.handle(version, type, data, pos + Protocol.HEADER, length);
             }

@@ -17,6 +17,12 @@ import heptarm.wire.ReleaseControl;
 import heptarm.wire.Resume;
 import heptarm.wire.RobotInfo;
 import heptarm.wire.Run;
+import heptarm.wire.ServoClose;
+import heptarm.wire.ServoJoints;
+import heptarm.wire.ServoJointsVelocity;
+import heptarm.wire.ServoOpen;
+import heptarm.wire.ServoPose;
+import heptarm.wire.ServoSettings;
 import heptarm.wire.SetOverride;
 import heptarm.wire.ShowMessage;
 import heptarm.wire.Stop;
@@ -34,7 +40,7 @@ final class Dispatcher {
     }
 
     /** Handles one frame; called by the client's reader. Nothing that a client sends gets past here as an exception. */
-    void handle(Client client, int type, long request, byte[] data, int offset, int length) {
+    void handle(Client client, int type, long request, long sent, byte[] data, int offset, int length) {
         try {
             Message message = Messages.read(type, data, offset, length);
             if (message == null || !Messages.fromClient(type)) {
@@ -57,6 +63,10 @@ final class Dispatcher {
                         holder.length() == 0 ? "nobody controls the robot; take control first"
                                 : holder + " controls the robot, not " + client.name());
             }
+            if (type == ServoJoints.TYPE || type == ServoJointsVelocity.TYPE || type == ServoPose.TYPE) {
+                steer(message, sent);
+                return;
+            }
             message.validate("");
             client.answer(act(client, message), request);
         } catch (WireException e) {
@@ -69,6 +79,42 @@ final class Dispatcher {
             fail(client, type, request, e);
         } catch (LinkageError e) { // a class that this cabinet lacks
             fail(client, type, request, e);
+        }
+    }
+
+    /** Hands a servo target over; nothing is answered, a refused one is told of in the status of the stream. */
+    private void steer(Message message, long sent) {
+        Stream stream;
+        Stream.Target target;
+        double[] joints = null;
+        if (message instanceof ServoJoints) {
+            ServoJoints one = (ServoJoints) message;
+            joints = one.q;
+            stream = server.executor.stream(one.servo);
+            target = new Stream.Target(one.q, null, null, null, one.watchdog, sent);
+        } else if (message instanceof ServoJointsVelocity) {
+            ServoJointsVelocity one = (ServoJointsVelocity) message;
+            joints = one.q;
+            stream = server.executor.stream(one.servo);
+            target = new Stream.Target(one.q, one.dq, null, null, one.watchdog, sent);
+        } else {
+            ServoPose one = (ServoPose) message;
+            stream = server.executor.stream(one.servo);
+            target = new Stream.Target(null, null, one.xyz, one.quat, one.watchdog, sent);
+        }
+        if (stream == null) {
+            return; // it has just ended; its client hears of that
+        }
+        try {
+            message.validate("");
+            if (joints != null) {
+                checkJoints(joints, server.robot.info(), "q");
+            }
+            stream.offer(target);
+        } catch (Violation e) {
+            stream.refuse(new Refusal(e.code, e.parameter, e.value, e.allowed, e.getMessage()));
+        } catch (Refusal e) {
+            stream.refuse(e);
         }
     }
 
@@ -87,6 +133,14 @@ final class Dispatcher {
             server.executor.stop(((Stop) message).kind);
         } else if (message instanceof Run) {
             id = run((Run) message);
+        } else if (message instanceof ServoOpen) {
+            server.robot.check((ServoOpen) message);
+            id = server.executor.open(new Stream(server, (ServoOpen) message));
+        } else if (message instanceof ServoSettings) {
+            running(((ServoSettings) message).servo).change(((ServoSettings) message).mode);
+        } else if (message instanceof ServoClose) {
+            running(((ServoClose) message).servo);
+            server.executor.cancel(((ServoClose) message).servo);
         } else if (message instanceof Cancel) {
             server.executor.cancel(((Cancel) message).id);
         } else if (message instanceof Subscribe) {
@@ -116,6 +170,14 @@ final class Dispatcher {
             throw new Refusal(Code.UNSUPPORTED, "this cabinet application cannot handle message " + message.type() + " yet");
         }
         return new Accepted(id);
+    }
+
+    private Stream running(long servo) throws Refusal {
+        Stream stream = server.executor.stream(servo);
+        if (stream == null) {
+            throw new Refusal(Code.UNKNOWN_MOTION, "servo", Long.toString(servo), "", "servo motion " + servo + " is not running");
+        }
+        return stream;
     }
 
     private long run(Run run) throws Refusal {

@@ -44,6 +44,7 @@ final class Executor {
     private final class Program {
         final long id;
         final Run run;
+        final Stream stream;
         final List<Job> jobs = new ArrayList<Job>();
         final Job.Ended[] ended;
         int item;
@@ -53,10 +54,16 @@ final class Executor {
         String text = "";
         long began;
 
-        Program(long id, Run run) {
+        /** Either a run of motions or a stream of targets. */
+        Program(long id, Run run, Stream stream) {
             this.id = id;
             this.run = run;
-            this.ended = new Job.Ended[run.items.length];
+            this.stream = stream;
+            this.ended = new Job.Ended[size()];
+        }
+
+        int size() {
+            return run == null ? 1 : run.items.length;
         }
 
         /** Ends it for a cause; the first cause counts. */
@@ -70,6 +77,9 @@ final class Executor {
                 all = new ArrayList<Job>(jobs);
                 notifyAll();
             }
+            if (stream != null) {
+                stream.close();
+            }
             for (int i = all.size() - 1; i >= 0; i--) {
                 try {
                     all.get(i).cancel(); // from the last, so that none of them begins while the others are cancelled
@@ -79,6 +89,24 @@ final class Executor {
             }
         }
 
+        /** Notes a job; true if the program has ended already. */
+        synchronized boolean adopt(Job job) {
+            jobs.add(job);
+            return cause != null;
+        }
+
+        synchronized Cause cause() {
+            return cause;
+        }
+
+        /** Waits for the end of an item. */
+        synchronized Job.Ended await(int index) throws InterruptedException {
+            while (ended[index] == null) {
+                wait();
+            }
+            return ended[index];
+        }
+
         Job.Listener listener(final int index) {
             return new Job.Listener() {
                 public void started() {
@@ -86,6 +114,9 @@ final class Executor {
                         item = index;
                     }
                     server.broadcast(new MotionStarted(id, index));
+                    if (stream != null) {
+                        stream.begun();
+                    }
                 }
 
                 public void finished(Job.Ended how, int failureCode, String failure) {
@@ -97,6 +128,9 @@ final class Executor {
                             text = failure;
                         }
                         Program.this.notifyAll();
+                    }
+                    if (stream != null) {
+                        stream.over(how);
                     }
                 }
             };
@@ -122,7 +156,7 @@ final class Executor {
             }
             int items = run.items.length;
             for (Program waiting : queue) {
-                items += waiting.run.items.length;
+                items += waiting.size();
             }
             if (items > MAX_ITEMS && run.when != When.REPLACE) {
                 throw new Refusal(Code.QUEUE_FULL, "items", Integer.toString(run.items.length), "",
@@ -135,13 +169,38 @@ final class Executor {
                     replaced.add(0, running);
                 }
             }
-            lastId = lastId % 0xFFFFFFFFL + 1;
-            program = new Program(lastId, run);
-            queue.add(program);
-            notifyAll();
+            program = queue(run, null);
         }
         end(replaced, Cause.REPLACED, "motion " + program.id + " took its place");
         return program.id;
+    }
+
+    private Program queue(Run run, Stream stream) {
+        lastId = lastId % 0xFFFFFFFFL + 1;
+        Program program = new Program(lastId, run, stream);
+        queue.add(program);
+        notifyAll();
+        return program;
+    }
+
+    /** Begins a servo motion; nothing else may be under way, since it starts where the arm is now. */
+    synchronized long open(Stream stream) throws Refusal {
+        if (closed) {
+            throw new Refusal(Code.SHUTTING_DOWN, "the cabinet application ends");
+        }
+        if (running != null || !queue.isEmpty()) {
+            throw new Refusal(Code.BUSY, "motion " + (running != null ? running.id : queue.peek().id)
+                    + " is running; wait for it or stop it before a servo motion begins");
+        }
+        Program program = queue(null, stream);
+        stream.number(program.id);
+        return program.id;
+    }
+
+    /** The stream of a servo motion that runs or is about to; null if it is none, or has ended. */
+    synchronized Stream stream(long id) {
+        Program program = running != null ? running : queue.peek();
+        return program != null && program.id == id ? program.stream : null;
     }
 
     void cancel(long id) throws Refusal {
@@ -257,7 +316,45 @@ final class Executor {
         }
     }
 
+    /** Lets a servo motion follow its targets; one that ended because none came for long is begun anew with the next. */
+    private void serve(Program program) throws InterruptedException {
+        Stream stream = program.stream;
+        String starved = "";
+        boolean goesOn = true;
+        while (goesOn) {
+            stream.prepare();
+            synchronized (program) {
+                program.ended[0] = null;
+            }
+            try {
+                Servo servo = server.robot.servo(stream.open, program.listener(0));
+                stream.adopt(servo);
+                if (program.adopt(servo)) {
+                    servo.cancel();
+                }
+                if (stream.awaitStart()) {
+                    starved = stream.follow();
+                }
+            } catch (Refusal e) {
+                program.listener(0).finished(Job.Ended.FAILED, e.code, e.getMessage());
+            }
+            if (starved.length() > 0) {
+                program.end(Cause.STARVED, starved);
+            }
+            goesOn = program.await(0) == Job.Ended.DONE && program.cause() == null;
+            if (goesOn && !stream.awaitNext()) {
+                program.end(Cause.STARVED, "no target came for so long that the servo motion ended");
+                goesOn = false;
+            }
+        }
+        stream.tell();
+    }
+
     private void carryOut(Program program) throws InterruptedException {
+        if (program.stream != null) {
+            serve(program);
+            return;
+        }
         for (int i = 0; i < program.run.items.length; i++) {
             synchronized (program) {
                 if (program.cause != null) {
@@ -268,12 +365,7 @@ final class Executor {
             try {
                 Job job = server.robot.start(program.run.items[i],
                         program.run.items[i].mode == null ? new PositionMode() : program.run.items[i].mode, program.listener(i));
-                boolean tooLate;
-                synchronized (program) {
-                    program.jobs.add(job);
-                    tooLate = program.cause != null;
-                }
-                if (tooLate) {
+                if (program.adopt(job)) {
                     job.cancel();
                 }
             } catch (Refusal e) {
@@ -281,19 +373,10 @@ final class Executor {
             }
         }
         for (int i = 0; i < program.ended.length; i++) {
-            boolean cancelRest = false;
-            boolean reached;
-            synchronized (program) {
-                while (program.ended[i] == null) {
-                    program.wait();
-                }
-                reached = program.ended[i] == Job.Ended.DONE && i + 1 < program.ended.length;
-                cancelRest = program.cause != null;
-            }
-            if (reached) {
+            if (program.await(i) == Job.Ended.DONE && i + 1 < program.ended.length) {
                 server.broadcast(new ItemReached(program.id, i));
             }
-            if (cancelRest) {
+            if (program.cause() != null) {
                 program.end(program.cause, program.why);
             }
         }

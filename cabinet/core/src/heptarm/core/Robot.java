@@ -6,6 +6,7 @@ import heptarm.wire.Mode;
 import heptarm.wire.PoseState;
 import heptarm.wire.RobotInfo;
 import heptarm.wire.SafetyState;
+import heptarm.wire.ServoOpen;
 import heptarm.wire.SignalInfo;
 import heptarm.wire.ToolInfo;
 import heptarm.wire.WrenchState;
@@ -54,6 +55,12 @@ public interface Robot {
 
     /** Appends an item to what the robot carries out. Returns at once; planning errors come to the listener. */
     Job start(Item item, Mode mode, Job.Listener listener) throws Refusal;
+
+    /** Checks that a servo motion can be opened here; nothing moves. */
+    void check(ServoOpen open) throws Refusal;
+
+    /** Starts a servo motion at the present position; it takes targets once the listener has heard of its start. */
+    Servo servo(ServoOpen open, Job.Listener listener) throws Refusal;
 
     /** Brakes whatever moves and drops what waits. Never blocks for long. */
     void stop();

@@ -1,0 +1,102 @@
+package heptarm.app;
+
+import com.kuka.connectivity.motionModel.directServo.DirectServo;
+import com.kuka.connectivity.motionModel.directServo.IDirectServoRuntime;
+import com.kuka.connectivity.motionModel.smartServo.IServoRuntime;
+import com.kuka.connectivity.motionModel.smartServo.ISmartServoRuntime;
+import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
+import com.kuka.connectivity.motionModel.smartServo.SmartServo;
+import com.kuka.roboticsAPI.deviceModel.JointPosition;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.Frame;
+import com.kuka.roboticsAPI.motionModel.IMotion;
+
+import heptarm.core.Refusal;
+import heptarm.core.Servo;
+import heptarm.wire.Code;
+import heptarm.wire.Mode;
+import heptarm.wire.Pose;
+import heptarm.wire.PositionMode;
+import heptarm.wire.ServoEngine;
+import heptarm.wire.ServoOpen;
+
+/** A servo motion of Sunrise. Only this class names the option's classes, so that a cabinet without it still runs. */
+final class SunriseServo implements Servo {
+    private final LBR robot;
+    private final SunriseJob job;
+    private final ServoMotion<?> motion;
+
+    private SunriseServo(LBR robot, SunriseJob job, ServoMotion<?> motion) {
+        this.robot = robot;
+        this.job = job;
+        this.motion = motion;
+    }
+
+    /** A servo motion at the present position. */
+    static SunriseServo of(ServoOpen open, LBR robot, SunriseJob job) throws Refusal {
+        JointPosition here = robot.getCurrentJointPosition();
+        ServoMotion<?> motion = open.engine == ServoEngine.DIRECT ? new DirectServo(here) : new SmartServo(here);
+        motion.setJointVelocityRel(open.velocity);
+        motion.setJointAccelerationRel(open.acceleration);
+        motion.setMinimumTrajectoryExecutionTime(open.min_trajectory_time);
+        motion.setTimeoutAfterGoalReach(open.goal_timeout);
+        if (open.mode != null && !(open.mode instanceof PositionMode)) {
+            if (!ServoMotion.validateForImpedanceMode(robot)) {
+                throw new Refusal(Code.NOT_READY, "impedance control cannot begin: the arm has to rest, away from a singularity,"
+                        + " with nothing pushing it and the load data right (less than 10 Nm external torque in every joint)");
+            }
+            motion.setMode(Modes.of(open.mode));
+        }
+        return new SunriseServo(robot, job, motion);
+    }
+
+    IMotion motion() {
+        return motion;
+    }
+
+    public void cancel() {
+        job.cancel();
+    }
+
+    public void follow(double[] q, double[] velocity) throws Refusal {
+        try {
+            IServoRuntime runtime = motion.getRuntime();
+            if (runtime instanceof IDirectServoRuntime && motion instanceof DirectServo) {
+                ((IDirectServoRuntime) runtime).setDestination(new JointPosition(q));
+            } else if (velocity == null) {
+                ((ISmartServoRuntime) runtime).setDestination(new JointPosition(q));
+            } else {
+                ((ISmartServoRuntime) runtime).setDestination(new JointPosition(q), new JointPosition(velocity));
+            }
+        } catch (RuntimeException e) {
+            throw refusal(e);
+        }
+    }
+
+    public void followPose(double[] xyz, double[] quat) throws Refusal {
+        try {
+            Frame target = new Frame(robot.getRootFrame(), Convert.transformation(new Pose(xyz, quat)));
+            IServoRuntime runtime = motion.getRuntime();
+            if (motion instanceof DirectServo) {
+                ((IDirectServoRuntime) runtime).setDestination(target);
+            } else {
+                ((ISmartServoRuntime) runtime).setDestination(target);
+            }
+        } catch (RuntimeException e) {
+            throw refusal(e);
+        }
+    }
+
+    public void change(Mode mode) throws Refusal {
+        try {
+            motion.getRuntime().changeControlModeSettings(Modes.of(mode));
+        } catch (RuntimeException e) {
+            throw refusal(e);
+        }
+    }
+
+    private static Refusal refusal(RuntimeException error) {
+        String text = String.valueOf(error.getMessage());
+        return new Refusal(SunriseJob.code(text), text);
+    }
+}
