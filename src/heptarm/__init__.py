@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from heptarm.arm.connect import connect
     from heptarm.arm.feed import States
     from heptarm.arm.handle import MotionHandle
+    from heptarm.arm.servo import JointServo, PoseServo, ServoStats
     from heptarm.arm.target import target_from_env
     from heptarm.errors import (
         ArrivalError,
@@ -62,6 +63,7 @@ __all__ = [
     "ConnectFailed",
     "ConnectionLost",
     "HeptarmError",
+    "JointServo",
     "LimitError",
     "LocalProtocolError",
     "MissingExtra",
@@ -73,12 +75,14 @@ __all__ = [
     "NotInControl",
     "NotReady",
     "Pose",
+    "PoseServo",
     "ProtocolError",
     "QualityLost",
     "Redundancy",
     "RemoteProtocolError",
     "Result",
     "SafetyStop",
+    "ServoStats",
     "ShapeError",
     "StaleState",
     "Starved",
@@ -104,6 +108,9 @@ _HOMES = {
     "connect": "arm.connect",
     "States": "arm.feed",
     "MotionHandle": "arm.handle",
+    "JointServo": "arm.servo",
+    "PoseServo": "arm.servo",
+    "ServoStats": "arm.servo",
     "target_from_env": "arm.target",
     "hold": "values.motion",
     "lin": "values.motion",

@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from types import TracebackType
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, TypedDict, overload
 
 import numpy as np
 
 from heptarm.arm import program
+from heptarm.arm import servo as servo_module
 from heptarm.arm.connection import GROUPS, Connection
 from heptarm.arm.feed import States
 from heptarm.arm.handle import MotionHandle
+from heptarm.arm.modes import mode_message
+from heptarm.arm.servo import JointServo, PoseServo
 from heptarm.errors import HeptarmError, ShapeError, StaleState, Timeout
 from heptarm.values.arrays import within
+from heptarm.values.mode import Mode
 from heptarm.values.motion import Motion
 from heptarm.values.result import Result
 from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 _log = logging.getLogger("heptarm.arm")
 
@@ -34,6 +42,19 @@ _DAY = 86400.0
 _STREAM_SIZE = 2000
 
 
+class _ServoSettings(TypedDict, total=False):
+    """What `Arm.servo` can be told, for type checkers."""
+
+    rate: float
+    watchdog: float | None
+    engine: Literal["smart", "direct"]
+    mode: Mode | None
+    speed: float
+    acceleration: float
+    min_trajectory_time: float | None
+    goal_timeout: float
+
+
 class Arm:
     """A connected arm; made by `connect`. Its methods may be called from any thread.
 
@@ -43,6 +64,7 @@ class Arm:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self._speed = 1.0
+        self._mode: Mode | None = None
 
     # ------------------------------------------------------------------------------- connection
 
@@ -292,6 +314,7 @@ class Arm:
         self,
         motion: Motion | Sequence[Motion],
         *,
+        mode: Mode | None = None,
         speed: float | None = None,
         timeout: float | None = None,
     ) -> Result:
@@ -299,6 +322,7 @@ class Arm:
 
         Args:
             motion: what to do.
+            mode: control mode of all of them; None: that of `using`, otherwise position.
             speed: ceiling for this call, (0, 1]; the lower one of this and `arm.speed` counts.
             timeout: how long to wait [s]; None: three times as long as it can take, and more.
 
@@ -319,7 +343,7 @@ class Arm:
                 hint="give a timeout, a hold with a duration, or use arm.start()",
             )
         with self._connection.stopping_on_interrupt():
-            handle = self._start(motions, speed=speed, when="queue")
+            handle = self._start(motions, mode=mode, speed=speed, when="queue")
             try:
                 return handle.wait(timeout=timeout)
             except Timeout:
@@ -330,6 +354,7 @@ class Arm:
         self,
         motion: Motion | Sequence[Motion],
         *,
+        mode: Mode | None = None,
         speed: float | None = None,
         when: Literal["queue", "replace", "reject"] = "queue",
     ) -> MotionHandle:
@@ -337,6 +362,7 @@ class Arm:
 
         Args:
             motion: what to do.
+            mode: control mode of all of them; None: that of `using`, otherwise position.
             speed: ceiling for this call, (0, 1].
             when: while another one runs: "queue" behind it, "replace" it, or "reject" this one.
 
@@ -345,15 +371,32 @@ class Arm:
             ConnectionLost: the connection has ended.
         """
         with self._connection.stopping_on_interrupt():
-            return self._start(program.listed(motion), speed=speed, when=when)
+            return self._start(program.listed(motion), mode=mode, speed=speed, when=when)
 
-    def _start(self, motions: tuple[Motion, ...], *, speed: float | None, when: str) -> MotionHandle:
+    @contextlib.contextmanager
+    def using(self, mode: Mode) -> Iterator[None]:
+        """A block whose motions and servo motions have a control mode unless they say another.
+
+        Raises:
+            ShapeError: it is no mode.
+        """
+        mode_message(mode)
+        outer, self._mode = self._mode, mode
+        try:
+            yield
+        finally:
+            self._mode = outer
+
+    def _start(
+        self, motions: tuple[Motion, ...], *, mode: Mode | None, speed: float | None, when: str
+    ) -> MotionHandle:
         if when not in _WHEN:
             raise ShapeError(f"when is {when!r}; allowed are {', '.join(map(repr, _WHEN))}", parameter="when")
         ceiling = self._speed
         if speed is not None:
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
-        message = wire.Run(items=program.items(motions, self.robot, ceiling), when=_WHEN[when])
+        chosen = mode_message(mode or self._mode)
+        message = wire.Run(items=program.items(motions, self.robot, ceiling, mode=chosen), when=_WHEN[when])
         return self._connection.run(message, len(motions), self._limit(motions, ceiling))
 
     def _limit(self, motions: tuple[Motion, ...], ceiling: float) -> float:
@@ -364,6 +407,57 @@ class Arm:
         own = program.longest(motions, self.robot, ceiling) / max(override, 0.01) / min(link.pace, 1.0)
         total = own + link.pending()
         return total if total < _DAY else _DAY
+
+    @overload
+    def servo(self, kind: Literal["joint"] = "joint", **settings: Unpack[_ServoSettings]) -> JointServo: ...
+    @overload
+    def servo(self, kind: Literal["pose"], **settings: Unpack[_ServoSettings]) -> PoseServo: ...
+    def servo(
+        self,
+        kind: Literal["joint", "pose"] = "joint",
+        *,
+        rate: float = 100.0,
+        watchdog: float | None = None,
+        engine: Literal["smart", "direct"] = "smart",
+        mode: Mode | None = None,
+        speed: float = 0.2,
+        acceleration: float = 0.2,
+        min_trajectory_time: float | None = None,
+        goal_timeout: float = 300.0,
+    ) -> JointServo | PoseServo:
+        """A stream of targets that the arm follows; it begins with the `with` block.
+
+        Args:
+            kind: what the targets are: "joint" positions or "pose" of the flange.
+            rate: ticks per second of the loop [Hz].
+            watchdog: within this time after a target the next one has to come, or the arm stops [s], 0.005 to 2;
+                None: five periods, and at least 0.05 s.
+            engine: "smart" plans a limited trajectory to each target; "direct" goes straight for it, for targets
+                that are close and smooth.
+            mode: control mode; None: position. It may change its parameters while the arm follows.
+            speed: ceiling, a fraction of each axis' maximum in (0, 1]; the lower one of this and `arm.speed` counts.
+            acceleration: likewise, of the acceleration and the jerk.
+            min_trajectory_time: no trajectory to a target is shorter [s]; None: a period and 5 ms.
+            goal_timeout: after so long at its target without another one the cabinet's servo motion ends [s]; the
+                next target begins a new one.
+
+        Raises:
+            LimitError: a value outside its range.
+            ModeConflict: another motion runs (when the block begins).
+        """
+        message, hertz, seconds = servo_module.open_message(
+            kind,
+            rate=rate,
+            watchdog=watchdog,
+            engine=engine,
+            mode=mode or self._mode,
+            speed=min(self._speed, within(speed, "speed", 0.0, 1.0, above=True)),
+            acceleration=acceleration,
+            min_trajectory_time=min_trajectory_time,
+            goal_timeout=goal_timeout,
+        )
+        stream = PoseServo if kind == "pose" else JointServo
+        return stream(self._connection, message, rate=hertz, watchdog=seconds)
 
     def stop(self, kind: Literal["path", "fast", "after_motion"] = "path") -> None:
         """Stop whatever runs and drop what waits; anybody may, at any time, from any thread, again and again.

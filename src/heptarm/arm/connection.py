@@ -87,6 +87,7 @@ class Connection:
         self._robot: RobotModel | None = None
         self._read: tuple[int, State] | None = None
         self._handles: dict[int, MotionHandle] = {}
+        self._servo_status: wire.ServoStatus | None = None
         self._unclaimed: deque[Message] = deque(maxlen=256)
         self._lock = threading.RLock()
 
@@ -247,8 +248,8 @@ class Connection:
         self.link.expect_states(rate * self.pace)
         self.options = replace(self.options, rate=rate, groups=tuple(groups))
 
-    def run(self, message: wire.Run, count: int, limit: float) -> MotionHandle:
-        """Send a program of `count` motions; its handle waits for up to `limit` seconds."""
+    def run(self, message: wire.Run | wire.ServoOpen, count: int, limit: float) -> MotionHandle:
+        """Send a program of `count` motions, or a servo motion; its handle waits for up to `limit` seconds."""
         handle = MotionHandle(self, count, limit)
 
         def claim(answer: Message) -> None:
@@ -257,6 +258,11 @@ class Connection:
 
         self.link.accept(message, timeout=self.options.timeout, on_answer=claim)
         return handle
+
+    def servo_status(self, number: int) -> wire.ServoStatus | None:
+        """What the cabinet said last of a servo motion's stream."""
+        told = self._servo_status
+        return told if told is not None and told.servo == number else None
 
     def pending(self) -> float:
         """How long the programs under way may take, all together [s]."""
@@ -367,6 +373,8 @@ class Connection:
                 self._unclaimed.append(message)  # its Accepted may still be on its way
             else:
                 self._hand_over(handle, message)
+        elif isinstance(message, wire.ServoStatus):
+            self._servo_status = message
         elif isinstance(message, wire.ControlChanged):
             self.controller = message.controller
             if self.controls and message.session != self.welcome.session:

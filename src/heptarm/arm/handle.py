@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import threading
 from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout
@@ -36,6 +37,7 @@ class MotionHandle:
         self._limit = limit
         self._id = 0
         self._item = -1
+        self._begun = threading.Event()
         self._future: Future[Result] = Future()
 
     def __repr__(self) -> str:
@@ -114,6 +116,10 @@ class MotionHandle:
                 hint="give a longer timeout, or look at arm.state whether the arm may move",
             ) from None
 
+    def wait_started(self, timeout: float) -> bool:
+        """Wait until the first motion has begun or the program has ended; False if neither came in time [s]."""
+        return self._begun.wait(timeout)
+
     def cancel(self) -> None:
         """End it: a running motion brakes on its path, a waiting one is dropped. Cancelling twice is legal."""
         self._connection.cancel(self)
@@ -136,6 +142,7 @@ class MotionHandle:
         """An event of this program came."""
         if isinstance(message, MotionStarted):
             self._item = message.item
+            self._begun.set()
         elif isinstance(message, ItemReached):
             self._item = max(self._item, message.item)
         elif isinstance(message, MotionFinished):
@@ -156,6 +163,7 @@ class MotionHandle:
         if result.cause in _GOOD:
             if not self._future.done():
                 self._future.set_result(result)
+            self._begun.set()
             return
         what = message.text or (MEANINGS[message.code].title if message.code in MEANINGS else "")
         text = f"motion {message.id} {_WORDS[result.cause]}{': ' + what if what else ''}"
@@ -177,6 +185,7 @@ class MotionHandle:
     def _end(self, error: HeptarmError) -> None:
         with contextlib.suppress(Exception):  # InvalidStateError: it has ended before
             self._future.set_exception(error)
+        self._begun.set()
 
 
 _WORDS = {

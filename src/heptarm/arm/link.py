@@ -239,6 +239,14 @@ class Link:
         """Send a request without waiting for its answer; callable from the callbacks."""
         self._say(message, _Slot(None))
 
+    def tell(self, message: Message) -> None:
+        """Send a message that nobody answers, stamped with the cabinet's clock as far as it is known."""
+        with self._sending:
+            if self._error is not None:
+                raise self._lost()
+            data = self._session.send(message, time=self.offset.to_cabinet(self._clock.nanos()))
+            self._transmit(data)
+
     def ping(self) -> None:
         """Probe the cabinet's clock; the answer goes into `offset`."""
         self._say(Ping(sent=self._clock.nanos()))
@@ -252,15 +260,19 @@ class Link:
                 request = self._session.next_request()
                 self._slots[request] = slot
             data = self._session.send(message, request=request, time=self._clock.nanos())
-            try:
-                self._transport.send(data)
-            except HeptarmError as error:
-                self._lose(error)
-                raise
-            except BaseException:
-                # a part of the frame may have left: nothing can follow it
-                self._lose(ConnectionLost("interrupted while sending"))
-                raise
+            self._transmit(data)
+
+    def _transmit(self, data: bytes) -> None:
+        """Send octets; the caller holds the lock."""
+        try:
+            self._transport.send(data)
+        except HeptarmError as error:
+            self._lose(error)
+            raise
+        except BaseException:
+            # a part of the frame may have left: nothing can follow it
+            self._lose(ConnectionLost("interrupted while sending"))
+            raise
 
     # ------------------------------------------------------------------------------------ reading
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import inf, isinf, isnan, nan
 
 import numpy as np
@@ -49,13 +50,16 @@ def listed(motion: Motion | Sequence[Motion]) -> tuple[Motion, ...]:
     return tuple(motions)
 
 
-def items(motions: Sequence[Motion], robot: RobotModel, ceiling: float) -> tuple[wire.Item, ...]:
+def items(
+    motions: Sequence[Motion], robot: RobotModel, ceiling: float, *, mode: wire.Mode | None = None
+) -> tuple[wire.Item, ...]:
     """The items of a program.
 
     Args:
         motions: what to do.
         robot: the connected robot.
         ceiling: no axis faster than this fraction of its maximum, (0, 1].
+        mode: control mode of all of them; None: position.
 
     Raises:
         LimitError: a target is outside the robot's limits; the text names motion, axis, value and range.
@@ -63,7 +67,7 @@ def items(motions: Sequence[Motion], robot: RobotModel, ceiling: float) -> tuple
     result = []
     for index, motion in enumerate(motions):
         try:
-            result.append(_item(motion.under(ceiling), robot))
+            result.append(replace(_item(motion.under(ceiling), robot), mode=mode))
         except HeptarmError as error:
             if len(motions) > 1:  # which of them
                 error.text = f"motions[{index}]: {error.text}"

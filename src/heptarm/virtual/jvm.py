@@ -123,7 +123,7 @@ def _mode(values: Any) -> Mode | None:
     if values is None:
         return None
     numbers = np.array(_numbers(values)[1:])
-    return JointImpedance(numbers[:7], numbers[7:])
+    return JointImpedance(numbers[:7], damping=numbers[7:])
 
 
 def _order(java: Any) -> Order:

@@ -8,6 +8,7 @@ import heptarm.core.Job;
 import heptarm.core.Models;
 import heptarm.core.Refusal;
 import heptarm.core.Robot;
+import heptarm.core.Servo;
 import heptarm.wire.Code;
 import heptarm.wire.FrameInfo;
 import heptarm.wire.Hold;
@@ -20,6 +21,8 @@ import heptarm.wire.Redundancy;
 import heptarm.wire.RobotInfo;
 import heptarm.wire.SafetyBits;
 import heptarm.wire.SafetyState;
+import heptarm.wire.ServoEngine;
+import heptarm.wire.ServoOpen;
 import heptarm.wire.SignalInfo;
 import heptarm.wire.ToolInfo;
 import heptarm.wire.WrenchState;
@@ -29,7 +32,8 @@ import heptarm.wire.WrenchState;
  *
  * <p>Errors to order: a PTP whose A7 is 1.25 rad fails when it is planned, one with 1.5 rad fails on the way, and one with
  * 1.0 rad is planned for half a second. One with 0.75 rad needs an option that
- * the cabinet lacks. After the message "blind" readings fail for a while, after "jammed" cancelling does.
+ * the cabinet lacks. A servo motion goes straight to its targets; one to more than 2 rad of A7 is refused by the robot,
+ * and after 0.3 s without a target it ends by itself. After the message "blind" readings fail for a while, after "jammed" cancelling does.
  */
 final class FakeRobot implements Robot, Runnable {
     static final double SPEED = 1.0;
@@ -37,6 +41,8 @@ final class FakeRobot implements Robot, Runnable {
     static final double FAILS_ON_THE_WAY = 1.5;
     static final double PLANS_SLOWLY = 1.0;
     static final double LACKS_A_CLASS = 0.75;
+    static final double REFUSED = 2.0;
+    static final double SERVO_TIMEOUT = 0.3;
     private static final long SLOWLY_NS = 500000000L;
     private static final long TICK_NS = 2000000L;
 
@@ -61,10 +67,11 @@ final class FakeRobot implements Robot, Runnable {
         this.info = Models.describe("LBR_iiwa_14_R820_1", low, limit);
     }
 
-    private final class FakeJob implements Job {
-        final double[] target;
+    private final class FakeJob implements Servo {
+        double[] target;
         final double seconds;
         final Job.Listener listener;
+        boolean follows;
         boolean started;
         boolean cancelled;
         double left;
@@ -74,6 +81,26 @@ final class FakeRobot implements Robot, Runnable {
             this.seconds = seconds;
             this.left = seconds;
             this.listener = listener;
+        }
+
+        @Override
+        public void follow(double[] to, double[] velocity) throws Refusal {
+            if (Math.abs(to[6]) > REFUSED) {
+                throw new Refusal(Code.EXECUTION_FAILED, "the robot does not want to go there");
+            }
+            synchronized (jobs) {
+                target = to;
+                left = SERVO_TIMEOUT;
+            }
+        }
+
+        @Override
+        public void followPose(double[] xyz, double[] quat) throws Refusal {
+            throw new Refusal(Code.UNREACHABLE, "not reachable");
+        }
+
+        @Override
+        public void change(Mode to) {
         }
 
         @Override
@@ -129,6 +156,13 @@ final class FakeRobot implements Robot, Runnable {
     }
 
     private Job.Ended move(FakeJob job, double dt) {
+        if (job.follows) {
+            job.left -= dt;
+            if (job.target != null) {
+                System.arraycopy(job.target, 0, q, 0, 7);
+            }
+            return job.left <= 0 ? Job.Ended.DONE : null;
+        }
         if (job.target == null) {
             job.left -= dt;
             return job.left <= 0 ? Job.Ended.DONE : null;
@@ -181,6 +215,23 @@ final class FakeRobot implements Robot, Runnable {
         }
         double seconds = item.motion instanceof Hold ? ((Hold) item.motion).duration : 0.0;
         FakeJob job = new FakeJob(target, Double.isNaN(seconds) ? 1e9 : seconds, listener);
+        synchronized (jobs) {
+            jobs.add(job);
+        }
+        return job;
+    }
+
+    @Override
+    public void check(ServoOpen open) throws Refusal {
+        if (open.engine == ServoEngine.LIN) {
+            throw new Refusal(Code.UNSUPPORTED, "engine", "lin", "smart, direct", "not here");
+        }
+    }
+
+    @Override
+    public Servo servo(ServoOpen open, Job.Listener listener) {
+        FakeJob job = new FakeJob(null, SERVO_TIMEOUT, listener);
+        job.follows = true;
         synchronized (jobs) {
             jobs.add(job);
         }

@@ -1,0 +1,391 @@
+"""Servo motions: a stream of targets that the arm follows while it is being told.
+
+::
+
+    with arm.servo("joint", rate=100) as sv:
+        while (dt := sv.tick()) and sv.t < 5:
+            sv.set(sv.start.q + [0, 0, 0, 0, 0, 0, 0.2 * np.sin(sv.t)])
+
+Each target brings the time within which the next one has to come; a program that hangs or dies leaves an arm at rest.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections import deque
+from dataclasses import dataclass
+from math import inf, nan
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.arm.handle import MotionHandle
+from heptarm.arm.modes import mode_message
+from heptarm.errors import HeptarmError, LimitError, LocalProtocolError, ShapeError, Timeout
+from heptarm.values.arrays import Array, array, within
+from heptarm.values.mode import Mode
+from heptarm.values.pose import Pose
+from heptarm.values.result import Result
+from heptarm.values.state import State
+from heptarm.wire import messages as wire
+
+if TYPE_CHECKING:
+    from heptarm.arm.connection import Connection
+
+_log = logging.getLogger("heptarm.servo")
+
+ENGINES = {"smart": wire.ServoEngine.SMART, "direct": wire.ServoEngine.DIRECT}
+#: Without a word of the user the watchdog is so many periods long, but no shorter than this [s].
+_PERIODS, _SHORTEST = 5.0, 0.05
+_LONGEST = 2.0
+#: How long the cabinet may take until the first target counts [s].
+_FIRST = 2.0
+#: How long to wait for the start, and for rest at the end [s].
+_PATIENCE = 5.0
+#: Calls of `set` whose cost is remembered.
+_REMEMBERED = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class ServoStats:
+    """How a stream of targets went.
+
+    Attributes:
+        sent: targets sent.
+        rate: targets per second since the first one [Hz].
+        late_ticks: ticks that came later than half a period.
+        set_median: what a call of `set` costs [s]; `set_p99` likewise.
+        set_p99: see `set_median`.
+        received: targets that the cabinet received, as it said last; the next ones likewise.
+        applied: how many of them became the arm's target; newer ones overtook the others.
+        refused: how many the cabinet refused; `text` says why it refused the last one.
+        late: gaps longer than the watchdog time.
+        age_median: age of the targets when they were applied [s]; NaN: not told yet.
+        age_p99: see `age_median`.
+        text: why the last refused target was refused.
+    """
+
+    sent: int
+    rate: float
+    late_ticks: int
+    set_median: float
+    set_p99: float
+    received: int = 0
+    applied: int = 0
+    refused: int = 0
+    late: int = 0
+    age_median: float = nan
+    age_p99: float = nan
+    text: str = ""
+
+
+class Servo:
+    """A stream of targets; made by `Arm.servo`, used in a `with` block. Its subclasses say what targets are.
+
+    Leaving the block ends the motion at rest. An error that ended it earlier, such as a missed watchdog, rises there.
+
+    Attributes:
+        period: pause between two ticks [s].
+        watchdog: within this time after a target the next one has to come [s].
+    """
+
+    def __init__(
+        self,
+        connection: Connection,
+        message: wire.ServoOpen,
+        *,
+        rate: float,
+        watchdog: float,
+    ) -> None:
+        self.period = 1.0 / rate
+        self.watchdog = watchdog
+        self._connection = connection
+        self._link = connection.link
+        self._clock = connection.clock
+        self._message = message
+        self._handle: MotionHandle | None = None
+        self._start: State | None = None
+        self._result: Result | None = None
+        self._began = self._due = self._last = 0
+        self._first_sent = self._last_sent = 0
+        self._sent = self._late_ticks = 0
+        self._costs: deque[int] = deque(maxlen=_REMEMBERED)
+
+    # ------------------------------------------------------------------------------------ life
+
+    def __enter__(self) -> Servo:
+        """Begin the servo motion where the arm is; waits until it runs.
+
+        Raises:
+            CommandRejected: refused; ModeConflict if another motion runs.
+            MotionAborted: the cabinet could not start it.
+        """
+        if self._handle is not None:
+            raise LocalProtocolError("a servo is used once; make another one with arm.servo(...)")
+        handle = self._handle = self._connection.run(self._message, 1, inf)
+        if not handle.wait_started(_PATIENCE):
+            handle.cancel()
+            raise Timeout(
+                f"the servo motion did not begin within {_PATIENCE:g} s",
+                hint="look at arm.state.safety: is the robot ready to move, is it paused?",
+            )
+        if handle.done:
+            self._result = handle.wait()  # raises why
+        newest = self._connection.newest()
+        before = 0 if newest is None or newest.joints is None else newest.joints.stamp
+        self._start = self._connection.wait_for(
+            lambda state: state.joints is not None and state.joints.stamp > before, _PATIENCE
+        )
+        self._began = self._due = self._last = self._clock.nanos()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """End the motion and wait for rest; raises what ended it early, unless another error is on its way."""
+        try:
+            self.close()
+        except HeptarmError as trouble:
+            if error is None:
+                raise
+            _log.warning("closing the servo motion: %s", trouble)
+
+    def close(self) -> None:
+        """End the motion at rest; raises what ended it early. Closing twice is legal."""
+        handle = self._handle
+        if handle is None or self._result is not None:
+            return
+        if not handle.done:
+            self._connection.cancel(handle)
+        self._result = handle.wait(timeout=_PATIENCE)
+
+    @property
+    def active(self) -> bool:
+        """Whether the arm follows."""
+        return self._handle is not None and not self._handle.done
+
+    @property
+    def start(self) -> State:
+        """The robot's state when the motion began: build targets on it, and nothing jumps."""
+        if self._start is None:
+            raise LocalProtocolError("the servo motion has not begun; use it in a with block")
+        return self._start
+
+    @property
+    def result(self) -> Result | None:
+        """How it ended, after the block."""
+        return self._result
+
+    @property
+    def t(self) -> float:
+        """Time since the motion began [s]."""
+        return (self._clock.nanos() - self._began) * 1e-9
+
+    # ---------------------------------------------------------------------------------- the loop
+
+    def tick(self) -> float | None:
+        """Wait for the next period.
+
+        Returns:
+            Time since the last tick [s]; None when the arm follows no more (why rises at the end of the block).
+        """
+        if not self.active:
+            return None
+        clock = self._clock
+        self._due += round(self.period * 1e9)
+        now = clock.nanos()
+        if now < self._due:
+            clock.sleep((self._due - now) * 1e-9)
+            now = clock.nanos()
+        late = (now - self._due) * 1e-9
+        if late > 0.5 * self.period:
+            self._late_ticks += 1
+            if late > self.period:
+                self._due = now  # what was missed is not caught up in a burst
+        passed = (now - self._last) * 1e-9
+        self._last = now
+        return passed if self.active else None
+
+    def _tell(self, message: wire.ServoJoints | wire.ServoJointsVelocity | wire.ServoPose) -> None:
+        if not self.active:
+            return
+        began = self._clock.nanos()
+        self._link.tell(message)
+        now = self._clock.nanos()
+        if self._sent == 0:
+            self._first_sent = now
+        self._last_sent = now
+        self._sent += 1
+        self._costs.append(now - began)
+
+    @property
+    def _number(self) -> int:
+        if self._handle is None:
+            raise LocalProtocolError("the servo motion has not begun; use it in a with block")
+        return self._handle.id
+
+    def change(self, mode: Mode) -> None:
+        """Change the parameters of the control mode while the arm follows.
+
+        Raises:
+            ModeConflict: it is another kind of mode than the one the servo motion began with.
+        """
+        message = mode_message(mode)
+        assert message is not None
+        self._connection.request(wire.ServoSettings(servo=self._number, mode=message))
+
+    @property
+    def stats(self) -> ServoStats:
+        """How it went so far."""
+        seconds = (self._last_sent - self._first_sent) * 1e-9
+        median, p99 = np.percentile(self._costs, [50, 99]) * 1e-9 if self._costs else (nan, nan)
+        told = None if self._handle is None else self._connection.servo_status(self._handle.id)
+        seen = {} if told is None else _seen(told)
+        rate = (self._sent - 1) / seconds if self._sent > 1 and seconds > 0 else nan
+        return ServoStats(self._sent, rate, self._late_ticks, float(median), float(p99), **seen)  # type: ignore[arg-type]
+
+
+def _seen(told: wire.ServoStatus) -> dict[str, object]:
+    return {
+        "received": told.targets,
+        "applied": told.applied,
+        "refused": told.refused,
+        "late": told.late,
+        "age_median": told.age_median,
+        "age_p99": told.age_p99,
+        "text": told.text,
+    }
+
+
+class JointServo(Servo):
+    """A stream of joint positions."""
+
+    def __enter__(self) -> JointServo:
+        """Begin; see `Servo`."""
+        super().__enter__()
+        return self
+
+    def set(self, q: npt.ArrayLike, dq: npt.ArrayLike | None = None) -> Array:
+        """Send a target; the newest wins. After the motion has ended it does nothing.
+
+        Args:
+            q: joint positions, shape (7,) [rad]; beyond a joint's limits they are brought back to them.
+            dq: velocity to pass them at, shape (7,) [rad/s]; None: come to rest there.
+
+        Returns:
+            What was sent, shape (7,) [rad].
+
+        Raises:
+            ShapeError: not seven numbers.
+            LimitError: one is not finite.
+        """
+        robot = self._connection.robot
+        wanted = _joints(q, "q")
+        sent = np.minimum(np.maximum(wanted, robot.q_min), robot.q_max)
+        if dq is None:
+            self._tell(wire.ServoJoints(servo=self._number, watchdog=self.watchdog, q=tuple(sent.tolist())))
+        else:
+            speed = tuple(_joints(dq, "dq").tolist())
+            self._tell(
+                wire.ServoJointsVelocity(
+                    servo=self._number, watchdog=self.watchdog, q=tuple(sent.tolist()), dq=speed
+                )
+            )
+        return sent
+
+
+class PoseServo(Servo):
+    """A stream of poses of the moved frame in the base."""
+
+    def __enter__(self) -> PoseServo:
+        """Begin; see `Servo`."""
+        super().__enter__()
+        return self
+
+    def set(self, pose: Pose) -> Pose:
+        """Send a target; the newest wins. After the motion has ended it does nothing.
+
+        The cabinet chooses the joints that reach it nearest to the last target; a pose that none reach is refused
+        there, and `stats` tells of it.
+
+        Returns:
+            What was sent.
+
+        Raises:
+            ShapeError: it is no Pose.
+        """
+        if not isinstance(pose, Pose):
+            raise ShapeError(
+                f"pose is {pose!r}; a Pose is wanted", parameter="pose", value=pose, hint="Pose.of(xyz, quat)"
+            )
+        self._tell(
+            wire.ServoPose(
+                servo=self._number,
+                watchdog=self.watchdog,
+                xyz=tuple(pose.xyz.tolist()),
+                quat=tuple(pose.quat.tolist()),
+            )
+        )
+        return pose
+
+
+def _joints(value: npt.ArrayLike, name: str) -> Array:
+    """Seven finite numbers; a shorter way than `array`, since it runs at every tick."""
+    result = np.asarray(value, dtype=np.float64)
+    if result.shape != (7,) or not np.isfinite(result).all():
+        return array(value, 7, name)  # says what is wrong
+    return result
+
+
+def open_message(
+    kind: str,
+    *,
+    rate: float,
+    watchdog: float | None,
+    engine: str,
+    mode: Mode | None,
+    speed: float,
+    acceleration: float,
+    min_trajectory_time: float | None,
+    goal_timeout: float,
+) -> tuple[wire.ServoOpen, float, float]:
+    """The message that opens a servo motion, its rate [Hz] and its watchdog [s], all checked; see `Arm.servo`."""
+    if engine not in ENGINES:
+        raise ShapeError(
+            f"engine is {engine!r}; allowed are {', '.join(map(repr, ENGINES))}", parameter="engine"
+        )
+    if kind not in ("joint", "pose"):
+        raise ShapeError(f"kind is {kind!r}; allowed are 'joint', 'pose'", parameter="kind")
+    hertz = within(rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
+    period = 1.0 / hertz
+    seconds = min(max(_PERIODS * period, _SHORTEST), _LONGEST)
+    if watchdog is not None:
+        seconds = within(watchdog, "watchdog", 0.005, _LONGEST, unit="s")
+    if seconds < period:
+        raise LimitError(
+            f"the watchdog of {seconds:g} s is shorter than the period of {period:g} s",
+            code=2,
+            parameter="watchdog",
+            value=seconds,
+            allowed=f"[{period:g}, {_LONGEST:g}] s",
+            hint="give a longer watchdog or a higher rate",
+        )
+    shortest = min(max(period + 0.005, 0.001), 1.0) if min_trajectory_time is None else min_trajectory_time
+    return (
+        wire.ServoOpen(
+            engine=ENGINES[engine],
+            mode=mode_message(mode),
+            velocity=within(speed, "speed", 0.0, 1.0, above=True),
+            acceleration=within(acceleration, "acceleration", 0.0, 1.0, above=True),
+            min_trajectory_time=within(shortest, "min_trajectory_time", 0.001, 1.0, unit="s"),
+            goal_timeout=within(goal_timeout, "goal_timeout", 0.1, 3600.0, unit="s"),
+            watchdog=_FIRST,
+        ),
+        hertz,
+        seconds,
+    )

@@ -1,0 +1,215 @@
+"""Servo motions on the plant: the newest target wins, limits hold at every tick, and everything stops."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from heptarm.values.arrays import Array
+from heptarm.values.mode import JointImpedance
+from heptarm.virtual.order import Order
+from heptarm.virtual.plant import Plant
+from tests.virtual.driving import READY, Ear, ready
+
+KINDS = ("servo", "direct")
+HERE = np.array(READY)
+
+
+def serving(kind: str = "servo", **terms: object) -> tuple[Plant, Ear]:
+    plant, ear = ready(), Ear()
+    plant.submit(Order(7, kind, listener=ear, **terms))  # type: ignore[arg-type]
+    plant.step(2)
+    return plant, ear
+
+
+def to_rest(plant: Plant, *, most: int = 3000) -> int:
+    ticks = 0
+    while not plant.idle:
+        plant.tick()
+        ticks += 1
+        assert ticks < most
+    return ticks
+
+
+def commands(plant: Plant, ticks: int) -> Array:
+    seen = []
+    for _ in range(ticks):
+        plant.tick()
+        seen.append(plant.snapshot.q_cmd)
+    return np.array(seen)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_far_target_is_reached_within_every_limit(kind: str) -> None:
+    plant, _ = serving(kind, joint_velocity=(0.5,) * 7, joint_acceleration=(0.5,) * 7)
+    target = HERE + [0.8, -0.4, 0.3, 0.5, -0.6, 0.2, 1.0]
+    plant.ring.post(7, target)
+    path = np.vstack([[HERE] * 3, commands(plant, 4000)])
+    assert np.abs(path[-1] - target).max() < 1e-6
+    speed = np.diff(path, axis=0) * 1e3
+    assert (np.abs(speed) <= 0.5 * plant.robot.dq_max * 1.001).all()
+    assert (np.abs(np.diff(speed, axis=0) * 1e3) <= 0.5 * plant.robot.ddq_max * 1.01 + 1e-6).all()
+
+
+@settings(max_examples=15, deadline=None)
+@given(
+    seed=st.integers(0, 10_000),
+    every=st.integers(1, 40),
+    kind=st.sampled_from(KINDS),
+    with_velocity=st.booleans(),
+)
+def test_whatever_the_targets_the_limits_hold(seed: int, every: int, kind: str, with_velocity: bool) -> None:
+    random = np.random.default_rng(seed)
+    plant, ear = serving(kind)
+    robot, path = plant.robot, [HERE] * 3
+    for tick in range(600):
+        if tick % every == 0:
+            goal = np.clip(HERE + random.normal(0, 0.5, 7), robot.q_min + 0.3, robot.q_max - 0.3)
+            plant.ring.post(7, goal, random.normal(0, 1.0, 7) if with_velocity else None)
+        plant.tick()
+        path.append(plant.snapshot.q_cmd)
+    speed = np.diff(np.array(path), axis=0) * 1e3
+    assert (np.abs(speed) <= robot.dq_max * 1.01).all()
+    assert (np.abs(np.diff(speed, axis=0) * 1e3) <= robot.ddq_max * 1.05 + 1e-3).all()
+    assert ear.causes == ["started"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_cancelling_brakes_at_full_deceleration_to_rest(kind: str) -> None:
+    plant, ear = serving(kind)
+    plant.ring.post(7, HERE + [1.5, 0, 0, 0, 0, 0, 2.0])
+    plant.step(500)
+    speed = np.abs(plant.snapshot.dq)
+    plant.cancel(7)
+    ticks = to_rest(plant)
+    robot = plant.robot
+    allowed = (speed / robot.ddq_max + robot.ddq_max / robot.dddq_max).max() + 0.1  # ramps, and settling
+    assert ticks * 1e-3 <= allowed
+    assert ear.causes == ["started", "cancelled"]
+    plant.step(200)
+    assert np.abs(plant.snapshot.dq).max() < 1e-3
+
+
+def test_targets_for_another_motion_are_not_followed() -> None:
+    plant, _ = serving()
+    plant.ring.post(6, HERE + 0.3)
+    assert (commands(plant, 100) == HERE).all()
+
+
+def test_of_two_targets_between_ticks_the_newest_wins() -> None:
+    plant, _ = serving()
+    plant.ring.post(7, HERE + 0.3)
+    plant.ring.post(7, HERE - 0.1)
+    assert np.abs(commands(plant, 3000)[-1] - (HERE - 0.1)).max() < 1e-9
+
+
+def test_a_passing_velocity_is_kept_for_a_moment_then_the_arm_rests() -> None:
+    plant, _ = serving()
+    plant.ring.post(7, HERE + [0, 0, 0, 0, 0, 0, 0.2], np.array([0, 0, 0, 0, 0, 0, 0.5]))
+    path = commands(plant, 3000)[:, 6]
+    assert path.max() > READY[6] + 0.2 + 0.04  # passed by
+    assert path[-1] == pytest.approx(path[-500], abs=1e-9)  # and rests
+
+
+def test_a_target_that_stays_ends_the_motion_after_its_timeout() -> None:
+    plant, ear = serving(goal_timeout=0.3)
+    plant.ring.post(7, HERE + 0.05)
+    to_rest(plant)
+    assert ear.causes == ["started", "done"]
+
+
+def test_a_velocity_that_leads_out_of_the_limits_stops_the_arm() -> None:
+    plant, ear = serving(speed_timeout=1.0)
+    edge = HERE.copy()
+    edge[6] = plant.robot.q_max[6] - 0.01
+    plant.ring.post(7, edge, np.array([0, 0, 0, 0, 0, 0, 1.0]))
+    to_rest(plant, most=6000)
+    cause, text = ear.heard[-1]
+    assert cause == "error" and "violates limit A7" in text
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_override_and_a_pause_slow_it_down(kind: str) -> None:
+    plant, _ = serving(kind)
+    plant.pause()
+    plant.step(600)
+    plant.ring.post(7, HERE + 0.2)
+    assert np.abs(commands(plant, 300)[-1] - HERE).max() < 1e-9
+    plant.resume()
+    assert np.abs(commands(plant, 2500)[-1] - HERE - 0.2).max() < 1e-6
+
+
+# ------------------------------------------------------------------------------- joint impedance
+
+
+def test_a_push_bends_a_joint_by_torque_over_stiffness() -> None:
+    plant, _ = serving(mode=JointImpedance(400.0))
+    plant.apply_wrench((0.0, 20.0, 0.0))
+    plant.step(4000)
+    state = plant.snapshot
+    assert np.abs(state.tau_ext).max() > 5.0
+    np.testing.assert_allclose(
+        (state.q - state.q_cmd) * 400.0, state.tau_ext, atol=0.02 * np.abs(state.tau_ext).max()
+    )
+
+
+def test_without_stiffness_the_arm_floats_away_from_a_push() -> None:
+    plant, _ = serving(mode=JointImpedance(0.0))
+    plant.apply_wrench((0.0, 3.0, 0.0))
+    plant.step(1000)
+    assert np.abs(plant.snapshot.q - HERE).max() > 0.05
+
+
+@pytest.mark.parametrize("stiffness", [100.0, 1000.0, 5000.0])
+def test_impedance_follows_a_motion_and_rests(stiffness: float) -> None:
+    plant, ear = ready(), Ear()
+    target = HERE + [0.5, 0, 0, 0.2, 0, 0, 0.5]
+    plant.submit(Order(1, "ptp", joints=tuple(target), mode=JointImpedance(stiffness), listener=ear))
+    to_rest(plant, most=8000)
+    assert ear.causes == ["started", "done"]
+    assert np.abs(plant.snapshot.q - target).max() < 2e-3
+    plant.step(1000)
+    assert np.abs(plant.snapshot.dq).max() < 1e-3
+
+
+def test_stiffness_changes_while_a_servo_motion_runs_without_a_jump() -> None:
+    plant, _ = serving(mode=JointImpedance(1000.0))
+    plant.apply_wrench((0.0, 20.0, 0.0))
+    plant.step(3000)
+    before = plant.snapshot.q - HERE
+    plant.change_mode(7, JointImpedance(250.0))
+    speeds = []
+    for _ in range(4000):
+        plant.tick()
+        speeds.append(np.abs(plant.snapshot.dq).max())
+    after = plant.snapshot.q - HERE
+    assert max(speeds) < 2.0
+    assert np.abs(after).max() > 3.0 * np.abs(before).max()
+
+
+def test_stiff_again_the_arm_stays_where_it_was_pushed_to() -> None:
+    plant, _ = serving(mode=JointImpedance(100.0))
+    plant.apply_wrench((0.0, 20.0, 0.0))
+    plant.step(3000)
+    there = plant.snapshot.q
+    plant.cancel(7)
+    to_rest(plant)
+    plant.step(1000)
+    assert np.abs(plant.snapshot.q - there).max() < 0.02
+    assert np.abs(plant.snapshot.q - HERE).max() > 0.05
+
+
+def test_a_motion_planned_behind_an_impedance_motion_starts_where_the_arm_is() -> None:
+    plant, ear = ready(), Ear()
+    plant.apply_wrench((0.0, 20.0, 0.0))
+    plant.submit(Order(1, "hold", duration=2.0, mode=JointImpedance(100.0)))
+    plant.submit(Order(2, "ptp", joints=READY, listener=ear))
+    fastest = 0.0
+    while not plant.idle:
+        plant.tick()
+        fastest = max(fastest, float((np.abs(plant.snapshot.dq) / plant.robot.dq_max).max()))
+    assert ear.causes == ["started", "done"]
+    assert fastest < 0.8  # no jump back
+    assert np.abs(plant.snapshot.q - HERE).max() < 1e-3
