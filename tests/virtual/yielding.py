@@ -34,6 +34,7 @@ class Arm:
         *,
         q: Any = ASKEW,
         tcp: Pose | None = None,
+        axes: Any = None,
         extra: str = "",
         tail: str = "",
         model: str = "iiwa14",
@@ -47,7 +48,7 @@ class Arm:
         mujoco.mj_forward(self.model, self.data)
         self.flange = Flange(self.model, self.data)
         self.tcp = Pose.at() if tcp is None else tcp
-        self.law = CartesianSpring(mode, self.robot, self.flange, tcp=self.tcp.array.tolist())
+        self.law = CartesianSpring(mode, self.robot, self.flange, tcp=self.tcp.array.tolist(), axes=axes)
         d, nv = self.data, self.model.nv
         self.mass = np.zeros((nv, nv))
         self.start = np.array(q, dtype=np.float64)
