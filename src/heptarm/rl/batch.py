@@ -27,13 +27,15 @@ class Step:
     Attributes:
         observation: what each sees now, after a new episode began where one ended, shape (envs, n).
         reward: shape (envs,).
-        distance: from flange to target after the decision, shape (envs,) [m].
+        tip: where the flange is after the decision, shape (envs, 3) [m].
+        distance: from there to the target, shape (envs,) [m].
         done: which episodes ended, all of them by their length, shape (envs,).
         final: what those saw last, shape (done.sum(), n).
     """
 
     observation: Array
     reward: Array
+    tip: Array
     distance: Array
     done: npt.NDArray[np.bool_]
     final: Array
@@ -177,11 +179,12 @@ class BatchReach:
         result: Array = np.asarray(self.engine.q)
         return result
 
-    def reset(self, targets: npt.ArrayLike | None = None) -> Array:
+    def reset(self, targets: npt.ArrayLike | None = None, *, seed: int | None = None) -> Array:
         """Begin an episode everywhere.
 
         Args:
             targets: shape (envs, 3) [m]; None: drawn.
+            seed: draw from here on by this seed; None: go on drawing.
 
         Returns:
             The observations, shape (envs, n).
@@ -189,6 +192,8 @@ class BatchReach:
         Raises:
             ShapeError: targets of another shape, or not finite.
         """
+        if seed is not None:
+            self._random = np.random.default_rng(seed)
         self._begin(self._all)
         if self._staggered:
             self.age[:] = self._random.integers(0, self.task.steps, self.envs)
@@ -244,7 +249,8 @@ class BatchReach:
         noise = self.randomisation.velocity_noise
         if noise:
             self._noise = self._random.uniform(1.0 - noise, 1.0 + noise, (self.envs, 7))
-        distance = task.distance(engine.q, self.target)
+        tip = task.tip(engine.q)
+        distance = task.distance(tip, self.target)
         self.age += 1
         observation = self.observe()
         done = self.age >= task.steps
@@ -253,7 +259,7 @@ class BatchReach:
             which = np.flatnonzero(done)
             self._begin(which)
             observation[done] = task.observe(engine.q[which], engine.dq[which], self.target[which])
-        return Step(observation, task.reward(distance), distance, done, final)
+        return Step(observation, task.reward(distance), tip, distance, done, final)
 
     # ------------------------------------------------------------------------------ interrupted training
 

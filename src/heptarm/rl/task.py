@@ -182,9 +182,9 @@ class ReachTask:
         result: Array = np.minimum(np.maximum(wanted, model.q_min), model.q_max)
         return result
 
-    def distance(self, q: Array, target: Array) -> Array:
-        """From the flange to the target, shape (...,) [m]."""
-        way = self.tip(q) - target
+    def distance(self, tip: Array, target: Array) -> Array:
+        """From the flange to the target, shapes (..., 3) to (...,) [m]."""
+        way = tip - target
         result: Array = np.sqrt((way * way).sum(axis=-1))
         return result
 

@@ -1,0 +1,84 @@
+"""The virtual cabinet's plant as an engine: the arm at 1 kHz, with the servo and the control laws of deployment.
+
+It knows nothing of the training simulator, so a policy that does well here does not lean on that one. Each arm
+takes about a millisecond for a decision of 33.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heptarm.rl.batch import Index
+from heptarm.rl.simulation import GRAVITY, IMPEDANCE_DAMPING
+from heptarm.rl.task import ReachTask
+from heptarm.values.arrays import Array
+from heptarm.values.mode import JointImpedance
+from heptarm.virtual.order import Order
+from heptarm.virtual.plant import TICK, Plant
+
+_SERVO = 1
+
+
+class PlantEngine:
+    """Plants side by side; same methods as `heptarm.rl.batch.Engine`.
+
+    Args:
+        task: the task.
+        envs: number of arms.
+        threads: not used.
+
+    Attributes:
+        q: measured positions, shape (envs, 7) [rad].
+        dq: measured velocities, shape (envs, 7) [rad/s].
+        plants: the plants.
+    """
+
+    #: Share of the axes' largest speed, acceleration and jerk that the servo uses.
+    share = 1.0
+
+    def __init__(self, task: ReachTask, *, envs: int, threads: int = 1) -> None:
+        self.plants: list[Plant] = []
+        self.q, self.dq = np.zeros((envs, 7)), np.zeros((envs, 7))
+        self._name = task.robot
+        self._period = 1.0 / task.rate
+        self._time = np.zeros(envs)  # that each plant should have lived [s]
+        self._stiffness: Array | None = None
+        self._payload = np.zeros(envs)
+        self.place(np.arange(envs), np.tile(np.asarray(task.home), (envs, 1)))
+
+    def payload(self, mass: Array) -> None:
+        """Hang unknown weights on the flanges, shape (envs,) [kg]."""
+        self._payload = np.asarray(mass, dtype=np.float64)
+        for plant, weight in zip(self.plants, self._payload, strict=True):
+            plant.apply_wrench((0.0, 0.0, -GRAVITY * float(weight)))
+
+    def stiffness(self, values: Array) -> None:
+        """Control the arms by joint impedance of these stiffnesses, shape (envs,) [Nm/rad]."""
+        self._stiffness = np.asarray(values, dtype=np.float64)
+        self.place(np.arange(len(self.plants)), self.q.copy())
+
+    def bandwidth(self, which: Index, values: Array) -> None:
+        """The plant's servo has its own; nothing changes."""
+
+    def place(self, which: Index, q: Array) -> None:
+        """Put some arms at rest at joint positions, shape (n, 7) [rad]; each is a new plant."""
+        for index, start in zip(which.tolist(), q, strict=True):
+            plant = Plant(self._name, q=tuple(start.tolist()))
+            if self._payload[index]:
+                plant.apply_wrench((0.0, 0.0, -GRAVITY * float(self._payload[index])))
+            mode, share = None, (self.share,) * 7
+            if self._stiffness is not None:
+                mode = JointImpedance(float(self._stiffness[index]), damping=IMPEDANCE_DAMPING)
+            plant.submit(Order(_SERVO, "servo", joint_velocity=share, joint_acceleration=share, mode=mode))
+            self.plants[index : index + 1] = [plant]
+            self._time[index] = 0.0
+            self.q[index], self.dq[index] = start, 0.0
+
+    def step(self, command: Array) -> None:
+        """Let one decision pass with commanded joints, shape (envs, 7) [rad]."""
+        self._time += self._period
+        for index, plant in enumerate(self.plants):
+            plant.ring.post(_SERVO, command[index])
+            plant.step(round(self._time[index] / TICK) - plant.tick_count)
+            state = plant.snapshot
+            self.q[index], self.dq[index] = state.q, state.dq
