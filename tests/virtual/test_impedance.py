@@ -76,7 +76,10 @@ def test_it_begins_without_a_jerk() -> None:
     arm.tick()
     holding = arm.data.qfrc_bias[:7]
     assert arm.torque == pytest.approx(holding, abs=2.0), "gravity and hardly more"
-    fastest = max(float(np.abs(arm.data.qacc[:7]).max()) for _ in range(50) if arm.tick() is None)
+    fastest = 0.0
+    for _ in range(50):
+        arm.tick()
+        fastest = max(fastest, float(np.abs(arm.data.qacc[:7]).max()))
     assert fastest < 40.0
     arm.step(1.2)
     assert arm.law.deviation == pytest.approx(along(2, 50.0 / 2000.0), abs=5e-4)
@@ -350,3 +353,15 @@ def test_an_overlaid_force_may_follow_another_while_the_law_is_in_force() -> Non
     arm.law.change(CartesianImpedance())
     arm.step(1.2)
     assert arm.law.deviation == pytest.approx(np.zeros(6), abs=1e-4)
+
+
+def test_another_stiffness_leaves_an_overlaid_force_its_rhythm() -> None:
+    mode = SineImpedance.sine("x", frequency=2.0, amplitude=10.0)
+    arm, other = Arm(mode), Arm(mode)
+    arm.step(0.6)
+    other.step(0.6)
+    arm.law.change(replace(mode, base=CartesianImpedance((500.0,) * 3 + (200.0,) * 3)))
+    arm.step(0.2)
+    other.step(0.2)
+    assert arm.law.overlay == pytest.approx(other.law.overlay)
+    assert np.abs(arm.law.deviation[0]) > np.abs(other.law.deviation[0])

@@ -18,6 +18,7 @@ which J a = 0 and a' M a = 1, and torques M a do not accelerate the moved frame.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import atan2, cos, sin, sqrt
 
 import mujoco
@@ -175,7 +176,11 @@ class CartesianSpring:
         ]
         self._limits = [(name, what, most, unit) for name, what, most, unit in limits if most is not None]
         now = self._pattern
-        if isinstance(mode, SineImpedance) and now is not None and mode == now.mode:
+        if (
+            isinstance(mode, SineImpedance)
+            and now is not None
+            and replace(mode, base=now.mode.base) == now.mode
+        ):
             return
         self._old_pattern, self._old_time = now, self._time
         self._pattern, self._time = (Pattern(mode) if isinstance(mode, SineImpedance) else None), 0.0
