@@ -10,7 +10,8 @@ import pytest
 
 from heptarm.model.kinematics import forward
 from heptarm.values.arrays import Array
-from heptarm.values.mode import DIRECTIONS, CartesianImpedance, SineImpedance
+from heptarm.values.directions import DIRECTIONS
+from heptarm.values.mode import CartesianImpedance, SineImpedance
 from heptarm.values.pose import Pose
 from heptarm.values.robot import robot
 from heptarm.virtual.impedance import RAMP

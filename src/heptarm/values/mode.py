@@ -16,13 +16,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import isnan, nan, pi
-from typing import TypeAlias, TypeVar
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, frozen, within
+from heptarm.errors import CommandRejected, ShapeError
+from heptarm.values.arrays import Array, Value, array, within
+from heptarm.values.directions import (
+    DIRECTIONS,
+    FORCE,
+    PLANES,
+    SPEED,
+    WAY,
+    at,
+    choice,
+    each,
+    flag,
+    limit,
+    one,
+    six,
+)
 from heptarm.values.motion import TOOL
 
 #: Largest stiffness of a joint [Nm/rad].
@@ -42,19 +56,9 @@ FASTEST = 15.0
 LISSAJOUS_RATIO = 0.4
 LISSAJOUS_PHASE = pi / 2
 
-#: Index of a direction by its name.
-DIRECTIONS = {"x": 0, "y": 1, "z": 2, "c": 3, "b": 4, "a": 5}
-#: The directions of a plane.
-PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
-
-_FORCE = ("N", "Nm")
-_WAY = ("m", "rad")
-_SPEED = ("m/s", "rad/s")
 _NO_FORCE = (0.0,) * 6
 _LONGEST_TIME = 1e6
 _LONGEST_NAME = 128
-
-_T = TypeVar("_T")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,8 +83,8 @@ class JointImpedance(Value):
     damping: Array
 
     def __init__(self, stiffness: npt.ArrayLike, *, damping: npt.ArrayLike = DAMPING) -> None:
-        _set(self, "stiffness", _each(stiffness, 7, "stiffness", 0.0, STIFFEST_JOINT, "Nm/rad"))
-        _set(self, "damping", _each(damping, 7, "damping", 0.0, 1.0))
+        _set(self, "stiffness", each(stiffness, 7, "stiffness", 0.0, STIFFEST_JOINT, "Nm/rad"))
+        _set(self, "damping", each(damping, 7, "damping", 0.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
@@ -133,22 +137,22 @@ class CartesianImpedance(Value):
         frame: str = TOOL,
     ) -> None:
         _set(self, "stiffness", _stiffness(stiffness))
-        _set(self, "damping", _each(damping, 6, "damping", 0.1, 1.0))
+        _set(self, "damping", each(damping, 6, "damping", 0.1, 1.0))
         _set(
             self,
             "nullspace_stiffness",
-            _one(nullspace_stiffness, "nullspace_stiffness", 0.0, 5000.0, "Nm/rad"),
+            one(nullspace_stiffness, "nullspace_stiffness", 0.0, 5000.0, "Nm/rad"),
         )
-        _set(self, "nullspace_damping", _one(nullspace_damping, "nullspace_damping", 0.3, 1.0))
+        _set(self, "nullspace_damping", one(nullspace_damping, "nullspace_damping", 0.3, 1.0))
         _set(
             self,
             "additional_force",
-            _six(additional_force, "additional_force", -STRONGEST, STRONGEST, _FORCE),
+            six(additional_force, "additional_force", -STRONGEST, STRONGEST, FORCE),
         )
-        _set(self, "max_force", _limit(max_force, "max_force", UNLIMITED, _FORCE))
-        _set(self, "max_force_stops", _flag(max_force_stops, "max_force_stops"))
-        _set(self, "max_velocity", _limit(max_velocity, "max_velocity", 100.0, _SPEED, above=True))
-        _set(self, "max_deviation", _limit(max_deviation, "max_deviation", 100.0, _WAY, above=True))
+        _set(self, "max_force", limit(max_force, "max_force", UNLIMITED, FORCE))
+        _set(self, "max_force_stops", flag(max_force_stops, "max_force_stops"))
+        _set(self, "max_velocity", limit(max_velocity, "max_velocity", 100.0, SPEED, above=True))
+        _set(self, "max_deviation", limit(max_deviation, "max_deviation", 100.0, WAY, above=True))
         _set(self, "frame", _name(frame))
         if self.max_force_stops and np.isnan(self.max_force).all():
             raise CommandRejected(
@@ -217,17 +221,17 @@ class SineImpedance(Value):
         stay_active: bool = False,
     ) -> None:
         _set(self, "base", _base(base))
-        _set(self, "amplitude", _six(amplitude, "amplitude", 0.0, STRONGEST, _FORCE))
-        _set(self, "frequency", _six(frequency, "frequency", 0.0, FASTEST, ("Hz", "Hz")))
-        _set(self, "phase", _six(phase, "phase", 0.0, 6.3, ("rad", "rad")))
-        _set(self, "bias", _six(bias, "bias", -STRONGEST, STRONGEST, _FORCE))
-        _set(self, "force_limit", _limit(force_limit, "force_limit", UNLIMITED, _FORCE))
-        _set(self, "position_limit", _limit(position_limit, "position_limit", 100.0, _WAY))
+        _set(self, "amplitude", six(amplitude, "amplitude", 0.0, STRONGEST, FORCE))
+        _set(self, "frequency", six(frequency, "frequency", 0.0, FASTEST, ("Hz", "Hz")))
+        _set(self, "phase", six(phase, "phase", 0.0, 6.3, ("rad", "rad")))
+        _set(self, "bias", six(bias, "bias", -STRONGEST, STRONGEST, FORCE))
+        _set(self, "force_limit", limit(force_limit, "force_limit", UNLIMITED, FORCE))
+        _set(self, "position_limit", limit(position_limit, "position_limit", 100.0, WAY))
         _set(self, "total_time", _time(total_time, "total_time"))
-        _set(self, "rise_time", _one(rise_time, "rise_time", 0.0, _LONGEST_TIME, "s"))
+        _set(self, "rise_time", one(rise_time, "rise_time", 0.0, _LONGEST_TIME, "s"))
         _set(self, "hold_time", _time(hold_time, "hold_time"))
-        _set(self, "fall_time", _one(fall_time, "fall_time", 0.0, _LONGEST_TIME, "s"))
-        _set(self, "stay_active", _flag(stay_active, "stay_active"))
+        _set(self, "fall_time", one(fall_time, "fall_time", 0.0, _LONGEST_TIME, "s"))
+        _set(self, "stay_active", flag(stay_active, "stay_active"))
         ramps = self.rise_time + self.fall_time
         if ramps > self.total_time:
             raise CommandRejected(
@@ -278,7 +282,7 @@ class SineImpedance(Value):
         Raises:
             LimitError: a value outside its range.
         """
-        bias = _six((x, y, z, c, b, a), "bias", -STRONGEST, STRONGEST, _FORCE)
+        bias = six((x, y, z, c, b, a), "bias", -STRONGEST, STRONGEST, FORCE)
         return cls(_with(base, stiffness, np.flatnonzero(bias).tolist()), bias=bias)
 
     @classmethod
@@ -308,13 +312,13 @@ class SineImpedance(Value):
             ShapeError: no such direction.
             LimitError: a value outside its range.
         """
-        index = _choice(direction, "direction", DIRECTIONS)
+        index = choice(direction, "direction", DIRECTIONS)
         return cls(
             _with(base, stiffness, [index]),
-            amplitude=_at([index], [amplitude]),
-            frequency=_at([index], [frequency]),
-            phase=_at([index], [phase]),
-            bias=_at([index], [bias]),
+            amplitude=at([index], [amplitude]),
+            frequency=at([index], [frequency]),
+            phase=at([index], [phase]),
+            bias=at([index], [bias]),
         )
 
     @classmethod
@@ -340,13 +344,13 @@ class SineImpedance(Value):
             ShapeError: no such plane.
             LimitError: a value outside its range.
         """
-        axes = _choice(plane, "plane", PLANES)
-        first = _one(frequency, "frequency", 0.0, FASTEST, "Hz")
+        axes = choice(plane, "plane", PLANES)
+        first = one(frequency, "frequency", 0.0, FASTEST, "Hz")
         return cls(
             _with(base, stiffness, axes),
-            amplitude=_at(axes, [amplitude, amplitude]),
-            frequency=_at(axes, [first, LISSAJOUS_RATIO * first]),
-            phase=_at(axes, [0.0, LISSAJOUS_PHASE]),
+            amplitude=at(axes, [amplitude, amplitude]),
+            frequency=at(axes, [first, LISSAJOUS_RATIO * first]),
+            phase=at(axes, [0.0, LISSAJOUS_PHASE]),
         )
 
     @classmethod
@@ -374,13 +378,13 @@ class SineImpedance(Value):
             ShapeError: no such plane.
             LimitError: a value outside its range.
         """
-        axes = _choice(plane, "plane", PLANES)
-        time = _one(total_time, "total_time", 0.0, _LONGEST_TIME, "s", above=True)
+        axes = choice(plane, "plane", PLANES)
+        time = one(total_time, "total_time", 0.0, _LONGEST_TIME, "s", above=True)
         return cls(
             _with(base, stiffness, axes),
-            amplitude=_at(axes, [amplitude, amplitude]),
-            frequency=_at(axes, [frequency, frequency]),
-            phase=_at(axes, [pi / 2, 0.0]),
+            amplitude=at(axes, [amplitude, amplitude]),
+            frequency=at(axes, [frequency, frequency]),
+            phase=at(axes, [pi / 2, 0.0]),
             total_time=time,
             rise_time=0.5 * time,
             fall_time=0.5 * time,
@@ -418,30 +422,6 @@ def _set(value: Value, name: str, content: object) -> None:
     object.__setattr__(value, name, content)
 
 
-def _one(value: float, name: str, low: float, high: float, unit: str = "", *, above: bool = False) -> float:
-    """A number in [low, high] that has no default to keep."""
-    number = within(value, name, low, high, above=above, unit=unit)
-    if isnan(number):
-        raise LimitError(f"{name} is not given; a number is wanted", code=1, parameter=name, value=value)
-    return number
-
-
-def _each(value: npt.ArrayLike, size: int, name: str, low: float, high: float, unit: str = "") -> Array:
-    """One number for all joints or directions, or one for each."""
-    result = array(np.full(size, value) if np.ndim(value) == 0 else value, size, name)
-    for index, entry in enumerate(result.tolist()):
-        within(entry, f"{name}[{index}]", low, high, unit=unit)
-    return result
-
-
-def _six(value: npt.ArrayLike, name: str, low: float, high: float, units: tuple[str, str]) -> Array:
-    """One number for each direction; units along and about an axis."""
-    result = array(value, 6, name)
-    for index, entry in enumerate(result.tolist()):
-        within(entry, f"{name}[{index}]", low, high, unit=units[index // 3])
-    return result
-
-
 def _stiffness(value: npt.ArrayLike) -> Array:
     if np.ndim(value) == 0:
         raise ShapeError(
@@ -457,29 +437,10 @@ def _stiffness(value: npt.ArrayLike) -> Array:
     return result
 
 
-def _limit(
-    value: npt.ArrayLike | None, name: str, high: float, units: tuple[str, str], *, above: bool = False
-) -> Array:
-    """Limits of six directions; NaN: none."""
-    if value is None:
-        return frozen(np.full(6, nan))
-    result = array(value, 6, name, nan=True)
-    for index, entry in enumerate(result.tolist()):
-        if not isnan(entry):
-            within(entry, f"{name}[{index}]", 0.0, high, above=above, unit=units[index // 3])
-    return result
-
-
 def _time(value: float | None, name: str) -> float:
     if isinstance(value, float) and isnan(value):
         return nan
     return within(value, name, 0.0, _LONGEST_TIME, unit="s")
-
-
-def _flag(value: bool, name: str) -> bool:
-    if not isinstance(value, (bool, np.bool_)):
-        raise ShapeError(f"{name} is {value!r}; True or False is wanted", parameter=name, value=value)
-    return bool(value)
 
 
 def _name(value: str) -> str:
@@ -500,26 +461,6 @@ def _base(value: CartesianImpedance | None) -> CartesianImpedance:
     if not isinstance(value, CartesianImpedance):
         raise ShapeError(f"base is {value!r}; a CartesianImpedance is wanted", parameter="base", value=value)
     return value
-
-
-def _choice(name: str, parameter: str, choices: dict[str, _T]) -> _T:
-    if isinstance(name, str) and name in choices:
-        return choices[name]
-    allowed = ", ".join(choices)
-    raise ShapeError(
-        f"{parameter} is {name!r}; allowed is one of {allowed}",
-        parameter=parameter,
-        value=name,
-        allowed=allowed,
-    )
-
-
-def _at(indices: Sequence[int], values: Sequence[float]) -> list[float]:
-    """Six numbers, zero but for some directions."""
-    result = [0.0] * 6
-    for index, value in zip(indices, values, strict=True):
-        result[index] = value
-    return result
 
 
 def _with(

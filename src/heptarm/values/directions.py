@@ -1,0 +1,121 @@
+"""Numbers for the six Cartesian directions: x y z, then about x, about y, about z; checked.
+
+Where a direction is given by its name, rotations bear KUKA's: "a" is about z, "b" about y, "c" about x.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import isnan, nan
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import LimitError, ShapeError
+from heptarm.values.arrays import Array, array, frozen, within
+
+#: Index of a direction by its name.
+DIRECTIONS = {"x": 0, "y": 1, "z": 2, "c": 3, "b": 4, "a": 5}
+#: The directions of a plane.
+PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+
+#: Units along and about an axis.
+FORCE = ("N", "Nm")
+WAY = ("m", "rad")
+SPEED = ("m/s", "rad/s")
+
+_T = TypeVar("_T")
+
+
+def one(value: float, name: str, low: float, high: float, unit: str = "", *, above: bool = False) -> float:
+    """A number in [low, high] (or (low, high] with `above`) that has no default to keep.
+
+    Raises:
+        LimitError: it is outside, or not given.
+        ShapeError: it is no number.
+    """
+    number = within(value, name, low, high, above=above, unit=unit)
+    if isnan(number):
+        raise LimitError(f"{name} is not given; a number is wanted", code=1, parameter=name, value=value)
+    return number
+
+
+def each(value: npt.ArrayLike, size: int, name: str, low: float, high: float, unit: str = "") -> Array:
+    """One number in [low, high] for all joints or directions, or one for each; shape (size,).
+
+    Raises:
+        LimitError: one is outside; the text names it.
+        ShapeError: neither one number nor that many.
+    """
+    result = array(np.full(size, value) if np.ndim(value) == 0 else value, size, name)
+    for index, entry in enumerate(result.tolist()):
+        within(entry, f"{name}[{index}]", low, high, unit=unit)
+    return result
+
+
+def six(value: npt.ArrayLike, name: str, low: float, high: float, units: tuple[str, str]) -> Array:
+    """One number in [low, high] for each direction, shape (6,); `units` along and about an axis.
+
+    Raises:
+        LimitError: one is outside; the text names it.
+        ShapeError: not six numbers.
+    """
+    result = array(value, 6, name)
+    for index, entry in enumerate(result.tolist()):
+        within(entry, f"{name}[{index}]", low, high, unit=units[index // 3])
+    return result
+
+
+def limit(
+    value: npt.ArrayLike | None, name: str, high: float, units: tuple[str, str], *, above: bool = False
+) -> Array:
+    """Limits of six directions in [0, high] (or (0, high] with `above`), shape (6,); NaN or None: unlimited.
+
+    Raises:
+        LimitError: one is outside; the text names it.
+        ShapeError: not six numbers.
+    """
+    if value is None:
+        return frozen(np.full(6, nan))
+    result = array(value, 6, name, nan=True)
+    for index, entry in enumerate(result.tolist()):
+        if not isnan(entry):
+            within(entry, f"{name}[{index}]", 0.0, high, above=above, unit=units[index // 3])
+    return result
+
+
+def flag(value: bool, name: str) -> bool:
+    """True or False.
+
+    Raises:
+        ShapeError: it is something else.
+    """
+    if not isinstance(value, (bool, np.bool_)):
+        raise ShapeError(f"{name} is {value!r}; True or False is wanted", parameter=name, value=value)
+    return bool(value)
+
+
+def choice(name: str, parameter: str, choices: dict[str, _T]) -> _T:
+    """What a name stands for.
+
+    Raises:
+        ShapeError: it is none of the choices.
+    """
+    if isinstance(name, str) and name in choices:
+        return choices[name]
+    allowed = ", ".join(choices)
+    raise ShapeError(
+        f"{parameter} is {name!r}; allowed is one of {allowed}",
+        parameter=parameter,
+        value=name,
+        allowed=allowed,
+    )
+
+
+def at(indices: Sequence[int], values: Sequence[float]) -> list[float]:
+    """Six numbers, zero but for some directions."""
+    result = [0.0] * 6
+    for index, value in zip(indices, values, strict=True):
+        result[index] = value
+    return result
