@@ -99,6 +99,33 @@ def test_queue_listeners_pause_and_an_error_of_the_application(tmp_path: Path) -
     assert "an error of the application" in done.stdout
 
 
+SERVING = (
+    "no runtime before the motion is commanded",
+    "SmartServo arrives",
+    "the goal is told of",
+    "the destination can be read back",
+    "a velocity leads a little further, then the arm rests",
+    "a Cartesian destination",
+    "out of reach",
+    "behind a limit",
+    "stopMotion",
+    "after its end it takes no destinations",
+    "DirectServo arrives",
+    "a servo motion without destinations times out",
+    "impedance control may begin",
+    "it follows softly",
+    "the kind of the mode cannot change",
+)
+
+
+def test_servo_motions_of_a_sunrise_application(tmp_path: Path) -> None:
+    _compile(HERE / "java" / "Serving.java", tmp_path)
+    said = tmp_path / "said.txt"
+    done = _run("sample.Serving", tmp_path, f"sample.file={said}")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert said.read_text().splitlines() == [f"{one} = true" for one in SERVING]
+
+
 def test_deselecting_an_application_is_no_failure(tmp_path: Path) -> None:
     source = tmp_path / "Endless.java"
     source.write_text(

@@ -336,10 +336,14 @@ class PoseServo(Servo):
 
 def _joints(value: npt.ArrayLike, name: str) -> Array:
     """Seven finite numbers; a shorter way than `array`, since it runs at every tick."""
-    result = np.asarray(value, dtype=np.float64)
-    if result.shape != (7,) or not np.isfinite(result).all():
-        return array(value, 7, name)  # says what is wrong
-    return result
+    if (
+        type(value) is np.ndarray
+        and value.dtype == np.float64
+        and value.shape == (7,)
+        and np.isfinite(value).all()
+    ):
+        return value
+    return array(value, 7, name)
 
 
 def open_message(

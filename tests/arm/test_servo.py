@@ -1,0 +1,213 @@
+"""Servo motions through everything: API, TCP, the Java application, the doubles, the plant."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm.modes import CartesianImpedance, JointImpedance, Position
+from tests.conftest import RunningCabinet
+
+A7 = np.array([0, 0, 0, 0, 0, 0, 1.0])
+TOUCH = 2e-3
+
+
+def follow(sv: ha.JointServo, seconds: float, *, turn: float = 0.2) -> np.ndarray:
+    """Swings A7 and comes back; returns the farthest target."""
+    farthest = sv.start.q
+    while sv.tick() and sv.t < seconds:
+        farthest = sv.set(sv.start.q + turn * np.sin(np.pi * min(sv.t / seconds, 1.0)) * A7)
+    return farthest
+
+
+@pytest.mark.parametrize("engine", ["smart", "direct"])
+def test_the_arm_follows_a_stream_and_rests_at_its_end(arm: ha.Arm, engine: str) -> None:
+    seen = []
+    with arm.servo("joint", rate=100, engine=engine, speed=0.5, acceleration=1.0, watchdog=0.5) as sv:  # type: ignore[arg-type]
+        start = sv.start.q
+        while sv.tick() and sv.t < 1.0:
+            sv.set(start + 0.2 * np.sin(np.pi * sv.t) * A7)
+            seen.append(arm.state.q[6] - start[6])
+    assert max(seen) > 0.15
+    assert sv.result is not None and sv.result.cause is ha.Cause.CANCELLED
+    stats = sv.stats
+    assert stats.received == stats.sent and stats.refused == stats.late == 0
+    assert np.abs(arm.wait_for_rest().dq).max() < 0.01
+
+
+def test_a_target_is_reached_and_passed_with_a_velocity(arm: ha.Arm) -> None:
+    with arm.servo("joint", rate=50, speed=0.5, acceleration=1.0, watchdog=0.5) as sv:
+        goal = sv.start.q + 0.1
+        while sv.tick() and sv.t < 1.5:
+            sv.set(goal)
+        assert np.abs(arm.state.q - goal).max() < TOUCH
+        while sv.tick() and sv.t < 2.0:
+            sv.set(goal, 0.05 * A7)
+    assert sv.stats.refused == 0
+
+
+def test_poses_are_followed_and_one_out_of_reach_is_refused_but_told_of(arm: ha.Arm) -> None:
+    with arm.servo("pose", rate=50, speed=0.5, acceleration=1.0, watchdog=0.5) as sv:
+        start = sv.start.pose
+        goal = ha.Pose.of(start.xyz + [0.0, 0.08, -0.05], start.quat)
+        while sv.tick() and sv.t < 1.5:
+            sv.set(goal)
+        assert arm.state.pose.distance_to(goal) < 1e-3
+        sv.set(ha.Pose.of([3.0, 0, 0], start.quat))
+        sv.tick()
+        sv.set(goal)
+    assert (sv.stats.refused, "not reachable" in sv.stats.text) == (1, True)
+
+
+def test_a_target_behind_a_limit_is_brought_back_to_it(arm: ha.Arm) -> None:
+    with arm.servo("joint", rate=50, watchdog=0.5) as sv:
+        sent = sv.set(sv.start.q + 9.0 * A7)
+        assert sent[6] == arm.robot.q_max[6]
+        np.testing.assert_array_equal(sent[:6], sv.start.q[:6])
+
+
+@pytest.mark.parametrize("bad", [[0.0] * 6, [np.nan] * 7, [np.inf] + [0.0] * 6, "joints", None])
+def test_bad_targets_are_refused_here(arm: ha.Arm, bad: object) -> None:
+    with arm.servo("joint", watchdog=1.0) as sv, pytest.raises(ha.CommandRejected):
+        sv.set(bad)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("settings", "word"),
+    [
+        ({"rate": 0.0}, "rate"),
+        ({"rate": 2000.0}, "rate"),
+        ({"watchdog": 0.001}, "watchdog"),
+        ({"rate": 1.0, "watchdog": 0.5}, "shorter than the period"),
+        ({"engine": "magic"}, "smart"),
+        ({"speed": 0.0}, "speed"),
+        ({"speed": float("nan")}, "speed"),
+        ({"acceleration": 1.5}, "acceleration"),
+        ({"min_trajectory_time": 5.0}, "min_trajectory_time"),
+        ({"goal_timeout": 0.0}, "goal_timeout"),
+        ({"mode": "soft"}, "mode"),
+        ({"mode": CartesianImpedance()}, "CartesianImpedance"),
+    ],
+)
+def test_bad_settings_are_refused_before_anything_is_sent(arm: ha.Arm, settings: dict, word: str) -> None:
+    with pytest.raises(ha.CommandRejected, match=word):
+        arm.servo("joint", **settings)
+    with pytest.raises(ha.ShapeError, match="kind"):
+        arm.servo("wheel")  # type: ignore[call-overload]
+
+
+def test_a_loop_that_hangs_ends_in_a_stop_and_an_error_that_says_so(arm: ha.Arm) -> None:
+    with (
+        pytest.raises(ha.Starved, match="no target came within 60 ms"),
+        arm.servo("joint", watchdog=0.06, speed=0.5) as sv,
+    ):
+        sv.set(sv.start.q + 0.5 * A7)
+        time.sleep(0.5)
+        assert sv.tick() is None
+        assert not sv.active
+        sv.set(sv.start.q)  # does nothing any more
+    assert np.abs(arm.wait_for_rest().dq).max() < 0.01
+
+
+def test_an_error_of_the_loop_is_not_hidden_and_the_arm_rests(arm: ha.Arm) -> None:
+    with pytest.raises(ZeroDivisionError), arm.servo("joint", watchdog=0.5) as sv:
+        sv.set(sv.start.q + 0.3 * A7)
+        raise ZeroDivisionError
+    arm.wait_for_rest()
+
+
+def test_a_stop_from_another_thread_ends_the_loop(arm: ha.Arm) -> None:
+    with pytest.raises(ha.MotionAborted, match="stopped"), arm.servo("joint", watchdog=0.5, speed=0.3) as sv:
+        threading.Timer(0.3, arm.stop).start()
+        while sv.tick() and sv.t < 5.0:
+            sv.set(sv.start.q + 0.5 * A7)
+        assert sv.t < 2.0
+    arm.wait_for_rest()
+
+
+def test_nothing_else_may_run_and_a_servo_is_used_once(arm: ha.Arm) -> None:
+    handle = arm.start(ha.hold(5.0))
+    with pytest.raises(ha.ModeConflict), arm.servo("joint"):
+        pass
+    handle.cancel()
+    handle.wait()
+    with arm.servo("joint", watchdog=1.0) as sv, pytest.raises(ha.ModeConflict):
+        arm.start(ha.hold(1.0), when="reject")
+    with pytest.raises(ha.LocalProtocolError, match="used once"), sv:
+        pass
+    with pytest.raises(ha.LocalProtocolError, match="with block"):
+        _ = arm.servo("joint").start
+
+
+def test_the_cabinets_own_time_out_is_renewed_with_the_next_target(arm: ha.Arm) -> None:
+    with arm.servo("joint", watchdog=2.0, goal_timeout=0.1, speed=0.5, acceleration=1.0) as sv:
+        sv.set(sv.start.q + 0.05 * A7)
+        time.sleep(0.9)  # reached, and timed out
+        goal = sv.start.q - 0.05 * A7
+        sv.set(goal)
+        arm.wait_until(lambda state: np.abs(state.q - goal).max() < TOUCH, timeout=3.0)
+
+
+def test_an_impedance_servo_is_soft_and_its_stiffness_can_change(arm: ha.Arm) -> None:
+    with arm.servo("joint", watchdog=1.0, mode=JointImpedance(300.0)) as sv:
+        sv.set(sv.start.q)
+        sv.change(JointImpedance(600.0, damping=1.0))
+        sv.set(sv.start.q)
+        with pytest.raises(ha.ModeConflict, match="keeps the kind"):
+            sv.change(Position())
+    assert sv.stats.refused == 0
+
+
+def test_motions_take_a_mode_of_their_own_or_of_a_block(arm: ha.Arm) -> None:
+    home = arm.state.q
+    assert arm.move(ha.ptp(home + 0.1 * A7), mode=JointImpedance(800.0)).arrived
+    with arm.using(JointImpedance(400.0)):
+        assert arm.move([ha.ptp(home), ha.lin_rel(z=-0.02), ha.lin_rel(z=0.02)]).arrived
+    assert arm.move(ha.ptp(home)).residual < 1e-4
+    with pytest.raises(ha.CommandRejected, match="SineImpedance|CartesianImpedance"):
+        arm.move(ha.hold(0.1), mode=CartesianImpedance())
+
+
+def test_a_servo_does_not_begin_in_impedance_at_a_singularity(arm: ha.Arm) -> None:
+    home = arm.state.q
+    arm.move(ha.ptp(home * [1, 1, 1, 0, 1, 1, 1]))
+    try:
+        with (
+            pytest.raises(ha.HeptarmError, match="singularity"),
+            arm.servo("joint", mode=JointImpedance(300.0)),
+        ):
+            pass
+    finally:
+        arm.move(ha.ptp(home))
+
+
+_KILLED = """
+import sys, time, numpy, heptarm
+arm = heptarm.connect(sys.argv[1])
+with arm.servo("joint", rate=100, speed=0.3, watchdog=0.3) as sv:
+    while sv.tick():
+        sv.set(sv.start.q + [0, 0, 0, 0, 0, 0, 0.5])
+        print("on", flush=True)
+"""
+
+
+def test_a_killed_program_leaves_an_arm_at_rest(cabinet: RunningCabinet) -> None:
+    child = subprocess.Popen(
+        [sys.executable, "-c", _KILLED, cabinet.target], stdout=subprocess.PIPE, text=True
+    )
+    assert child.stdout is not None
+    for _ in range(20):
+        assert child.stdout.readline()
+    os.kill(child.pid, signal.SIGKILL)
+    child.wait()
+    child.stdout.close()
+    with ha.connect(cabinet.target, control=False) as watching:
+        watching.wait_for_rest(timeout=5.0)
