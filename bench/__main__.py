@@ -19,6 +19,7 @@ from bench import (  # noqa: F401  they register themselves
     lost_client,
     motion,
     round_trip,
+    servo,
     state_push,
 )
 from bench.registry import BENCHMARKS

@@ -18,7 +18,7 @@ def target(cabinet) -> str:
 
 def test_help_names_every_command() -> None:
     text = run("--help").stdout
-    for command in ("sim", "state", "move", "stop", "doctor", "install-cabinet", "demo"):
+    for command in ("sim", "state", "move", "servo", "stop", "doctor", "install-cabinet", "demo"):
         assert command in text
 
 
@@ -54,6 +54,15 @@ def test_move_ptp_in_degrees_with_negative_angles(target: str) -> None:
     )
     assert done["cause"] == "finished" and done["residual_rad"] < 1e-4
     assert done["q"][6] == pytest.approx(math.radians(-5), abs=1e-3)
+
+
+def test_servo_swings_an_axis_and_tells_how_the_stream_went(target: str) -> None:
+    (told,) = objects("servo", "--axis", "6", "--rate", "50", "--duration", "1.5", "--target", target)
+    assert told["received"] == told["sent"] > 50
+    assert told["refused"] == told["late"] == 0 and told["largest_lag_rad"] < 0.1
+    done = run("servo", "--duration", "1", "--target", target)
+    assert "targets at 100" in done.stdout and "when applied" in done.stdout
+    assert run("servo", "--axis", "8", "--target", target).returncode == 1
 
 
 def test_move_lin_and_lin_rel(target: str) -> None:

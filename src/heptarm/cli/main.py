@@ -156,6 +156,37 @@ def move_lin_rel(
 
 
 @app.command
+def servo(
+    *,
+    axis: Annotated[int, Parameter(help="Axis to swing, 1 to 7.")] = 7,
+    amplitude: Annotated[float, Parameter(help="How far [deg].")] = 5.0,
+    frequency: Annotated[float, Parameter(help="Swings per second [Hz].")] = 0.5,
+    rate: Annotated[float, Parameter(help="Targets per second [Hz].")] = 100.0,
+    duration: Annotated[float, Parameter(help="How long [s].")] = 5.0,
+    speed: Speed = 0.3,
+    engine: Annotated[Literal["smart", "direct"], Parameter(help="Servo motion of the cabinet.")] = "smart",
+    yes: Yes = False,
+    target: Target = None,
+    json: Json = False,
+) -> int:
+    """Swing an axis by a stream of targets, and say how the stream went."""
+    from heptarm.cli import servo as work
+
+    return work.run(
+        axis=axis,
+        amplitude=amplitude,
+        frequency=frequency,
+        rate=rate,
+        duration=duration,
+        speed=speed,
+        engine=engine,
+        yes=yes,
+        target=target,
+        as_json=json,
+    )
+
+
+@app.command
 def stop(*, target: Target = None, json: Json = False) -> int:
     """Stop whatever runs; needs no control."""
     from heptarm.cli import move as work
