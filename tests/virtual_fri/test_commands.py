@@ -90,11 +90,15 @@ def test_a_wrench_goes_through_as_it_is() -> None:
 
 
 def test_torques_of_answers_to_waiting_messages_are_ignored() -> None:
-    rig = Rig()
+    rig = Rig().ready()
     rig.client.waiting = lambda message: replace(mirror(message), tau=(30.0,) * 7)
-    rig.active(TORQUE)
+    rig.run(50)
+    rig.controller.start(TORQUE)
+    rig.run(9)
+    rig.latency = 2_900_000  # answers to waiting messages are under way when commanding becomes active
+    rig.until(State.COMMANDING_ACTIVE)
     rig.command(tau=(1.0,) * 7)
-    rig.run(5)
+    rig.run(6)
     given = [tau for tau, _ in rig.arm.loads if tau is not None]
     assert given[-1].tolist() == [1.0] * 7 and max(float(tau.max()) for tau in given) == 1.0
 
