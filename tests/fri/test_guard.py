@@ -1,0 +1,214 @@
+"""The guard: whatever is asked, what is sent keeps the limits; what fits passes; what was limited is named."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from heptarm.errors import LimitError
+from heptarm.fri.guard import Guard, Limited, Limits, _brake, _overrun
+from heptarm.values.robot import robot
+
+LIMITS = Limits.of(robot("iiwa14"))
+START = (0.1, 0.4, -0.1, -1.2, 0.2, 0.9, 0.0)
+STILL = (0.0,) * 7
+
+
+def begun(*, q: tuple[float, ...] = START, dq: tuple[float, ...] = STILL, period: float = 1e-3) -> Guard:
+    guard = Guard(LIMITS)
+    guard.start(q, dq, period=period)
+    return guard
+
+
+def run(guard: Guard, wishes: Iterable[object]) -> np.ndarray:
+    """What is sent, shape (n, 7)."""
+    return np.array([list(guard.position(wish)) for wish in wishes])  # type: ignore[arg-type]
+
+
+def check(
+    guard: Guard, sent: np.ndarray, q: tuple[float, ...] = START, dq: tuple[float, ...] = STILL
+) -> None:
+    """The finite differences of what was sent, from the start on, keep every limit."""
+    period, limits = guard.period, guard.limits
+    before = np.array([np.subtract(q, np.multiply(n * period, dq)) for n in (3, 2, 1, 0)])
+    track = np.vstack((before, sent))
+    noise = 1e-14  # rounding of a position
+    for order, most in ((1, limits.dq_max), (2, limits.ddq_max), (3, limits.dddq_max)):
+        slope = np.abs(np.diff(track, order, axis=0)).max(axis=0) / period**order
+        assert (slope <= np.multiply(most, 1 + 1e-6) + noise / period**order).all(), (order, slope)
+    assert (sent >= np.minimum(guard.low, limits.q_min) - 1e-9).all()
+    assert (sent <= np.maximum(guard.high, limits.q_max) + 1e-9).all()
+
+
+wild = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-3.5, 3.5)
+
+
+@st.composite
+def requests(draw: st.DrawFn) -> list[tuple[float, ...] | None]:
+    """Jumps, ramps, sines, noise, no numbers and pauses, one after the other."""
+    wishes: list[tuple[float, ...] | None] = []
+    for _ in range(draw(st.integers(1, 5))):
+        kind, size = (
+            draw(st.sampled_from(["jump", "ramp", "sine", "noise", "brake"])),
+            draw(st.integers(1, 300)),
+        )
+        level, pace = draw(st.tuples(*[wild] * 7)), draw(st.floats(-20.0, 20.0))
+        random = np.random.default_rng(draw(st.integers(0, 1000)))
+        for index in range(size):
+            if kind == "brake":
+                wishes.append(None)
+                continue
+            with np.errstate(invalid="ignore", over="ignore"):
+                offset = {
+                    "jump": 0.0,
+                    "ramp": pace * index * 1e-3,
+                    "sine": 0.3 * math.sin(pace * index * 1e-3),
+                    "noise": random.uniform(-3, 3),
+                }[kind]
+                wishes.append(tuple(value + offset for value in level))
+    return wishes
+
+
+@settings(max_examples=60, deadline=None)
+@given(wishes=requests(), period=st.sampled_from([1e-3, 2e-3, 5e-3, 1e-2, 0.1]), data=st.data())
+def test_whatever_is_asked_the_limits_hold(
+    wishes: list[tuple[float, ...] | None], period: float, data: st.DataObject
+) -> None:
+    q = tuple(data.draw(st.floats(low, high)) for low, high in zip(LIMITS.q_min, LIMITS.q_max, strict=True))
+    dq = tuple(data.draw(st.floats(-0.9, 0.9)) * most for most in LIMITS.dq_max)
+    guard = begun(q=q, dq=dq, period=period)
+    sent = run(guard, wishes)
+    check(guard, sent, q, dq)
+    stopped = run(guard, [None] * (1 + int(4.0 / period)))
+    check(guard, np.vstack((sent, stopped)), q, dq)
+    assert np.abs(guard.v).max() < 1e-12, "and it can always be brought to a stop"
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    v=st.floats(-1, 1),
+    a=st.floats(-1, 1),
+    top=st.floats(1.0, 15.0),
+    jerk=st.floats(10.0, 10_000.0),
+    period=st.sampled_from([1e-3, 5e-3, 2e-2]),
+)
+def test_braking_never_goes_further_than_foretold(
+    v: float, a: float, top: float, jerk: float, period: float
+) -> None:
+    top, jerk = top * period**2, jerk * period**3
+    speed, acceleration, way, furthest = 2.0 * v * period, a * top, 0.0, 0.0
+    foretold = _overrun(speed, acceleration, top, jerk)
+    for _ in range(100_000):
+        if abs(speed) < 1e-15 and abs(acceleration) < 1e-15:
+            break
+        acceleration = _brake(speed, acceleration, top, jerk)
+        speed += acceleration
+        way += speed
+        furthest = max(furthest, way)
+    else:
+        pytest.fail("braking does not end")
+    assert furthest <= foretold + 1e-9 * (1 + foretold)
+
+
+def test_a_motion_within_the_limits_passes_unchanged() -> None:
+    """A sine that begins gently; not one sample is altered and nothing is reported."""
+    times = np.arange(1, 4001) * 1e-3
+    rise = np.minimum(times, 1.0)
+    envelope = rise**3 * (10.0 - 15.0 * rise + 6.0 * rise**2)
+    wishes = np.array(START) + (0.1 * envelope * np.sin(2.0 * times))[:, None]
+    guard = begun()
+    assert (run(guard, wishes.tolist()) == wishes).all()
+    assert not guard.report.lines and not guard.was_limited
+
+
+def test_a_step_is_walked_up_without_overshoot_and_ends_exactly() -> None:
+    guard, goal = begun(), tuple(value + 0.5 for value in START)
+    sent = run(guard, [goal] * 1500)
+    check(guard, sent)
+    assert (sent <= np.array(goal) + 1e-12).all() and tuple(sent[-1]) == goal and guard.is_still
+    assert np.abs(sent[900] - goal).max() < 1e-6, "and it takes little more than the fastest way"
+    assert any("A1: velocity limited" in line and "500 rad/s asked" in line for line in guard.report.lines)
+
+
+def test_no_number_keeps_the_last_wish_and_is_named() -> None:
+    guard = begun()
+    broken = (math.nan, *START[1:])
+    sent = run(guard, [broken] * 10)
+    assert (sent == np.array(START)).all()
+    assert guard.report.counts[Limited.NOT_FINITE][0] == 10
+    assert guard.report.lines == ["A1: asked for no finite number in 10 cycles; the last one was kept"]
+
+
+def test_ten_times_the_velocity_is_followed_as_fast_as_it_may() -> None:
+    guard = begun()
+    most = LIMITS.dq_max[6]
+    sent = run(guard, [(*START[:6], 10 * most * 1e-3 * (k + 1)) for k in range(500)])
+    check(guard, sent)
+    assert np.diff(sent[:, 6]).max() / 1e-3 == pytest.approx(most)
+    assert guard.report.counts[Limited.VELOCITY][6] and guard.report.lines[0].startswith("A7: ")
+    assert (sent[:, :6] == np.array(START[:6])).all(), "the other axes are left alone"
+
+
+def test_a_goal_beyond_the_range_ends_at_its_edge() -> None:
+    guard = begun()
+    sent = run(guard, [(9.0, *START[1:])] * 4000)
+    check(guard, sent)
+    assert sent[-1, 0] == pytest.approx(LIMITS.q_max[0], abs=1e-6)
+    assert guard.report.lines[0] == "A1: position limited in 4000 cycles: 9 rad asked, 2.95 allowed"
+
+
+def test_a_start_outside_the_range_goes_only_inwards() -> None:
+    q = (LIMITS.q_max[0] + 0.01, *START[1:])
+    guard = begun(q=q)
+    assert (run(guard, [(3.2, *START[1:])] * 500)[:, 0] <= q[0]).all()
+    sent = run(guard, [START] * 4000)
+    assert tuple(sent[-1]) == START
+
+
+def test_a_start_in_motion_has_no_jump() -> None:
+    dq = (0.5, 0.0, -0.5, 0.0, 0.3, 0.0, 1.0)
+    guard = begun(dq=dq)
+    sent = run(guard, [START] * 3000)
+    check(guard, sent, dq=dq)
+    assert (
+        sent[0] == pytest.approx(np.add(START, np.multiply(1e-3, dq)), abs=2e-6) and tuple(sent[-1]) == START
+    )
+
+
+def test_the_reach_around_the_interpolator_bounds_the_wish() -> None:
+    guard = Guard(Limits.of(robot("iiwa14"), reach=0.05))
+    guard.start(START, STILL, period=1e-3)
+    for _ in range(2000):
+        sent = guard.position([value + 1.0 for value in START], ipo=START)
+    assert sent == pytest.approx([value + 0.05 for value in START])
+    assert guard.report.counts[Limited.POSITION][0] == 2000
+
+
+@given(wishes=st.lists(st.tuples(*[wild] * 7), min_size=1, max_size=50))
+def test_torques_keep_magnitude_and_rate_and_start_from_zero(wishes: list[tuple[float, ...]]) -> None:
+    guard = begun()
+    sent = np.array([STILL, *(list(guard.torque(one)) for one in wishes)])
+    assert (np.abs(sent) <= LIMITS.tau_max).all() and np.isfinite(sent).all()
+    assert (np.abs(np.diff(sent, axis=0)) <= np.multiply(LIMITS.dtau_max, 1e-3) * (1 + 1e-9)).all()
+    force = np.array([list(guard.force(one[:6])) for one in wishes])
+    assert (np.abs(force) <= LIMITS.wrench_max).all()
+
+
+def test_torque_reports_magnitude() -> None:
+    guard = begun()
+    guard.torque((1e6, *STILL[1:]))
+    assert guard.report.lines == ["A1: torque limited in 1 cycle: 1e+06 Nm asked, 304 allowed"]
+    guard.start(START, STILL, period=1e-3)
+    assert guard.tau == [0.0] * 7, "a new start begins without torque"
+
+
+def test_limits_without_room_are_refused() -> None:
+    with pytest.raises(LimitError, match="empty"):
+        Limits.of(robot("iiwa7"), margin=4.0)
+    with pytest.raises(LimitError, match="dq_max is 0"):
+        Limits.of(robot("iiwa7"), share=0.0)
