@@ -1,209 +1,23 @@
-"""How good a policy is: episodes on targets that training never saw, and a report of them."""
+"""How good a policy is in simulation: episodes on targets that training never saw."""
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Callable
-from dataclasses import KW_ONLY, dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, LimitError, ShapeError, require
+from heptarm.errors import CommandRejected, LimitError
 from heptarm.rl.batch import BatchReach, Engine
 from heptarm.rl.policy import Policy
 from heptarm.rl.randomise import NONE, Randomisation
+from heptarm.rl.report import Report
 from heptarm.rl.task import ReachTask
-from heptarm.values.arrays import Array, frozen
+from heptarm.values.arrays import Array
 
 #: Keeps held-back targets apart from those of training, whatever the seeds.
 _HELD_BACK = 0x4E1D
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Report:
-    """Episodes of a policy; n of them, t decisions each.
-
-    Attributes:
-        task: the task.
-        targets: base frame, shape (n, 3) [m].
-        distances: from flange to target after each decision, shape (n, t) [m].
-        paths: of the flange, with where it began, shape (n, t + 1, 3) [m].
-        facts: where and how: engine, randomisation, seed.
-    """
-
-    task: ReachTask
-    targets: Array
-    distances: Array
-    paths: Array
-    _: KW_ONLY
-    facts: dict[str, Any] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        for name in ("targets", "distances", "paths"):
-            object.__setattr__(self, name, frozen(np.array(getattr(self, name), dtype=np.float64)))
-        n, t = self.distances.shape if self.distances.ndim == 2 else (0, 0)
-        if not n or not t or self.targets.shape != (n, 3) or self.paths.shape != (n, t + 1, 3):
-            raise ShapeError(
-                f"distances {self.distances.shape}, targets {self.targets.shape} and paths {self.paths.shape} "
-                "do not belong together"
-            )
-
-    @property
-    def final(self) -> Array:
-        """Distance at the end, shape (n,) [m]."""
-        return self.distances[:, -1]
-
-    @property
-    def time_to_reach(self) -> Array:
-        """When the flange first was within the radius, shape (n,) [s]; inf: never."""
-        near = self.distances <= self.task.radius
-        return np.where(near.any(axis=1), (near.argmax(axis=1) + 1) / self.task.rate, np.inf)
-
-    @property
-    def success(self) -> npt.NDArray[np.bool_]:
-        """Which ended within the radius, shape (n,)."""
-        result: npt.NDArray[np.bool_] = self.final <= self.task.radius
-        return result
-
-    @property
-    def success_rate(self) -> float:
-        """Share of `success`."""
-        return float(self.success.mean())
-
-    @property
-    def mean(self) -> float:
-        """Of the final distances [m]."""
-        return float(self.final.mean())
-
-    @property
-    def median(self) -> float:
-        """Of the final distances [m]."""
-        return float(np.median(self.final))
-
-    @property
-    def p95(self) -> float:
-        """What 95 % of the final distances stay below [m]."""
-        return float(np.percentile(self.final, 95))
-
-    def reached_within(self, seconds: float) -> float:
-        """Share of the episodes that came within the radius in that time."""
-        return float((self.time_to_reach <= seconds + 1e-9).mean())
-
-    def as_dict(self) -> dict[str, Any]:
-        """The figures, for a file; never reached is None."""
-        reached = self.time_to_reach[np.isfinite(self.time_to_reach)]
-        return {
-            "episodes": len(self.final),
-            "radius": self.task.radius,
-            "success_rate": self.success_rate,
-            "mean": self.mean,
-            "median": self.median,
-            "p95": self.p95,
-            "worst": float(self.final.max()),
-            "time_to_reach": float(np.median(reached)) if len(reached) else None,
-            "time_to_reach_p95": float(np.percentile(reached, 95)) if len(reached) else None,
-            "facts": self.facts,
-        }
-
-    def summary(self) -> str:
-        """The figures as text, a few lines."""
-        entries = self.as_dict()
-        reach = "never"
-        if entries["time_to_reach"] is not None:
-            reach = f"{entries['time_to_reach']:.2f} s (median), {entries['time_to_reach_p95']:.2f} s (95 %)"
-        return "\n".join(
-            [
-                f"episodes         {entries['episodes']}",
-                f"success          {100 * self.success_rate:.1f} % within {1e3 * self.task.radius:.0f} mm at the end",
-                f"final distance   {1e3 * self.mean:.2f} mm mean, {1e3 * self.median:.2f} mm median, "
-                f"{1e3 * self.p95:.2f} mm (95 %), {1e3 * entries['worst']:.2f} mm worst",
-                f"time to reach    {reach}",
-            ]
-        )
-
-    def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write to a `.json` file (figures and per-target numbers) or a `.npz` file (everything).
-
-        Raises:
-            CommandRejected: another kind of file.
-        """
-        target = Path(path)
-        if target.suffix == ".json":
-            reached = [None if np.isinf(t) else float(t) for t in self.time_to_reach]
-            per_target = {
-                "target": self.targets.tolist(),
-                "final": self.final.tolist(),
-                "time_to_reach": reached,
-            }
-            entries = {**self.as_dict(), "task": self.task.as_dict(), "per_target": per_target}
-            target.write_text(json.dumps(entries, indent=1) + "\n", encoding="utf-8")
-        elif target.suffix == ".npz":
-            about = json.dumps({"task": self.task.as_dict(), "facts": self.facts})
-            np.savez_compressed(
-                target,
-                about=np.array(about),
-                targets=self.targets,
-                distances=self.distances,
-                paths=self.paths,
-            )
-        else:
-            raise CommandRejected(f"{target.name!r} ends neither in .json nor in .npz", parameter="path")
-        return target
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Report:
-        """Read a `.npz` file of `save`."""
-        with np.load(path, allow_pickle=False) as file:
-            about = json.loads(str(file["about"]))
-            return cls(
-                ReachTask.from_dict(about["task"]),
-                file["targets"],
-                file["distances"],
-                file["paths"],
-                facts=about["facts"],
-            )
-
-    def plot(self, path: str | os.PathLike[str], *, most: int = 60) -> Path:
-        """Draw paths and distance over time into a picture; returns its path.
-
-        Args:
-            path: file to write, `.png`, `.svg` or `.pdf`.
-            most: episodes that are drawn; the distribution is of all.
-
-        Raises:
-            MissingExtra: matplotlib is not installed.
-        """
-        figures = require("matplotlib.figure", extra="rl")
-        figure = figures.Figure(figsize=(13, 4.2), layout="constrained")
-        side, above, over = figure.subplots(1, 3)
-        for axes, (x, y), names in ((side, (0, 2), "xz"), (above, (0, 1), "xy")):
-            for line, target in zip(self.paths[:most], self.targets[:most], strict=True):
-                axes.plot(line[:, x], line[:, y], linewidth=0.7, alpha=0.7)
-                axes.plot(target[x], target[y], "k+", markersize=5)
-            axes.set_xlabel(f"{names[0]} [m]")
-            axes.set_ylabel(f"{names[1]} [m]")
-            axes.set_aspect("equal")
-        side.set_title("paths of the flange, from the side")
-        above.set_title("from above; + targets")
-        time = np.arange(1, self.distances.shape[1] + 1) / self.task.rate
-        mm = 1e3 * self.distances
-        over.fill_between(
-            time, np.percentile(mm, 5, axis=0), np.percentile(mm, 95, axis=0), alpha=0.3, label="5 to 95 %"
-        )
-        over.plot(time, np.median(mm, axis=0), label="median")
-        over.axhline(1e3 * self.task.radius, color="k", linestyle="--", linewidth=0.8, label="radius")
-        over.set_yscale("log")
-        over.set_xlabel("time [s]")
-        over.set_ylabel("distance to the target [mm]")
-        over.set_title(f"{len(self.final)} episodes, {1e3 * self.mean:.1f} mm at the end")
-        over.grid(which="both", alpha=0.3)
-        over.legend()
-        figure.savefig(path, dpi=110)
-        return Path(path)
 
 
 def held_back(task: ReachTask, count: int, *, seed: int = 0) -> Array:
@@ -259,10 +73,11 @@ def evaluate(
     observation = arms.reset(goals)
     distances = np.empty((len(goals), task.steps))
     paths = np.empty((len(goals), task.steps + 1, 3))
-    paths[:, 0] = task.tip(arms.q)
+    joints = np.empty((len(goals), task.steps + 1, 7))
+    paths[:, 0], joints[:, 0] = task.tip(arms.q), arms.q
     for t in range(task.steps):
         step = arms.step(policy(observation))
         observation, distances[:, t] = step.observation, step.distance
-        paths[:, t + 1] = step.tip
+        paths[:, t + 1], joints[:, t + 1] = step.tip, arms.q
     facts = {"engine": engine.__name__, "randomisation": randomisation.as_dict(), "seed": seed}
-    return Report(task, goals, distances, paths, facts=facts)
+    return Report(task, goals, distances, paths, joints=joints, facts=facts)
