@@ -17,6 +17,7 @@ from heptarm.virtual.fri.configuration import Configuration
 from heptarm.virtual.fri.controller import TICK_NS, Controller
 from heptarm.virtual.fri.events import Event, OverlayEnded, Refused, StateChanged
 from heptarm.virtual.fri.overlay import MotionOverlay, Reading, Superposition
+from heptarm.virtual.ring import NEWEST, Ring
 
 State = m.SessionState
 READY = (0.0, 0.5, 0.1, -1.3, 0.2, 0.9, 0.0)
@@ -37,6 +38,7 @@ class Arm:
         self.loads: list[tuple[Array | None, Array | None]] = []
         self.mode: Mode | None = None
         self.holds = 0
+        self.ring = Ring()
 
     def reading(self) -> Reading:
         q, ipo = tuple(self.q.tolist()), tuple(self.q_ipo.tolist())
@@ -49,6 +51,7 @@ class Arm:
         self.action = action
 
     def tick(self) -> None:
+        self.ring.header[NEWEST] += 1
         if self.action is not None:
             self.q = self.action.q
             self.loads.append((self.action.tau, self.action.wrench))

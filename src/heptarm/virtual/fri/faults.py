@@ -178,9 +178,14 @@ class Line:
 
     def arrived(self, now: int) -> list[bytes]:
         """What has arrived by `now` [ns], in order of arrival."""
+        return [datagram for datagram, _ in self.taken(now)]
+
+    def taken(self, now: int) -> list[tuple[bytes, int]]:
+        """What has arrived by `now` [ns], in order of arrival, each with its time of arrival."""
         found = []
         while self._under_way and self._under_way[0].due <= now:
-            found.append(heapq.heappop(self._under_way).datagram)
+            one = heapq.heappop(self._under_way)
+            found.append((one.datagram, one.due))
         self.damage.passed += len(found)
         return found
 

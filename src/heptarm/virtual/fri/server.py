@@ -1,0 +1,238 @@
+"""Carries a session over UDP from one fixed port, in step with the plant and never waiting for anybody."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import struct
+import sys
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+from heptarm.errors import ConnectFailed
+from heptarm.fri.messages import DriveState
+from heptarm.fri.version import MAX_DATAGRAM
+from heptarm.virtual.fri.configuration import Configuration
+from heptarm.virtual.fri.controller import TICK_NS, TOLD, Controller
+from heptarm.virtual.fri.events import Event, Refused
+from heptarm.virtual.fri.faults import Line, Scenario
+from heptarm.virtual.fri.overlay import MotionOverlay, OverlayTarget, Reading
+
+#: The port of FRI on both sides; KUKA advises the next nine for further sessions and robots.
+PORT = 30200
+PORTS = range(PORT, PORT + 10)
+
+Address = tuple[str, int]
+
+#: Datagrams that are read in one tick at most, so that a flood cannot hold the plant up.
+MOST = 64
+
+# Linux: the kernel stamps what arrives (SO_TIMESTAMPNS), so that latency is not rounded up to the next tick
+_STAMPS = 35 if sys.platform.startswith("linux") else None
+_STAMP = struct.Struct("@qq")
+
+
+def source_port(client: Address) -> int:
+    """The cabinet's port for a client: the client's own, as on a cabinet, unless both are this machine."""
+    host, port = client
+    if host != "localhost" and not host.startswith("127."):
+        return port
+    return port + 1 if port + 1 in PORTS or port not in PORTS else PORT
+
+
+class Server:
+    """One session, its socket, and the arm that its overlay acts on.
+
+    `tick` belongs to the thread that ticks the arm, and comes before each tick of it. `open`, `close`, `start` and
+    `stop` may be called from any thread.
+
+    Args:
+        configuration: of the session.
+        arm: what overlays act on.
+        client: where the messages go, IPv4.
+        port: where they come from; None: see `source_port`; 0: any free one.
+        bind: own address; empty: all.
+        speed: seconds of the arm's time per second; 0: the arm's time is no function of the clock.
+        clock: monotonic time [ns].
+        scenario: faults on purpose.
+        listener: hears of events, called by `tick`; must not block.
+
+    Attributes:
+        controller: the session.
+        port: the own port.
+        strangers: datagrams from elsewhere than the client.
+
+    Raises:
+        ConnectFailed: the port is taken, or the client's address is none.
+    """
+
+    def __init__(
+        self,
+        configuration: Configuration,
+        arm: OverlayTarget,
+        *,
+        client: Address,
+        port: int | None = None,
+        bind: str = "",
+        speed: float = 1.0,
+        clock: Callable[[], int] = time.monotonic_ns,
+        scenario: Scenario | None = None,
+        listener: Callable[[Event], None] | None = None,
+    ) -> None:
+        self._arm = arm
+        self._client = _resolved(client)
+        self._socket = _bound(bind, source_port(client) if port is None else port)
+        self.port: int = self._socket.getsockname()[1]
+        self._stamped = _ask_for_stamps(self._socket)
+        self._clock, self._speed, self._origin = clock, speed, clock()
+        self._listener = listener
+        self._scenario = scenario or Scenario()
+        self._there, self._back = Line(self._scenario.to_client), Line(self._scenario.from_client)
+        self._lock = threading.Lock()
+        self._ticks = 0
+        self._before = 0  # time of the last tick
+        self._troubles: list[Event] = []
+        self._told: set[str] = set()
+        self.strangers = 0
+        self.controller = Controller(configuration, arm.robot, epoch_ns=time.time_ns())
+
+    # ------------------------------------------------------------------------------ from any thread
+
+    def open(self) -> None:
+        """Begin to send.
+
+        Raises:
+            ModeConflict: it was open before.
+        """
+        with self._lock:
+            self.controller.open()
+
+    def start(self, overlay: MotionOverlay) -> None:
+        """The motion with the overlay begins.
+
+        Raises:
+            CommandRejected: this session cannot have such an overlay.
+            ModeConflict: command and control mode do not match, or the session is not ready.
+        """
+        with self._lock:
+            self.controller.start(overlay)
+
+    def stop(self) -> None:
+        """The motion with the overlay has ended or was cancelled."""
+        with self._lock:
+            self.controller.stop()
+
+    def close(self) -> None:
+        """Close the session; the next tick sends its last message. `release` frees the port."""
+        with self._lock:
+            self.controller.close()
+
+    def release(self) -> None:
+        """Free the port, after the last tick."""
+        self._socket.close()
+
+    # ------------------------------------------------------------------------------ the arm's thread
+
+    def tick(self) -> None:
+        """What comes before a tick of the arm: take answers, send a message if one is due, act on the arm."""
+        wall = self._clock()
+        now = self._ticks * TICK_NS if self._speed == 0.0 else round((wall - self._origin) * self._speed)
+        with self._lock:
+            self._listen(wall, now)
+            reading = self._reading(now)
+            datagram = self.controller.tick(reading, now)
+            if datagram is not None:
+                version = self.controller.configuration.version
+                self._there.send(self._scenario.spoken(datagram, version, now * 1e-9), now)
+            for message in self._there.arrived(now):
+                self._send(message)
+            action = self.controller.superposition
+            events = self.controller.events() + self._troubles
+            self._troubles = []
+        self._arm.overlay(action)
+        self._ticks, self._before = self._ticks + 1, now
+        if self._listener is not None:
+            for event in events:
+                self._listener(event)
+
+    def _reading(self, now: int) -> Reading:
+        reading = self._arm.reading()
+        stop = self._scenario.safety(now * 1e-9)
+        return reading if stop is None else replace(reading, safety=stop, drives=DriveState.OFF)
+
+    def _listen(self, wall: int, now: int) -> None:
+        for _ in range(MOST):
+            try:
+                datagram, ancillary, _, address = self._socket.recvmsg(MAX_DATAGRAM + 1, 64)
+            except BlockingIOError:
+                break
+            except OSError as error:
+                self._tell(f"nothing can be received on port {self.port}: {error}")
+                break
+            if address != self._client:
+                self.strangers += 1
+                self._tell(
+                    f"a datagram from {address[0]}:{address[1]} was ignored; the session's client is "
+                    f"{self._client[0]}:{self._client[1]}"
+                )
+                continue
+            self._back.send(datagram, self._arrival(ancillary, wall, now))
+        for answer, at in self._back.taken(now):
+            self.controller.receive(answer, at)
+
+    def _arrival(self, ancillary: list[tuple[int, int, bytes]], wall: int, now: int) -> int:
+        """When a datagram arrived: by the kernel's stamp, or else in the middle between the last tick and this."""
+        if not self._stamped or self._speed == 0.0 or not ancillary:
+            return (self._before + now) // 2
+        seconds, nanoseconds = _STAMP.unpack(ancillary[0][2])
+        age: int = time.time_ns() - (seconds * 1_000_000_000 + nanoseconds)
+        at = now + round((self._clock() - age - wall) * self._speed)
+        return max(self._before, min(at, now))
+
+    def _send(self, datagram: bytes) -> None:
+        try:
+            self._socket.sendto(datagram, self._client)
+        except OSError as error:
+            self._tell(f"nothing can be sent to {self._client[0]}:{self._client[1]}: {error}")
+
+    def _tell(self, text: str) -> None:
+        if text not in self._told and len(self._told) < TOLD:
+            self._told.add(text)
+            self._troubles.append(Refused(text))
+
+
+def _resolved(client: Address) -> Address:
+    host, port = client
+    if not 0 < port < 65536:
+        raise ConnectFailed(
+            f"the FRI client's port {port} is none", hint=f"it is {PORT} unless set otherwise"
+        )
+    try:
+        return socket.gethostbyname(host), port
+    except (OSError, UnicodeError) as error:
+        raise ConnectFailed(f"the FRI client {host!r} has no IPv4 address: {error}") from error
+
+
+def _bound(bind: str, port: int) -> socket.socket:
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        sock.bind((bind, port))
+    except (OSError, OverflowError) as error:
+        sock.close()
+        raise ConnectFailed(
+            f"the FRI controller cannot have UDP port {port}: {error}",
+            hint=f"end the program that has it, or choose another of {PORTS[0]} to {PORTS[-1]}",
+        ) from error
+    sock.setblocking(False)
+    return sock
+
+
+def _ask_for_stamps(sock: socket.socket) -> bool:
+    if _STAMPS is None:
+        return False
+    with contextlib.suppress(OSError):
+        sock.setsockopt(socket.SOL_SOCKET, _STAMPS, 1)
+        return True
+    return False
