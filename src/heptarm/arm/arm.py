@@ -184,6 +184,11 @@ class Arm:
         return self._connection.stands
 
     @property
+    def pace(self) -> float:
+        """Seconds of the robot's time per second of ours: 1 on a robot, N on a simulator that runs N times faster."""
+        return self._connection.pace
+
+    @property
     def speed(self) -> float:
         """Ceiling of the speed of all motions sent, a fraction of each axis' maximum in (0, 1].
 

@@ -1,0 +1,236 @@
+"""A policy on an arm, virtual or real: the same API, the same observation, the same integration of its actions.
+
+The loop runs at the task's rate over a servo motion. Nothing here needs torch or MuJoCo.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, dataclass
+from math import ceil
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import LimitError, StaleState, StreamError
+from heptarm.rl.guard import Guard, Watch
+from heptarm.rl.policy import Policy
+from heptarm.rl.report import Report
+from heptarm.values.arrays import Array, array
+from heptarm.values.mode import Mode
+from heptarm.values.motion import ptp
+
+if TYPE_CHECKING:
+    from heptarm.arm.arm import Arm
+    from heptarm.arm.servo import JointServo
+    from heptarm.values.state import State
+
+#: Where the target is, base frame, shape (3,) [m], at a time since the episode's beginning [s].
+Target = Callable[[float], Array]
+#: Ticks of the servo loop a decision where commands are delayed, so that a delay is met within a few milliseconds.
+_FINE = 8
+#: States a second per decision, so that what a decision sees is fresh.
+_STATES = 8.0
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """How a policy is deployed.
+
+    Attributes:
+        guard: limits.
+        mode: control mode of the servo motion; None: position.
+        speed: ceiling of the servo motion, a fraction of each axis' maximum.
+        acceleration: likewise.
+        latency: added between seeing and commanding [s].
+        homing: speed of the motion to where an episode begins.
+    """
+
+    _: KW_ONLY
+    guard: Guard = Guard()  # noqa: RUF009  frozen
+    mode: Mode | None = None
+    speed: float = 0.5
+    acceleration: float = 1.0
+    latency: float = 0.0
+    homing: float = 0.3
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.latency <= 0.5:
+            raise LimitError(f"latency is {self.latency}; allowed is [0, 0.5] s", code=2, parameter="latency")
+
+
+@dataclass(frozen=True, slots=True)
+class _Episode:
+    joints: Array
+    targets: Array
+
+
+def deploy(
+    arm: Arm,
+    policy: Policy,
+    targets: npt.ArrayLike | Sequence[Target],
+    *,
+    settings: Settings | None = None,
+    starts: npt.ArrayLike | None = None,
+    progress: Callable[[int, float], object] | None = None,
+) -> Report:
+    """Run a policy on an arm, one episode a target, each from home.
+
+    Args:
+        arm: in control.
+        policy: of a joint or Cartesian task for this robot.
+        targets: points, base frame, shape (n, 3) [m], or functions of time that say where the target is.
+        settings: guard, control mode and so on.
+        starts: joint positions at the beginning, shape (n, 7) [rad]; None: the task's home.
+        progress: called after each episode with its number and its final distance [m].
+
+    Returns:
+        The report; its facts tell what the guard did and how the streams went.
+
+    Raises:
+        LimitError: a target outside the guard's box, or a robot that is not the task's.
+        StaleState: the states stopped coming; the arm was stopped.
+        StreamError: the servo stream ended under way.
+    """
+    task, settings = policy.task, settings or Settings()
+    if arm.robot.name != task.model.name:
+        raise LimitError(
+            f"the policy was trained for the {task.model.title}; this is a {arm.robot.title}",
+            parameter="policy",
+            value=task.robot,
+            hint=f"train one with --robot {arm.robot.name}",
+        )
+    goals = [_target(one, settings.guard) for one in _listed(targets)]
+    begins = (
+        [np.asarray(task.home)] * len(goals) if starts is None else list(np.atleast_2d(np.asarray(starts)))
+    )
+    watch = Watch(settings.guard, arm.robot, period=1.0 / task.rate)
+    episodes = []
+    late = 0
+    arm.subscribe(rate=min(_STATES * task.rate, 500.0), groups=("joints", "motion", "safety"))
+    for number, (goal, begin) in enumerate(zip(goals, begins, strict=True)):
+        arm.move(ptp(begin), speed=settings.homing)
+        episode, ticks = _run(arm, policy, goal, watch, settings)
+        episodes.append(episode)
+        late += ticks
+        if progress is not None:
+            progress(number, _distances(policy, episode)[-1])
+    joints = np.array([one.joints for one in episodes])
+    facts = {
+        "engine": "arm",
+        "robot": arm.robot.title,
+        "virtual": arm.is_virtual,
+        "mode": "position" if settings.mode is None else repr(settings.mode),
+        "latency": settings.latency,
+        "guard": dict(watch.counts),
+        "late_ticks": late,
+    }
+    return Report(
+        task,
+        np.array([one.targets[-1] for one in episodes]),
+        np.array([_distances(policy, one) for one in episodes]),
+        task.tip(joints),
+        joints=joints,
+        facts=facts,
+    )
+
+
+def _run(arm: Arm, policy: Policy, goal: Target, watch: Watch, settings: Settings) -> tuple[_Episode, int]:
+    """One episode; also how many of its ticks came late."""
+    task = policy.task
+    fine = _FINE if settings.latency > 0 else 1
+    delay = ceil(settings.latency * task.rate * fine - 1e-9)
+    # the arm's time is what counts: a simulator may run faster than the clock on the wall
+    rate = task.rate * fine * arm.pace
+    waiting: deque[tuple[int, Array]] = deque()
+    joints, targets = np.empty((task.steps + 1, 7)), np.empty((task.steps, 3))
+    with arm.servo(
+        "joint", rate=rate, mode=settings.mode, speed=settings.speed, acceleration=settings.acceleration
+    ) as sv:
+        state = sv.start
+        command, held = state.q, task.hold(state.q)
+        joints[0] = state.q
+        for tick in range(task.steps * fine):
+            step, is_decision = divmod(tick, fine)[0], tick % fine == 0
+            if is_decision:
+                targets[step] = goal(step / task.rate)
+                action = policy(task.observe(state.q, state.dq, targets[step])).astype(np.float64)
+                command = watch.allow(command, task.advance(command, state.q, action, held))
+                waiting.append((tick + delay, command))
+            _send(sv, waiting, tick)
+            if sv.tick() is None:
+                break
+            if (tick + 1) % fine == 0:
+                state = _fresh(arm, settings.guard)
+                joints[step + 1] = state.q
+        else:
+            return _Episode(joints, targets), sv.stats.late_ticks
+    raise StreamError("the servo stream ended before the episode did", hint="look at the cabinet's log")
+
+
+def _send(sv: JointServo, waiting: deque[tuple[int, Array]], tick: int) -> None:
+    """Send what is due, or again what was sent last, as a sign of life."""
+    while len(waiting) > 1 and waiting[1][0] <= tick:
+        waiting.popleft()
+    sv.set(waiting[0][1] if waiting[0][0] <= tick else sv.start.q)
+
+
+def _fresh(arm: Arm, guard: Guard) -> State:
+    state = arm.state
+    if not state.age <= guard.stale:
+        raise StaleState(
+            f"the newest state is {state.age:.2f} s old; the guard allows {guard.stale:g} s",
+            value=state.age,
+            allowed=f"[0, {guard.stale:g}] s",
+            hint="check the connection and the load of this machine",
+        )
+    return state
+
+
+def _distances(policy: Policy, episode: _Episode) -> Array:
+    return policy.task.distance(policy.task.tip(episode.joints[1:]), episode.targets)
+
+
+def _listed(targets: npt.ArrayLike | Sequence[Target]) -> list[npt.ArrayLike | Target]:
+    if isinstance(targets, Sequence) and targets and callable(targets[0]):
+        return list(targets)
+    return list(np.atleast_2d(np.asarray(targets, dtype=np.float64)))
+
+
+def _target(target: npt.ArrayLike | Target, guard: Guard) -> Target:
+    """A target as a function of time, checked where it begins; a moving one is checked by the guard on the way."""
+    if callable(target):
+        moving: Target = target
+        point = array(moving(0.0), 3, "target")
+    else:
+        point = array(target, 3, "target")
+        moving = lambda _: point  # noqa: E731
+    if not guard.contains(point):
+        raise LimitError(
+            f"the target {np.round(point, 3).tolist()} m is outside the guard's box",
+            code=2,
+            parameter="target",
+            value=point.tolist(),
+            allowed=f"{list(guard.low)} to {list(guard.high)} m",
+            hint="choose another target, or a guard with a larger box",
+        )
+    return moving
+
+
+def circle(centre: npt.ArrayLike, radius: float, *, period: float) -> Target:
+    """A target that moves on a circle across the arm's front.
+
+    Args:
+        centre: base frame, shape (3,) [m].
+        radius: [m].
+        period: of a round [s].
+    """
+    middle = array(centre, 3, "centre")
+
+    def where(time: float) -> Array:
+        angle = 2 * np.pi * time / period
+        return middle + radius * np.array([0.0, np.sin(angle), np.cos(angle)])
+
+    return where

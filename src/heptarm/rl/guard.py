@@ -1,0 +1,86 @@
+"""What a policy may not do, whatever it decides: the deployment's last word before a target is sent."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import KW_ONLY, dataclass
+
+import numpy as np
+
+from heptarm.errors import LimitError
+from heptarm.rl import kinematics
+from heptarm.values.arrays import Array
+from heptarm.values.robot import RobotModel
+
+
+@dataclass(frozen=True, slots=True)
+class Guard:
+    """Limits of a deployment.
+
+    Attributes:
+        low: corner of the box that the flange stays in, base frame, shape (3,) [m].
+        high: the opposite corner [m].
+        margin: kept from every joint's limits [rad].
+        speed: of the commanded joints at most [rad/s].
+        stale: an older state ends the deployment [s].
+
+    Raises:
+        LimitError: a box without a volume, or a limit that is not positive.
+    """
+
+    _: KW_ONLY
+    low: tuple[float, float, float] = (0.30, -0.50, 0.10)
+    high: tuple[float, float, float] = (0.95, 0.50, 0.95)
+    margin: float = 0.05
+    speed: float = 1.3
+    stale: float = 0.25
+
+    def __post_init__(self) -> None:
+        if not all(a < b for a, b in zip(self.low, self.high, strict=True)):
+            raise LimitError(f"the box from {self.low} to {self.high} has no volume", code=2, parameter="low")
+        for name in ("speed", "stale"):
+            if not getattr(self, name) > 0:
+                raise LimitError(f"{name} is {getattr(self, name)}; it is positive", code=2, parameter=name)
+
+    def contains(self, point: Array) -> bool:
+        """Whether a point [m] is inside the box."""
+        return bool((point >= self.low).all() and (point <= self.high).all())
+
+
+class Watch:
+    """A guard on duty: passes commands on, or less than them, and counts what it did.
+
+    Args:
+        guard: the limits.
+        robot: the robot.
+        period: of the commands [s].
+
+    Attributes:
+        counts: how often it stepped in, by "joint", "speed", "box".
+    """
+
+    def __init__(self, guard: Guard, robot: RobotModel, *, period: float) -> None:
+        self._guard, self._robot = guard, robot
+        self._step = guard.speed * period
+        self._low, self._high = robot.q_min + guard.margin, robot.q_max - guard.margin
+        self.counts: Counter[str] = Counter()
+
+    def allow(self, last: Array, wanted: Array) -> Array:
+        """What may be commanded, shape (7,) [rad].
+
+        A command outside the joints' margins or faster than allowed is brought back; one that leads the flange out
+        of the box (or farther out of it) is not taken at all: the arm holds its last command.
+        """
+        allowed = np.minimum(np.maximum(wanted, self._low), self._high)
+        self.counts["joint"] += bool((allowed != wanted).any())
+        bounded = np.minimum(np.maximum(allowed, last - self._step), last + self._step)
+        self.counts["speed"] += bool((bounded != allowed).any())
+        if self._outside(bounded) > self._outside(last):
+            self.counts["box"] += 1
+            return last
+        return bounded
+
+    def _outside(self, q: Array) -> float:
+        """How far the flange is out of the box [m]; 0 inside."""
+        tip = kinematics.tip(self._robot, q)
+        return float(np.maximum(np.maximum(self._guard.low - tip, tip - self._guard.high), 0.0).max())
