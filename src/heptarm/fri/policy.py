@@ -1,0 +1,146 @@
+"""What is sent when the user's commands stay away: the declared policy for missing commands."""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from heptarm.errors import LimitError
+
+
+class Missing(enum.Enum):
+    """What to do without a fresh command.
+
+    HOLD keeps the last one. EXTRAPOLATE lets the position move on with its last speed, from the moment it was
+    commanded, and keeps torques; after `over` seconds it ramps down. RAMP_DOWN brakes the axes to a stop where they are
+    and lets torques and wrenches fall to zero within `over` seconds.
+    """
+
+    HOLD = "hold"
+    EXTRAPOLATE = "extrapolate"
+    RAMP_DOWN = "ramp down"
+
+
+@dataclass(frozen=True, slots=True)
+class Policy:
+    """How long a command counts, and what comes after it.
+
+    Attributes:
+        missing: what to do without a fresh command.
+        patience: a command is fresh for this long [s].
+        over: duration of an extrapolation, and of a ramp of torques to zero [s].
+
+    Raises:
+        LimitError: a duration is negative.
+    """
+
+    missing: Missing = Missing.RAMP_DOWN
+    patience: float = 0.05
+    over: float = 0.1
+
+    def __post_init__(self) -> None:
+        for name in ("patience", "over"):
+            if not getattr(self, name) >= 0.0:
+                raise LimitError(f"{name} is {getattr(self, name)}; a duration [s] is wanted", parameter=name)
+
+
+class Filler:
+    """Turns commands that come when they come into one wish for every cycle.
+
+    Args:
+        policy: the declared policy.
+
+    Attributes:
+        is_filled: the last wish was made without a fresh command.
+        is_braking: the last wish is to brake.
+    """
+
+    __slots__ = ("_at", "_q", "_slope", "_tau", "_wrench", "is_braking", "is_filled", "policy")
+
+    def __init__(self, policy: Policy) -> None:
+        self.policy = policy
+        self.start()
+
+    def start(self) -> None:
+        """Begin without any command: the interpolator is mirrored until there is one."""
+        self._at = 0
+        self._q: Sequence[float] | None = None
+        self._slope: Sequence[float] | None = None
+        self._tau: Sequence[float] | None = None
+        self._wrench: Sequence[float] | None = None
+        self.is_filled = self.is_braking = False
+
+    def command(
+        self,
+        at: int,
+        *,
+        q: Sequence[float] | None = None,
+        tau: Sequence[float] | None = None,
+        wrench: Sequence[float] | None = None,
+    ) -> None:
+        """Take a command of the user; what is None stays as it was.
+
+        Args:
+            at: when it was given [ns].
+            q: joint position [rad].
+            tau: superposed torques [Nm].
+            wrench: superposed wrench [N, Nm].
+        """
+        if q is not None:
+            gap = (at - self._at) * 1e-9
+            # two commands of one stream tell its speed, a pause between them does not
+            if self._q is not None and 0.0 < gap <= self.policy.patience:
+                self._slope = [(new - old) / gap for new, old in zip(q, self._q, strict=True)]
+            else:
+                self._slope = None
+            self._q = q
+        self._tau = tau if tau is not None else self._tau
+        self._wrench = wrench if wrench is not None else self._wrench
+        self._at = at
+
+    def wish(self, now: int, ipo: Sequence[float]) -> Sequence[float] | None:
+        """The position wanted now; None to brake.
+
+        Args:
+            now: the clock of the commands [ns].
+            ipo: interpolator's position, which is mirrored until a position was commanded.
+        """
+        self.is_filled = self.is_braking = False
+        if not self._at:
+            return ipo
+        age = (now - self._at) * 1e-9
+        late = age - self.policy.patience
+        self.is_filled = late > 0.0
+        missing = self.policy.missing
+        if missing is not Missing.HOLD and late > (
+            self.policy.over if missing is Missing.EXTRAPOLATE else 0.0
+        ):
+            self.is_braking = True
+            return None
+        if self._q is None:
+            return ipo
+        if missing is Missing.EXTRAPOLATE and self._slope is not None:
+            return [value + slope * age for value, slope in zip(self._q, self._slope, strict=True)]
+        return self._q
+
+    def efforts(self, now: int) -> tuple[Sequence[float] | None, Sequence[float] | None]:
+        """Torques and wrench wanted now; None where none was ever commanded."""
+        share = self._share((now - self._at) * 1e-9 - self.policy.patience) if self._at else 1.0
+        tau, wrench = self._tau, self._wrench
+        if share == 1.0:
+            return tau, wrench
+        return (
+            None if tau is None else [share * value for value in tau],
+            None if wrench is None else [share * value for value in wrench],
+        )
+
+    def _share(self, late: float) -> float:
+        """How much of the last torque remains this long after patience has ended."""
+        if self.policy.missing is Missing.HOLD:
+            return 1.0
+        if self.policy.missing is Missing.EXTRAPOLATE:
+            late -= self.policy.over
+        if late <= 0.0:
+            return 1.0
+        return max(0.0, 1.0 - late / self.policy.over) if self.policy.over else 0.0
