@@ -197,7 +197,7 @@ def test_the_spiral_force_grows_and_shrinks() -> None:
 def test_a_constant_force_sets_in_gently_and_lasts() -> None:
     felt = clamped(SineImpedance.force(z=-10.0), 0.6)
     assert felt[200:, 2] == pytest.approx(np.full(400, -10.0), rel=ACCURACY)
-    assert np.abs(np.diff(felt[:, 2])).max() < 10.0 / (RAMP * 1000) * 3.0
+    assert np.abs(np.diff(felt[:, 2], prepend=0.0)).max() < 10.0 / (RAMP * 1000) * 3.0
 
 
 # ------------------------------------------------------------------------------------------- a free hand
