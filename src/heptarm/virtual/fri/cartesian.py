@@ -12,7 +12,7 @@ import numpy as np
 
 from heptarm.errors import Unreachable
 from heptarm.fri import messages as m
-from heptarm.model.kinematics import forward, jacobian
+from heptarm.model.kinematics import flange, forward, jacobian
 from heptarm.values.arrays import Array
 from heptarm.values.pose import quaternion, rotation
 from heptarm.values.robot import RobotModel
@@ -31,10 +31,9 @@ STRIDE = 0.2
 
 def transformation(robot: RobotModel, q: tuple[float, ...]) -> m.Transformation:
     """The flange's pose at joint positions, shape (7,) [rad]."""
-    pose = forward(robot, q)
-    x, y, z, w = quaternion(pose[:3, :3]).tolist()
-    x_mm, y_mm, z_mm = (1e3 * pose[:3, 3]).tolist()
-    return m.Transformation(NAME, (x_mm, y_mm, z_mm, w, x, y, z))
+    columns, (px, py, pz) = flange(robot, q)
+    x, y, z, w = quaternion(list(zip(*columns, strict=True))).tolist()
+    return m.Transformation(NAME, (1e3 * px, 1e3 * py, 1e3 * pz, w, x, y, z))
 
 
 def matrix(pose: m.Transformation) -> Array:

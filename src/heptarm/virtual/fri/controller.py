@@ -23,7 +23,7 @@ import numpy as np
 
 from heptarm.errors import ModeConflict, Unreachable
 from heptarm.fri import messages as m
-from heptarm.fri.codec import decode_command, encode_monitoring
+from heptarm.fri.codec import decode_command
 from heptarm.fri.protobuf import MalformedMessage
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
@@ -36,6 +36,7 @@ from heptarm.virtual.fri.overlay import MotionOverlay, Reading, Superposition, m
 from heptarm.virtual.fri.quality import Meter
 from heptarm.virtual.fri.report import Status, report
 from heptarm.virtual.fri.setpoint import COAST, SetPoint
+from heptarm.virtual.fri.writer import Writer
 
 TICK_NS = 1_000_000
 
@@ -98,6 +99,7 @@ class Controller:
         self.meter = Meter(configuration.receive_ms * TICK_NS)
         self.traffic = Traffic()
         self.exchange = Exchange(configuration)
+        self._writer = Writer(configuration.version)
         self._robot = robot
         self._epoch = epoch_ns
         self._events: deque[Event] = deque(maxlen=1000)
@@ -383,7 +385,7 @@ class Controller:
         if self.state is not m.SessionState.IDLE and number % configuration.multiplier == 0:
             self.meter.asked(number // configuration.multiplier, now)
         self.traffic.sent += 1
-        return encode_monitoring(message, configuration.version)
+        return self._writer.encode(message)
 
 
 _STOPS = {

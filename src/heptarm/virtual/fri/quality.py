@@ -3,14 +3,14 @@
 KUKA names four classes and publishes no thresholds. The rule here is heptarm's own:
 
 * The client owes one answer in each receive period (send period times multiplier).
-* An answer within one receive period of its message is on time and earns 2 points; a later one earns 1; one that is
+* An answer within one receive period of its message is on time and earns 4 points; a later one earns 3; one that is
   not there after `LOST_PERIODS` receive periods, at least `LOST_TIME`, is lost and earns none.
 * The window is the last 100 receive periods; where they would last longer than a second, as many as a second holds, at
   least 20. What has not been answered since the session opened counts as lost, so that quality is earned.
 * EXCELLENT from 99 % of the window's points on, GOOD from 95 %, FAIR from 75 %, POOR below.
 
-So 1 lost or 2 late answers in a hundred leave it EXCELLENT, 5 lost or 10 late ones GOOD, and GOOD is what commanding
-needs. Silence at 1 kHz is noticed after 26 ms.
+So 1 lost or 4 late answers in a hundred leave it EXCELLENT, 5 lost or 20 late ones GOOD, and GOOD is what commanding
+needs; a client that is always late never has it. Silence at 1 kHz is noticed after 26 ms.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from heptarm.fri.messages import Quality
 
 #: Points of an answer.
-ON_TIME, LATE, LOST = 2, 1, 0
+ON_TIME, LATE, LOST = 4, 3, 0
 #: Share of the window's points from which a class is reached.
 SHARES = ((Quality.EXCELLENT, 0.99), (Quality.GOOD, 0.95), (Quality.FAIR, 0.75))
 

@@ -1,0 +1,143 @@
+"""Writes the monitoring messages of one session, a thousand times a second.
+
+The octets are those of `heptarm.fri.codec.encode_monitoring`; what seldom changes (robot, connection, modes, signals)
+is encoded once and kept, joint arrays are packed in one call.
+"""
+
+from __future__ import annotations
+
+import struct
+
+from heptarm.fri import messages as m
+from heptarm.fri.codec import encode_monitoring
+from heptarm.fri.protobuf import fields, put_bytes, put_double, put_packed, put_varint, varint
+from heptarm.fri.version import MONITORING_ID, Version, unwrap, wrap
+
+_ARRAY = struct.Struct("<BB" + "Bd" * 7)
+_FIXED64 = 1 << 3 | 1
+_HEAD = put_varint(1, MONITORING_ID) + b"\x10"
+
+#: Different sections that are kept.
+KEPT = 64
+
+
+def _array(tag: int, joints: m.Joints | None) -> bytes:
+    """A joint array as a field, 65 octets."""
+    if joints is None:
+        return b""
+    a, b, c, d, e, f, g = joints
+    k = _FIXED64
+    return _ARRAY.pack(tag << 3 | 2, 63, k, a, k, b, k, c, k, d, k, e, k, f, k, g)
+
+
+def _stamp(tag: int, stamp: m.TimeStamp | None) -> bytes:
+    if stamp is None:
+        return b""
+    return put_bytes(tag, b"\x08" + varint(stamp.seconds) + b"\x10" + varint(stamp.nanoseconds))
+
+
+def _pose(tag: int, pose: m.Transformation | None) -> bytes:
+    if pose is None:
+        return b""
+    return put_bytes(
+        tag, put_bytes(1, pose.name.encode()) + put_packed(2, pose.values) + _stamp(3, pose.stamp)
+    )
+
+
+def _redundancy(tag: int, value: m.Redundancy | None) -> bytes:
+    return (
+        b"" if value is None else put_bytes(tag, put_varint(1, value.strategy) + put_double(2, value.value))
+    )
+
+
+class Writer:
+    """Encodes monitoring messages of one version."""
+
+    def __init__(self, version: Version) -> None:
+        self._version = version
+        self._kept: dict[object, bytes] = {}
+
+    def encode(self, message: m.Monitoring) -> bytes:
+        """The datagram of a message.
+
+        Raises:
+            ValueError: the version cannot carry a field, or a name or list is too long.
+        """
+        counters = varint(message.header.sequence) + b"\x18" + varint(message.header.reflected)
+        parts = [bytes((0x0A, len(_HEAD) + len(counters))), _HEAD, counters]
+        if message.robot is not None:
+            parts.append(self._section(2, message.robot, m.Monitoring(message.header, robot=message.robot)))
+        if message.monitor is not None:
+            parts.append(self._monitor(message.header, message.monitor))
+        if message.connection is not None:
+            parts.append(
+                self._section(
+                    4, message.connection, m.Monitoring(message.header, connection=message.connection)
+                )
+            )
+        if message.ipo is not None:
+            parts.append(self._ipo(message.header, message.ipo))
+        if message.requested:
+            whole = encode_monitoring(
+                m.Monitoring(message.header, requested=message.requested), self._version
+            )
+            parts += [put_bytes(6, value) for value in self._values(whole, 6)]
+        return wrap(b"".join(parts), self._version)
+
+    def _monitor(self, header: m.Header, data: m.MonitorData) -> bytes:
+        traits = self._version.traits
+        if (
+            (data.q_cmd is not None and traits.quaternions)
+            or ((data.pose or data.redundancy) and not traits.quaternions)
+            or (data.wrench is not None and not traits.framed)
+        ):
+            encode_monitoring(m.Monitoring(header, monitor=data), self._version)  # says what is wrong
+        signals = b""
+        if data.io:
+            only = m.Monitoring(header, monitor=m.MonitorData(io=data.io))
+            if any(
+                value.type is m.IoType.ANALOG for value in data.io
+            ):  # they change all the time, and -0.0 == 0.0
+                signals = self._values(encode_monitoring(only, self._version), 3)[0]
+            else:
+                signals = self._section(3, data.io, only, inside=True)
+        return put_bytes(
+            3,
+            _array(1, data.q)
+            + _array(2, data.tau)
+            + _array(3, data.q_cmd)
+            + _array(4, data.tau_cmd)
+            + _array(5, data.tau_ext)
+            + (b"" if data.wrench is None else put_bytes(6, put_packed(1, data.wrench)))
+            + signals
+            + _pose(9, data.pose)
+            + _redundancy(10, data.redundancy)
+            + _stamp(15, data.stamp),
+        )
+
+    def _ipo(self, header: m.Header, ipo: m.IpoData) -> bytes:
+        modes = m.IpoData(command_mode=ipo.command_mode, overlay=ipo.overlay)
+        return put_bytes(
+            5,
+            _array(1, ipo.q)
+            + _pose(2, ipo.pose)
+            + _redundancy(3, ipo.redundancy)
+            + self._section(5, modes, m.Monitoring(header, ipo=modes), inside=True)
+            + (b"" if ipo.tracking is None else put_double(12, ipo.tracking)),
+        )
+
+    def _section(self, tag: int, value: object, only: m.Monitoring, *, inside: bool = False) -> bytes:
+        """The octets of a section, from a message that has only it; `inside`: without key and length."""
+        key = (tag, value)
+        kept = self._kept.get(key)
+        if kept is None:
+            octets = self._values(encode_monitoring(only, self._version), tag)[0]
+            kept = octets if inside else put_bytes(tag, octets)
+            if len(self._kept) >= KEPT:
+                self._kept.clear()
+            self._kept[key] = kept
+        return kept
+
+    def _values(self, datagram: bytes, wanted: int) -> list[bytes]:
+        message = unwrap(datagram, self._version)
+        return [value for tag, _, value in fields(message) if tag == wanted and isinstance(value, bytes)]
