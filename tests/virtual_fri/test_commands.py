@@ -12,7 +12,7 @@ from heptarm.fri import messages as m
 from heptarm.fri.version import Version
 from heptarm.model.kinematics import forward
 from heptarm.values.pose import Pose
-from heptarm.virtual.fri import cartesian
+from heptarm.virtual.fri import cartesian, controller
 from heptarm.virtual.fri.configuration import Configuration
 from heptarm.virtual.fri.controller import MIRRORED
 from heptarm.virtual.fri.overlay import MotionOverlay
@@ -245,8 +245,9 @@ def test_the_next_overlay_begins_where_the_arm_is() -> None:
     ],
 )
 def test_a_client_that_does_not_mirror_never_commands(
-    overlay: MotionOverlay, fields: dict[str, object], text: str
+    overlay: MotionOverlay, fields: dict[str, object], text: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(controller, "SYNCHRONISATION", 200_000_000)
     rig = Rig(Version.V2_5)
     rig.client.waiting = lambda message: replace(mirror(message), **fields)  # type: ignore[arg-type]
     rig.waiting(overlay).until(State.MONITORING_READY)

@@ -150,7 +150,7 @@ def test_a_good_line_keeps_commanding() -> None:
     assert trial.causes == [] and trial.rig.controller.quality is m.Quality.EXCELLENT
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize(
     ("faults", "least"),
     [
@@ -161,11 +161,11 @@ def test_a_good_line_keeps_commanding() -> None:
 )
 def test_small_faults_keep_commanding(faults: Faults, least: m.Quality, seed: int) -> None:
     faults = Faults(**{name: getattr(faults, name) for name in ("loss", "duplicate", "jitter")}, seed=seed)
-    trial = Trial(Scenario(from_client=faults)).run(1000)
+    trial = Trial(Scenario(from_client=faults)).run(500)
     assert trial.causes == [] and trial.rig.controller.quality >= least
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("version", [Version.V1_11, Version.V2_7])
 @pytest.mark.parametrize(
     "faults",
@@ -175,7 +175,9 @@ def test_great_faults_end_commanding_by_quality(
     faults: dict[str, float], version: Version, seed: int
 ) -> None:
     both = Faults(seed=seed, **faults)
-    trial = Trial(Scenario(to_client=both, from_client=both), version).run(1500)
+    trial = Trial(Scenario(to_client=both, from_client=both), version)
+    while not trial.causes and trial.rig.now < 3_000 * MS:
+        trial.run(20)
     # a damaged command of a version without CRC may still be one, and then asks for something illegal
     assert trial.causes[0] == "quality" or ("corrupt" in faults and not version.traits.framed)
     trial.works_again()
