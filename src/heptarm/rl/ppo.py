@@ -61,7 +61,7 @@ class Settings:
     value: float = 1.0
     gradient: float = 1.0
     entropy: float = 0.0
-    action_cost: float = 0.0
+    action_cost: float = 4e-3
     reward_scale: float = 5.0
 
     def __post_init__(self) -> None:
