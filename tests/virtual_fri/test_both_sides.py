@@ -1,0 +1,152 @@
+"""heptarm's client machine against heptarm's controller: two machines that know nothing of each other's code."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from heptarm.fri import messages as m
+from heptarm.fri.session import Kind, Session, Setpoint
+from heptarm.fri.version import Version
+from heptarm.virtual.fri.configuration import Configuration
+from heptarm.virtual.fri.controller import TICK_NS, Controller
+from heptarm.virtual.fri.faults import NONE, Faults, Line
+from heptarm.virtual.fri.overlay import CONTROLS, MotionOverlay
+from tests.virtual_fri.rig import READY, Arm, State
+
+
+LEGAL = [
+    (version, mode)
+    for version in Version
+    for mode in CONTROLS
+    if version.traits.quaternions or mode is not m.CommandMode.CARTESIAN_POSE
+]
+
+
+@dataclass
+class Pair:
+    """A controller and heptarm's client, one tick after the other; the client's answers take 0.3 ms."""
+
+    configuration: Configuration
+    faults: Faults = NONE
+    setpoint: Setpoint = field(default_factory=Setpoint)
+
+    def __post_init__(self) -> None:
+        self.arm, self.session, self.now = Arm(), Session(), 0
+        self.there, self.back = Line(self.faults), Line(self.faults)
+        self.renew()
+
+    def renew(self) -> None:
+        self.controller = Controller(self.configuration, self.arm.robot)
+        self.controller.open()
+
+    def run(self, ticks: int) -> None:
+        for _ in range(ticks):
+            self.now += TICK_NS
+            for answer in self.back.arrived(self.now):
+                self.controller.receive(answer, self.now - 700_000)
+            datagram = self.controller.tick(self.arm.reading(), self.now)
+            self.arm.overlay(self.controller.superposition)
+            self.arm.tick()
+            if datagram is not None:
+                self.there.send(datagram, self.now)
+            for message in self.there.arrived(self.now):
+                if self.session.receive(message, self.now) is not None:
+                    answer_now = self.session.answer(self.setpoint)
+                    if answer_now is not None:
+                        self.back.send(answer_now, self.now)
+
+    def until(self, state: m.SessionState) -> None:
+        for _ in range(4000):
+            if self.controller.state is self.session.state is state:
+                return
+            self.run(1)
+        raise AssertionError(
+            f"{self.controller.state.name}, {self.session.state.name} instead of {state.name}"
+        )
+
+    def active(self, overlay: MotionOverlay) -> None:
+        self.until(State.MONITORING_READY)
+        self.controller.start(overlay)
+        self.until(State.COMMANDING_ACTIVE)
+
+
+@pytest.mark.parametrize(("version", "mode"), LEGAL)
+@pytest.mark.parametrize("receive", [(1, 1), (1, 3), (5, 1)])
+def test_the_two_agree_on_everything(version: Version, mode: m.CommandMode, receive: tuple[int, int]) -> None:
+    pair = Pair(Configuration(version, *receive))
+    pair.active(MotionOverlay(mode, CONTROLS[mode][0]))
+    session, controller = pair.session, pair.controller
+    assert session.mode is mode and session.multiplier == receive[1]
+    pair.setpoint = Setpoint(tau=(1.0,) * 7, wrench=(2.0,) * 6)
+    pair.run(300)
+    assert controller.state is State.COMMANDING_ACTIVE and session.quality is m.Quality.EXCELLENT
+    tau, wrench = pair.arm.loads[-1]
+    assert (tau is not None) == (mode is m.CommandMode.TORQUE) and (tau is None or tau.tolist() == [1.0] * 7)
+    assert (wrench is not None) == (mode is m.CommandMode.WRENCH) and (wrench is None or wrench[0] == 2.0)
+    counts = session.counters
+    assert counts.lost == counts.missed == counts.malformed == 0
+    assert controller.meter.counts.lost == controller.traffic.refused == controller.traffic.stale == 0
+    assert session.version in (version, Version.V1_15)
+
+
+def test_the_arm_follows_the_clients_setpoints() -> None:
+    pair = Pair(Configuration(Version.V2_7))
+    pair.active(MotionOverlay())
+    for step in range(1, 301):
+        pair.setpoint.q = (READY[0] + 5e-4 * step, *READY[1:])
+        pair.run(1)
+    pair.run(3)
+    assert pair.arm.q[0] == pytest.approx(READY[0] + 0.15, abs=1e-12)
+    assert np.abs(pair.arm.q[1:] - READY[1:]).max() < 1e-12
+
+
+@pytest.mark.parametrize("version", Version)
+def test_one_client_outlives_a_hundred_sessions(version: Version) -> None:
+    pair = Pair(Configuration(version))
+    for _ in range(100 if version is Version.V1_15 else 5):
+        pair.active(MotionOverlay())
+        pair.run(5)
+        pair.controller.close()
+        pair.run(2)
+        assert pair.session.state is State.IDLE
+        pair.renew()
+    assert pair.session.counters.malformed == 0
+
+
+def test_a_session_that_is_torn_off_is_followed_by_another() -> None:
+    pair = Pair(Configuration(Version.V2_7))
+    for _ in range(5):
+        pair.active(MotionOverlay())
+        pair.renew()  # as when the controller's process is killed: no last word
+    pair.active(MotionOverlay())
+    assert Kind.RESTARTED in {event.kind for event in pair.session.events()}
+
+
+@given(
+    st.sampled_from(Version),
+    st.builds(
+        Faults,
+        loss=st.floats(0, 0.3),
+        duplicate=st.floats(0, 0.3),
+        corrupt=st.floats(0, 0.1),
+        reorder=st.floats(0, 0.2),
+        jitter=st.floats(0, 0.01),
+        seed=st.integers(0, 1000),
+    ),
+)
+@settings(max_examples=25, deadline=None)
+def test_after_any_faults_the_two_find_each_other_again(version: Version, faults: Faults) -> None:
+    pair = Pair(Configuration(version))
+    pair.active(MotionOverlay())
+    pair.there, pair.back = Line(faults), Line(faults)
+    pair.run(300)
+    assert (pair.arm.leaps <= 1.2 * pair.arm.robot.dq_max * 1e-3 + 1e-12).all()
+    pair.there, pair.back = Line(), Line()
+    pair.controller.stop()
+    pair.run(700)  # a counter that was damaged under way may silence the client for a moment
+    pair.active(MotionOverlay())
