@@ -18,7 +18,6 @@ from heptarm.virtual.fri.faults import NONE, Faults, Line
 from heptarm.virtual.fri.overlay import CONTROLS, MotionOverlay
 from tests.virtual_fri.rig import READY, Arm, State
 
-
 LEGAL = [
     (version, mode)
     for version in Version

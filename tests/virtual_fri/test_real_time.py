@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 from heptarm.fri.version import Version, recognise
 from tests.virtual_fri.rig import State
 from tests.virtual_fri.test_udp import Peer
 
+ROOT = Path(__file__).parents[2]
 PROGRAM = """
 import sys, threading
 from heptarm.fri.version import Version
@@ -29,7 +31,8 @@ def test_it_runs_until_it_is_stopped_and_says_goodbye() -> None:
     peer = Peer(Version.V2_7)
     peer.socket.settimeout(60.0)
     command = [sys.executable, "-c", PROGRAM, str(peer.address[1])]
-    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, cwd=ROOT) as process:
         assert process.stdin is not None and process.stdout is not None
         for _ in range(6000):  # a minute at most, on however busy a machine
             peer.turn()
