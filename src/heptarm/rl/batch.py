@@ -116,7 +116,8 @@ class Engine:
         for name, rows in self._state.items():
             rows[:] = entries[name]
         if "filter" in entries:
-            self.bandwidth(np.arange(len(self.q)), entries["filter"][:, 0])
+            self.bandwidth(np.arange(len(self.q)), np.ones(len(self.q)))  # so that the field is there
+            self._filter[:, :, 0] = entries["filter"]
 
 
 class BatchReach:
