@@ -47,6 +47,7 @@ class Kind(enum.Enum):
     COMMAND_MODE = "command mode"
     SAFETY = "safety"
     NO_IPO = "no interpolator position"
+    CLIENT = "client"
 
 
 @dataclass(frozen=True, slots=True)

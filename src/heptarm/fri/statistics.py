@@ -3,12 +3,23 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import MutableSequence
+from collections.abc import Iterator
+from typing import Protocol
 
 #: Histograms have bins of one microsecond; the last one takes all that is longer.
 BINS = 16_384
 #: Longest duration that is told apart [ns].
 LONGEST = 10**15
+
+
+class Words(Protocol):
+    """Integer words, of an array or of shared memory."""
+
+    def __getitem__(self, index: int, /) -> int: ...
+
+    def __setitem__(self, index: int, value: int, /) -> None: ...
+
+    def __iter__(self) -> Iterator[int]: ...
 
 
 class Counters:
@@ -67,12 +78,12 @@ class Counters:
         for name in self.__slots__:
             setattr(self, name, 0)
 
-    def save(self, words: MutableSequence[int], at: int) -> None:
+    def save(self, words: Words, at: int) -> None:
         """Write the counts into integer words, in the order of `COUNTERS`."""
         for index, name in enumerate(COUNTERS):
             words[at + index] = getattr(self, name)
 
-    def load(self, words: MutableSequence[int], at: int) -> None:
+    def load(self, words: Words, at: int) -> None:
         """Take the counts from integer words, in the order of `COUNTERS`."""
         for index, name in enumerate(COUNTERS):
             setattr(self, name, int(words[at + index]))
@@ -111,8 +122,8 @@ class Histogram:
 
     __slots__ = ("_words",)
 
-    def __init__(self, words: MutableSequence[int] | None = None) -> None:
-        self._words = array("q", bytes(8 * (BINS + 1))) if words is None else words
+    def __init__(self, words: Words | None = None) -> None:
+        self._words: Words = array("q", bytes(8 * (BINS + 1))) if words is None else words
 
     def add(self, nanos: int) -> None:
         """Count one duration [ns]; negative ones count as zero."""
@@ -131,7 +142,7 @@ class Histogram:
 
         Resolution is a microsecond; what is beyond the bins answers with the longest duration.
         """
-        counts = list(self._words[:BINS])
+        counts = list(self._words)[:BINS]
         total = sum(counts)
         found = []
         for share in shares:

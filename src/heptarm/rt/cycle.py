@@ -1,0 +1,391 @@
+"""One turn of the loop: datagram in, answer out, everything that happened into shared memory. No socket, no clock."""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+import traceback
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from heptarm.errors import CommandRejected
+from heptarm.fri import messages as m
+from heptarm.fri.guard import Guard, Limited, Limits
+from heptarm.fri.policy import Filler, Policy
+from heptarm.fri.session import Kind, Session, Setpoint
+from heptarm.fri.statistics import Histogram
+from heptarm.fri.template import Sample
+from heptarm.fri.version import Version
+from heptarm.rt import layout as at
+from heptarm.rt.state import Output, Params, State
+
+Law = Callable[[State, Output, Params], object]
+
+#: After a silence of this many command periods the guard begins anew from the last position, at rest.
+SILENT_PERIODS = 5
+#: An output is written this often, since an answer may be lost.
+REPEAT_OUTPUTS = 10
+_ROW = struct.Struct(f"=18q{at.STATE_WORDS - 19}d")
+_NAN7, _NAN6 = (math.nan,) * 7, (math.nan,) * 6
+
+
+class Cycle:
+    """The loop's work, sans IO.
+
+    Args:
+        layout: the shared memory.
+        version: wire format; None takes it from the first datagram.
+        limits: what the guard keeps.
+        policy: what is sent without fresh commands.
+        law: called in every cycle of COMMANDING_ACTIVE; None takes the commands of the user's process.
+        params: of the law.
+    """
+
+    def __init__(
+        self,
+        layout: at.Layout,
+        *,
+        version: Version | None,
+        limits: Limits,
+        policy: Policy,
+        law: Law | None = None,
+        params: Params | None = None,
+    ) -> None:
+        self.layout = layout
+        self.session = Session(version, latency=Histogram(layout.latency), jitter=Histogram(layout.jitter))
+        self.guard = Guard(limits)
+        self.filler = Filler(policy)
+        self.is_ending = False
+        self._law = law
+        self._params = params
+        self._param_tick = -1
+        self._out = Output()
+        self._slot = memoryview(bytearray(8 * at.STATE_WORDS))
+        self._state = State(np.frombuffer(self._slot, dtype=np.float64))
+        self._commands_seen = layout.commands.count
+        self._restarts = 0
+        self._ipo: tuple[m.Joints, int] | None = None  # last mirrored position and its sequence
+        self._slope: Sequence[float] = _NAN7
+        self._ticks = 0
+        self._sent_at = 0
+        self._sent: tuple[Sequence[float], Sequence[float], Sequence[float]] = (_NAN7, _NAN7, _NAN6)
+        self._flags = 0
+        self._answered = False
+        self._info: tuple[object, object, tuple[int, ...]] = (None, None, ())
+        self._full: tuple[Sample | None, m.Monitoring] = (None, m.Monitoring(m.Header(0, 0)))
+        self._outputs_tick = layout.outputs.tick
+        self._outputs: tuple[int, dict[str, float], dict[str, list[float]]] = (0, {}, {})
+        self._inputs: tuple[m.IoValue, ...] = ()
+        self._trouble = ""
+
+    # --------------------------------------------------------------------------------------------- a message
+
+    def turn(self, datagram: bytes, received: int) -> bytes | None:
+        """Take a datagram and make its answer; `finish` has to follow.
+
+        Args:
+            datagram: its octets.
+            received: monotonic clock at its receipt [ns].
+        """
+        session = self.session
+        self._flags, self._answered, before = 0, False, session.received
+        sample = session.receive(datagram, received)
+        if sample is None:
+            return None
+        self._follow(sample, received, before)
+        if not session.is_due:
+            return None
+        if session.is_commanding and session.mode in _JOINT_MODES and sample.q_ipo is not None:
+            setpoint = self._setpoint(sample, received)
+            self._flags |= at.LIMITED if self.guard.was_limited else 0
+            session.counters.limited += self.guard.was_limited
+            session.counters.filled += bool(self._flags & at.FILLED)
+        else:
+            setpoint = _NOTHING
+        if session.is_commanding:
+            setpoint = self._with_io(sample, setpoint)
+        try:
+            octets = session.answer(setpoint)
+        except CommandRejected as refusal:
+            self._outputs = (0, {}, {})
+            self.tell(received, str(refusal))
+            octets = session.answer(replace(setpoint, io=(), transformations=()))
+        self._answered = octets is not None
+        return octets
+
+    def finish(self, now: int) -> None:
+        """Publish the turn; called after its answer has left at `now` [ns]."""
+        session, header = self.session, self.layout.header
+        if self._answered:
+            session.answered(now)
+            self._flags |= at.ANSWERED
+        for event in session.events():
+            self.tell(event.at, event.text, event.kind)
+        if session.trouble != self._trouble:
+            self._trouble = session.trouble
+            self.layout.trouble.write(self._trouble)
+        if session.sample is not None:
+            self._publish(session.sample, now - session.received if self._answered else 0)
+        session.counters.save(header, at.COUNTS)
+        if self.guard.was_limited:
+            self._report()
+        header[at.BEAT] = now
+
+    def idle(self, now: int) -> None:
+        """Nothing has come for a while."""
+        self.layout.header[at.BEAT] = now
+        if self._trouble != self.session.trouble:
+            self._trouble = self.session.trouble
+            self.layout.trouble.write(self._trouble)
+
+    def end(self) -> None:
+        """From now on brake, whatever is commanded."""
+        self.is_ending = True
+
+    @property
+    def may_end(self) -> bool:
+        """Nothing moves by this client."""
+        return not self.guard.is_started or self.guard.is_still
+
+    # ----------------------------------------------------------------------------------------- what is wanted
+
+    def _follow(self, sample: Sample, received: int, before: int) -> None:
+        """Keep guard and filler in step with the session's state."""
+        session, guard = self.session, self.guard
+        again = session.counters.restarts != self._restarts
+        self._restarts = session.counters.restarts
+        if guard.is_started and (again or not session.is_commanding):
+            guard.stop()
+        if session.is_commanding:
+            period = session.period * session.multiplier * 1e-9 or 1e-3
+            if not guard.is_started:
+                if self._ipo is not None and not again:
+                    guard.start(self._ipo[0], self._slope, period=period)
+                elif sample.q_ipo is not None:  # the client was not there when commanding began
+                    guard.start(sample.q_ipo, _ZEROS7, period=period)
+                self.filler.start()
+                self._ticks = -1
+                # a command given just before the start counts, an old one does not
+                self._commands_seen = max(0, self.layout.commands.count - 1)
+                self._sent_at = received
+            elif received - before > SILENT_PERIODS * period * 1e9:
+                guard.start(guard.q, _ZEROS7, period=period)
+            self._ticks += 1
+            self._ipo = None
+        elif session.state is m.SessionState.COMMANDING_WAIT and sample.q_ipo is not None:
+            last, self._ipo = self._ipo, (sample.q_ipo, sample.sequence)
+            self._slope = _ZEROS7
+            if last is not None and session.period and sample.sequence > last[1]:
+                gap = (sample.sequence - last[1]) * session.period * 1e-9
+                self._slope = tuple((new - old) / gap for new, old in zip(sample.q_ipo, last[0], strict=True))
+        else:
+            self._ipo = None
+
+    def _setpoint(self, sample: Sample, now: int) -> Setpoint:
+        guard, ipo = self.guard, sample.q_ipo
+        assert ipo is not None
+        tau: Sequence[float] | None = None
+        wrench: Sequence[float] | None = None
+        wish: Sequence[float] | None
+        if self.is_ending:
+            wish = None
+            tau, wrench = _ZEROS7, _ZEROS6
+        elif self._law is not None:
+            wish, tau, wrench = self._call(sample, ipo, now)
+        else:
+            self._take()
+            wish = self.filler.wish(now, ipo)
+            tau, wrench = self.filler.efforts(now)
+            self._flags |= at.FILLED if self.filler.is_filled else 0
+        if wish is None:
+            self._flags |= at.BRAKING
+        reach = ipo if guard.limits.reach < math.inf else None
+        q = tuple(guard.position(wish, reach))
+        mode = self.session.mode
+        limited = guard.was_limited
+        sent_tau = tuple(guard.torque(tau or _ZEROS7)) if mode is m.CommandMode.TORQUE else None
+        sent_wrench = tuple(guard.force(wrench or _ZEROS6)) if mode is m.CommandMode.WRENCH else None
+        guard.was_limited |= limited
+        self._sent = (q, sent_tau or _NAN7, sent_wrench or _NAN6)
+        return Setpoint(q=q, tau=sent_tau, wrench=sent_wrench)
+
+    def _take(self) -> None:
+        """The newest command of the user's process, if there is a new one."""
+        ring = self.layout.commands
+        if ring.count == self._commands_seen:
+            return
+        words = ring.read(ring.count - 1)
+        if words is None:  # just being written: next time
+            return
+        self._commands_seen = ring.count
+        ints = words.view("int64")
+        given, numbers = int(ints[at.C_GIVEN]), words.tolist()
+        when = int(ints[at.C_AT])
+        if when + round(self.filler.policy.patience * 1e9) < self._sent_at:
+            return
+        self.filler.command(
+            when,
+            q=numbers[at.C_Q : at.C_Q + 7] if given & at.GIVEN_Q else None,
+            tau=numbers[at.C_TAU : at.C_TAU + 7] if given & at.GIVEN_TAU else None,
+            wrench=numbers[at.C_WRENCH : at.C_WRENCH + 6] if given & at.GIVEN_WRENCH else None,
+        )
+
+    def _call(
+        self, sample: Sample, ipo: m.Joints, now: int
+    ) -> tuple[Sequence[float] | None, Sequence[float], Sequence[float]]:
+        """Let the law decide; if it fails, brake from then on."""
+        assert self._law is not None and self._params is not None
+        ring = self.layout.params
+        if ring.count != self._param_tick:
+            words = ring.read(ring.count - 1)
+            if words is not None:
+                self._param_tick = ring.count
+                self._params._values[:] = words[1:]
+        out = self._out
+        out.q[:], out.tau[:], out.wrench[:] = ipo, 0.0, 0.0
+        _ROW.pack_into(self._slot, 8, *self._row(sample, 0))
+        try:
+            self._law(self._state, out, self._params)
+            return out.q.tolist(), out.tau.tolist(), out.wrench.tolist()
+        except Exception:
+            self.tell(now, "the law failed, the arm brakes: " + traceback.format_exc(limit=-2))
+            self.end()
+            return None, _ZEROS7, _ZEROS6
+
+    def _with_io(self, sample: Sample, setpoint: Setpoint) -> Setpoint:
+        """Adds the outputs and transformations that the user's process has left."""
+        note = self.layout.outputs
+        if note.tick != self._outputs_tick:
+            text = note.read()
+            if text is not None:
+                self._outputs_tick = note.tick
+                given = json.loads(text)
+                self._outputs = (REPEAT_OUTPUTS, given["io"], given["transformations"])
+        left, outputs, frames = self._outputs
+        if not left and not frames:
+            return setpoint
+        self._outputs = (max(0, left - 1), outputs, frames)
+        offered = self._message(sample).monitor
+        kinds = {one.name: one.type for one in (offered.io if offered is not None else ())}
+        return replace(
+            setpoint,
+            io=tuple(
+                m.IoValue(name, kinds.get(name, m.IoType.DIGITAL), m.IoDirection.OUTPUT, value)
+                for name, value in outputs.items()
+            )
+            if left
+            else (),
+            transformations=tuple(m.Transformation(name, tuple(values)) for name, values in frames.items()),
+        )
+
+    # ------------------------------------------------------------------------------------------- what is told
+
+    def tell(self, now: int, text: str, kind: Kind = Kind.CLIENT) -> None:
+        """Leave an event for the user's process."""
+        ring = self.layout.events
+        octets = text.encode()[: at.EVENT_TEXT].ljust(at.EVENT_TEXT, b"\0")
+        slot = ring.begin()
+        ring.ints[slot, 1], ring.ints[slot, 2] = now, _KINDS.index(kind)
+        ring.ints[slot, 3:] = memoryview(octets).cast("q")
+        ring.end()
+
+    def _row(self, sample: Sample, latency: int) -> tuple[float, ...]:
+        """The words of a state, without the sequence word."""
+        session = self.session
+        robot, link = sample.robot, sample.connection
+        if self._info[0] is not robot or self._info[1] is not link:
+            full = self._message(sample)
+            self._info = (robot, link, _information(full))
+            self._read_inputs(full)
+        seconds, nanos = sample.stamp
+        wrench, pose, e1 = _NAN6, _NAN7, math.nan
+        if session.version is not None and session.version.traits.quaternions:
+            monitor = self._message(sample).monitor or m.MonitorData()
+            wrench = monitor.wrench or _NAN6  # type: ignore[assignment]
+            pose = monitor.pose.values if monitor.pose is not None else _NAN7  # type: ignore[assignment]
+            e1 = monitor.redundancy.value if monitor.redundancy is not None else math.nan
+        overlay, safety, operation, control, drive, multiplier = self._info[2]
+        sent = self._sent if session.is_commanding else (_NAN7, _NAN7, _NAN6)
+        return (
+            session.received,
+            sample.sequence,
+            seconds * 1_000_000_000 + nanos,
+            session.state,
+            session.quality,
+            session.mode,
+            overlay,
+            safety,
+            operation,
+            control,
+            drive,
+            session.period,
+            multiplier,
+            latency,
+            self._flags,
+            session.reflected,
+            session.sent,
+            max(0, self._ticks) if session.is_commanding else 0,
+            sample.tracking,
+            *(sample.q or _NAN7),
+            *(sample.tau or _NAN7),
+            *(sample.tau_cmd or _NAN7),
+            *(sample.tau_ext or _NAN7),
+            *(sample.q_cmd or _NAN7),
+            *(sample.q_ipo or _NAN7),
+            *wrench,
+            *pose,
+            e1,
+            *sent[0],
+            *sent[1],
+            *sent[2],
+        )
+
+    def _message(self, sample: Sample) -> m.Monitoring:
+        """The full message, decoded once."""
+        if self._full[0] is not sample:
+            self._full = (sample, sample.message)
+        return self._full[1]
+
+    def _read_inputs(self, full: m.Monitoring) -> None:
+        """Leave the signals for the user's process when they change."""
+        signals = full.monitor.io if full.monitor is not None else ()
+        if signals != self._inputs:
+            self._inputs = signals
+            self.layout.inputs.write(json.dumps({one.name: one.value for one in signals}))
+
+    def _publish(self, sample: Sample, latency: int) -> None:
+        ring = self.layout.states
+        row = self._row(sample, latency)
+        _ROW.pack_into(self._slot, 8, *row)
+        slot = ring.begin()
+        ring.ints[slot, 1:] = self._slot[8:].cast("q")
+        ring.end()
+
+    def _report(self) -> None:
+        """Publish what the guard has limited so far."""
+        report, ints, floats = self.guard.report, self.layout.block.ints, self.layout.block.floats
+        size = len(Limited)
+        for kind in range(size):
+            start = 7 * kind
+            ints[at.LIMITED_COUNTS + start : at.LIMITED_COUNTS + start + 7] = report.counts[kind]
+            floats[at.LIMITED_WORST + start : at.LIMITED_WORST + start + 7] = report.worst[kind]
+            floats[at.LIMITED_ALLOWED + start : at.LIMITED_ALLOWED + start + 7] = report.allowed[kind]
+
+
+_NOTHING = Setpoint()
+_KINDS = list(Kind)
+_ZEROS7, _ZEROS6 = (0.0,) * 7, (0.0,) * 6
+_JOINT_MODES = (m.CommandMode.POSITION, m.CommandMode.TORQUE, m.CommandMode.WRENCH)
+
+
+def _information(full: m.Monitoring) -> tuple[int, ...]:
+    """What seldom changes: overlay, safety, operation, control, drive, multiplier."""
+    robot, ipo = full.robot or m.RobotInfo(), full.ipo or m.IpoData()
+    drives = set(robot.drives)
+    drive = None if not drives else drives.pop() if len(drives) == 1 else m.DriveState.TRANSITIONING
+    multiplier = full.connection.multiplier if full.connection is not None else None
+    values = (ipo.overlay, robot.safety, robot.operation_mode, robot.control_mode, drive, multiplier)
+    return tuple(at.ABSENT if value is None else int(value) for value in values)

@@ -1,0 +1,109 @@
+"""Where everything stands in the memory that the loop and the user's process share; the native loop has the same."""
+
+from __future__ import annotations
+
+import enum
+
+from heptarm.fri.statistics import BINS, COUNTERS
+from heptarm.io.shared import Block, Note, Ring
+
+# words of the header
+STATES, COMMANDS, PARAMS, EVENTS, STOP, STATUS, PID, BEAT, PORT, NATIVE, HISTORY, SIZE = range(12)
+COUNTS = 16
+LIMITED_COUNTS, LIMITED_WORST, LIMITED_ALLOWED = 32, 81, 130
+LATENCY = 192
+JITTER = LATENCY + BINS + 1
+HEADER_WORDS = JITTER + BINS + 1
+
+assert COUNTS + len(COUNTERS) <= LIMITED_COUNTS
+
+# words of a state: integers first, then floats
+(
+    S_SEQ,
+    S_RECEIVED,
+    S_SEQUENCE,
+    S_STAMP,
+    S_SESSION,
+    S_QUALITY,
+    S_MODE,
+    S_OVERLAY,
+    S_SAFETY,
+    S_OPERATION,
+    S_CONTROL,
+    S_DRIVE,
+    S_PERIOD,
+    S_MULTIPLIER,
+    S_LATENCY,
+    S_FLAGS,
+    S_REFLECTED,
+    S_SENT,
+    S_TICKS,
+) = range(19)
+S_TRACKING = 19
+S_Q, S_TAU, S_TAU_CMD, S_TAU_EXT, S_Q_CMD, S_Q_IPO = range(20, 62, 7)
+S_WRENCH, S_POSE, S_E1 = 62, 68, 75
+S_Q_SENT, S_TAU_SENT, S_WRENCH_SENT = 76, 83, 90
+STATE_WORDS = 96
+#: An enumeration that the controller did not send.
+ABSENT = -1
+
+# bits of the flags
+ANSWERED, FILLED, LIMITED, BRAKING = 1, 2, 4, 8
+
+# words of a command: sequence, time [ns], bits of what is given, then the numbers
+C_AT, C_GIVEN, C_Q, C_TAU, C_WRENCH = 1, 2, 3, 10, 17
+COMMAND_WORDS, COMMAND_SLOTS = 24, 8
+GIVEN_Q, GIVEN_TAU, GIVEN_WRENCH = 1, 2, 4
+
+PARAM_SLOTS = 8
+# words of an event: sequence, time [ns], kind, then its text
+EVENT_WORDS, EVENT_SLOTS = 48, 128
+EVENT_TEXT = 8 * (EVENT_WORDS - 3)
+NOTE_WORDS = 1024
+
+
+class Status(enum.IntEnum):
+    """Life of the loop's process."""
+
+    STARTING = 0
+    RUNNING = 1
+    ENDED = 2
+    FAILED = 3
+
+
+class Layout:
+    """The rings and notes of a block.
+
+    Args:
+        block: the memory.
+        history: slots of the ring of states.
+        params: numbers of the law's parameters.
+    """
+
+    def __init__(self, block: Block, *, history: int, params: int) -> None:
+        at = HEADER_WORDS
+        self.block = block
+        self.states_at = at
+        self.states = Ring(block, head=STATES, start=at, slots=history, width=STATE_WORDS)
+        at += history * STATE_WORDS
+        self.commands_at = at
+        self.commands = Ring(block, head=COMMANDS, start=at, slots=COMMAND_SLOTS, width=COMMAND_WORDS)
+        at += COMMAND_SLOTS * COMMAND_WORDS
+        self.params = Ring(block, head=PARAMS, start=at, slots=PARAM_SLOTS, width=1 + params)
+        at += PARAM_SLOTS * (1 + params)
+        self.events = Ring(block, head=EVENTS, start=at, slots=EVENT_SLOTS, width=EVENT_WORDS)
+        at += EVENT_SLOTS * EVENT_WORDS
+        notes = []
+        for _ in range(5):
+            notes.append(Note(block, start=at, words=NOTE_WORDS))
+            at += NOTE_WORDS
+        self.config, self.trouble, self.refused, self.inputs, self.outputs = notes
+        self.header = block.view(0, LATENCY)
+        self.latency = block.view(LATENCY, BINS + 1)
+        self.jitter = block.view(JITTER, BINS + 1)
+
+    @staticmethod
+    def words(*, history: int, params: int) -> int:
+        """Size of a block."""
+        rings = history * STATE_WORDS + COMMAND_SLOTS * COMMAND_WORDS + PARAM_SLOTS * (1 + params)
+        return HEADER_WORDS + rings + EVENT_SLOTS * EVENT_WORDS + 5 * NOTE_WORDS

@@ -1,0 +1,321 @@
+"""What a law and a user see of one monitoring message, what a law writes, and its parameters."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected, ShapeError
+from heptarm.fri.messages import (
+    CommandMode,
+    ControlMode,
+    DriveState,
+    OperationMode,
+    Overlay,
+    Quality,
+    Safety,
+    SessionState,
+)
+from heptarm.rt import layout as at
+from heptarm.values.pose import Pose
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+class State:
+    """One monitoring message with what was answered to it. Arrays are NaN where the controller sends nothing.
+
+    Args:
+        words: one slot of the ring of states, shape (96,); it is not copied.
+    """
+
+    __slots__ = ("_floats", "_ints")
+
+    def __init__(self, words: Floats) -> None:
+        self._floats = words
+        self._ints: Ints = words.view(np.int64)
+
+    @property
+    def q(self) -> Floats:
+        """Measured position, shape (7,) [rad]."""
+        return self._floats[at.S_Q : at.S_Q + 7]
+
+    @property
+    def tau(self) -> Floats:
+        """Measured torques, shape (7,) [Nm]."""
+        return self._floats[at.S_TAU : at.S_TAU + 7]
+
+    @property
+    def tau_cmd(self) -> Floats:
+        """Torques that the controller commands, shape (7,) [Nm]."""
+        return self._floats[at.S_TAU_CMD : at.S_TAU_CMD + 7]
+
+    @property
+    def tau_ext(self) -> Floats:
+        """External torques, shape (7,) [Nm]."""
+        return self._floats[at.S_TAU_EXT : at.S_TAU_EXT + 7]
+
+    @property
+    def q_cmd(self) -> Floats:
+        """Position that the controller commands, shape (7,) [rad]; FRI 1.x only."""
+        return self._floats[at.S_Q_CMD : at.S_Q_CMD + 7]
+
+    @property
+    def q_ipo(self) -> Floats:
+        """Interpolator's position, on which the overlay is laid, shape (7,) [rad]."""
+        return self._floats[at.S_Q_IPO : at.S_Q_IPO + 7]
+
+    @property
+    def wrench(self) -> Floats:
+        """External wrench, shape (6,) [N, Nm]; FRI 2.7 only."""
+        return self._floats[at.S_WRENCH : at.S_WRENCH + 6]
+
+    @property
+    def pose(self) -> Pose:
+        """Measured pose; FRI 2.x only.
+
+        Raises:
+            CommandRejected: this version of FRI has none.
+        """
+        numbers = self._floats[at.S_POSE : at.S_POSE + 7]
+        if numbers[0] != numbers[0]:
+            raise CommandRejected(
+                "the controller sends no pose", hint="FRI 1.x has none: use heptarm.model.forward(robot, s.q)"
+            )
+        return Pose.of(numbers[:3] * 1e-3, numbers[[4, 5, 6, 3]])
+
+    @property
+    def e1(self) -> float:
+        """Redundancy angle of the pose [rad]; NaN if there is none."""
+        return float(self._floats[at.S_E1])
+
+    @property
+    def q_sent(self) -> Floats:
+        """Position that was answered, shape (7,) [rad]."""
+        return self._floats[at.S_Q_SENT : at.S_Q_SENT + 7]
+
+    @property
+    def tau_sent(self) -> Floats:
+        """Torques that were answered, shape (7,) [Nm]."""
+        return self._floats[at.S_TAU_SENT : at.S_TAU_SENT + 7]
+
+    @property
+    def wrench_sent(self) -> Floats:
+        """Wrench that was answered, shape (6,) [N, Nm]."""
+        return self._floats[at.S_WRENCH_SENT : at.S_WRENCH_SENT + 6]
+
+    @property
+    def session(self) -> SessionState:
+        """State of the session."""
+        return SessionState(int(self._ints[at.S_SESSION]))
+
+    @property
+    def is_commanding(self) -> bool:
+        """Commands are effective."""
+        return bool(self._ints[at.S_SESSION] == SessionState.COMMANDING_ACTIVE)
+
+    @property
+    def quality(self) -> Quality:
+        """Quality of the connection."""
+        return Quality(int(self._ints[at.S_QUALITY]))
+
+    @property
+    def mode(self) -> CommandMode:
+        """Client command mode."""
+        return CommandMode(int(self._ints[at.S_MODE]))
+
+    @property
+    def overlay(self) -> Overlay | None:
+        """Type of the overlay."""
+        value = int(self._ints[at.S_OVERLAY])
+        return None if value == at.ABSENT else Overlay(value)
+
+    @property
+    def safety(self) -> Safety | None:
+        """Safety state."""
+        value = int(self._ints[at.S_SAFETY])
+        return None if value == at.ABSENT else Safety(value)
+
+    @property
+    def operation_mode(self) -> OperationMode | None:
+        """Operation mode."""
+        value = int(self._ints[at.S_OPERATION])
+        return None if value == at.ABSENT else OperationMode(value)
+
+    @property
+    def control_mode(self) -> ControlMode | None:
+        """Control mode under the overlay."""
+        value = int(self._ints[at.S_CONTROL])
+        return None if value == at.ABSENT else ControlMode(value)
+
+    @property
+    def drive(self) -> DriveState | None:
+        """State of the drives; TRANSITIONING if they differ."""
+        value = int(self._ints[at.S_DRIVE])
+        return None if value == at.ABSENT else DriveState(value)
+
+    @property
+    def tracking(self) -> float:
+        """Tracking performance, 0 to 1; NaN outside COMMANDING_ACTIVE."""
+        return float(self._floats[at.S_TRACKING])
+
+    @property
+    def sequence(self) -> int:
+        """Controller's counter."""
+        return int(self._ints[at.S_SEQUENCE])
+
+    @property
+    def stamp(self) -> int:
+        """Controller's clock [ns since 1970]; 0 if it sends none."""
+        return int(self._ints[at.S_STAMP])
+
+    @property
+    def received(self) -> int:
+        """This machine's monotonic clock at the message's receipt [ns]."""
+        return int(self._ints[at.S_RECEIVED])
+
+    @property
+    def age(self) -> float:
+        """Time since its receipt [s]."""
+        return (time.monotonic_ns() - self.received) * 1e-9
+
+    @property
+    def period(self) -> float:
+        """Send period [s]."""
+        return float(self._ints[at.S_PERIOD]) * 1e-9
+
+    @property
+    def t(self) -> float:
+        """Controller's time since commands became effective [s]; 0 before."""
+        return float(self._ints[at.S_TICKS]) * self.period
+
+    @property
+    def latency(self) -> float:
+        """Receipt to answer [s]; 0 without an answer."""
+        return float(self._ints[at.S_LATENCY]) * 1e-9
+
+    @property
+    def is_answered(self) -> bool:
+        """It was answered."""
+        return bool(self._ints[at.S_FLAGS] & at.ANSWERED)
+
+    @property
+    def is_filled(self) -> bool:
+        """The answer was made by the policy, without a fresh command."""
+        return bool(self._ints[at.S_FLAGS] & at.FILLED)
+
+    @property
+    def is_limited(self) -> bool:
+        """The guard changed something in the answer."""
+        return bool(self._ints[at.S_FLAGS] & at.LIMITED)
+
+    def __repr__(self) -> str:
+        return (
+            f"State({self.sequence}, {self.session.name}, {self.quality.name}, q={self.q.round(4).tolist()})"
+        )
+
+
+class Output:
+    """What a law wants; set again before every call.
+
+    Attributes:
+        q: position, shape (7,) [rad]; begins as the interpolator's.
+        tau: superposed torques, shape (7,) [Nm]; begin as zero.
+        wrench: superposed wrench, shape (6,) [N, Nm]; begins as zero.
+    """
+
+    __slots__ = ("q", "tau", "wrench")
+
+    def __init__(self) -> None:
+        self.q: Floats = np.zeros(7)
+        self.tau: Floats = np.zeros(7)
+        self.wrench: Floats = np.zeros(6)
+
+
+class Params:
+    """Parameters of a law: numbers and arrays by name, all of them taken over at once.
+
+    Args:
+        values: numbers and arrays, flat.
+        schema: name, shape and place of each.
+        changed: called after an assignment; None makes them read-only.
+    """
+
+    __slots__ = ("_changed", "_schema", "_values")
+
+    def __init__(
+        self,
+        values: Floats,
+        schema: Mapping[str, tuple[tuple[int, ...], int]],
+        *,
+        changed: Callable[[], None] | None = None,
+    ) -> None:
+        object.__setattr__(self, "_values", values)
+        object.__setattr__(self, "_schema", dict(schema))
+        object.__setattr__(self, "_changed", changed)
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            shape, start = self._schema[name]
+        except KeyError:
+            raise AttributeError(
+                f"no parameter {name!r}; there are {', '.join(self._schema) or 'none'}"
+            ) from None
+        if not shape:
+            return float(self._values[start])
+        part = self._values[start : start + int(np.prod(shape))].reshape(shape)
+        part.flags.writeable = False
+        return part
+
+    def __setattr__(self, name: str, value: npt.ArrayLike) -> None:
+        self.set(**{name: value})
+
+    def set(self, **values: npt.ArrayLike) -> None:
+        """Change several parameters in one go: the law sees all of them or none.
+
+        Raises:
+            ShapeError: a value has another shape than at the start.
+            AttributeError: no such parameter, or they are read-only.
+        """
+        if self._changed is None:
+            raise AttributeError("parameters are read-only in a law")
+        checked = []
+        for name, value in values.items():
+            given: Floats = np.asarray(value, dtype=np.float64)
+            if name not in self._schema:
+                raise AttributeError(f"no parameter {name!r}; there are {', '.join(self._schema) or 'none'}")
+            shape, start = self._schema[name]
+            if given.shape != tuple(shape):
+                raise ShapeError(
+                    f"{name} has shape {given.shape}; {tuple(shape)} is wanted, as at the start",
+                    parameter=name,
+                )
+            checked.append((start, given.reshape(-1)))
+        for start, given in checked:
+            self._values[start : start + given.size] = given
+        self._changed()
+
+    @staticmethod
+    def flat(values: Mapping[str, npt.ArrayLike]) -> tuple[Floats, dict[str, tuple[tuple[int, ...], int]]]:
+        """Flat numbers and schema of a mapping.
+
+        Raises:
+            ShapeError: a value is no number and no array of numbers.
+        """
+        parts: list[Floats] = []
+        schema: dict[str, tuple[tuple[int, ...], int]] = {}
+        start = 0
+        for name, value in values.items():
+            try:
+                given: Floats = np.asarray(value, dtype=np.float64)
+            except (TypeError, ValueError):
+                raise ShapeError(f"{name} is {value!r}; numbers are wanted", parameter=name) from None
+            schema[name] = (given.shape, start)
+            parts.append(given.reshape(-1))
+            start += given.size
+        return (np.concatenate(parts) if parts else np.zeros(0)), schema
