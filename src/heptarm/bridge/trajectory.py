@@ -1,0 +1,142 @@
+"""A path through way-points in time: linear, cubic or quintic pieces, by the fields that both ends have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from heptarm.values.arrays import Array, Value, frozen
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sample(Value):
+    """Where a path is at one moment.
+
+    Attributes:
+        q: positions, shape (7,) [rad].
+        dq: velocities, shape (7,) [rad/s].
+        ddq: accelerations, shape (7,) [rad/s²].
+    """
+
+    q: Array
+    dq: Array
+    ddq: Array
+
+    @staticmethod
+    def at_rest(q: Array) -> Sample:
+        """At rest at `q`, shape (7,) [rad]."""
+        zeros = frozen(np.zeros(7))
+        return Sample(q, zeros, zeros)
+
+
+class Trajectory:
+    """Way-points and what is between them.
+
+    A piece whose two ends have positions only is linear; with velocities it is cubic, with accelerations too quintic.
+
+    Args:
+        times: of the way-points, increasing, shape (n,) [s].
+        q: positions, shape (n, 7) [rad].
+        dq: velocities, shape (n, 7) [rad/s]; a row of NaN: not given.
+        ddq: accelerations, likewise [rad/s²].
+
+    Attributes:
+        times: see above.
+        points: the positions, shape (n, 7) [rad].
+    """
+
+    def __init__(self, times: Array, q: Array, dq: Array, ddq: Array) -> None:
+        self.times = frozen(times)
+        self.points = frozen(q)
+        self._pieces = _pieces(times, q, dq, ddq)
+        self._last = Sample(frozen(q[-1]), frozen(np.nan_to_num(dq[-1])), frozen(np.nan_to_num(ddq[-1])))
+
+    @property
+    def duration(self) -> float:
+        """Time of the last way-point [s]."""
+        return float(self.times[-1])
+
+    @property
+    def end(self) -> Sample:
+        """The last way-point."""
+        return self._last
+
+    def sample(self, t: float) -> Sample:
+        """Where it is at a time [s]; before the first way-point it is there, after the last one there."""
+        if t >= self.times[-1]:
+            return self._last
+        piece = max(int(np.searchsorted(self.times, t, side="right")) - 1, 0)
+        x = max(t - float(self.times[piece]), 0.0)
+        c = self._pieces[piece]
+        q = c[0] + x * (c[1] + x * (c[2] + x * (c[3] + x * (c[4] + x * c[5]))))
+        dq = c[1] + x * (2 * c[2] + x * (3 * c[3] + x * (4 * c[4] + x * 5 * c[5])))
+        ddq = 2 * c[2] + x * (6 * c[3] + x * (12 * c[4] + x * 20 * c[5]))
+        return Sample(q, dq, ddq)
+
+    def index(self, t: float) -> int:
+        """How many way-points are before a time [s]: the one being approached."""
+        return int(np.searchsorted(self.times, t, side="left"))
+
+    def extremes(self, per_piece: int = 16) -> tuple[Array, Array]:
+        """Positions [rad] and velocities [rad/s] along the way, shape (m, 7) each, `per_piece` of every piece."""
+        if len(self._pieces) == 0:
+            return self._last.q[None], self._last.dq[None]
+        share = np.linspace(0.0, 1.0, per_piece)
+        x = (np.diff(self.times)[:, None] * share)[..., None]
+        c = self._pieces[:, :, None, :]
+        q = c[:, 0] + x * (c[:, 1] + x * (c[:, 2] + x * (c[:, 3] + x * (c[:, 4] + x * c[:, 5]))))
+        dq = c[:, 1] + x * (2 * c[:, 2] + x * (3 * c[:, 3] + x * (4 * c[:, 4] + x * 5 * c[:, 5])))
+        return q.reshape(-1, 7), dq.reshape(-1, 7)
+
+
+def _pieces(times: Array, q: Array, dq: Array, ddq: Array) -> Array:
+    """Coefficients of the pieces, shape (n - 1, 6, 7), lowest power first."""
+    span = np.diff(times)[:, None]
+    q0, q1, v0, v1, a0, a1 = q[:-1], q[1:], dq[:-1], dq[1:], ddq[:-1], ddq[1:]
+    out = np.zeros((len(q) - 1, 6, 7))
+    step = q1 - q0
+    out[:, 0], out[:, 1] = q0, step / span
+    cubic = ~np.isnan(v0 + v1).any(axis=1)
+    t, d = span[cubic], step[cubic]
+    b0, b1 = v0[cubic], v1[cubic]
+    out[cubic, 1] = b0
+    out[cubic, 2] = (3 * d / t - 2 * b0 - b1) / t
+    out[cubic, 3] = (b0 + b1 - 2 * d / t) / t**2
+    quintic = cubic & ~np.isnan(a0 + a1).any(axis=1)
+    t, d = span[quintic], step[quintic]
+    b0, b1, c0, c1 = v0[quintic], v1[quintic], a0[quintic], a1[quintic]
+    out[quintic, 2] = c0 / 2
+    out[quintic, 3] = (20 * d / t - 8 * b1 - 12 * b0 - (3 * c0 - c1) * t) / (2 * t**2)
+    out[quintic, 4] = (-30 * d / t + 14 * b1 + 16 * b0 + (3 * c0 - 2 * c1) * t) / (2 * t**3)
+    out[quintic, 5] = (12 * d / t - 6 * (b0 + b1) - (c0 - c1) * t) / (2 * t**4)
+    return out
+
+
+class Brake:
+    """From a state to rest, all joints together and with constant deceleration: straight on along the tangent.
+
+    Args:
+        begin: the state to begin with.
+        deceleration: no joint slows down faster, shape (7,) [rad/s²].
+        low: no position below, shape (7,) [rad].
+        high: no position above, shape (7,) [rad].
+
+    Attributes:
+        duration: how long it takes [s].
+    """
+
+    def __init__(self, begin: Sample, deceleration: Array, low: Array, high: Array) -> None:
+        self._begin, self._low, self._high = begin, low, high
+        self.duration = float(np.max(np.abs(begin.dq) / deceleration))
+
+    def sample(self, t: float) -> Sample:
+        """Where it is `t` seconds after its begin."""
+        if self.duration <= 0.0:
+            return Sample.at_rest(self._begin.q)
+        x = min(max(t, 0.0), self.duration)
+        dq = self._begin.dq * (1.0 - x / self.duration)
+        q = self._begin.q + x * (self._begin.dq + dq) / 2
+        held = np.minimum(np.maximum(q, self._low), self._high)
+        slowing = -self._begin.dq / self.duration if x < self.duration else np.zeros(7)
+        return Sample(held, np.where(held == q, dq, 0.0), np.where(held == q, slowing, 0.0))
