@@ -56,6 +56,14 @@ class Law(Protocol):
     #: Whether the arm follows its set-points stiffly, so that a motion can wait for its arrival.
     is_stiff: bool
 
+    @property
+    def stays(self) -> bool:
+        """Whether a motion must not end yet."""
+
+    @property
+    def violation(self) -> str:
+        """Which limit that stops the motion is exceeded, in words; "" while none is."""
+
     def torque(self, sensed: Sensed) -> Array:
         """Torques of the motors, shape (7,) [Nm]."""
 
@@ -64,6 +72,8 @@ class PositionLaw:
     """Stiff position control."""
 
     is_stiff = True
+    stays = False
+    violation = ""
 
     def __init__(self) -> None:
         self._lasting = np.zeros(7)
@@ -92,6 +102,8 @@ class JointSpring:
     """
 
     is_stiff = False
+    stays = False
+    violation = ""
 
     def __init__(self, stiffness: Array, damping: Array) -> None:
         self._stiffness = self._from = self._goal = stiffness

@@ -51,6 +51,7 @@ class Order:
         cart_velocity: [m/s]; then [m/s²], [m/s³]; orientation [rad/s], [rad/s²], [rad/s³].
         duration: of a hold [s]; NaN: until cancelled.
         mode: control mode; None: position.
+        axes: of the mode's frame as a quaternion in the base; None: as the mode says, "tool" or "base".
         minimum_time: no trajectory to a servo target is shorter [s].
         goal_timeout: a servo motion ends so long after its target was reached and no other came [s].
         speed_timeout: how long a servo target's velocity is kept after it was passed [s].
@@ -76,6 +77,7 @@ class Order:
     ori_jerk: float = nan
     duration: float = nan
     mode: Mode | None = None
+    axes: Seven | None = None
     minimum_time: float = 0.02
     goal_timeout: float = 30.0
     speed_timeout: float = 0.1

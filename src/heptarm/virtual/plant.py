@@ -19,17 +19,18 @@ import numpy as np
 from heptarm.errors import Unreachable
 from heptarm.model.kinematics import flange
 from heptarm.values.arrays import Array
-from heptarm.values.mode import JointImpedance, Mode
+from heptarm.values.mode import Mode
 from heptarm.values.robot import RobotModel, robot
 from heptarm.virtual import ring
-from heptarm.virtual.law import JointSpring, Law, PositionLaw, Sensed
+from heptarm.virtual.control import Control
+from heptarm.virtual.law import Sensed
 from heptarm.virtual.load import Load
 from heptarm.virtual.order import Order, PlanError
 from heptarm.virtual.path import CartesianLine, JointLine
 from heptarm.virtual.planner import Plan, plan
 from heptarm.virtual.posture import posture
 from heptarm.virtual.profile import Limits, Profile, brake, change
-from heptarm.virtual.servo import DirectFollower, Follower, ServoTerms, SmartFollower
+from heptarm.virtual.servo import Follower, follower
 
 TICK_NS = 1_000_000
 TICK = 1e-3
@@ -134,7 +135,7 @@ class Plant:
         self._views()
         self._load = Load(self.model, self.data)
         self._command = [self._q.copy() for _ in range(3)]  # set-points of the last, this and the next tick
-        self._law: Law = PositionLaw()
+        self._control = Control(self.robot, self.model, self.data)
         self._sensed = Sensed(
             self._q, self._dq, self._mass[:7, :7], self._bias, self._passive, self._q, self._q, self._q
         )
@@ -261,7 +262,7 @@ class Plant:
         mujoco.mj_fullM(m, d, self._mass)
         sensed = self._sensed
         sensed.before, sensed.now, sensed.after = self._command
-        torque = self._law.torque(sensed)
+        torque = self._control.torque(sensed)
         np.minimum(torque, self._limit, out=torque)
         np.maximum(torque, self._least, out=torque)
         self._ctrl[:] = torque
@@ -280,8 +281,8 @@ class Plant:
             self._cancel_now(*self._cancels.popleft())
         while self._changes:
             order_id, mode = self._changes.popleft()
-            if order_id == self._run_id() and not self._law.is_stiff:
-                self._switch(mode)
+            if order_id == self._run_id():
+                self._control.retune(mode)
         goal = 0.0 if self._paused else min(1.0, max(0.0, float(self.ring.reals[ring.OVERRIDE])))
         before = self._scale
         if goal != self._goal or self._slew is not None:
@@ -290,8 +291,8 @@ class Plant:
         run = self._run
         if run is None:
             run = self._next()
-            if run is None and not self._law.is_stiff:
-                self._switch(None)
+            if run is None and self._control.stiffen():
+                self._stay()
             command = self._command
         command[0], command[1] = command[1], command[2]
         if run is None:
@@ -300,6 +301,8 @@ class Plant:
             run.started = True
             if run.plan.order.listener is not None:
                 run.plan.order.listener.started()
+        if self._control.violation:
+            self._catch(run, self._control.violation)
         return self._follow(run)
 
     def _rescale(self, goal: float) -> None:
@@ -367,8 +370,10 @@ class Plant:
         run.profile, run.time = brake((0.0, 1.0, 0.0), limits), 0.0
 
     def _settle(self, run: _Run) -> tuple[float, float]:
+        if self._control.stays and not run.cancelled and not run.failure:
+            return 1.0, 0.0
         run.settling += 1
-        at_rest = not self._law.is_stiff or float(np.abs(self._q - self._command[2]).max()) <= SETTLED
+        at_rest = not self._control.is_stiff or float(np.abs(self._q - self._command[2]).max()) <= SETTLED
         at_rest = at_rest and float(np.abs(self._dq).max()) <= SETTLED_SPEED
         if at_rest or run.settling >= SETTLE_TICKS:
             cause = "error" if run.failure else "cancelled" if run.cancelled else "done"
@@ -390,7 +395,8 @@ class Plant:
     def _next(self) -> _Run | None:
         while self._inbox:
             serial, order, planned = self._inbox.popleft()
-            self._switch(order.mode)
+            if self._control.take(order):
+                self._stay()
             here = self._command[2]
             if planned is None or float(np.abs(planned.start - here).max()) > 1e-9:
                 try:
@@ -403,7 +409,7 @@ class Plant:
                         self._tail = planned.end
             self._run = _Run(planned, serial)
             if order.is_servo:
-                self._run.follower = self._follower(order, here)
+                self._run.follower = follower(self.robot, order, here)
             return self._run
         return None
 
@@ -441,7 +447,7 @@ class Plant:
         run.profile = brake(state, run.plan.braking)
         run.time, run.braking = 0.0, True
 
-    # ------------------------------------------------------------------------------ servo motions and modes
+    # ------------------------------------------------------------------------------ servo motions and yielding
 
     def _serve(self, run: _Run, follower: Follower) -> tuple[float, float]:
         """Lead the set-point to the newest target."""
@@ -458,27 +464,17 @@ class Plant:
             self._go(run, there)
         return nan, follower.remaining
 
-    def _follower(self, order: Order, here: Array) -> Follower:
-        terms = ServoTerms.of(
-            self.robot,
-            velocity=order.joint_velocity,
-            acceleration=order.joint_acceleration,
-            minimum_time=order.minimum_time,
-            speed_timeout=order.speed_timeout,
-        )
-        return (DirectFollower if order.kind == "direct" else SmartFollower)(terms, here)
+    def _stay(self) -> None:
+        """The set-points of an arm that has yielded become what it has yielded to."""
+        self._command = [self._q.copy() for _ in range(3)]
 
-    def _switch(self, mode: Mode | None) -> None:
-        """Bring the control law of a mode into force; set-points of a yielding arm become what it has yielded to."""
-        law = self._law
-        if isinstance(mode, JointImpedance):
-            if isinstance(law, JointSpring):
-                law.change(mode.stiffness, mode.damping)
-            else:
-                self._law = JointSpring(mode.stiffness, mode.damping)
-        elif not law.is_stiff:
-            self._law = PositionLaw()
-            self._command = [self._q.copy() for _ in range(3)]
+    def _catch(self, run: _Run, text: str) -> None:
+        """A limit of the control mode is exceeded: become stiff and brake from the measured speed."""
+        self._control.stiffen()
+        way = self._dq * TICK
+        self._command = [self._q - way, self._q.copy(), self._q.copy()]
+        run.settling = 0
+        self._fail(run, text)
 
     # ------------------------------------------------------------------------------ state
 

@@ -14,6 +14,7 @@ from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError
 
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
+from heptarm.virtual.order import Order
 
 #: The last approach of a direct follower is an exponential one with this time constant [s].
 APPROACH = 0.01
@@ -227,3 +228,15 @@ class DirectFollower:
 
 
 Follower = SmartFollower | DirectFollower
+
+
+def follower(robot: RobotModel, order: Order, here: Array) -> Follower:
+    """What follows the targets of a servo motion that begins at rest, at a set-point of shape (7,) [rad]."""
+    terms = ServoTerms.of(
+        robot,
+        velocity=order.joint_velocity,
+        acceleration=order.joint_acceleration,
+        minimum_time=order.minimum_time,
+        speed_timeout=order.speed_timeout,
+    )
+    return (DirectFollower if order.kind == "direct" else SmartFollower)(terms, here)
