@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from heptarm.fri import messages as m
-from heptarm.fri.session import Kind, Session, Setpoint
+from heptarm.fri.session import Kind, Setpoint
 from heptarm.fri.version import Version
 from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.controller import TICK_NS, Controller
-from heptarm.virtual.fri.faults import NONE, Faults, Line
+from heptarm.virtual.fri.faults import Faults, Line
 from heptarm.virtual.fri.overlay import CONTROLS, MotionOverlay
-from tests.virtual_fri.rig import READY, Arm, State
+from tests.virtual_fri.pair import Pair
+from tests.virtual_fri.rig import READY, State
 
 LEGAL = [
     (version, mode)
@@ -24,54 +22,6 @@ LEGAL = [
     for mode in CONTROLS
     if version.traits.quaternions or mode is not m.CommandMode.CARTESIAN_POSE
 ]
-
-
-@dataclass
-class Pair:
-    """A controller and heptarm's client, one tick after the other; the client's answers take 0.3 ms."""
-
-    configuration: Configuration
-    faults: Faults = NONE
-    setpoint: Setpoint = field(default_factory=Setpoint)
-
-    def __post_init__(self) -> None:
-        self.arm, self.session, self.now = Arm(), Session(), 0
-        self.there, self.back = Line(self.faults), Line(self.faults)
-        self.renew()
-
-    def renew(self) -> None:
-        self.controller = Controller(self.configuration, self.arm.robot)
-        self.controller.open()
-
-    def run(self, ticks: int) -> None:
-        for _ in range(ticks):
-            self.now += TICK_NS
-            for answer in self.back.arrived(self.now):
-                self.controller.receive(answer, self.now - 700_000)
-            datagram = self.controller.tick(self.arm.reading(), self.now)
-            self.arm.overlay(self.controller.superposition)
-            self.arm.tick()
-            if datagram is not None:
-                self.there.send(datagram, self.now)
-            for message in self.there.arrived(self.now):
-                if self.session.receive(message, self.now) is not None:
-                    answer_now = self.session.answer(self.setpoint)
-                    if answer_now is not None:
-                        self.back.send(answer_now, self.now)
-
-    def until(self, state: m.SessionState) -> None:
-        for _ in range(4000):
-            if self.controller.state is self.session.state is state:
-                return
-            self.run(1)
-        raise AssertionError(
-            f"{self.controller.state.name}, {self.session.state.name} instead of {state.name}"
-        )
-
-    def active(self, overlay: MotionOverlay) -> None:
-        self.until(State.MONITORING_READY)
-        self.controller.start(overlay)
-        self.until(State.COMMANDING_ACTIVE)
 
 
 @pytest.mark.parametrize(("version", "mode"), LEGAL)
@@ -138,7 +88,7 @@ def test_a_session_that_is_torn_off_is_followed_by_another() -> None:
         seed=st.integers(0, 1000),
     ),
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=15, deadline=None)
 def test_after_any_faults_the_two_find_each_other_again(version: Version, faults: Faults) -> None:
     pair = Pair(Configuration(version))
     pair.active(MotionOverlay())
