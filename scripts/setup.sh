@@ -31,4 +31,11 @@ if [ ! -x $venv/bin/python ]; then
 fi
 # Old versions of pip can search for a long time for a set of versions that fit.
 $venv/bin/python -m pip install -q --disable-pip-version-check -U "pip>=24"
+case ",$extras," in
+*,all,* | *,dev,* | *,rl,*)
+    # A version for which there is a build without CUDA here; any newer one would bring gigabytes that no test needs.
+    $venv/bin/python -m pip install -q --disable-pip-version-check "torch==2.13.0" ||
+        echo "torch 2.13.0 is not to be had here; another version will be taken" >&2
+    ;;
+esac
 $venv/bin/python -m pip install -q --disable-pip-version-check -e ".[$extras]"

@@ -199,6 +199,9 @@ Engine = Annotated[
     ),
 ]
 PolicyFile = Annotated[Path, Parameter(help="File of the policy, .npz.")]
+AnyPolicy = Annotated[
+    Path | None, Parameter(help="File of the policy, .npz. Default: the one that comes with heptarm.")
+]
 
 
 @rl_app.command(name="train")
@@ -208,10 +211,10 @@ def rl_train(
     robot: Annotated[Literal["iiwa7", "iiwa14"], Parameter(help="Robot.")] = "iiwa14",
     action: Annotated[Literal["joint", "cartesian"], Parameter(help="What the policy decides.")] = "joint",
     feature: Annotated[bool, Parameter(negative="", help="Let it see the way to the target, too.")] = False,
-    randomisation: Randomisation = "strong",
-    steps: Annotated[
-        int | None, Parameter(help="Environment steps. Default: 2.2 million, 1.3 with the feature.")
-    ] = None,
+    exact: Annotated[
+        bool, Parameter(negative="", help="The paper's reward to the letter: no costs for robustness.")
+    ] = False,
+    steps: Annotated[int, Parameter(help="Environment steps; 0: 2.2 million, 1.3 with the feature.")] = 0,
     seed: Seed = 0,
     resume: Annotated[bool, Parameter(negative="", help="Go on where --out left off.")] = False,
     device: Annotated[Literal["cpu", "cuda"], Parameter(help="Where the networks learn.")] = "cpu",
@@ -226,7 +229,7 @@ def rl_train(
         robot=robot,
         action=action,
         feature=feature,
-        randomisation=randomisation,
+        exact=exact,
         steps=steps,
         seed=seed,
         resume=resume,
@@ -238,7 +241,7 @@ def rl_train(
 
 @rl_app.command(name="eval")
 def rl_eval(
-    policy: PolicyFile = Path("reach.npz"),
+    policy: AnyPolicy = None,
     /,
     *,
     episodes: Annotated[int, Parameter(help="Targets, none of them seen in training.")] = 1000,
@@ -264,7 +267,7 @@ def rl_eval(
 
 @rl_app.command(name="deploy")
 def rl_deploy(
-    policy: PolicyFile = Path("reach.npz"),
+    policy: AnyPolicy = None,
     /,
     *,
     at: Annotated[

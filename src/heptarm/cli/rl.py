@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,7 @@ from heptarm.arm.connect import connect
 from heptarm.cli.output import confirm, emit
 from heptarm.errors import CommandRejected, NotReady, require
 from heptarm.rl.deploy import Settings, Target, circle, deploy
-from heptarm.rl.policy import Policy
+from heptarm.rl.policy import Policy, shipped
 from heptarm.rl.report import Report
 from heptarm.values.mode import JointImpedance
 
@@ -26,8 +27,8 @@ def train(
     robot: str,
     action: str,
     feature: bool,
-    randomisation: str,
-    steps: int | None,
+    exact: bool,
+    steps: int,
     seed: int,
     resume: bool,
     device: str,
@@ -40,16 +41,14 @@ def train(
         HeptarmError: arguments that do not go together, nothing to resume, or a missing extra.
     """
     require("torch", extra="rl")
-    from heptarm.rl.randomise import level
     from heptarm.rl.task import ReachTask
     from heptarm.rl.train import Recipe
     from heptarm.rl.train import train as work
 
-    budget = steps or (1_300_000 if feature else 2_200_000)
-    recipe = None
-    if not resume:
-        task = ReachTask(robot, action=action, feature="kinematic" if feature else "")
-        recipe = Recipe(task, steps=budget, seed=seed, randomisation=level(randomisation))
+    task = ReachTask(robot, action=action, feature="kinematic" if feature else "")
+    recipe = Recipe.exact(task, seed=seed) if exact else Recipe(task, seed=seed)
+    recipe = replace(recipe, steps=steps) if steps else recipe
+    budget = recipe.steps
 
     def show(row: Row) -> None:
         if as_json:
@@ -68,11 +67,11 @@ def train(
         )
 
     trained = work(
-        recipe,
+        None if resume else recipe,
         out=out,
         progress=show,
         resume=out if resume else None,
-        steps=budget if resume and steps else None,
+        steps=steps if resume and steps else None,
         device=device,
         engine=_engine(engine),
     )
@@ -102,7 +101,7 @@ def _engine(name: str) -> Any:
 
 def evaluate(
     *,
-    policy: Path,
+    policy: Path | None,
     episodes: int,
     seed: int,
     randomisation: str,
@@ -119,14 +118,14 @@ def evaluate(
     from heptarm.rl.randomise import level
 
     report = work(
-        Policy.load(policy), episodes, randomisation=level(randomisation), seed=seed, engine=_engine(engine)
+        _brain(policy), episodes, randomisation=level(randomisation), seed=seed, engine=_engine(engine)
     )
     return _tell(report, out, film=False, as_json=as_json)
 
 
 def drive(
     *,
-    policy: Path,
+    policy: Path | None,
     at: tuple[tuple[float, float, float], ...],
     random: int,
     ask: bool,
@@ -163,6 +162,10 @@ def drive(
 
         report = deploy(arm, brain, targets, settings=settings, progress=show)
     return _tell(report, out, film=film, as_json=as_json)
+
+
+def _brain(file: Path | None) -> Policy:
+    return shipped() if file is None else Policy.load(file)
 
 
 def _targets(

@@ -9,15 +9,15 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from math import ceil
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import LimitError, StaleState, StreamError
 from heptarm.rl.guard import Guard, Watch
-from heptarm.rl.policy import Policy
 from heptarm.rl.report import Report
+from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import Array, array
 from heptarm.values.mode import Mode
 from heptarm.values.motion import ptp
@@ -29,10 +29,21 @@ if TYPE_CHECKING:
 
 #: Where the target is, base frame, shape (3,) [m], at a time since the episode's beginning [s].
 Target = Callable[[float], Array]
+#: Without a command for so long the arm stops [s]; meanwhile it comes to rest at the last one, a step away.
+WATCHDOG = 0.2
 #: Ticks of the servo loop a decision where commands are delayed, so that a delay is met within a few milliseconds.
-_FINE = 8
+_FINE = 4
 #: States a second per decision, so that what a decision sees is fresh.
 _STATES = 8.0
+
+
+class Decides(Protocol):
+    """What can be deployed: a `Policy`, or anything else that decides."""
+
+    task: ReachTask
+
+    def __call__(self, observation: Array, /) -> npt.NDArray[np.floating[Any]]:
+        """The action, shape (actions,), within +-1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +80,7 @@ class _Episode:
 
 def deploy(
     arm: Arm,
-    policy: Policy,
+    policy: Decides,
     targets: npt.ArrayLike | Sequence[Target],
     *,
     settings: Settings | None = None,
@@ -137,7 +148,7 @@ def deploy(
     )
 
 
-def _run(arm: Arm, policy: Policy, goal: Target, watch: Watch, settings: Settings) -> tuple[_Episode, int]:
+def _run(arm: Arm, policy: Decides, goal: Target, watch: Watch, settings: Settings) -> tuple[_Episode, int]:
     """One episode; also how many of its ticks came late."""
     task = policy.task
     fine = _FINE if settings.latency > 0 else 1
@@ -147,7 +158,12 @@ def _run(arm: Arm, policy: Policy, goal: Target, watch: Watch, settings: Setting
     waiting: deque[tuple[int, Array]] = deque()
     joints, targets = np.empty((task.steps + 1, 7)), np.empty((task.steps, 3))
     with arm.servo(
-        "joint", rate=rate, mode=settings.mode, speed=settings.speed, acceleration=settings.acceleration
+        "joint",
+        rate=rate,
+        watchdog=WATCHDOG,
+        mode=settings.mode,
+        speed=settings.speed,
+        acceleration=settings.acceleration,
     ) as sv:
         state = sv.start
         command, held = state.q, task.hold(state.q)
@@ -189,7 +205,7 @@ def _fresh(arm: Arm, guard: Guard) -> State:
     return state
 
 
-def _distances(policy: Policy, episode: _Episode) -> Array:
+def _distances(policy: Decides, episode: _Episode) -> Array:
     return policy.task.distance(policy.task.tip(episode.joints[1:]), episode.targets)
 
 

@@ -19,6 +19,8 @@ Weights = npt.NDArray[np.float32]
 #: Scaled observations are clipped to this.
 CLIP = 5.0
 _FORMAT = 1
+#: Where the policies are that come with heptarm.
+SHIPPED = Path(__file__).parent / "policies"
 
 
 class Policy:
@@ -61,8 +63,12 @@ class Policy:
             width = w.shape[1]
         if width != task.action_size:
             raise ShapeError(f"the network has {width} outputs; this task has {task.action_size} actions")
-        # the scaling belongs to the first layer, so that it costs nothing; the clip is kept in observation units
-        self._scale = 1.0 / self.std
+        # clipped in units of the observations, scaled by the first layer: two passes fewer over the numbers
+        mean64, std64 = self.mean.astype(np.float64), self.std.astype(np.float64)
+        self._low, self._high = _weights(mean64 - CLIP * std64), _weights(mean64 + CLIP * std64)
+        w, b = (part.astype(np.float64) for part in self.layers[0])
+        scaled = w / std64[:, None]
+        self._first = (_weights(scaled), _weights(b - mean64 @ scaled))
 
     def __call__(self, observation: npt.ArrayLike) -> Weights:
         """The action, without noise.
@@ -73,17 +79,16 @@ class Policy:
         Returns:
             Shape (..., actions), within +-1.
         """
-        x = (np.asarray(observation, dtype=np.float32) - self.mean) * self._scale
-        np.maximum(x, -CLIP, out=x)
-        np.minimum(x, CLIP, out=x)
-        for w, b in self.layers[:-1]:
+        x = np.maximum(np.asarray(observation, dtype=np.float32), self._low)
+        np.minimum(x, self._high, out=x)
+        w, b = self._first
+        for following, offset in self.layers[1:]:
             x = x @ w
             x += b
-            low = np.minimum(x, 0.0)  # ELU, branch free
-            np.expm1(low, out=low)
-            np.maximum(x, 0.0, out=x)
-            x += low
-        w, b = self.layers[-1]
+            curved = np.minimum(x, 0.0)
+            np.expm1(curved, out=curved)
+            np.maximum(x, curved, out=x)  # ELU: exp(x) - 1 is above x, and 0 where x is not negative
+            w, b = following, offset
         x = x @ w
         x += b
         np.maximum(x, -1.0, out=x)
@@ -137,6 +142,15 @@ class Policy:
             if isinstance(error, HeptarmError):
                 raise
             raise HeptarmError(f"{path} is no policy ({error})") from error
+
+
+def shipped(*, feature: bool = False) -> Policy:
+    """The policy that comes with heptarm, for an iiwa 14: `heptarm rl train --seed 0` made it.
+
+    Args:
+        feature: the one that also sees the way to the target (`--feature`).
+    """
+    return Policy.load(SHIPPED / f"reach-iiwa14{'-feature' if feature else ''}.npz")
 
 
 def _weights(values: npt.ArrayLike) -> Weights:

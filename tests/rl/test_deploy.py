@@ -1,0 +1,123 @@
+"""A policy on the virtual cabinet: through TCP, the Java application, a servo motion, the plant; and its guard."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm.modes import JointImpedance
+from heptarm.rl.deploy import Settings, circle, deploy
+from heptarm.rl.film import chain, film
+from heptarm.rl.guard import Guard, Watch
+from heptarm.rl.policy import shipped
+from heptarm.rl.report import Report
+from heptarm.rl.task import ReachTask
+from heptarm.values.robot import robot
+
+FAST = "sim://iiwa14?speed=2"
+POINT = (0.55, 0.1, 0.4)
+
+
+@pytest.fixture(scope="module")
+def reached() -> Report:
+    with ha.connect(FAST) as arm:
+        return deploy(arm, shipped(feature=True), [POINT, (0.65, -0.15, 0.3)], settings=Settings(homing=0.6))
+
+
+def test_the_shipped_policy_reaches_its_targets(reached: Report) -> None:
+    assert reached.success_rate == 1.0 and reached.mean < 0.02
+    assert reached.facts["virtual"] and reached.facts["guard"].get("box", 0) == 0
+    np.testing.assert_allclose(reached.paths, reached.task.tip(reached.joints))
+
+
+def test_the_one_with_the_feature_does_so_softly_and_late() -> None:
+    with ha.connect(FAST) as arm:
+        settings = Settings(mode=JointImpedance(300.0), latency=0.06, homing=0.6)
+        report = deploy(arm, shipped(feature=True), [POINT], settings=settings)
+    assert report.success_rate == 1.0 and report.mean < 0.012
+
+
+def test_a_moving_target_is_followed() -> None:
+    with ha.connect(FAST) as arm:
+        moving = circle((0.6, 0.0, 0.4), 0.1, period=8.0)
+        report = deploy(arm, shipped(feature=True), [moving])
+    assert report.distances[0, 60:].max() < 0.08
+    assert np.linalg.norm(report.targets[0] - moving(99 / 30)) < 1e-9
+
+
+def test_targets_outside_the_box_and_foreign_robots_are_refused_before_anything_moves() -> None:
+    with (
+        ha.connect("sim://iiwa7?speed=5") as arm,
+        pytest.raises(ha.LimitError, match="trained for the LBR iiwa 14"),
+    ):
+        deploy(arm, shipped(feature=True), [POINT])
+    with ha.connect(FAST) as arm:
+        before = arm.state.q
+        for bad in ([2.0, 0, 0.4], [np.nan, 0, 0.4], [0.5, 0.1]):
+            with pytest.raises(ha.CommandRejected):
+                deploy(arm, shipped(feature=True), [bad])
+        assert np.abs(arm.state.q - before).max() < 1e-4
+    with pytest.raises(ha.LimitError, match="latency"):
+        Settings(latency=3.0)
+    with pytest.raises(ha.LimitError, match="volume"):
+        Guard(low=(1.0, 0.0, 0.0))
+
+
+class Wild:
+    """Decides nonsense at full strength."""
+
+    def __init__(self) -> None:
+        self.task = ReachTask()
+        self._random = np.random.default_rng(1)
+        self._push = np.ones(7)
+
+    def __call__(self, observation: np.ndarray, /) -> np.ndarray:
+        if self._random.random() < 0.05:
+            self._push = np.sign(self._random.normal(size=7))
+        return self._push
+
+
+def test_a_wild_policy_stays_in_the_box_and_within_the_limits() -> None:
+    guard = Guard(low=(0.3, -0.3, 0.3), high=(0.7, 0.3, 0.8))
+    with ha.connect(FAST) as arm:
+        report = deploy(arm, Wild(), [POINT, POINT], settings=Settings(guard=guard, homing=0.6))
+        arm.wait_for_rest()
+    assert (report.paths > np.array(guard.low) - 0.03).all()
+    assert (report.paths < np.array(guard.high) + 0.03).all()
+    assert report.facts["guard"]["box"] > 0
+
+
+def test_the_guard_brings_commands_back() -> None:
+    model = robot("iiwa14")
+    home = np.array(ReachTask().home)
+    watch = Watch(Guard(speed=0.6), model, period=1 / 30)
+    assert (watch.allow(home, home) == home).all() and not any(watch.counts.values())
+    hasty = watch.allow(home, home + 0.5)
+    assert np.abs(hasty - home).max() == pytest.approx(0.02)
+    edge = home.copy()
+    edge[6] = model.q_max[6]
+    assert watch.allow(edge, edge)[6] < model.q_max[6]
+    assert watch.counts["speed"] >= 1 and watch.counts["joint"] == 2
+
+
+def test_deploying_needs_neither_torch_nor_mujoco() -> None:
+    code = (
+        "import sys; import heptarm.cli.rl, heptarm.rl.deploy; from heptarm.rl.policy import shipped; shipped(feature=True)\n"
+        "sys.exit(any(m in sys.modules for m in ('torch', 'mujoco')))"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_film_and_row_of_pictures(reached: Report, tmp_path: Path) -> None:
+    gif = film(reached, tmp_path / "reach.gif", episodes=1, every=20)
+    assert gif.read_bytes()[:6] in (b"GIF87a", b"GIF89a")
+    assert film(reached, tmp_path / "reach.png").read_bytes()[:4] == b"\x89PNG"
+    with pytest.raises(ha.CommandRejected, match="gif"):
+        film(reached, tmp_path / "reach.mp4")
+    points = chain(reached.task.model, reached.joints[0, 0])
+    np.testing.assert_allclose(points[-1], reached.paths[0, 0], atol=1e-12)
