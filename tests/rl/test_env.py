@@ -19,6 +19,8 @@ from heptarm.rl.evaluate import evaluate
 from heptarm.rl.randomise import NONE, Randomisation
 from heptarm.rl.task import ReachTask
 
+heptarm.rl.register()
+
 
 @pytest.mark.parametrize("engine", ["plant", "training"])
 @pytest.mark.parametrize("action", ["joint", "cartesian"])

@@ -66,9 +66,8 @@ class Policy:
         # clipped in units of the observations, scaled by the first layer: two passes fewer over the numbers
         mean64, std64 = self.mean.astype(np.float64), self.std.astype(np.float64)
         self._low, self._high = _weights(mean64 - CLIP * std64), _weights(mean64 + CLIP * std64)
-        w, b = (part.astype(np.float64) for part in self.layers[0])
-        scaled = w / std64[:, None]
-        self._first = (_weights(scaled), _weights(b - mean64 @ scaled))
+        scaled = self.layers[0][0] / std64[:, None]
+        self._first = (_weights(scaled), _weights(self.layers[0][1] - mean64 @ scaled))
 
     def __call__(self, observation: npt.ArrayLike) -> Weights:
         """The action, without noise.
