@@ -1,0 +1,280 @@
+"""Ways to execute a trajectory on an arm: so far `servo`, an interpolated stream of targets, in a thread of its own."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from heptarm.arm.arm import Arm
+from heptarm.arm.servo import JointServo
+from heptarm.bridge.goal import End, Goal, GoalRefused
+from heptarm.bridge.runner import Feedback, Measured, Runner, Settings, Step
+from heptarm.errors import CommandRejected, HeptarmError
+from heptarm.io.clock import Clock, RealClock
+from heptarm.values.arrays import within
+from heptarm.values.mode import Mode
+from heptarm.values.state import State
+
+_log = logging.getLogger("heptarm.bridge")
+
+#: Ways of execution, and those that are there.
+WAYS = ("servo", "spline", "fri")
+_THERE = ("servo",)
+#: How long to wait for the thread at the end [s].
+_PATIENCE = 10.0
+
+
+def check_way(way: str) -> None:
+    """Refuse a way of execution that is not there.
+
+    Raises:
+        CommandRejected: the text says which there are.
+    """
+    if way not in _THERE:
+        known = "is not there yet" if way in WAYS else "is unknown"
+        raise CommandRejected(
+            f"the way of execution {way!r} {known}",
+            parameter="execution",
+            value=way,
+            allowed=", ".join(_THERE),
+            hint=f"choose from {', '.join(_THERE)}",
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ServoOptions:
+    """How the way `servo` streams.
+
+    Attributes:
+        rate: targets per second [Hz].
+        watchdog: within this time after a target the next one has to come, or the arm brakes [s].
+        engine: see `Arm.servo`.
+        speed: ceiling, a fraction of each axis' maximum in (0, 1].
+        acceleration: likewise.
+        linger: how long the servo motion stays open after a goal [s]; the next goal begins at once in it.
+        mode: control mode; None: the arm's.
+    """
+
+    rate: float = 100.0
+    watchdog: float = 0.2
+    engine: Literal["smart", "direct"] = "smart"
+    speed: float = 1.0
+    acceleration: float = 1.0
+    linger: float = 0.5
+    mode: Mode | None = None
+
+    def __post_init__(self) -> None:
+        within(self.linger, "linger", 0.0, 60.0, unit="s")
+
+
+class Listener(Protocol):
+    """Hears of goals, from the thread of the execution; it must not block."""
+
+    def on_feedback(self, feedback: Feedback) -> None:
+        """A goal went on."""
+        ...
+
+    def on_end(self, end: End) -> None:
+        """A goal ended."""
+        ...
+
+
+def measured(state: State) -> Measured:
+    """What a runner wants to know of a state of an arm.
+
+    Raises:
+        StaleState: the state has no joints.
+    """
+    scaling = 1.0 if state.motion is None else state.motion.override
+    if state.status is not None and state.status.paused:
+        scaling = 0.0
+    return Measured(state.sampled * 1e-9, state.q, state.dq, scaling)
+
+
+class ServoExecution:
+    """Executes goals as a servo motion of joint positions.
+
+    The servo motion opens with a goal and closes a moment after the last one; in between the arm is free for others.
+
+    Args:
+        arm: in control.
+        names: of its joints, seven.
+        listener: hears of goals.
+        options: how to stream.
+        settings: how to run goals.
+        clock: the arm's.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        names: Sequence[str],
+        listener: Listener,
+        *,
+        options: ServoOptions | None = None,
+        settings: Settings | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        self._arm = arm
+        self._listener = listener
+        self._options = options or ServoOptions()
+        self._runner = Runner(names, arm.robot, settings)
+        self._clock = clock or RealClock()
+        self._changed = threading.Condition()
+        self._closing = False
+        self._servo: JointServo | None = None
+        self._thread = threading.Thread(target=self._run, name="heptarm-execution")
+        self._thread.start()
+
+    @property
+    def settings(self) -> Settings:
+        """How goals are run; exchange it, and the next goal has it."""
+        return self._runner.settings
+
+    @settings.setter
+    def settings(self, value: Settings) -> None:
+        with self._changed:
+            self._runner.settings = value
+
+    @property
+    def busy(self) -> bool:
+        """Whether a goal is under way or the arm brakes after one."""
+        return self._runner.busy
+
+    @property
+    def goal(self) -> int:
+        """Number of the goal under way; 0: none."""
+        return self._runner.goal
+
+    @property
+    def now(self) -> float:
+        """The time on the clock that goals start by [s]."""
+        return self._clock.nanos() * 1e-9
+
+    def accept(self, goal: Goal) -> int:
+        """Take a goal; one under way ends as preempted.
+
+        Returns:
+            The goal's number.
+
+        Raises:
+            GoalRefused: it makes no sense, or the arm cannot follow now.
+        """
+        try:
+            state = measured(self._arm.state)
+        except HeptarmError as error:
+            raise GoalRefused(f"nothing is known of the arm: {error}") from error
+        with self._changed:
+            if self._closing:
+                raise GoalRefused("the execution is closed")
+            number = self._runner.accept(goal, now=self.now, state=state)
+            if self._runner.warning:
+                _log.warning("goal %d: all default tolerances count: %s", number, self._runner.warning)
+            self._changed.notify_all()
+            return number
+
+    def cancel(self, number: int) -> bool:
+        """End a goal early; the arm brakes. False: it is not under way."""
+        with self._changed:
+            cancelled = self._runner.cancel(number, self.now)
+            self._changed.notify_all()
+            return cancelled
+
+    def abort(self, text: str) -> None:
+        """End the goal under way, if there is one, because of something outside; the arm brakes."""
+        with self._changed:
+            self._runner.abort(text, now=self.now)
+            self._changed.notify_all()
+
+    def wait_idle(self, timeout: float) -> bool:
+        """Wait until nothing runs and the servo motion is closed; False: not within `timeout` [s]."""
+        with self._changed:
+            return self._changed.wait_for(lambda: not self._runner.busy and self._servo is None, timeout)
+
+    def close(self) -> None:
+        """End the goal under way and leave the arm at rest."""
+        self.abort("the driver closes")
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+        self._thread.join(_PATIENCE)
+
+    # ------------------------------------------------------------------------------------ thread
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closing or self._runner.busy)
+                if self._closing and not self._runner.busy:
+                    ends = self._runner.ends()
+                    break
+            try:
+                self._stream()
+            except HeptarmError as error:
+                self._lose(str(error))
+            except Exception as error:
+                _log.exception("executing a goal")
+                self._lose(f"{type(error).__name__}: {error}")
+        self._tell(None, ends)
+
+    def _stream(self) -> None:
+        """One servo motion: from the first goal to some time after the last one."""
+        options = self._options
+        arm = self._arm
+        with arm.servo(
+            "joint",
+            rate=options.rate,
+            watchdog=options.watchdog,
+            engine=options.engine,
+            speed=options.speed,
+            acceleration=options.acceleration,
+            mode=options.mode,
+        ) as servo:
+            self._servo = servo
+            quiet = 0.0
+            while True:
+                passed = servo.tick()
+                if passed is None:
+                    break
+                state = measured(arm.state)
+                with self._changed:
+                    step = self._runner.advance(self.now, state)
+                    busy = self._runner.busy
+                if step.command is not None:
+                    servo.set(step.command.q, step.command.dq)
+                self._tell_step(step)
+                quiet = 0.0 if busy else quiet + passed
+                if not busy and (self._closing or quiet >= options.linger):
+                    break
+        with self._changed:
+            if servo.result is not None and passed is None:
+                self._runner.abort(f"the servo motion ended: {servo.result.cause.value} {servo.result.text}")
+            self._runner.forget()
+            self._servo = None
+            ends = self._runner.ends()
+            self._changed.notify_all()
+        self._tell(None, ends)
+
+    def _lose(self, text: str) -> None:
+        """The arm follows no more."""
+        with self._changed:
+            self._runner.abort(text)
+            self._servo = None
+            ends = self._runner.ends()
+            self._changed.notify_all()
+        self._tell(None, ends)
+
+    def _tell_step(self, step: Step) -> None:
+        self._tell(step.feedback, step.ends)
+
+    def _tell(self, feedback: Feedback | None, ends: Sequence[End]) -> None:
+        try:
+            if feedback is not None:
+                self._listener.on_feedback(feedback)
+            for end in ends:
+                self._listener.on_end(end)
+        except Exception:
+            _log.exception("telling of a goal")
