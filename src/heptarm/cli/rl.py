@@ -145,7 +145,7 @@ def drive(
     Raises:
         HeptarmError: refused, or ended under way.
     """
-    brain = Policy.load(policy)
+    brain = _brain(policy)
     settings = Settings(
         mode=None if stiffness is None else JointImpedance(stiffness), latency=latency, speed=speed
     )
