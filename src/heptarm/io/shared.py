@@ -166,9 +166,10 @@ class Note:
         self._words[0] += 1
 
     def read(self) -> str | None:
-        """The text; None if it is being written just now."""
-        tick = self._words[0]
-        if tick & 1:
-            return None
-        octets = self._text[: self._words[1]].tobytes()
-        return octets.decode(errors="replace") if self._words[0] == tick else None
+        """The text; None if it is being written all the time."""
+        for _ in range(16):
+            tick = self._words[0]
+            octets = self._text[: self._words[1]].tobytes()
+            if not tick & 1 and self._words[0] == tick:
+                return octets.decode(errors="replace")
+        return None

@@ -216,8 +216,7 @@ class Client:
     @property
     def trouble(self) -> str:
         """Why no session stands, in words; empty if one does."""
-        text = self._layout.trouble.read()
-        return "nothing has arrived from a controller yet" if text is None and not self._seen else text or ""
+        return self._layout.trouble.read() or ""
 
     @property
     def refused(self) -> list[str]:

@@ -26,6 +26,8 @@ Law = Callable[[State, Output, Params], object]
 
 #: After a silence of this many command periods the guard begins anew from the last position, at rest.
 SILENT_PERIODS = 5
+#: A command given this long before commanding begins still counts [ns].
+GRACE = 50_000_000
 #: An output is written this often, since an answer may be lost.
 REPEAT_OUTPUTS = 10
 _ROW = struct.Struct(f"=18q{at.STATE_WORDS - 19}d")
@@ -70,7 +72,7 @@ class Cycle:
         self._ipo: tuple[m.Joints, int] | None = None  # last mirrored position and its sequence
         self._slope: Sequence[float] = _NAN7
         self._ticks = 0
-        self._sent_at = 0
+        self._started = 0
         self._sent: tuple[Sequence[float], Sequence[float], Sequence[float]] = (_NAN7, _NAN7, _NAN6)
         self._flags = 0
         self._answered = False
@@ -79,7 +81,8 @@ class Cycle:
         self._outputs_tick = layout.outputs.tick
         self._outputs: tuple[int, dict[str, float], dict[str, list[float]]] = (0, {}, {})
         self._inputs: tuple[m.IoValue, ...] = ()
-        self._trouble = ""
+        self._trouble = self.session.trouble
+        layout.trouble.write(self._trouble)
 
     # --------------------------------------------------------------------------------------------- a message
 
@@ -170,7 +173,7 @@ class Cycle:
                 self._ticks = -1
                 # a command given just before the start counts, an old one does not
                 self._commands_seen = max(0, self.layout.commands.count - 1)
-                self._sent_at = received
+                self._started = received
             elif received - before > SILENT_PERIODS * period * 1e9:
                 guard.start(guard.q, _ZEROS7, period=period)
             self._ticks += 1
@@ -224,7 +227,7 @@ class Cycle:
         ints = words.view("int64")
         given, numbers = int(ints[at.C_GIVEN]), words.tolist()
         when = int(ints[at.C_AT])
-        if when + round(self.filler.policy.patience * 1e9) < self._sent_at:
+        if when + GRACE < self._started:
             return
         self.filler.command(
             when,

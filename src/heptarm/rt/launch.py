@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import warnings
+from importlib.machinery import PathFinder
 from typing import Protocol
 
 from heptarm.errors import CommandRejected
@@ -33,6 +34,8 @@ def importable(law: Law | None) -> str | None:
     """The name "module:function" by which a fresh process finds a law; None if it cannot."""
     module, name = getattr(law, "__module__", None), getattr(law, "__qualname__", "<")
     if module is None or module == "__main__" or "<" in name:
+        return None
+    if PathFinder.find_spec(module.partition(".")[0]) is None:  # this process knows it, a fresh one would not
         return None
     found: object = sys.modules.get(module)
     for part in name.split("."):

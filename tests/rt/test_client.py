@@ -1,0 +1,269 @@
+"""The client and its loop's process, against a tiny controller on this machine."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import random
+import socket
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, NotReady, ShapeError, Timeout
+from heptarm.fri import messages as m
+from heptarm.fri.messages import CommandMode, Quality, SessionState
+from heptarm.fri.policy import Missing, Policy
+from heptarm.fri.version import Version
+from heptarm.rt import Client, Output, Params, State
+from heptarm.rt.launch import importable
+from heptarm.rt.layout import PID
+
+from .controller import IPO, Controller
+
+ROOT = Path(__file__).resolve().parents[2]
+ACTIVE = SessionState.COMMANDING_ACTIVE
+
+
+@pytest.fixture
+def client() -> Iterator[Client]:
+    with Client(0, realtime=False) as one:
+        yield one
+
+
+def test_from_nothing_to_commanding_and_a_second_session_without_restarting(client: Client) -> None:
+    assert client.session is SessionState.IDLE and "nothing has arrived" in client.trouble
+    with pytest.raises(NotReady, match="firewall"):
+        _ = client.state
+    with pytest.raises(Timeout, match="no FRI message within"):
+        client.next(timeout=0.1)
+    for _ in range(2):
+        controller = Controller(client.port)
+        with controller.running():
+            assert client.wait("MONITORING_WAIT").q.tolist() == list(IPO)
+            controller.active()
+            client.wait(ACTIVE)
+            goal, seen = np.add(IPO, 0.05), 0
+            for s in client:
+                client.command(q=goal)
+                seen += 1
+                if np.abs(s.q - goal).max() < 1e-9:
+                    break
+            assert seen > 20 and client.quality is Quality.GOOD
+            controller.walk(SessionState.MONITORING_READY, SessionState.IDLE)
+            client.wait(SessionState.IDLE)
+        time.sleep(0.02)
+    stats = client.stats
+    assert stats.restarts + sum("listening to" in one.text for one in client.events()) >= 2
+    assert stats.answered and stats.commanded and stats.limited and not stats.malformed
+    assert any("velocity limited" in line for line in client.limited)
+    assert stats.latency[0] > 0.0 and len(client.history(10)) == 10
+
+
+def test_a_user_who_falls_silent_stops_the_arm_by_the_policy() -> None:
+    policy = Policy(Missing.RAMP_DOWN, patience=0.05)
+    with Client(0, policy=policy, realtime=False) as client:
+        controller = Controller(client.port)
+        with controller.running():
+            controller.active()
+            begin = client.wait(ACTIVE).t
+            for s in client:
+                rise = min((s.t - begin) / 0.4, 1.0)
+                client.command(q=np.add(IPO, 0.2 * (s.t - begin) * rise**2))
+                if s.t > begin + 0.6:
+                    break
+            time.sleep(0.4)  # the user's code is busy elsewhere; answers go on
+            states = client.history(100)
+    assert all(one.is_answered and one.is_filled for one in states[-50:])
+    assert np.ptp([one.q_sent[0] for one in states[-50:]]) == 0.0, "the arm stands"
+    assert states[-1].q_sent[0] > IPO[0] + 0.01
+
+
+def test_an_imported_law_runs_in_the_loop_and_follows_its_parameters(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "laws_of_a_user.py").write_text(
+        "def offset(state, out, params):\n    out.q += params.offset\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    offset = importlib.import_module("laws_of_a_user").offset
+    assert importable(offset) == "laws_of_a_user:offset"
+    with Client(0, law=offset, params={"offset": [0.02] * 7}, realtime=False) as client:
+        controller = Controller(client.port)
+        with controller.running():
+            controller.active()
+            _until(client, np.add(IPO, 0.02))
+            client.params.offset = [-0.02] * 7
+            _until(client, np.subtract(IPO, 0.02))
+
+
+def test_a_law_of_this_very_function_is_taken_over_by_a_fork() -> None:
+    shift = 0.03
+
+    def law(state: State, out: Output, params: Params) -> None:
+        out.q += shift
+
+    with Client(0, law=law, realtime=False) as client:
+        controller = Controller(client.port)
+        with controller.running():
+            controller.active()
+            _until(client, np.add(IPO, shift))
+
+
+def _until(client: Client, goal: np.ndarray) -> None:
+    deadline = time.monotonic() + 10.0
+    while time.monotonic() < deadline:
+        if np.abs(client.next().q - goal).max() < 1e-9:
+            return
+    pytest.fail("the goal was not reached")
+
+
+@pytest.mark.parametrize("wire", [Version.V2_5, Version.V2_7])
+@pytest.mark.parametrize("mode", [CommandMode.TORQUE, CommandMode.WRENCH, CommandMode.CARTESIAN_POSE])
+def test_other_versions_and_modes(wire: Version, mode: CommandMode, client: Client) -> None:
+    controller = Controller(client.port, wire=wire, mode=mode)
+    with controller.running():
+        controller.active()
+        client.wait(ACTIVE)
+        for _ in range(100):
+            client.command(tau=[3.0] * 7, wrench=[0.0, 0.0, 5.0, 0.0, 0.0, 0.0])
+            s = client.next()
+        assert s.mode is mode and s.pose.xyz.tolist() == pytest.approx([0.1, 0.2, 0.3])
+        answer = controller.answers[-1]
+        assert answer.tau == ((3.0,) * 7 if mode is CommandMode.TORQUE else None)
+        assert answer.wrench == ((0.0, 0.0, 5.0, 0.0, 0.0, 0.0) if mode is CommandMode.WRENCH else None)
+        assert (answer.pose is not None) == (mode is CommandMode.CARTESIAN_POSE)
+
+
+def test_loss_duplicates_reordering_and_garbage_end_no_session(client: Client) -> None:
+    controller = Controller(client.port)
+    rng, kept = random.Random(3), []
+
+    def mangle(octets: bytes) -> bytes | None:
+        chance = rng.random()
+        kept.append(octets)
+        if chance < 0.1:
+            return None
+        if chance < 0.15 and len(kept) > 2:
+            return kept[-2]
+        return rng.randbytes(40) if chance < 0.2 else octets
+
+    controller.mangle = mangle
+    with controller.running():
+        controller.active()
+        client.wait(ACTIVE)
+        deadline = time.monotonic() + 1.0
+        while time.monotonic() < deadline:
+            client.command(q=IPO)
+            client.next()
+    stats = client.stats
+    assert stats.lost and stats.malformed and stats.duplicated + stats.reordered
+    assert stats.restarts == 0 and client.session is ACTIVE and stats.answered > 200
+
+
+def test_a_wrong_version_is_told_in_words() -> None:
+    with Client(0, version="1.15", realtime=False) as client:
+        controller = Controller(client.port, wire=Version.V2_7)
+        wanted = pytest.raises(Timeout, match='speaks FRI 2.7 ."3.0"., this side FRI 1.14-1.16')
+        with controller.running(), wanted:
+            client.next(timeout=0.3)
+        assert client.stats.malformed > 20 and not controller.answers
+
+
+def test_signals_are_read_and_written(client: Client) -> None:
+    controller = Controller(client.port)
+    controller.io = (
+        m.IoValue("FRI.In", m.IoType.ANALOG, m.IoDirection.INPUT, 2.5),
+        m.IoValue("FRI.Out", m.IoType.BOOLEAN, m.IoDirection.OUTPUT, 0),
+    )
+    with controller.running():
+        controller.active()
+        client.wait(ACTIVE)
+        assert client.inputs == {"FRI.In": 2.5, "FRI.Out": 0}
+        client.output("FRI.Out", True)
+        client.output("FRI.In", 1.0)
+        deadline = time.monotonic() + 5.0
+        texts: list[str] = []
+        while not any("'FRI.In' is no output" in text for text in texts) and time.monotonic() < deadline:
+            time.sleep(0.01)
+            texts += [event.text for event in client.events()]
+        assert any("'FRI.In' is no output of this FRI session" in text for text in texts)
+
+
+def test_a_taken_port_and_bad_arguments_are_refused_in_words(client: Client) -> None:
+    with pytest.raises(ConnectFailed, match="another program"):
+        Client(client.port, realtime=False)
+    with pytest.raises(CommandRejected, match="FRI '1.9' is not known"):
+        Client(0, version="1.9")
+    with pytest.raises(CommandRejected, match="history is 1"):
+        Client(0, history=1)
+    with pytest.raises(ShapeError, match="q has shape"):
+        client.command(q=[1.0])
+    client.close()
+    client.close()
+    with pytest.raises(ConnectionLost, match="is closed"):
+        client.command(q=IPO)
+    with Client(client.port, realtime=False) as again:
+        assert again.port == client.port, "the port is free again"
+
+
+def test_another_sender_is_ignored_while_a_session_stands(client: Client) -> None:
+    controller = Controller(client.port)
+    with controller.running(), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+        client.wait(SessionState.MONITORING_WAIT)
+        for _ in range(20):
+            stranger.sendto(controller.datagram(), ("127.0.0.1", client.port))
+            time.sleep(1e-3)
+        client.next()
+        assert client.stats.malformed == client.stats.restarts == 0
+        stranger.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            stranger.recv(100)
+
+
+def test_the_loop_ends_with_a_killed_user_and_brakes_before() -> None:
+    """The user's process dies at once while the arm moves: the loop brings it to a stop and goes."""
+    script = textwrap.dedent(
+        """
+        import numpy as np, os, sys
+        from heptarm.rt import Client
+        client = Client(0, realtime=False)
+        print(client.port, flush=True)
+        begin = client.wait("COMMANDING_ACTIVE")
+        for s in client:
+            client.command(q=begin.q_ipo + 0.3)
+            if s.q_sent[0] > begin.q_ipo[0] + 0.1:
+                os.kill(os.getpid(), 9)
+        """
+    )
+    user = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, cwd=ROOT)
+    assert user.stdout is not None
+    controller = Controller(int(user.stdout.readline()))
+    with controller.running():
+        controller.active()
+        assert user.wait(20) == -9
+        count = -1
+        deadline = time.monotonic() + 20.0
+        while count != len(controller.answers) and time.monotonic() < deadline:
+            count = len(controller.answers)
+            time.sleep(0.3)
+        user.stdout.close()
+    sent = np.array([one.q for one in controller.answers if one.q is not None])[-400:]
+    jerk = np.abs(np.diff(sent, 3, axis=0)).max() / controller.period_ms**3 * 1e9
+    assert jerk < 100.0 and np.abs(sent[-1] - sent[-2]).max() < 1e-12, "it came to rest within its limits"
+    assert count == len(controller.answers), "and nobody answers any more"
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setscheduler"), reason="asks Linux")
+def test_what_the_system_refuses_is_said_plainly() -> None:
+    with Client(0) as client:
+        for line in client.refused:
+            assert "limits.conf" in line
+        policy = os.sched_getscheduler(int(client._header[PID]))
+        assert policy == os.SCHED_FIFO or "no real-time priority" in client.refused[0]

@@ -1,0 +1,224 @@
+"""The turn of the loop without sockets or processes: guard, policy and session together, and what is published."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from heptarm.errors import ShapeError
+from heptarm.fri import codec
+from heptarm.fri import messages as m
+from heptarm.fri.guard import Limits
+from heptarm.fri.messages import CommandMode, SessionState
+from heptarm.fri.policy import Missing, Policy
+from heptarm.fri.version import Version
+from heptarm.io.shared import Block
+from heptarm.rt import layout as at
+from heptarm.rt.cycle import Cycle, Law
+from heptarm.rt.state import Params, State
+from heptarm.values.robot import robot
+
+from .controller import IPO, Controller
+from .laws import fails_later, offset, torque
+
+MS = 1_000_000
+
+
+class Bench:
+    """A cycle with a controller whose clock is counted."""
+
+    def __init__(self, *, wire: Version = Version.V1_15, law: Law | None = None, **params: object) -> None:
+        values, schema = Params.flat(params)  # type: ignore[arg-type]
+        block = Block(at.Layout.words(history=256, params=values.size))
+        block.unlink()
+        self.layout = at.Layout(block, history=256, params=values.size)
+        self.layout.params.write(values)
+        policy = Policy(Missing.HOLD, patience=1e6) if law is None else Policy()
+        self.cycle = Cycle(
+            self.layout,
+            version=None,
+            limits=Limits.of(robot("iiwa14")),
+            policy=policy,
+            law=law,
+            params=Params(np.zeros(values.size), schema),
+        )
+        self.controller = Controller(9, wire=wire, period_ms=1)
+        self.controller._sock.close()
+        self.now = 10**12
+        self.sent: list[m.Command] = self.controller.answers
+
+    def run(self, count: int, state: SessionState | None = None) -> None:
+        if state is not None:
+            self.controller.state = state
+        for _ in range(count):
+            self.now += MS
+            octets = self.cycle.turn(self.controller.datagram(), self.now)
+            if octets is not None:
+                self.sent.append(codec.decode_command(octets, self.controller.wire))
+            self.cycle.finish(self.now + 30_000)
+            self.controller.sequence += 1
+
+    def activate(self) -> None:
+        self.run(3, SessionState.MONITORING_READY)
+        self.run(3, SessionState.COMMANDING_WAIT)
+        self.controller.state = SessionState.COMMANDING_ACTIVE
+
+    def command(self, q: tuple[float, ...]) -> None:
+        words = np.zeros(at.COMMAND_WORDS)
+        words[at.C_Q : at.C_Q + 7] = q
+        words.view(np.int64)[at.C_AT : at.C_GIVEN + 1] = self.now, at.GIVEN_Q
+        self.layout.commands.write(words[1:])
+
+    @property
+    def states(self) -> list[State]:
+        ring = self.layout.states
+        return [State(words) for tick in range(ring.count) if (words := ring.read(tick)) is not None]
+
+    def track(self) -> np.ndarray:
+        """Every position that was sent while commanding or mirroring."""
+        return np.array([one.q for one in self.sent if one.q is not None])
+
+
+def test_what_happens_is_published() -> None:
+    bench = Bench(wire=Version.V2_7)
+    bench.activate()
+    bench.run(5)
+    states = bench.states
+    assert [one.sequence for one in states] == list(range(11))
+    last = states[-1]
+    assert last.is_commanding and last.is_answered and not last.is_limited
+    assert last.q_sent.tolist() == list(IPO) and last.q_ipo.tolist() == list(IPO)
+    assert last.latency == pytest.approx(30e-6) and last.period == 1e-3 and last.t == pytest.approx(4e-3)
+    assert last.pose.xyz.tolist() == pytest.approx([0.1, 0.2, 0.3]) and last.tracking == 1.0
+    assert last.drive is m.DriveState.ACTIVE and last.operation_mode is m.OperationMode.AUT
+    assert last.mode is CommandMode.POSITION and last.overlay is m.Overlay.JOINT
+    assert math.isnan(states[0].q_sent[0]) and states[0].t == 0.0
+
+
+def test_a_jump_at_the_start_of_commanding_becomes_a_gentle_way() -> None:
+    bench = Bench()
+    bench.activate()
+    bench.command(tuple(value + 0.3 for value in IPO))
+    bench.run(1500)
+    track = bench.track()[-1503:]
+    assert track[-1] == pytest.approx(np.add(IPO, 0.3))
+    jerk = np.abs(np.diff(track, 3, axis=0)).max() * 1e9
+    assert jerk <= 95.0 * 1.01
+    assert bench.cycle.session.counters.limited > 100
+    assert any("A1: velocity limited" in line for line in bench.cycle.guard.report.lines)
+
+
+def test_after_commanding_is_left_the_next_start_is_where_the_interpolator_then_is() -> None:
+    bench = Bench()
+    bench.activate()
+    bench.command(tuple(value + 0.2 for value in IPO))
+    bench.run(1200)
+    bench.controller.ipo = tuple(value - 0.1 for value in IPO)  # the arm was moved meanwhile
+    bench.activate()
+    first = len(bench.sent)
+    bench.run(300)
+    active = np.array([one.q for one in bench.sent[first:]])
+    assert active == pytest.approx(np.tile(np.subtract(IPO, 0.1), (300, 1))), "the old command is forgotten"
+
+
+def test_a_session_that_restarts_between_two_messages_is_a_new_start() -> None:
+    bench = Bench()
+    bench.activate()
+    bench.command(tuple(value + 0.2 for value in IPO))
+    bench.run(1200)
+    bench.controller.sequence = 0
+    bench.controller.ipo = tuple(value - 0.1 for value in IPO)
+    bench.run(1)
+    assert bench.sent[-1].q == bench.controller.ipo
+
+
+def test_the_interpolators_speed_is_taken_over() -> None:
+    """An overlay on a moving interpolator: mirroring while it moves at 0.2 rad/s, then commanding."""
+    bench = Bench()
+    for state, count in ((SessionState.COMMANDING_WAIT, 20), (SessionState.COMMANDING_ACTIVE, 20)):
+        for _ in range(count):
+            bench.controller.ipo = tuple(value + 0.2e-3 for value in bench.controller.ipo)
+            bench.run(1, state)
+    assert np.diff(bench.track(), axis=0) == pytest.approx(0.2e-3)
+    assert not bench.cycle.guard.report.lines
+
+
+def test_a_long_silence_while_commanding_begins_anew_at_rest() -> None:
+    bench = Bench()
+    bench.activate()
+    bench.command(tuple(value + 0.5 for value in IPO))
+    bench.run(250)
+    last = bench.sent[-1].q
+    assert last is not None
+    bench.now += 200 * MS
+    bench.controller.sequence += 200
+    bench.run(2)
+    assert np.abs(np.subtract(bench.sent[-2].q, last)).max() < 1e-6, "no jump after the gap"
+
+
+def test_a_law_sees_the_state_and_its_parameters() -> None:
+    bench = Bench(law=offset, offset=np.full(7, 0.01))
+    bench.activate()
+    bench.run(800)
+    assert bench.sent[-1].q == pytest.approx(np.add(IPO, 0.01))
+    bench.layout.params.write(np.full(7, -0.01))
+    bench.run(800)
+    assert bench.sent[-1].q == pytest.approx(np.subtract(IPO, 0.01))
+
+
+def test_a_torque_law() -> None:
+    bench = Bench(law=torque, gain=4.0)
+    bench.controller.mode = CommandMode.TORQUE
+    bench.activate()
+    assert bench.sent[-1].tau == (0.0,) * 7, "in COMMANDING_WAIT there is a torque field already"
+    bench.run(10)
+    assert bench.sent[-1].tau == pytest.approx((2.0,) * 7)
+    assert bench.states[-1].tau_sent == pytest.approx((2.0,) * 7)
+
+
+def test_a_law_that_fails_brakes_the_arm_and_says_why() -> None:
+    bench = Bench(law=fails_later)
+    bench.activate()
+    bench.run(400)
+    assert bench.cycle.may_end and bench.cycle.guard.is_still
+    texts = [bytes(words[3:].tobytes()).rstrip(b"\0").decode() for words in _events(bench)]
+    assert any("the law has had enough" in text for text in texts)
+
+
+def _events(bench: Bench) -> list[np.ndarray]:
+    ring = bench.layout.events
+    return [words for tick in range(ring.count) if (words := ring.read(tick)) is not None]
+
+
+def test_outputs_are_written_and_unknown_ones_refused_in_words() -> None:
+    bench = Bench()
+    signal = m.IoValue("FRI.Out", m.IoType.BOOLEAN, m.IoDirection.OUTPUT, 0)
+    bench.controller.io = (signal,)
+    bench.activate()
+    bench.layout.outputs.write('{"io": {"FRI.Out": 1}, "transformations": {}}')
+    bench.run(20)
+    written = [one.io[0].value for one in bench.sent if one.io]
+    assert written == [1] * 10, "a few times, since an answer may be lost"
+    assert bench.layout.inputs.read() == '{"FRI.Out": 0}'
+    bench.layout.outputs.write('{"io": {"FRI.Nowhere": 1}, "transformations": {}}')
+    bench.run(3)
+    assert bench.sent[-1].q == IPO, "the cycle is answered all the same"
+    assert any(b"no output of this FRI session" in words.tobytes() for words in _events(bench))
+
+
+def test_parameters_have_names_and_shapes() -> None:
+    changed: list[bool] = []
+    values, schema = Params.flat({"k": 2.0, "goal": [1.0, 2.0, 3.0]})
+    params = Params(values, schema, changed=lambda: changed.append(True))
+    assert params.k == 2.0 and params.goal.tolist() == [1.0, 2.0, 3.0]
+    params.goal = [3.0, 2.0, 1.0]
+    params.set(k=1.0, goal=[0.0, 0.0, 0.0])
+    assert params.k == 1.0 and not params.goal.any() and len(changed) == 2
+    with pytest.raises(ShapeError, match="goal has shape"):
+        params.goal = 1.0
+    with pytest.raises(AttributeError, match="there are k, goal"):
+        params.speed = 1.0
+    with pytest.raises(AttributeError, match="read-only"):
+        Params(values, schema).k = 2.0

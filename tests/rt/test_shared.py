@@ -1,0 +1,64 @@
+"""Shared memory: two processes, no lock, and no torn slot ever comes out."""
+
+from __future__ import annotations
+
+import multiprocessing
+
+import numpy as np
+import pytest
+
+from heptarm.io.shared import Block, Note, Ring
+
+WIDTH, SLOTS = 16, 4
+
+
+def _write(path: str, count: int) -> None:
+    ring = Ring(Block(path=path), head=0, start=8, slots=SLOTS, width=WIDTH)
+    for value in range(count):
+        ring.write(np.full(WIDTH - 1, float(value)))
+
+
+def test_a_ring_that_is_overrun_by_another_process_is_never_read_torn() -> None:
+    block = Block(8 + SLOTS * WIDTH)
+    ring = Ring(block, head=0, start=8, slots=SLOTS, width=WIDTH)
+    writer = multiprocessing.get_context("fork").Process(target=_write, args=(block.path, 100_000))
+    writer.start()
+    seen, last = 0, -1.0
+    while writer.is_alive():
+        words = ring.newest()
+        if words is not None:
+            assert (words[1:] == words[1]).all() and words[1] >= last
+            seen, last = seen + 1, words[1]
+    writer.join()
+    block.unlink()
+    newest = ring.newest()
+    assert seen > 100 and newest is not None and newest[1] == 99_999.0 and ring.count == 100_000
+
+
+def test_a_ring_keeps_its_last_slots() -> None:
+    block = Block(8 + SLOTS * WIDTH)
+    block.unlink()
+    ring = Ring(block, head=0, start=8, slots=SLOTS, width=WIDTH)
+    assert ring.newest() is None and ring.read(0) is None
+    for value in range(10):
+        ring.write([float(value)])
+    kept = [ring.read(tick) for tick in range(10)]
+    assert [None if one is None else one[1] for one in kept] == [None] * 6 + [6.0, 7.0, 8.0, 9.0]
+    ring.begin()
+    assert ring.read(6) is None, "it is being overwritten"
+    newest = ring.newest()
+    assert newest is not None and newest[1] == 9.0
+
+
+def test_a_note_stands_until_the_next_one() -> None:
+    block = Block(64)
+    block.unlink()
+    note = Note(block, start=0, words=8)
+    assert note.read() == ""
+    note.write("läuft")
+    before = note.tick
+    assert note.read() == "läuft"
+    note.write("")
+    assert note.read() == "" and note.tick != before
+    with pytest.raises(ValueError, match="48 fit"):
+        note.write("x" * 49)

@@ -1,0 +1,56 @@
+"""UDP: receive times, a taken port in words, and what a closed socket says."""
+
+from __future__ import annotations
+
+import socket
+import sys
+import time
+
+import pytest
+
+from heptarm.errors import ConnectFailed, ConnectionLost
+from heptarm.io.udp import UdpSocket
+
+
+def test_a_datagram_comes_with_the_time_of_its_arrival_not_of_its_reading() -> None:
+    one, other = UdpSocket(0, host="127.0.0.1"), UdpSocket(0, host="127.0.0.1")
+    time.sleep(0.1)  # the kernel begins to stamp a moment after it was asked
+    before = time.monotonic_ns()
+    assert other.send(b"hello", ("127.0.0.1", one.port))
+    sent = time.monotonic_ns()
+    time.sleep(0.05)
+    got = one.receive()
+    assert got is not None
+    data, received, sender = got
+    assert data == b"hello" and sender == ("127.0.0.1", other.port)
+    if one.stamps:
+        assert before - 1_000_000 <= received <= sent + 20_000_000, "50 ms of sleep do not count"
+    one.close()
+    other.close()
+
+
+def test_nothing_comes_within_the_patience() -> None:
+    one = UdpSocket(0, host="127.0.0.1", patience=0.01)
+    assert one.receive() is None
+    one.close()
+    one.close()
+    with pytest.raises(ConnectionLost, match="is closed"):
+        one.receive()
+    with pytest.raises(ConnectionLost, match="is closed"):
+        one.send(b"", ("127.0.0.1", 9))
+
+
+def test_a_taken_port_is_named_with_a_remedy() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+        with pytest.raises(ConnectFailed, match=f"UDP port {port}") as caught:
+            UdpSocket(port, host="127.0.0.1")
+    assert "another program" in caught.value.hint
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux")
+def test_an_address_of_no_card_is_named() -> None:
+    with pytest.raises(ConnectFailed) as caught:
+        UdpSocket(0, host="203.0.113.1")
+    assert "no network card" in caught.value.hint
