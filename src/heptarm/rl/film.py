@@ -87,7 +87,7 @@ def _draw(axes: Any, report: Report, episode: int, step: int) -> None:
     distance = report.task.distance(report.paths[episode, step], report.targets[episode])
     axes.set_title(f"{step / report.task.rate:.2f} s, {1e3 * float(distance):.0f} mm", y=0.96, fontsize=10)
     axes.set(xlim=(-0.25, 0.85), ylim=(-0.55, 0.55), zlim=(0.0, 1.1))
-    axes.set_box_aspect((1, 1, 1))
+    axes.set_box_aspect((1, 1, 1), zoom=1.5)
     axes.view_init(elev=18, azim=-60)
     axes.set_axis_off()
 
