@@ -39,7 +39,7 @@ def action_space(task: ReachTask) -> spaces.Box:
     return spaces.Box(-1.0, 1.0, (task.action_size,), dtype=np.float32)
 
 
-class ReachEnv(gymnasium.Env[Any, Any]):
+class ReachEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is not looked into
     """One simulated robot that reaches for points.
 
     Episodes are truncated after `task.steps` decisions and never terminate. `info` holds "distance" [m],

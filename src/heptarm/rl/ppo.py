@@ -7,6 +7,7 @@ ceiling falls towards the end.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import KW_ONLY, asdict, dataclass
 from itertools import pairwise
 from typing import Any
@@ -34,6 +35,8 @@ class Settings:
         clip: largest change of an action's likelihood that is rewarded.
         kl: the learning rate falls above the second, rises below the first.
         spread: logarithm of the action's deviation at the beginning.
+        spread_end: its ceiling at the end; on the way there the ceiling falls in a straight line. What is left
+            of the noise is what a policy cannot be more precise than.
         hidden: widths of the hidden layers of both networks.
         value: weight of the value's loss.
         gradient: largest norm of the gradient.
@@ -57,6 +60,7 @@ class Settings:
     clip: float = 0.2
     kl: tuple[float, float] = (0.004, 0.016)
     spread: float = -0.5
+    spread_end: float = -2.3
     hidden: tuple[int, ...] = (64, 64)
     value: float = 1.0
     gradient: float = 1.0
@@ -93,7 +97,7 @@ class Settings:
         return asdict(self)
 
 
-class Scaler(nn.Module):
+class Scaler(nn.Module):  # type: ignore[misc]  # torch is not looked into
     """Running mean and deviation of the observations (Chan et al. 1979)."""
 
     def __init__(self, size: int) -> None:
@@ -137,7 +141,7 @@ def network(inputs: int, hidden: tuple[int, ...], outputs: int, last: float) -> 
     return nn.Sequential(*parts[:-1])
 
 
-class Agent(nn.Module):
+class Agent(nn.Module):  # type: ignore[misc]
     """Scaler, policy network, value network."""
 
     def __init__(self, observations: int, actions: int, settings: Settings) -> None:
@@ -186,10 +190,12 @@ class Learner:
     Args:
         agent: what learns.
         settings: the numbers.
-        mean: averages a tensor over all workers; identity for one.
+        mean: averages a tensor over all workers; None: there is only this one.
     """
 
-    def __init__(self, agent: Agent, settings: Settings, mean: Any = None) -> None:
+    def __init__(
+        self, agent: Agent, settings: Settings, mean: Callable[[Tensor], Tensor] | None = None
+    ) -> None:
         self.agent, self.settings = agent, settings
         self._mean = mean
         self.rate = settings.rate
@@ -244,6 +250,8 @@ class Learner:
                 self.optimiser.param_groups[0]["lr"] = self.rate
                 self.optimiser.step()
                 losses.append(float(loss.detach()))
+        with torch.no_grad():
+            agent.spread.clamp_(max=s.spread + (s.spread_end - s.spread) * min(1.0, progress))
         count = len(kls)
         return {
             "kl": sum(kls) / count,

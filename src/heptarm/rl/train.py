@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from dataclasses import KW_ONLY, asdict, dataclass, field, replace
+from dataclasses import KW_ONLY, asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +14,14 @@ import numpy as np
 from heptarm.errors import CommandRejected, HeptarmError, LimitError, require
 from heptarm.rl.batch import BatchReach, Engine
 from heptarm.rl.policy import Policy
-from heptarm.rl.randomise import MILD, STRONG, Randomisation
-from heptarm.rl.task import ReachTask
 
 torch = require("torch", extra="rl")
 
 from heptarm.rl import ppo  # noqa: E402  needs torch
+from heptarm.rl.recipe import Recipe  # noqa: E402
 
-#: Environment steps of a training by its task's feature; enough for some millimetres.
-STEPS = {"": 2_200_000, "kinematic": 1_300_000}
+__all__ = ["Recipe", "Row", "Trained", "Training", "beside", "train"]
+
 #: Updates between two checkpoints.
 CHECKPOINT = 25
 
@@ -97,59 +96,6 @@ class Trained:
         axes.grid(which="both", alpha=0.3)
         figure.savefig(path, dpi=120)
         return Path(path)
-
-
-@dataclass(frozen=True, slots=True)
-class Recipe:
-    """Everything that a training is made of; saved with its checkpoints.
-
-    The defaults make policies that bear late commands and a compliant arm; `exact` keeps to the paper.
-
-    Attributes:
-        task: the task.
-        steps: environment steps, of all workers; rounded up to whole updates; 0: `STEPS`.
-        seed: of networks, simulation and shuffling.
-        randomisation: what differs between the simulated robots.
-        settings: numbers of the algorithm.
-    """
-
-    task: ReachTask = field(default_factory=ReachTask)
-    _: KW_ONLY
-    steps: int = 0
-    seed: int = 0
-    randomisation: Randomisation = STRONG
-    settings: ppo.Settings = field(default_factory=ppo.Settings)
-
-    def __post_init__(self) -> None:
-        if self.steps == 0:
-            object.__setattr__(self, "steps", STEPS[self.task.feature])
-        if self.steps < 1:
-            raise LimitError(f"steps is {self.steps}; at least 1 is wanted", code=2, parameter="steps")
-        if self.seed < 0:
-            raise LimitError(f"seed is {self.seed}; it is not negative", code=2, parameter="seed")
-
-    @classmethod
-    def exact(cls, task: ReachTask | None = None, *, seed: int = 0) -> Recipe:
-        """The paper's reward to the letter: no action costs; robots that are roughly known."""
-        settings = ppo.Settings(action_cost=0.0)
-        return cls(task or ReachTask(), seed=seed, randomisation=MILD, settings=settings)
-
-    def as_dict(self) -> dict[str, Any]:
-        """For a file."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, entries: dict[str, Any]) -> Recipe:
-        """Of `as_dict`."""
-        given = dict(entries)
-        given["task"] = ReachTask.from_dict(given["task"])
-        given["randomisation"] = Randomisation(**{k: _tuple(v) for k, v in given["randomisation"].items()})
-        given["settings"] = ppo.Settings(**{k: _tuple(v) for k, v in given["settings"].items()})
-        return cls(**given)
-
-
-def _tuple(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
 
 
 class Training:

@@ -16,7 +16,7 @@ require("stable_baselines3", extra="rl")
 from stable_baselines3.common.vec_env import VecEnv  # noqa: E402  after the check that it is there
 
 
-class VectorReach(VecEnv):
+class VectorReach(VecEnv):  # type: ignore[misc]  # stable_baselines3 is not looked into
     """Many simulated robots that reach for points.
 
     Args:

@@ -1,0 +1,67 @@
+"""What a training is made of: task, simulated robots, numbers of the algorithm, seed."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, asdict, dataclass, field
+from typing import Any
+
+from heptarm.errors import LimitError
+from heptarm.rl import ppo
+from heptarm.rl.randomise import MILD, STRONG, Randomisation
+from heptarm.rl.task import ReachTask
+
+#: Environment steps of a training by its task's feature; enough for some millimetres.
+STEPS = {"": 2_200_000, "kinematic": 1_300_000}
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """Everything that a training is made of; saved with its checkpoints.
+
+    The defaults make policies that bear late commands and a compliant arm; `exact` keeps to the paper.
+
+    Attributes:
+        task: the task.
+        steps: environment steps, of all workers; rounded up to whole updates; 0: `STEPS`.
+        seed: of networks, simulation and shuffling.
+        randomisation: what differs between the simulated robots.
+        settings: numbers of the algorithm.
+    """
+
+    task: ReachTask = field(default_factory=ReachTask)
+    _: KW_ONLY
+    steps: int = 0
+    seed: int = 0
+    randomisation: Randomisation = STRONG
+    settings: ppo.Settings = field(default_factory=ppo.Settings)
+
+    def __post_init__(self) -> None:
+        if self.steps == 0:
+            object.__setattr__(self, "steps", STEPS[self.task.feature])
+        if self.steps < 1:
+            raise LimitError(f"steps is {self.steps}; at least 1 is wanted", code=2, parameter="steps")
+        if self.seed < 0:
+            raise LimitError(f"seed is {self.seed}; it is not negative", code=2, parameter="seed")
+
+    @classmethod
+    def exact(cls, task: ReachTask | None = None, *, seed: int = 0) -> Recipe:
+        """The paper's reward to the letter: no action costs; robots that are roughly known."""
+        settings = ppo.Settings(action_cost=0.0)
+        return cls(task or ReachTask(), seed=seed, randomisation=MILD, settings=settings)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a file."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, entries: dict[str, Any]) -> Recipe:
+        """Of `as_dict`."""
+        given = dict(entries)
+        given["task"] = ReachTask.from_dict(given["task"])
+        given["randomisation"] = Randomisation(**{k: _tuple(v) for k, v in given["randomisation"].items()})
+        given["settings"] = ppo.Settings(**{k: _tuple(v) for k, v in given["settings"].items()})
+        return cls(**given)
+
+
+def _tuple(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
