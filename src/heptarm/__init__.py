@@ -47,7 +47,7 @@ if TYPE_CHECKING:
         Unreachable,
         VersionMismatch,
     )
-    from heptarm.values.motion import hold, lin, lin_rel, ptp
+    from heptarm.values.motion import arc, circ, hold, lin, lin_rel, ptp
     from heptarm.values.pose import Pose, deg
     from heptarm.values.redundancy import Redundancy
     from heptarm.values.result import Cause, Result
@@ -93,6 +93,8 @@ __all__ = [
     "Unreachable",
     "VersionMismatch",
     "__version__",
+    "arc",
+    "circ",
     "connect",
     "deg",
     "hold",
@@ -112,6 +114,8 @@ _HOMES = {
     "PoseServo": "arm.servo",
     "ServoStats": "arm.servo",
     "target_from_env": "arm.target",
+    "arc": "values.motion",
+    "circ": "values.motion",
     "hold": "values.motion",
     "lin": "values.motion",
     "lin_rel": "values.motion",

@@ -134,3 +134,19 @@ def test_whatever_the_values_allow_the_protocol_carries(program: list[Motion], c
         if limits is not None:
             assert all(v <= ceiling or (ceiling == 1.0 and isnan(v)) for v in limits.velocity)
     assert longest(program, ROBOT, ceiling) > 0
+
+
+def test_arcs_and_how_the_orientation_is_led() -> None:
+    via, end = Pose.at(0.55, 0.1, 0.4), Pose.xyz_abc(0.5, 0.2, 0.4, *deg(180, 0, 180))
+    item = one(
+        ha.circ(via, end, near=deg(0, 30, 0, -90, 0, 60, 0), blend_m=0.02, orientation="constant"), 0.5
+    )
+    assert isinstance(item.motion, wire.Circ)
+    assert item.motion.via.xyz == (0.55, 0.1, 0.4) and item.motion.end.xyz == (0.5, 0.2, 0.4)
+    assert item.motion.orientation.type is wire.OrientationType.CONSTANT
+    assert item.motion.blending.distance == 0.02 and item.motion.joints.velocity == (0.5,) * 7
+    along = one(ha.circ(via, end, reference="path")).motion
+    assert isinstance(along, wire.Circ) and along.orientation.reference is wire.OrientationReference.PATH
+    joint = one(lin(POSE, orientation="joint")).motion
+    assert isinstance(joint, wire.Lin) and joint.orientation.type is wire.OrientationType.JOINT
+    assert longest([ha.circ(via, end, speed_mps=0.01)], ROBOT, 1.0) > 1800

@@ -13,16 +13,17 @@ from heptarm.model.inverse import redundancy
 from heptarm.values import motion as values
 from heptarm.values.arrays import Array
 from heptarm.values.limits import Blending, CartesianDynamics, JointDynamics
-from heptarm.values.motion import Hold, Lin, LinRel, Motion, Ptp, PtpPose
+from heptarm.values.motion import Circ, Hold, Lin, LinRel, Motion, Ptp, PtpPose
+from heptarm.values.orientation import Orientation
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 from heptarm.wire import messages as wire
 
-_MOTIONS = (Ptp, PtpPose, Lin, LinRel, Hold)
+_MOTIONS = (Ptp, PtpPose, Lin, LinRel, Circ, Hold)
 #: A motion may take this much longer than its slowest plausible estimate, and this much more [s].
 _GENEROUS, _AND_MORE = 3.0, 15.0
-#: The longest straight line inside the workspace of the largest arm [m].
-_LONGEST_LINE = 2.0
+#: The longest straight line and the longest arc inside the workspace of the largest arm [m].
+_LONGEST_LINE, _LONGEST_ARC = 2.0, 6.0
 #: Cartesian speed assumed where none is given [m/s].
 _SLOW_LINE = 0.1
 
@@ -38,14 +39,14 @@ def listed(motion: Motion | Sequence[Motion]) -> tuple[Motion, ...]:
         raise ShapeError(
             f"{type(motion).__name__} given where a motion or a list of 1 to 1000 motions is wanted",
             parameter="motion",
-            hint="make motions with ptp, lin, lin_rel and hold",
+            hint="make motions with ptp, lin, lin_rel, circ and hold",
         )
     for index, one in enumerate(motions):
         if not isinstance(one, _MOTIONS):
             raise ShapeError(
                 f"motions[{index}] is {one!r}, which is no motion",
                 parameter=f"motions[{index}]",
-                hint="make motions with ptp, lin, lin_rel and hold; joint positions alone are ptp(q)",
+                hint="make motions with ptp, lin, lin_rel, circ and hold; joint positions alone are ptp(q)",
             )
     return tuple(motions)
 
@@ -86,9 +87,10 @@ def _slowest(motion: Motion, robot: RobotModel) -> float:
     if isinstance(motion, Hold):
         return motion.duration
     turn = _turn(motion.joints, robot)
-    if isinstance(motion, Lin | LinRel):
+    if isinstance(motion, Lin | LinRel | Circ):
         speed = motion.path.velocity
-        return turn + _LONGEST_LINE / (_SLOW_LINE if isnan(speed) else speed) + 1.0
+        way = _LONGEST_ARC if isinstance(motion, Circ) else _LONGEST_LINE
+        return turn + way / (_SLOW_LINE if isnan(speed) else speed) + 1.0
     return turn
 
 
@@ -130,6 +132,7 @@ def _item(motion: Motion, robot: RobotModel) -> wire.Item:
                 dynamics=_path(motion.path),
                 joints=_joints(motion.joints),
                 blending=_blending(motion.blending),
+                orientation=_orientation(motion.orientation),
             ),
             frame=_frame(motion.moving),
         )
@@ -141,6 +144,20 @@ def _item(motion: Motion, robot: RobotModel) -> wire.Item:
                 dynamics=_path(motion.path),
                 joints=_joints(motion.joints),
                 blending=_blending(motion.blending),
+                orientation=_orientation(motion.orientation),
+            ),
+            frame=_frame(motion.moving),
+        )
+    if isinstance(motion, Circ):
+        return wire.Item(
+            motion=wire.Circ(
+                via=_pose(motion.via),
+                end=_pose(motion.end),
+                redundancy=_redundancy(motion, robot),
+                dynamics=_path(motion.path),
+                joints=_joints(motion.joints),
+                blending=_blending(motion.blending),
+                orientation=_orientation(motion.orientation),
             ),
             frame=_frame(motion.moving),
         )
@@ -152,7 +169,7 @@ def _frame(name: str) -> str:
     return "" if name == values.TOOL else name
 
 
-def _redundancy(motion: PtpPose | Lin, robot: RobotModel) -> wire.Redundancy:
+def _redundancy(motion: PtpPose | Lin | Circ, robot: RobotModel) -> wire.Redundancy:
     if motion.near is not None:
         robot.check(motion.near, "near")
         near = redundancy(robot, motion.near.tolist())
@@ -187,6 +204,13 @@ def _path(limits: CartesianDynamics) -> wire.CartesianDynamics:
 def _blending(blending: Blending) -> wire.Blending:
     return wire.Blending(
         relative=blending.relative, distance=blending.distance, orientation=blending.orientation
+    )
+
+
+def _orientation(led: Orientation) -> wire.Orientation:
+    return wire.Orientation(
+        type=wire.OrientationType[led.type.upper()],
+        reference=wire.OrientationReference[led.reference.upper()],
     )
 
 

@@ -13,29 +13,48 @@ from typing import TypeAlias
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.arrays import Array, Value, array, fractions, within
+from heptarm.values.arguments import (
+    AXES,
+    EXACT,
+    FREE,
+    TOOL,
+    blending_of,
+    check_name,
+    check_pose,
+    joints_of,
+    near_of,
+    path_of,
+    seven,
+)
+from heptarm.values.arrays import Array, Value, array, within
+from heptarm.values.circ import Circ, arc, circ
 from heptarm.values.limits import Blending, CartesianDynamics, JointDynamics
+from heptarm.values.orientation import VARIABLE, Orientation, orientation_of
 from heptarm.values.pose import Pose
 from heptarm.values.redundancy import Redundancy
 
-#: The frame that a tool moves: the attached tool's, without a tool the flange.
-TOOL = "tool"
+__all__ = [
+    "BASE",
+    "TOOL",
+    "Circ",
+    "Hold",
+    "Lin",
+    "LinRel",
+    "Motion",
+    "Ptp",
+    "PtpPose",
+    "arc",
+    "circ",
+    "hold",
+    "lin",
+    "lin_rel",
+    "ptp",
+]
+
 #: The robot's base frame.
 BASE = "base"
 
-_AXES = JointDynamics()
-_FREE = CartesianDynamics()
-_EXACT = Blending()
-_LONGEST_NAME = 128
 _LONGEST_HOLD = 1e6
-_PATH = (
-    ("speed_mps", 10.0, "m/s"),
-    ("acceleration_mps2", 100.0, "m/s²"),
-    ("jerk_mps3", 1e4, "m/s³"),
-    ("speed_radps", 20.0, "rad/s"),
-    ("acceleration_radps2", 200.0, "rad/s²"),
-    ("jerk_radps3", 2e4, "rad/s³"),
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -49,8 +68,8 @@ class Ptp(Value):
     """
 
     q: Array
-    joints: JointDynamics = _AXES
-    blending: Blending = _EXACT
+    joints: JointDynamics = AXES
+    blending: Blending = EXACT
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "q", array(self.q, 7, "q"))
@@ -78,13 +97,13 @@ class PtpPose(Value):
     near: Array | None = None
     redundancy: Redundancy | None = None
     moving: str = TOOL
-    joints: JointDynamics = _AXES
-    blending: Blending = _EXACT
+    joints: JointDynamics = AXES
+    blending: Blending = EXACT
 
     def __post_init__(self) -> None:
-        _target(self.pose)
-        object.__setattr__(self, "near", _near(self.near, self.redundancy))
-        _name(self.moving, "moving")
+        check_pose(self.pose)
+        object.__setattr__(self, "near", near_of(self.near, self.redundancy))
+        check_name(self.moving, "moving")
 
     def under(self, ceiling: float) -> PtpPose:
         """The same motion, no axis faster than that fraction of its maximum."""
@@ -103,20 +122,22 @@ class Lin(Value):
         path: limits along the path.
         joints: fractions of the axes' maxima, as well.
         blending: into the following motion.
+        orientation: how the orientation is led.
     """
 
     pose: Pose
     near: Array | None = None
     redundancy: Redundancy | None = None
     moving: str = TOOL
-    path: CartesianDynamics = _FREE
-    joints: JointDynamics = _AXES
-    blending: Blending = _EXACT
+    path: CartesianDynamics = FREE
+    joints: JointDynamics = AXES
+    blending: Blending = EXACT
+    orientation: Orientation = VARIABLE
 
     def __post_init__(self) -> None:
-        _target(self.pose)
-        object.__setattr__(self, "near", _near(self.near, self.redundancy))
-        _name(self.moving, "moving")
+        check_pose(self.pose)
+        object.__setattr__(self, "near", near_of(self.near, self.redundancy))
+        check_name(self.moving, "moving")
 
     def under(self, ceiling: float) -> Lin:
         """The same motion, no axis faster than that fraction of its maximum."""
@@ -134,22 +155,24 @@ class LinRel(Value):
         path: limits along the path.
         joints: fractions of the axes' maxima, as well.
         blending: into the following motion.
+        orientation: how the orientation is led.
     """
 
     offset: Pose
     frame: str = TOOL
     moving: str = TOOL
-    path: CartesianDynamics = _FREE
-    joints: JointDynamics = _AXES
-    blending: Blending = _EXACT
+    path: CartesianDynamics = FREE
+    joints: JointDynamics = AXES
+    blending: Blending = EXACT
+    orientation: Orientation = VARIABLE
 
     def __post_init__(self) -> None:
         if not isinstance(self.offset, Pose):
             raise ShapeError(
                 f"offset is {self.offset!r}; a Pose is wanted", parameter="offset", value=self.offset
             )
-        _name(self.frame, "frame")
-        _name(self.moving, "moving")
+        check_name(self.frame, "frame")
+        check_name(self.moving, "moving")
 
     def under(self, ceiling: float) -> LinRel:
         """The same motion, no axis faster than that fraction of its maximum."""
@@ -178,7 +201,7 @@ class Hold(Value):
         return self
 
 
-Motion: TypeAlias = Ptp | PtpPose | Lin | LinRel | Hold
+Motion: TypeAlias = Ptp | PtpPose | Lin | LinRel | Circ | Hold
 
 
 def ptp(
@@ -214,10 +237,10 @@ def ptp(
         CommandRejected: an argument that belongs to a pose is given with joint positions, or both ways of
             choosing the arm position.
     """
-    joints = _joints(speed, acceleration, jerk)
-    blending = _blending(blend_rel, blend_m, blend_rad)
+    joints = joints_of(speed, acceleration, jerk)
+    blending = blending_of(blend_rel, blend_m, blend_rad)
     if isinstance(target, Pose):
-        return PtpPose(target, _seven(near, "near"), redundancy, moving, joints, blending)
+        return PtpPose(target, seven(near, "near"), redundancy, moving, joints, blending)
     if near is not None or redundancy is not None or moving != TOOL:
         raise CommandRejected(
             "near, redundancy and moving belong to a pose; joint positions leave no choice",
@@ -233,6 +256,8 @@ def lin(
     near: npt.ArrayLike | None = None,
     redundancy: Redundancy | None = None,
     moving: str = TOOL,
+    orientation: str = "variable",
+    reference: str = "base",
     speed_mps: float | None = None,
     acceleration_mps2: float | None = None,
     jerk_mps3: float | None = None,
@@ -254,6 +279,9 @@ def lin(
         redundancy: E1 and Status of the target, instead of `near`.
         moving: the moved frame: "tool" (the attached tool's, without a tool the flange), "flange" or a
             frame's name.
+        orientation: "variable": from the start's to the target's; "constant": the start's; "joint": as the
+            joints would turn it in a PTP.
+        reference: "base" or "path", of which a straight line makes the same.
         speed_mps: speed along the path [m/s], up to 10.
         acceleration_mps2: [m/s²], up to 100.
         jerk_mps3: [m/s³], up to 10 000.
@@ -274,12 +302,13 @@ def lin(
     """
     return Lin(
         pose,
-        _seven(near, "near"),
+        seven(near, "near"),
         redundancy,
         moving,
-        _path(speed_mps, acceleration_mps2, jerk_mps3, speed_radps, acceleration_radps2, jerk_radps3),
-        _joints(joint_speed, joint_acceleration, joint_jerk),
-        _blending(blend_rel, blend_m, blend_rad),
+        path_of(speed_mps, acceleration_mps2, jerk_mps3, speed_radps, acceleration_radps2, jerk_radps3),
+        joints_of(joint_speed, joint_acceleration, joint_jerk),
+        blending_of(blend_rel, blend_m, blend_rad),
+        orientation_of(orientation, reference),
     )
 
 
@@ -293,6 +322,8 @@ def lin_rel(
     *,
     frame: str = TOOL,
     moving: str = TOOL,
+    orientation: str = "variable",
+    reference: str = "base",
     speed_mps: float | None = None,
     acceleration_mps2: float | None = None,
     jerk_mps3: float | None = None,
@@ -317,6 +348,8 @@ def lin_rel(
         c: see a.
         frame: whose axes these are: "tool" (the moved frame's own), "base", or a frame's name.
         moving: the moved frame, as for `lin`; the speeds and blending as well.
+        orientation: see `lin`.
+        reference: see `lin`.
         speed_mps: see `lin`.
         acceleration_mps2: see `lin`.
         jerk_mps3: see `lin`.
@@ -339,9 +372,10 @@ def lin_rel(
         Pose.xyz_abc(x, y, z, a, b, c),
         frame,
         moving,
-        _path(speed_mps, acceleration_mps2, jerk_mps3, speed_radps, acceleration_radps2, jerk_radps3),
-        _joints(joint_speed, joint_acceleration, joint_jerk),
-        _blending(blend_rel, blend_m, blend_rad),
+        path_of(speed_mps, acceleration_mps2, jerk_mps3, speed_radps, acceleration_radps2, jerk_radps3),
+        joints_of(joint_speed, joint_acceleration, joint_jerk),
+        blending_of(blend_rel, blend_m, blend_rad),
+        orientation_of(orientation, reference),
     )
 
 
@@ -355,63 +389,3 @@ def hold(seconds: float = inf) -> Hold:
         LimitError: not positive, or NaN.
     """
     return Hold(seconds)
-
-
-def _seven(value: npt.ArrayLike | None, name: str) -> Array | None:
-    return None if value is None else array(value, 7, name)
-
-
-def _joints(
-    velocity: npt.ArrayLike | None, acceleration: npt.ArrayLike | None, jerk: npt.ArrayLike | None
-) -> JointDynamics:
-    return JointDynamics(
-        fractions(velocity, "speed"), fractions(acceleration, "acceleration"), fractions(jerk, "jerk")
-    )
-
-
-def _path(*values: float | None) -> CartesianDynamics:
-    return CartesianDynamics(
-        *(
-            within(value, name, 0.0, high, above=True, unit=unit)
-            for value, (name, high, unit) in zip(values, _PATH, strict=True)
-        )
-    )
-
-
-def _blending(relative: float, distance: float, orientation: float) -> Blending:
-    return Blending(
-        within(relative, "blend_rel", 0.0, 1.0),
-        within(distance, "blend_m", 0.0, 2.0, unit="m"),
-        within(orientation, "blend_rad", 0.0, 6.3, unit="rad"),
-    )
-
-
-def _target(pose: Pose) -> None:
-    if not isinstance(pose, Pose):
-        raise ShapeError(
-            f"the target is {pose!r}; a Pose is wanted",
-            parameter="pose",
-            value=pose,
-            hint="build one with Pose.xyz_abc(x, y, z, a, b, c)",
-        )
-
-
-def _near(near: Array | None, redundancy: Redundancy | None) -> Array | None:
-    if near is not None and redundancy is not None:
-        raise CommandRejected(
-            "near and redundancy both choose the arm position", parameter="near", hint="give one of them"
-        )
-    if redundancy is not None and not isinstance(redundancy, Redundancy):
-        raise ShapeError(f"redundancy is {redundancy!r}; a Redundancy is wanted", parameter="redundancy")
-    return _seven(near, "near")
-
-
-def _name(value: str, parameter: str) -> None:
-    if not isinstance(value, str) or not 1 <= len(value.encode()) <= _LONGEST_NAME:
-        raise ShapeError(
-            f"{parameter} is {value!r}; the name of a frame is wanted, up to {_LONGEST_NAME} octets",
-            code=3,
-            parameter=parameter,
-            value=value,
-            hint='for example "tool" or "base"',
-        )
