@@ -9,6 +9,7 @@ from heptarm.values.arrays import Array
 from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, SineImpedance
 from heptarm.values.pose import rotation
 from heptarm.values.robot import RobotModel
+from heptarm.virtual.fri.overlay import Superposition
 from heptarm.virtual.impedance import CartesianSpring, Flange
 from heptarm.virtual.law import JointSpring, Law, PositionLaw, Sensed
 from heptarm.virtual.order import Order
@@ -50,6 +51,14 @@ class Control:
     def torque(self, sensed: Sensed) -> Array:
         """Torques of the motors, shape (7,) [Nm]."""
         return self._law.torque(sensed)
+
+    def superpose(self, torque: Array, action: Superposition) -> None:
+        """Add to the motors' torques, shape (7,) [Nm], what an FRI overlay lays on them."""
+        if action.tau is not None:
+            torque += action.tau
+        if action.wrench is not None:
+            self._flange.update()
+            torque += self._flange.jacobian.T @ action.wrench
 
     def take(self, order: Order) -> bool:
         """Bring the law of an order's mode into force.

@@ -228,8 +228,11 @@ class CartesianSpring:
             self._watch()
         if self._max_force is not None:
             self.force = force = np.minimum(np.maximum(force, -self._max_force), self._max_force)
-        wanted = (sensed.after - 2 * sensed.now + sensed.before) * 1e6
-        torque: Array = sensed.mass @ wanted + sensed.bias - sensed.passive + jacobian.T @ force
+        torque: Array = sensed.bias - sensed.passive + jacobian.T @ force
+        if (
+            not sensed.is_overlaid
+        ):  # a client's set-points may jump, and the arm shall not be thrown after them
+            torque += sensed.mass @ ((sensed.after - 2 * sensed.now + sensed.before) * 1e6)
         torque += self._null(mobility, root, sensed.mass, sensed.now - sensed.q, speed - sensed.dq)
         self._time += TICK
         self._old_time += TICK

@@ -38,6 +38,7 @@ class Sensed:
         bias: Coriolis, centrifugal and gravity torques [Nm].
         passive: what friction gives [Nm].
         before: set-point of the last tick [rad], then of this and of the next one.
+        is_overlaid: the set-points are an FRI client's; an impedance law then follows them by its spring alone.
     """
 
     q: Array
@@ -48,6 +49,7 @@ class Sensed:
     before: Array
     now: Array
     after: Array
+    is_overlaid: bool = False
 
 
 class Law(Protocol):
@@ -120,10 +122,12 @@ class JointSpring:
             self._ramp += TICK
             share = min(1.0, self._ramp / RAMP)
             self._stiffness = self._from + share * (self._goal - self._from)
-        wanted = (sensed.after - 2 * sensed.now + sensed.before) * 1e6
-        speed = (sensed.after - sensed.before) * 500.0
         damper = 2.0 * self._damping * np.sqrt(self._stiffness * sensed.mass.diagonal())
         np.maximum(damper, LEAST_DAMPER, out=damper)
-        torque = sensed.mass @ wanted + sensed.bias - sensed.passive
-        torque += self._stiffness * (sensed.now - sensed.q) + damper * (speed - sensed.dq)
+        torque = sensed.bias - sensed.passive + self._stiffness * (sensed.now - sensed.q) - damper * sensed.dq
+        if (
+            not sensed.is_overlaid
+        ):  # a client's set-points may jump, and the arm shall not be thrown after them
+            torque += sensed.mass @ ((sensed.after - 2 * sensed.now + sensed.before) * 1e6)
+            torque += damper * ((sensed.after - sensed.before) * 500.0)
         return torque

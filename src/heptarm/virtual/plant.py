@@ -23,6 +23,7 @@ from heptarm.values.mode import Mode
 from heptarm.values.robot import RobotModel, robot
 from heptarm.virtual import ring
 from heptarm.virtual.control import Control
+from heptarm.virtual.fri.overlay import Superposition
 from heptarm.virtual.law import Sensed
 from heptarm.virtual.load import Load
 from heptarm.virtual.order import Order, PlanError
@@ -150,6 +151,9 @@ class Plant:
         self._inbox: deque[tuple[int, Order, Plan | None]] = deque()
         self._cancels: deque[tuple[int, int | None]] = deque()  # newest order at that time, which one
         self._changes: deque[tuple[int, Mode]] = deque()  # of the control mode of an order
+        self._aborts: deque[tuple[int, str]] = deque()  # orders that somebody else ends by an error
+        self._action: Superposition | None = None  # what an FRI overlay wants of the next tick
+        self._overlaid = False  # whether the last set-point was an overlay's
         self._run: _Run | None = None
         self._tail: Array | None = None  # where the last accepted order ends; None: not known
         self._open = 0  # accepted orders that have not ended
@@ -246,6 +250,21 @@ class Plant:
         """Change the parameters of a running order's control mode; of another order or kind it does nothing."""
         self._changes.append((order_id, mode))
 
+    def abort(self, order_id: int, text: str) -> None:
+        """End a running order by an error that somebody else has found; every axis brakes by itself."""
+        self._aborts.append((order_id, text))
+
+    # ------------------------------------------------------------------------------ overlays, from the tick's thread
+
+    @property
+    def interpolated(self) -> Array:
+        """Set-point of the next tick without an overlay, shape (7,) [rad]: where a held arm was when the hold began."""
+        return self._run.plan.end if self._overlaid and self._run is not None else self._command[2]
+
+    def overlay(self, action: Superposition | None) -> None:
+        """Lay an action on the running hold in the next tick; None after one: brake, and end the hold."""
+        self._action = action
+
     # ------------------------------------------------------------------------------ the tick
 
     def step(self, ticks: int = 1) -> None:
@@ -262,7 +281,10 @@ class Plant:
         mujoco.mj_fullM(m, d, self._mass)
         sensed = self._sensed
         sensed.before, sensed.now, sensed.after = self._command
+        sensed.is_overlaid = self._overlaid
         torque = self._control.torque(sensed)
+        if self._overlaid and self._action is not None:
+            self._control.superpose(torque, self._action)
         np.minimum(torque, self._limit, out=torque)
         np.maximum(torque, self._least, out=torque)
         self._ctrl[:] = torque
@@ -279,6 +301,12 @@ class Plant:
         command = self._command
         while self._cancels:
             self._cancel_now(*self._cancels.popleft())
+        while self._aborts:
+            order_id, text = self._aborts.popleft()
+            if self._run is not None and order_id == self._run_id() and not self._run.failure:
+                self._run.failure = text
+                if not self._overlaid and not self._run.braking:
+                    self._fail(self._run, text)
         while self._changes:
             order_id, mode = self._changes.popleft()
             if order_id == self._run_id():
@@ -321,6 +349,13 @@ class Plant:
             return self._settle(run)
         if run.follower is not None:
             return self._serve(run, run.follower)
+        if self._action is not None and planned.order.kind == "hold" and not (run.cancelled or run.failure):
+            self._overlaid = True
+            self._command[2] = self._action.q
+            return 0.0, nan
+        if self._overlaid:
+            self._overlaid = False
+            self._halt(run)
         run.time += TICK if run.braking else TICK * self._pace
         if run.path is None or run.profile is None:
             if run.cancelled or run.time >= planned.duration or planned.order.kind != "hold":
@@ -358,7 +393,12 @@ class Plant:
 
     def _fail(self, run: _Run, text: str) -> None:
         """Brake every axis by itself, off the path: straight on from where the last set-points led."""
-        run.failure, run.braking, run.ended, run.follower = text, True, False, None
+        run.failure = text
+        self._halt(run)
+
+    def _halt(self, run: _Run) -> None:
+        """Brake every axis by itself, straight on from where the last set-points led."""
+        run.braking, run.ended, run.follower = True, False, None
         here = self._command[2]
         speed = np.clip((here - self._command[0]) / TICK, -self.robot.dq_max, self.robot.dq_max)
         run.path = JointLine(here.copy(), here + speed)
@@ -438,6 +478,8 @@ class Plant:
             run.follower.brake(scale=self._scale, rate=rate)
             run.braking = True
             return
+        if self._overlaid:
+            return  # the next tick brakes from the overlay's speed
         if run.ended or run.profile is None or run.path is None:
             run.ended = run.ended or run.path is None
             return

@@ -1,0 +1,167 @@
+"""Overlays on the simulated arm: what the client commands is what the arm does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from math import cos, pi
+
+import numpy as np
+import pytest
+
+from heptarm.fri import messages as m
+from heptarm.fri.version import Version
+from heptarm.model.kinematics import forward
+from heptarm.values.arrays import Array
+from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, Position
+from heptarm.virtual.fri.configuration import Configuration
+from heptarm.virtual.fri.controller import TICK_NS, Controller
+from heptarm.virtual.fri.events import OverlayEnded
+from heptarm.virtual.fri.overlay import MotionOverlay
+from heptarm.virtual.fri.plant_arm import PlantArm
+from heptarm.virtual.fri.standalone import control_of
+from heptarm.virtual.plant import Plant
+from tests.virtual_fri.rig import READY, Client, Law, State, mirror
+
+FLOATING = JointImpedance(0.0)
+
+
+@dataclass
+class World:
+    """A plant under a session, one tick after the other."""
+
+    period: int = 1
+    client: Client = field(default_factory=lambda: Client(Version.V1_15))
+
+    def __post_init__(self) -> None:
+        self.plant = Plant("iiwa14", q=READY)
+        self.arm = PlantArm(self.plant)
+        self.controller = Controller(Configuration(Version.V1_15, self.period), self.arm.robot)
+        self.answer: bytes | None = None
+        self.q: list[Array] = []
+        self.ends: list[OverlayEnded] = []
+        self.controller.open()
+
+    @property
+    def now(self) -> int:
+        return self.plant.time_ns
+
+    def run(self, ticks: int) -> None:
+        for _ in range(ticks):
+            if self.answer is not None:
+                self.controller.receive(self.answer, self.now - TICK_NS // 2)
+                self.answer = None
+            datagram = self.controller.tick(self.arm.reading(), self.now)
+            self.arm.overlay(self.controller.superposition)
+            for event in self.controller.events():
+                if isinstance(event, OverlayEnded):
+                    self.ends.append(event)
+                    self.arm.release()
+            self.plant.tick()
+            self.q.append(self.plant.snapshot.q)
+            if datagram is not None:
+                self.answer = self.client.answer(datagram)
+
+    def active(self, mode: m.CommandMode, control: Mode) -> None:
+        while self.controller.state is not State.MONITORING_READY:
+            self.run(1)
+        self.arm.hold(control)
+        self.controller.start(MotionOverlay(mode, control_of(control)))
+        while self.controller.state is not State.COMMANDING_ACTIVE:
+            self.run(1)
+
+
+def swing(world: World, amplitude: float) -> Law:
+    """All axes on sines that begin and go on without a jerk; the wish for a message's time."""
+    start = world.now * 1e-9
+
+    def law(message: m.Monitoring) -> m.Command:
+        assert message.monitor is not None and message.monitor.stamp is not None
+        stamp = message.monitor.stamp
+        time = stamp.seconds + stamp.nanoseconds * 1e-9 - start
+        return replace(mirror(message), q=tuple(wish(time, amplitude).tolist()))
+
+    return law
+
+
+def wish(time: float, amplitude: float) -> Array:
+    return np.array(READY) + amplitude * 0.5 * (1.0 - cos(2.0 * time))
+
+
+@pytest.mark.parametrize(("period", "behind"), [(1, 1), (5, 6)])
+def test_a_position_overlay_is_tracked_within_a_milliradian(period: int, behind: int) -> None:
+    world = World(period)
+    world.active(m.CommandMode.POSITION, Position())
+    start, first = world.now * 1e-9, len(world.q)
+    world.client.law = swing(world, 0.3)
+    world.run(3000)
+    assert world.ends == []
+    # the state after a tick is a tick later than the message that the tick's command answers
+    late = [world.q[first + k] - wish((k + 1 - behind) * 1e-3, 0.3) for k in range(100, 3000)]
+    assert float(np.abs(late).max()) < 1e-3 and start > 0
+
+
+def test_a_torque_law_balances_the_floating_arm() -> None:
+    world = World()
+    world.active(m.CommandMode.TORQUE, FLOATING)
+    goal = np.array(READY)
+
+    def law(message: m.Monitoring) -> m.Command:
+        assert message.monitor is not None and message.monitor.q is not None
+        q = np.array(message.monitor.q)
+        dq, law.before = (q - law.before) * 1e3, q  # type: ignore[attr-defined]
+        tau = np.clip(200.0 * (goal - q) - 20.0 * dq, -30.0, 30.0)
+        return replace(mirror(message), q=message.monitor.q, tau=tuple(tau.tolist()))
+
+    law.before = goal  # type: ignore[attr-defined]
+    world.client.law = law
+    world.plant.apply_wrench((10.0, 0.0, 0.0), duration=0.3)
+    world.run(3000)
+    assert world.ends == []
+    assert float(np.abs(world.plant.snapshot.q - goal).max()) < 0.02
+
+
+def test_a_torque_moves_the_joint_that_it_acts_on() -> None:
+    world = World()
+    world.active(m.CommandMode.TORQUE, FLOATING)
+    world.client.law = lambda message: replace(mirror(message), tau=(*(0.0,) * 6, 0.8))
+    world.run(150)
+    moved = world.plant.snapshot.q - READY
+    assert moved[6] > 5e-3 and world.ends == []
+
+
+def test_a_wrench_pushes_with_its_force_against_the_spring() -> None:
+    world = World()
+    world.active(m.CommandMode.WRENCH, CartesianImpedance((500.0, 500.0, 500.0, 50.0, 50.0, 50.0)))
+    here = world.plant.snapshot.q
+    world.client.law = lambda message: replace(mirror(message), wrench=(0.0, 0.0, -10.0, 0.0, 0.0, 0.0))
+    world.run(2500)
+    way = forward(world.plant.robot, world.plant.snapshot.q) - forward(world.plant.robot, here)
+    assert world.ends == [] and way[2, 3] == pytest.approx(-10.0 / 500.0, abs=1e-3)
+
+
+def test_an_overlay_that_ends_at_speed_brakes_within_the_axes_acceleration() -> None:
+    world = World()
+    world.active(m.CommandMode.POSITION, Position())
+    world.client.law = swing(world, 0.5)
+    world.run(int(1e3 * pi / 4))
+    world.client.law = lambda message: replace(mirror(message), q=(0.0,) * 7)
+    world.run(800)
+    assert [end.cause for end in world.ends] == ["limit"]
+    assert world.plant.idle and np.abs(world.plant.snapshot.dq).max() < 1e-3
+    speed = np.diff(np.array(world.q)[-800:], axis=0) * 1e3
+    acceleration = np.diff(speed, axis=0) * 1e3
+    assert float(np.abs(acceleration).max()) < 1.5 * float(world.plant.robot.ddq_max[0])
+
+
+def test_the_next_overlay_mirrors_where_the_arm_came_to_rest() -> None:
+    world = World()
+    world.active(m.CommandMode.POSITION, Position())
+    world.client.law = swing(world, 0.5)
+    world.run(700)
+    world.controller.stop()
+    world.run(500)
+    rest = world.plant.snapshot.q_cmd
+    world.client.law = mirror
+    world.active(m.CommandMode.POSITION, Position())
+    world.run(200)
+    assert np.abs(world.plant.snapshot.q - rest).max() < 1e-4 and abs(rest[0] - READY[0]) > 0.1
