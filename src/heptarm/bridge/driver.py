@@ -1,0 +1,351 @@
+"""One arm behind a node: connection and reconnection, states, goals, commands, services; free of ROS.
+
+A node makes one, converts messages for it, and is told of states and goals from the driver's own threads.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import socket
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from heptarm.arm.arm import Arm
+from heptarm.arm.connect import connect
+from heptarm.arm.handle import MotionHandle
+from heptarm.bridge.execution import Listener, ServoExecution
+from heptarm.bridge.goal import Goal, GoalRefused
+from heptarm.bridge.parameters import Configuration
+from heptarm.bridge.report import Report, report
+from heptarm.bridge.stream import Stream
+from heptarm.errors import HeptarmError, NotReady, ShapeError
+from heptarm.io.clock import RealClock
+from heptarm.values.arrays import Array
+from heptarm.values.motion import Motion, lin, ptp
+from heptarm.values.pose import Pose
+from heptarm.values.state import State
+
+_log = logging.getLogger("heptarm.bridge")
+
+#: Pauses between attempts to reconnect [s].
+_BACK_OFF, _LONGEST_BACK_OFF = 0.2, 2.0
+#: How long a motion may take to come to rest before a goal [s].
+_REST = 5.0
+
+
+class DriverListener(Listener, Protocol):
+    """Hears of everything, from the driver's threads; it must not block."""
+
+    def on_state(self, state: State) -> None:
+        """A new state came."""
+        ...
+
+    def on_link(self, trouble: str) -> None:
+        """The connection came (empty) or went (why)."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a service answers.
+
+    Attributes:
+        success: whether it was done.
+        message: what was done, or why not.
+    """
+
+    success: bool
+    message: str
+
+
+class Driver:
+    """One arm behind a node.
+
+    Args:
+        configuration: what the node's parameters say.
+        listener: hears of everything.
+
+    Raises:
+        ConnectFailed: nobody answers.
+        NotInControl: another client controls the robot.
+    """
+
+    def __init__(self, configuration: Configuration, listener: DriverListener) -> None:
+        values = configuration.values
+        self.configuration = configuration
+        self._listener = listener
+        self._clock = RealClock()
+        self._active = False
+        self._closed = threading.Event()
+        self._handle: MotionHandle | None = None
+        self._trouble = ""
+        self._arm = connect(
+            values["target"] or None, key=values["key"] or None, state_rate=values["state_rate"], name=_name()
+        )
+        self._arm.speed = values["speed"]
+        self._execution = ServoExecution(
+            self._arm,
+            configuration.joints,
+            listener,
+            options=configuration.servo,
+            settings=configuration.settings,
+        )
+        self._stream = Stream(self._arm, timeout=values["command_timeout"], options=configuration.servo)
+        self._pump = threading.Thread(target=self._run, name="heptarm-states")
+        self._pump.start()
+        listener.on_link("")
+
+    # ------------------------------------------------------------------------------------ life
+
+    @property
+    def arm(self) -> Arm:
+        """The arm."""
+        return self._arm
+
+    @property
+    def trouble(self) -> str:
+        """Why there is no connection; empty: there is one."""
+        return self._trouble
+
+    @property
+    def active(self) -> bool:
+        """Whether goals and commands are taken."""
+        return self._active
+
+    def activate(self) -> None:
+        """Take goals and commands from now on."""
+        self._active = True
+
+    def deactivate(self) -> None:
+        """Take no more; what runs comes to rest."""
+        self._active = False
+        self._execution.abort("the node was deactivated")
+        self._stream.close()
+        if self._handle is not None and not self._handle.done:
+            try:
+                self._arm.stop()
+            except HeptarmError as error:
+                _log.warning("deactivating: %s", error)
+        self._execution.wait_idle(_REST)
+
+    def close(self) -> None:
+        """Leave the arm at rest and disconnect. Closing twice is legal."""
+        if self._closed.is_set():
+            return
+        self.deactivate()
+        self._closed.set()
+        self._execution.close()
+        self._arm.close()
+        self._pump.join(_REST)
+
+    def configure(self, configuration: Configuration) -> None:
+        """Take other values of those parameters that count at once."""
+        self.configuration = configuration
+        self._execution.settings = configuration.settings
+
+    def report(self) -> Report:
+        """How the arm is."""
+        state = None
+        try:
+            state = self._arm.state
+        except HeptarmError as error:
+            return report(None, trouble=self._trouble or str(error), active=self._active)
+        return report(state, trouble=self._trouble, active=self._active, age=state.age)
+
+    def _run(self) -> None:
+        """States from one connection after the other."""
+        while not self._closed.is_set():
+            try:
+                for state in self._arm.states(size=16):
+                    self._listener.on_state(state)
+            except HeptarmError as error:
+                if self._closed.is_set():
+                    return
+                self._lost(str(error))
+            except Exception:
+                _log.exception("publishing a state")
+            if not self._closed.is_set():
+                self._reconnect()
+
+    def _lost(self, why: str) -> None:
+        self._trouble = why
+        _log.error("the connection is lost: %s", why)
+        self._listener.on_link(why)
+
+    def _reconnect(self) -> None:
+        pause = _BACK_OFF
+        while not self._closed.is_set() and not self._arm.connected:
+            try:
+                self._arm.reconnect()
+                _log.warning("reconnected; nothing moves until it is told to")
+            except HeptarmError as error:
+                self._trouble = str(error)
+                self._closed.wait(pause)
+                pause = min(2 * pause, _LONGEST_BACK_OFF)
+        if self._arm.connected and self._trouble:
+            self._trouble = ""
+            self._listener.on_link("")
+
+    # ------------------------------------------------------------------------------------ goals
+
+    @property
+    def now(self) -> float:
+        """The time on the clock that goals start by [s]."""
+        return self._execution.now
+
+    def accept(self, goal: Goal) -> int:
+        """Take a goal of FollowJointTrajectory; whatever else moves the arm comes to rest first.
+
+        Returns:
+            Its number.
+
+        Raises:
+            GoalRefused: it makes no sense, or the node is not active, or the arm cannot follow.
+        """
+        if not self._active:
+            raise GoalRefused("the node is not active", hint="activate it")
+        if self._trouble:
+            raise GoalRefused(f"no connection: {self._trouble}")
+        handle = self._handle
+        try:
+            self._check_ready()
+            self._stream.close()
+            if handle is not None and not handle.done:
+                handle.cancel()
+                self._arm.wait_for_rest(timeout=_REST)
+        except HeptarmError as error:
+            raise GoalRefused(str(error)) from error
+        return self._execution.accept(goal)
+
+    def cancel(self, number: int) -> bool:
+        """End a goal early; the arm brakes. False: it is not under way."""
+        return self._execution.cancel(number)
+
+    def _check_ready(self) -> None:
+        safety = self._arm.state.status
+        if safety is not None and (safety.emergency_stop or safety.protective_stop):
+            raise NotReady("a stop is active", hint=report(self._arm.state).text)
+
+    # --------------------------------------------------------------------------------- commands
+
+    def positions(self, names: list[str], values: list[float]) -> Array:
+        """Joint positions of a message in the arm's order, shape (7,) [rad]; joints left out stay where they are.
+
+        Args:
+            names: of the joints, in any order; empty: all, in the arm's order.
+            values: positions [rad].
+
+        Raises:
+            ShapeError: an unknown name, a name twice, or not as many numbers as names.
+        """
+        order = names or list(self.configuration.joints)
+        if len(order) != len(values) or len(set(order)) != len(order):
+            raise ShapeError(f"{len(values)} numbers for the joints {order}; one for each is wanted")
+        q = self._arm.state.q_cmd.copy()
+        for name, value in zip(order, values):
+            if name not in self.configuration.joints:
+                raise ShapeError(
+                    f"unknown joint {name!r}", hint=f"joints are {', '.join(self.configuration.joints)}"
+                )
+            q[self.configuration.joints.index(name)] = value
+        return q
+
+    def move(self, target: Array | Pose, *, straight: bool = False) -> MotionHandle:
+        """Start a motion to joint positions or a pose; it takes the place of whatever runs.
+
+        Args:
+            target: joint positions, shape (7,) [rad], or a pose of the flange in the base.
+            straight: on a straight line; needs a pose.
+
+        Raises:
+            HeptarmError: refused; the text says why.
+        """
+        self._check_active()
+        motion: Motion
+        if isinstance(target, Pose):
+            motion = lin(target) if straight else ptp(target)
+        else:
+            motion = ptp(target)
+        self._execution.abort("a command took the place of this goal")
+        self._stream.close()
+        self._handle = self._arm.start(motion, when="replace")
+        return self._handle
+
+    def follow(self, target: Array | Pose, dq: Array | None = None) -> None:
+        """Follow a target of a servo topic until none comes for `command_timeout`.
+
+        Args:
+            target: joint positions, shape (7,) [rad], or a pose of the flange in the base.
+            dq: velocity to pass the joint positions at, shape (7,) [rad/s].
+
+        Raises:
+            HeptarmError: refused; the text says why.
+        """
+        self._prepare_stream()
+        if isinstance(target, Pose):
+            self._stream.pose(target)
+        else:
+            self._stream.joints(target, dq)
+
+    def follow_velocity(self, dq: Array) -> None:
+        """Move at joint velocities, shape (7,) [rad/s], until none come for `command_timeout`.
+
+        Raises:
+            HeptarmError: refused; the text says why.
+        """
+        self._prepare_stream()
+        self._stream.velocity(np.asarray(dq, dtype=np.float64))
+
+    def _prepare_stream(self) -> None:
+        self._check_active()
+        if not self._stream.active:
+            if self._execution.busy:
+                self._execution.abort("a servo command took the place of this goal")
+            self._execution.wait_idle(_REST)
+
+    def _check_active(self) -> None:
+        if not self._active:
+            raise NotReady("the node is not active", hint="activate it")
+
+    # --------------------------------------------------------------------------------- services
+
+    def stop(self) -> Answer:
+        """Stop whatever runs."""
+        return self._answer(self._arm.stop, "stopped")
+
+    def recover(self) -> Answer:
+        """Come back after trouble as far as a program may: connection, control, pause; and say what is left."""
+
+        def work() -> None:
+            if not self._arm.connected:
+                self._arm.reconnect()
+            if not self._arm.in_control:
+                self._arm.take_control()
+            state = self._arm.wait_until(lambda state: True, timeout=2.0)
+            if state.status is not None and state.status.paused:
+                self._arm.resume()
+            now = report(state, active=self._active)
+            if now.level >= 2:
+                raise NotReady(now.text)
+
+        return self._answer(work, "connected, in control, nothing in the way")
+
+    def set_override(self, value: float) -> Answer:
+        """Set the cabinet's application override, [0, 1]."""
+        return self._answer(lambda: self._arm.set_override(value), f"override is {value:g}")
+
+    def _answer(self, work: Callable[[], None], done: str) -> Answer:
+        try:
+            work()
+        except HeptarmError as error:
+            return Answer(False, str(error))
+        return Answer(True, done)
+
+
+def _name() -> str:
+    return f"ROS node at {socket.gethostname()}:{os.getpid()}"

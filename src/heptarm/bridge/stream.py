@@ -1,0 +1,116 @@
+"""Targets that come one by one as messages: the first one opens a servo motion, silence ends it."""
+
+from __future__ import annotations
+
+import logging
+import threading
+
+import numpy as np
+
+from heptarm.arm.arm import Arm
+from heptarm.arm.servo import JointServo, PoseServo
+from heptarm.bridge.execution import ServoOptions
+from heptarm.errors import HeptarmError
+from heptarm.io.clock import RealClock
+from heptarm.values.arrays import Array, array
+from heptarm.values.pose import Pose
+
+_log = logging.getLogger("heptarm.bridge")
+
+#: A velocity is turned into a target so far ahead [s]; the cabinet keeps a target's velocity longer than that.
+_AHEAD = 0.05
+
+
+class Stream:
+    """Targets that come one by one; the cabinet's own watchdog brakes the arm when they stay away.
+
+    Args:
+        arm: in control.
+        timeout: within this time after a target the next one has to come [s].
+        options: ceilings and engine.
+    """
+
+    def __init__(self, arm: Arm, *, timeout: float, options: ServoOptions) -> None:
+        self._arm = arm
+        self._timeout = timeout
+        self._options = options
+        self._clock = RealClock()
+        self._lock = threading.RLock()
+        self._servo: JointServo | PoseServo | None = None
+        self._q = np.zeros(7)
+        self._last = 0
+
+    @property
+    def active(self) -> bool:
+        """Whether the arm follows."""
+        servo = self._servo
+        return servo is not None and servo.active
+
+    def joints(self, q: Array, dq: Array | None = None) -> None:
+        """Follow joint positions, shape (7,) [rad], passed at `dq` [rad/s]."""
+        with self._lock:
+            wanted = array(q, 7, "position")
+            self._q = self._joint_servo().set(wanted, None if dq is None else array(dq, 7, "velocity"))
+
+    def velocity(self, dq: Array) -> None:
+        """Move at joint velocities, shape (7,) [rad/s], at most the robot's."""
+        with self._lock:
+            robot = self._arm.robot
+            wanted = np.clip(array(dq, 7, "velocity"), -robot.dq_max, robot.dq_max)
+            was_active = self.active
+            servo = self._joint_servo()
+            now = self._clock.nanos()
+            if not was_active:
+                self._q, self._last = servo.start.q.copy(), now
+            passed = min((now - self._last) * 1e-9, self._timeout)
+            self._last = now
+            self._q = np.clip(self._q + wanted * passed, robot.q_min, robot.q_max)
+            servo.set(self._q + wanted * _AHEAD, wanted)
+
+    def pose(self, pose: Pose) -> None:
+        """Follow a pose of the flange in the base."""
+        with self._lock:
+            servo = self._servo
+            if not isinstance(servo, PoseServo) or not servo.active:
+                self.close()
+                options = self._options
+                servo = self._servo = self._arm.servo(
+                    "pose",
+                    rate=self._rate,
+                    watchdog=self._timeout,
+                    engine=options.engine,
+                    speed=options.speed,
+                    acceleration=options.acceleration,
+                    mode=options.mode,
+                ).__enter__()
+            servo.set(pose)
+
+    def close(self) -> None:
+        """End it at rest; what ended it earlier is told to the log."""
+        with self._lock:
+            servo, self._servo = self._servo, None
+            if servo is not None:
+                try:
+                    servo.close()
+                except HeptarmError as error:
+                    _log.info("the stream of targets ended: %s", error)
+
+    def _joint_servo(self) -> JointServo:
+        servo = self._servo
+        if not isinstance(servo, JointServo) or not servo.active:
+            self.close()
+            options = self._options
+            servo = self._servo = self._arm.servo(
+                "joint",
+                rate=self._rate,
+                watchdog=self._timeout,
+                engine=options.engine,
+                speed=options.speed,
+                acceleration=options.acceleration,
+                mode=options.mode,
+            ).__enter__()
+        return servo
+
+    @property
+    def _rate(self) -> float:
+        return max(self._options.rate, 1.0 / self._timeout)
