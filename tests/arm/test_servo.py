@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.modes import CartesianImpedance, JointImpedance, Position
+from heptarm.modes import JointImpedance, Position
 from tests.conftest import RunningCabinet
 
 A7 = np.array([0, 0, 0, 0, 0, 0, 1.0])
@@ -94,7 +94,6 @@ def test_bad_targets_are_refused_here(arm: ha.Arm, bad: object) -> None:
         ({"min_trajectory_time": 5.0}, "min_trajectory_time"),
         ({"goal_timeout": 0.0}, "goal_timeout"),
         ({"mode": "soft"}, "mode"),
-        ({"mode": CartesianImpedance()}, "CartesianImpedance"),
     ],
 )
 def test_bad_settings_are_refused_before_anything_is_sent(arm: ha.Arm, settings: dict, word: str) -> None:
@@ -172,8 +171,6 @@ def test_motions_take_a_mode_of_their_own_or_of_a_block(arm: ha.Arm) -> None:
     with arm.using(JointImpedance(400.0)):
         assert arm.move([ha.ptp(home), ha.lin_rel(z=-0.02), ha.lin_rel(z=0.02)]).arrived
     assert arm.move(ha.ptp(home)).residual < 1e-4
-    with pytest.raises(ha.CommandRejected, match="SineImpedance|CartesianImpedance"):
-        arm.move(ha.hold(0.1), mode=CartesianImpedance())
 
 
 def test_a_servo_does_not_begin_in_impedance_at_a_singularity(arm: ha.Arm) -> None:

@@ -19,9 +19,11 @@ import jpype.nio
 import numpy as np
 
 from heptarm import _resources
-from heptarm.errors import MissingExtra, Unreachable
+from heptarm.errors import CommandRejected, MissingExtra, Unreachable
 from heptarm.model.inverse import solve
-from heptarm.values.mode import JointImpedance, Mode
+from heptarm.values.arrays import Array
+from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, SineImpedance
+from heptarm.values.motion import TOOL
 from heptarm.values.pose import Pose
 from heptarm.virtual.order import Order, PlanError
 from heptarm.virtual.plant import Plant
@@ -118,18 +120,62 @@ def _numbers_if(values: Any) -> tuple[float, ...] | None:
     return None if values is None else _numbers(values)
 
 
-def _mode(values: Any) -> Mode | None:
-    """A control mode as heptarm.doubles.MotionOrder describes it."""
+def _mode(values: Any) -> tuple[Mode | None, tuple[float, ...] | None]:
+    """A control mode as heptarm.doubles.MotionOrder describes it, and the quaternion of its axes if they are fixed."""
     if values is None:
-        return None
-    numbers = np.array(_numbers(values)[1:])
-    return JointImpedance(numbers[:7], damping=numbers[7:])
+        return None, None
+    left = np.array(_numbers(values))
+    kind = int(left[0])
+    left = left[1:]
+
+    def take(count: int) -> Array:
+        nonlocal left
+        taken, left = left[:count], left[count:]
+        return taken
+
+    if kind == 1:
+        return JointImpedance(take(7), damping=take(7)), None
+    stiffness, damping, elbow, added = take(6), take(6), take(2), take(6)
+    force, stops, velocity, deviation, turn = take(6), bool(take(1)[0]), take(6), take(6), take(4)
+    axes = None if np.isnan(turn).any() else tuple(turn.tolist())
+    base = CartesianImpedance(
+        stiffness,
+        damping=damping,
+        nullspace_stiffness=float(elbow[0]),
+        nullspace_damping=float(elbow[1]),
+        additional_force=added,
+        max_force=force,
+        max_force_stops=stops and not np.isnan(force).all(),
+        max_velocity=velocity,
+        max_deviation=deviation,
+        frame=TOOL if axes is None else "reference",
+    )
+    if kind == 2:
+        return base, axes
+    amplitude, frequency, phase, bias, force_limit, position_limit = (take(6) for _ in range(6))
+    total, rise, hold, fall, stays = take(5).tolist()
+    pattern = SineImpedance(
+        base,
+        amplitude=amplitude,
+        frequency=frequency,
+        phase=phase,
+        bias=bias,
+        force_limit=force_limit,
+        position_limit=position_limit,
+        total_time=total,
+        rise_time=rise,
+        hold_time=hold,
+        fall_time=fall,
+        stay_active=bool(stays),
+    )
+    return pattern, axes
 
 
 def _order(java: Any) -> Order:
     relative, cartesian = _numbers(java.relative), _numbers(java.cartesian)
     e1, status, turn = _numbers(java.redundancy)
     minimum_time, goal_timeout, speed_timeout = _numbers(java.timing)
+    mode, axes = _mode(java.mode)
     return Order(
         int(java.id),
         str(java.kind),
@@ -149,7 +195,8 @@ def _order(java: Any) -> Order:
         ori_acceleration=cartesian[4],
         ori_jerk=cartesian[5],
         duration=float(java.duration),
-        mode=_mode(java.mode),
+        mode=mode,
+        axes=axes,
         minimum_time=minimum_time,
         goal_timeout=goal_timeout,
         speed_timeout=speed_timeout,
@@ -178,7 +225,7 @@ def open_station(plant: Plant) -> Any:
         def submit(self, order: Any) -> str | None:
             try:
                 plant.submit(_order(order))
-            except PlanError as error:
+            except (PlanError, CommandRejected) as error:
                 return str(error)
             return None
 
@@ -200,7 +247,7 @@ def open_station(plant: Plant) -> Any:
 
         @jpype.JOverride  # type: ignore[untyped-decorator]
         def changeMode(self, order_id: int, values: Any) -> None:
-            mode = _mode(values)
+            mode, _ = _mode(values)
             if mode is not None:
                 plant.change_mode(int(order_id), mode)
 

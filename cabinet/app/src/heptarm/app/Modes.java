@@ -1,24 +1,52 @@
 package heptarm.app;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.CartDOF;
+import com.kuka.roboticsAPI.geometricModel.CartPlane;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.AbstractMotionControlMode;
+import com.kuka.roboticsAPI.motionModel.controlModeModel.CartesianImpedanceControlMode;
+import com.kuka.roboticsAPI.motionModel.controlModeModel.CartesianSineImpedanceControlMode;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.JointImpedanceControlMode;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.PositionControlMode;
 
+import heptarm.core.Refusal;
+import heptarm.wire.CartesianImpedance;
+import heptarm.wire.Code;
 import heptarm.wire.JointImpedance;
 import heptarm.wire.Mode;
-import heptarm.wire.PositionMode;
+import heptarm.wire.SineImpedance;
+import heptarm.wire.SpiralPattern;
 
 /** Control modes of the protocol as those of Sunrise. */
 final class Modes {
-    private Modes() {
+    /** Sunrise's names of the protocol's directions x y z, about x, about y, about z. */
+    private static final CartDOF[] DIRECTIONS = {CartDOF.X, CartDOF.Y, CartDOF.Z, CartDOF.C, CartDOF.B, CartDOF.A};
+    /** In a direction without a limit where another has one [N, Nm, mm, rad, ...]. */
+    private static final double OFF = 1e6;
+
+    private final LBR robot;
+
+    Modes(LBR robot) {
+        this.robot = robot;
     }
 
-    static boolean isKnown(Mode mode) {
-        return mode instanceof PositionMode || mode instanceof JointImpedance;
+    /** Refuses a mode whose frame is not known here. */
+    static void check(Mode mode, String path) throws Refusal {
+        String at = path;
+        CartesianImpedance spring = null;
+        if (mode instanceof SineImpedance) {
+            at = path + "base.";
+            spring = ((SineImpedance) mode).base;
+        } else if (mode instanceof CartesianImpedance) {
+            spring = (CartesianImpedance) mode;
+        }
+        if (spring != null && spring.frame.length() > 0 && !"tool".equals(spring.frame) && !"base".equals(spring.frame)) {
+            throw new Refusal(Code.UNKNOWN_NAME, at + "frame", spring.frame, "tool, base", "no frame " + spring.frame);
+        }
     }
 
-    /** The Sunrise mode of a known one; null is position control. */
-    static AbstractMotionControlMode of(Mode mode) {
+    /** The Sunrise mode of a checked one; null is position control. */
+    AbstractMotionControlMode of(Mode mode) {
         if (mode instanceof JointImpedance) {
             JointImpedance spring = (JointImpedance) mode;
             JointImpedanceControlMode joints = new JointImpedanceControlMode(spring.stiffness.length);
@@ -26,6 +54,96 @@ final class Modes {
             joints.setDamping(spring.damping);
             return joints;
         }
+        if (mode instanceof CartesianImpedance) {
+            CartesianImpedanceControlMode spring = new CartesianImpedanceControlMode();
+            set(spring, (CartesianImpedance) mode);
+            return spring;
+        }
+        if (mode instanceof SineImpedance) {
+            CartesianSineImpedanceControlMode pattern = new CartesianSineImpedanceControlMode();
+            set(pattern, ((SineImpedance) mode).base);
+            set(pattern, (SineImpedance) mode);
+            return pattern;
+        }
+        if (mode instanceof SpiralPattern) {
+            SpiralPattern spiral = (SpiralPattern) mode;
+            return CartesianSineImpedanceControlMode.createSpiralPattern(CartPlane.valueOf(spiral.plane.name()), spiral.frequency,
+                    spiral.amplitude, spiral.stiffness, spiral.total_time);
+        }
         return new PositionControlMode();
+    }
+
+    private void set(CartesianImpedanceControlMode spring, CartesianImpedance from) {
+        for (int i = 0; i < DIRECTIONS.length; i++) {
+            spring.parametrize(DIRECTIONS[i]).setStiffness(from.stiffness[i]);
+            spring.parametrize(DIRECTIONS[i]).setDamping(from.damping[i]);
+            spring.parametrize(DIRECTIONS[i]).setAdditionalControlForce(from.additional_force[i]);
+        }
+        spring.setNullSpaceStiffness(from.nullspace_stiffness);
+        spring.setNullSpaceDamping(from.nullspace_damping);
+        if (limits(from.max_force)) {
+            double[] most = six(from.max_force, false);
+            spring.setMaxControlForce(most[0], most[1], most[2], most[3], most[4], most[5], from.max_force_stops);
+        }
+        if (limits(from.max_velocity)) {
+            double[] most = six(from.max_velocity, true);
+            spring.setMaxCartesianVelocity(most[0], most[1], most[2], most[3], most[4], most[5]);
+        }
+        if (limits(from.max_deviation)) {
+            double[] most = six(from.max_deviation, true);
+            spring.setMaxPathDeviation(most[0], most[1], most[2], most[3], most[4], most[5]);
+        }
+        if ("base".equals(from.frame)) {
+            spring.setReferenceSystem(robot.getRootFrame());
+        }
+    }
+
+    private static void set(CartesianSineImpedanceControlMode pattern, SineImpedance from) {
+        for (int i = 0; i < DIRECTIONS.length; i++) {
+            pattern.parametrize(DIRECTIONS[i]).setAmplitude(from.amplitude[i]);
+            pattern.parametrize(DIRECTIONS[i]).setFrequency(from.frequency[i]);
+            pattern.parametrize(DIRECTIONS[i]).setPhaseDeg(Math.toDegrees(from.phase[i]));
+            pattern.parametrize(DIRECTIONS[i]).setBias(from.bias[i]);
+            if (!Double.isNaN(from.force_limit[i])) {
+                pattern.parametrize(DIRECTIONS[i]).setForceLimit(from.force_limit[i]);
+            }
+            if (!Double.isNaN(from.position_limit[i])) {
+                double most = i < 3 ? Convert.toMillimetres(from.position_limit[i]) : from.position_limit[i];
+                pattern.parametrize(DIRECTIONS[i]).setPositionLimit(most);
+            }
+        }
+        if (!Double.isNaN(from.total_time)) {
+            pattern.setTotalTime(from.total_time);
+        }
+        if (from.rise_time > 0) {
+            pattern.setRiseTime(from.rise_time);
+        }
+        if (!Double.isNaN(from.hold_time)) {
+            pattern.setHoldTime(from.hold_time);
+        }
+        if (from.fall_time > 0) {
+            pattern.setFallTime(from.fall_time);
+        }
+        pattern.setStayActiveUntilPatternFinished(from.stay_active);
+    }
+
+    /** Whether any direction has a limit. */
+    private static boolean limits(double[] values) {
+        for (int i = 0; i < values.length; i++) {
+            if (!Double.isNaN(values[i])) {
+                return true;
+            }
+        }
+        return false;
+    }
+
+    /** Limits in Sunrise's order x y z a b c, lengths in millimetres. */
+    private static double[] six(double[] values, boolean lengths) {
+        double[] result = new double[values.length];
+        for (int i = 0; i < values.length; i++) {
+            double value = lengths && i < 3 ? Convert.toMillimetres(values[i]) : values[i];
+            result[i < 3 ? i : 8 - i] = Double.isNaN(value) ? OFF : value;
+        }
+        return result;
     }
 }

@@ -16,7 +16,6 @@ import com.kuka.roboticsAPI.motionModel.LIN;
 import com.kuka.roboticsAPI.motionModel.RelativeLIN;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 import com.kuka.roboticsAPI.motionModel.SplineMotionCP;
-import com.kuka.roboticsAPI.motionModel.controlModeModel.PositionControlMode;
 
 import heptarm.core.Refusal;
 import heptarm.wire.Blending;
@@ -42,20 +41,22 @@ import heptarm.wire.ServoOpen;
 /** Turns items of a program into Sunrise motions. What cannot be carried out is refused, never ignored. */
 final class Motions {
     static final String[] CAPABILITIES = {"ptp", "ptp_pose", "lin", "lin_rel", "hold", "override", "pause",
-        "servo", "servo_direct", "servo_pose", "joint_impedance"};
+        "servo", "servo_direct", "servo_pose", "joint_impedance", "cartesian_impedance", "sine_impedance"};
 
     private static final int JOINTS = 7;
 
     private final LBR robot;
+    private final Modes modes;
 
     Motions(LBR robot) {
         this.robot = robot;
+        this.modes = new Modes(robot);
     }
 
     /** Refuses what this cabinet cannot carry out. */
     void check(Item item, String path) throws Refusal {
         checkFrame(item.frame, path);
-        checkMode(item.mode, path);
+        Modes.check(item.mode, path + "mode.");
         if (item.until.nodes.length > 0) {
             throw unsupported(path + "until", "break conditions");
         }
@@ -88,7 +89,7 @@ final class Motions {
     /** Refuses a servo motion that this cabinet cannot carry out. */
     void check(ServoOpen open) throws Refusal {
         checkFrame(open.frame, "");
-        checkMode(open.mode, "");
+        Modes.check(open.mode, "mode.");
         if (open.engine == ServoEngine.LIN) {
             throw unsupported("engine", "the servo engine \"lin\"");
         }
@@ -100,12 +101,6 @@ final class Motions {
     private static void checkFrame(String frame, String path) throws Refusal {
         if (frame.length() > 0 && !"flange".equals(frame)) {
             throw new Refusal(Code.UNKNOWN_NAME, path + "frame", frame, "flange", "no frame " + frame + " can be moved here");
-        }
-    }
-
-    private static void checkMode(Mode mode, String path) throws Refusal {
-        if (mode != null && !Modes.isKnown(mode)) {
-            throw unsupported(path + "mode", mode.getClass().getSimpleName());
         }
     }
 
@@ -135,7 +130,7 @@ final class Motions {
     /** The Sunrise motion of a checked item. */
     IMotion motion(Item item, Mode mode) {
         RobotMotion<?> motion = motion(item);
-        motion.setMode(Modes.of(mode));
+        motion.setMode(modes.of(mode));
         return motion;
     }
 
@@ -165,7 +160,7 @@ final class Motions {
         }
         double duration = ((Hold) motion).duration;
         long millis = Double.isNaN(duration) ? -1 : Math.max(1, Math.round(duration * 1000));
-        return positionHold(new PositionControlMode(), millis, TimeUnit.MILLISECONDS);
+        return positionHold(modes.of(item.mode), millis, TimeUnit.MILLISECONDS);
     }
 
     private Frame frame(Pose pose, Redundancy redundancy) {

@@ -45,7 +45,7 @@ final class SunriseServo implements Servo {
                 throw new Refusal(Code.NOT_READY, "impedance control cannot begin: the arm has to rest, away from a singularity,"
                         + " with nothing pushing it and the load data right (less than 10 Nm external torque in every joint)");
             }
-            motion.setMode(Modes.of(open.mode));
+            motion.setMode(new Modes(robot).of(open.mode));
         }
         return new SunriseServo(robot, job, motion);
     }
@@ -88,8 +88,9 @@ final class SunriseServo implements Servo {
     }
 
     public void change(Mode mode) throws Refusal {
+        Modes.check(mode, "mode.");
         try {
-            motion.getRuntime().changeControlModeSettings(Modes.of(mode));
+            motion.getRuntime().changeControlModeSettings(new Modes(robot).of(mode));
         } catch (RuntimeException e) {
             throw refusal(e);
         }

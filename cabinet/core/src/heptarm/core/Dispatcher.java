@@ -134,9 +134,11 @@ final class Dispatcher {
         } else if (message instanceof Run) {
             id = run((Run) message);
         } else if (message instanceof ServoOpen) {
+            ModeRules.check(((ServoOpen) message).mode, "mode.");
             server.robot.check((ServoOpen) message);
             id = server.executor.open(new Stream(server, (ServoOpen) message));
         } else if (message instanceof ServoSettings) {
+            ModeRules.check(((ServoSettings) message).mode, "mode.");
             running(((ServoSettings) message).servo).change(((ServoSettings) message).mode);
         } else if (message instanceof ServoClose) {
             running(((ServoClose) message).servo);
@@ -188,6 +190,7 @@ final class Dispatcher {
             if (item.motion instanceof Ptp) {
                 checkJoints(((Ptp) item.motion).q, info, path + "motion.q");
             }
+            ModeRules.check(item.mode, path + "mode.");
             server.robot.check(item, path);
         }
         return server.executor.add(run);

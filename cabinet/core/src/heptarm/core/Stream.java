@@ -102,6 +102,10 @@ final class Stream {
             throw new Refusal(Code.MODE_CONFLICT, "mode", mode.getClass().getSimpleName(), kind,
                     "a running servo motion keeps the kind of its control mode; close it and open another one");
         }
+        if (!ModeRules.frame(mode).equals(ModeRules.frame(open.mode))) {
+            throw new Refusal(Code.MODE_CONFLICT, "mode.frame", ModeRules.frame(mode), ModeRules.frame(open.mode),
+                    "a running servo motion keeps the frame of its control mode; close it and open another one");
+        }
         if (running == null) {
             throw new Refusal(Code.MODE_CONFLICT, "servo", Long.toString(id), "", "servo motion " + id + " is not running");
         }

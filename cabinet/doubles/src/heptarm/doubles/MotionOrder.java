@@ -22,7 +22,13 @@ public final class MotionOrder {
     public double[] cartesian = {Double.NaN, Double.NaN, Double.NaN, Double.NaN, Double.NaN, Double.NaN};
     /** Of a hold [s]; NaN: until cancelled. */
     public double duration = Double.NaN;
-    /** Control mode; null: position; 1 and stiffness, damping, seven each: joint impedance. */
+    /**
+     * Control mode; null: position; 1 and stiffness, damping, seven each: joint impedance. 2: Cartesian impedance, directions
+     * x y z, then about x y z: stiffness, damping, null space's stiffness and damping, additional force, largest force, 1 if
+     * that stops, largest velocity, largest deviation (NaN: no limit), quaternion of the axes in the base (NaN: the moved
+     * frame's). 3: the same and a pattern: amplitude, frequency, phase, bias, force limit, position limit, then total, rise,
+     * hold and fall time, 1 if the motion waits for its end.
+     */
     public double[] mode;
     /** Of a servo motion: shortest trajectory, time-out after the goal, time-out of its speed [s]. */
     public double[] timing = {0.02, 30.0, 0.1};

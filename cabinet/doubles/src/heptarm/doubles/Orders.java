@@ -20,9 +20,6 @@ import com.kuka.roboticsAPI.motionModel.PositionHold;
 import com.kuka.roboticsAPI.motionModel.RelativeLIN;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 import com.kuka.roboticsAPI.motionModel.SplineMotionCP;
-import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
-import com.kuka.roboticsAPI.motionModel.controlModeModel.JointImpedanceControlMode;
-import com.kuka.roboticsAPI.motionModel.controlModeModel.PositionControlMode;
 
 /** Turns motions of the Sunrise API (millimetres) into the plant's orders (SI). */
 public final class Orders {
@@ -37,7 +34,7 @@ public final class Orders {
         order.tcp = pose(robot.getFlange().transformationTo(moved));
         if (motion instanceof RobotMotion) {
             order.relative = ((RobotMotion<?>) motion).relativeParameters();
-            order.mode = mode(((RobotMotion<?>) motion).getMode());
+            order.mode = Modes.of(((RobotMotion<?>) motion).getMode(), moved, robot);
         }
         if (motion instanceof SplineMotionCP) {
             double[] cartesian = ((SplineMotionCP<?>) motion).cartesianParameters();
@@ -78,23 +75,6 @@ public final class Orders {
             throw new IllegalArgumentException("the virtual cabinet cannot carry out a " + motion.getClass().getName());
         }
         return order;
-    }
-
-    /** A control mode as the plant takes it; null: position. */
-    public static double[] mode(IMotionControlMode mode) {
-        if (mode == null || mode instanceof PositionControlMode) {
-            return null;
-        }
-        if (!(mode instanceof JointImpedanceControlMode)) {
-            throw new IllegalArgumentException("the virtual cabinet has no " + mode.getClass().getName());
-        }
-        double[] stiffness = ((JointImpedanceControlMode) mode).getStiffness();
-        double[] damping = ((JointImpedanceControlMode) mode).getDamping();
-        double[] all = new double[1 + stiffness.length + damping.length];
-        all[0] = 1;
-        System.arraycopy(stiffness, 0, all, 1, stiffness.length);
-        System.arraycopy(damping, 0, all, 1 + stiffness.length, damping.length);
-        return all;
     }
 
     private static void target(MotionOrder order, AbstractFrame frame, LBR robot) {

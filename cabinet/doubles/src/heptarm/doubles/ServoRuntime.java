@@ -146,7 +146,7 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
         if (mode == null || mode.getClass() != settings.getClass()) {
             throw new CommandInvalidException("the control mode of a running servo motion cannot become another kind");
         }
-        station.plant.changeMode(container.id, Orders.mode(settings));
+        station.plant.changeMode(container.id, Modes.of(settings, moved, robot));
     }
 
     @Override

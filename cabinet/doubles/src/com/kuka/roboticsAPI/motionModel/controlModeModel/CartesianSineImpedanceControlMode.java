@@ -1,0 +1,183 @@
+package com.kuka.roboticsAPI.motionModel.controlModeModel;
+
+import com.kuka.roboticsAPI.geometricModel.CartDOF;
+import com.kuka.roboticsAPI.geometricModel.CartPlane;
+
+/** Cartesian impedance with a force laid over it: a constant part and a sine in each direction, risen and fallen. */
+public class CartesianSineImpedanceControlMode extends CartesianImpedanceControlMode {
+    private static final double FASTEST = 15.0;
+    private static final double LISSAJOUS_RATIO = 0.4;
+
+    private final double[] amplitude = new double[DIRECTIONS];
+    private final double[] frequency = new double[DIRECTIONS];
+    private final double[] phaseDeg = new double[DIRECTIONS];
+    private final double[] bias = new double[DIRECTIONS];
+    private final double[] forceLimit = filled(OFF);
+    private final double[] positionLimit = filled(OFF);
+    private double totalTime = Double.NaN;
+    private double riseTime;
+    private double holdTime = Double.NaN;
+    private double fallTime;
+    private boolean stayActive;
+
+    public CartesianSineImpedanceControlMode() {
+    }
+
+    public CartesianSineImpedanceControlMode(CartesianSineImpedanceControlMode other) {
+        super(other);
+        double[][] from = {other.amplitude, other.frequency, other.phaseDeg, other.bias, other.forceLimit, other.positionLimit};
+        double[][] into = {amplitude, frequency, phaseDeg, bias, forceLimit, positionLimit};
+        for (int i = 0; i < from.length; i++) {
+            System.arraycopy(from[i], 0, into[i], 0, DIRECTIONS);
+        }
+        totalTime = other.totalTime;
+        riseTime = other.riseTime;
+        holdTime = other.holdTime;
+        fallTime = other.fallTime;
+        stayActive = other.stayActive;
+    }
+
+    /** Sets parameters of some directions. */
+    public static class CartSineImpBuilder extends CartImpBuilder {
+        private final CartesianSineImpedanceControlMode mode;
+
+        CartSineImpBuilder(CartesianSineImpedanceControlMode mode, CartDOF... directions) {
+            super(mode, directions);
+            this.mode = mode;
+        }
+
+        @Override
+        public CartSineImpBuilder setStiffness(double value) {
+            super.setStiffness(value);
+            return this;
+        }
+
+        @Override
+        public CartSineImpBuilder setDamping(double value) {
+            super.setDamping(value);
+            return this;
+        }
+
+        @Override
+        public CartSineImpBuilder setAdditionalControlForce(double value) {
+            super.setAdditionalControlForce(value);
+            return this;
+        }
+
+        private CartSineImpBuilder put(double[] into, double value) {
+            fill(into, value);
+            return this;
+        }
+
+        public CartSineImpBuilder setAmplitude(double value) {
+            return put(mode.amplitude, notNegative("amplitude", value));
+        }
+
+        public CartSineImpBuilder setFrequency(double hertz) {
+            return put(mode.frequency, within("frequency", hertz, 0.0, FASTEST));
+        }
+
+        public CartSineImpBuilder setPhaseDeg(double degrees) {
+            return put(mode.phaseDeg, notNegative("phase", degrees));
+        }
+
+        public CartSineImpBuilder setBias(double value) {
+            return put(mode.bias, finite("bias", value));
+        }
+
+        public CartSineImpBuilder setForceLimit(double value) {
+            return put(mode.forceLimit, notNegative("forceLimit", value));
+        }
+
+        public CartSineImpBuilder setPositionLimit(double value) {
+            return put(mode.positionLimit, notNegative("positionLimit", value));
+        }
+    }
+
+    @Override
+    public CartSineImpBuilder parametrize(CartDOF... directions) {
+        return new CartSineImpBuilder(this, directions);
+    }
+
+    // ------------------------------------------------------------------------------ patterns
+
+    public static CartesianSineImpedanceControlMode createDesiredForce(CartDOF direction, double force, double stiffness) {
+        CartesianSineImpedanceControlMode mode = new CartesianSineImpedanceControlMode();
+        mode.parametrize(direction).setBias(force).setStiffness(stiffness);
+        return mode;
+    }
+
+    public static CartesianSineImpedanceControlMode createSinePattern(CartDOF direction, double frequency, double amplitude,
+            double stiffness) {
+        CartesianSineImpedanceControlMode mode = new CartesianSineImpedanceControlMode();
+        mode.parametrize(direction).setFrequency(frequency).setAmplitude(amplitude).setStiffness(stiffness);
+        return mode;
+    }
+
+    public static CartesianSineImpedanceControlMode createLissajousPattern(CartPlane plane, double frequency, double amplitude,
+            double stiffness) {
+        CartesianSineImpedanceControlMode mode = new CartesianSineImpedanceControlMode();
+        mode.parametrize(first(plane)).setFrequency(frequency).setAmplitude(amplitude).setStiffness(stiffness);
+        mode.parametrize(second(plane)).setFrequency(LISSAJOUS_RATIO * frequency).setAmplitude(amplitude).setPhaseDeg(90)
+                .setStiffness(stiffness);
+        return mode;
+    }
+
+    /** Outwards for half of the time, then back. */
+    public static CartesianSineImpedanceControlMode createSpiralPattern(CartPlane plane, double frequency, double amplitude,
+            double stiffness, double totalTime) {
+        CartesianSineImpedanceControlMode mode = new CartesianSineImpedanceControlMode();
+        mode.parametrize(first(plane), second(plane)).setFrequency(frequency).setAmplitude(amplitude).setStiffness(stiffness);
+        mode.parametrize(first(plane)).setPhaseDeg(90);
+        mode.setTotalTime(totalTime).setRiseTime(0.5 * totalTime).setFallTime(0.5 * totalTime);
+        return mode;
+    }
+
+    private static CartDOF first(CartPlane plane) {
+        return plane == CartPlane.YZ ? CartDOF.Y : CartDOF.X;
+    }
+
+    private static CartDOF second(CartPlane plane) {
+        return plane == CartPlane.XY ? CartDOF.Y : CartDOF.Z;
+    }
+
+    // ------------------------------------------------------------------------------ times
+
+    /** The force is gone after this time in any case [s]. */
+    public CartesianSineImpedanceControlMode setTotalTime(double seconds) {
+        totalTime = notNegative("totalTime", seconds);
+        return this;
+    }
+
+    public CartesianSineImpedanceControlMode setRiseTime(double seconds) {
+        riseTime = notNegative("riseTime", seconds);
+        return this;
+    }
+
+    public CartesianSineImpedanceControlMode setHoldTime(double seconds) {
+        holdTime = notNegative("holdTime", seconds);
+        return this;
+    }
+
+    public CartesianSineImpedanceControlMode setFallTime(double seconds) {
+        fallTime = notNegative("fallTime", seconds);
+        return this;
+    }
+
+    /** The motion does not end before the pattern has. */
+    public CartesianSineImpedanceControlMode setStayActiveUntilPatternFinished(boolean stay) {
+        stayActive = stay;
+        return this;
+    }
+
+    /** Amplitude, frequency, phase [deg], bias, force limit, position limit, in the directions; for the simulation. */
+    public double[][] waves() {
+        return new double[][] {amplitude.clone(), frequency.clone(), phaseDeg.clone(), bias.clone(), forceLimit.clone(),
+            positionLimit.clone()};
+    }
+
+    /** Total, rise, hold, fall time [s] (NaN: not given), and 1 if the motion waits for the pattern; for the simulation. */
+    public double[] times() {
+        return new double[] {totalTime, riseTime, holdTime, fallTime, stayActive ? 1 : 0};
+    }
+}
