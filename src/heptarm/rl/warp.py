@@ -6,6 +6,7 @@ single precision. The first step of a process compiles its kernels, up to two mi
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,9 @@ class WarpEngine:
     def __init__(self, task: ReachTask, *, envs: int, threads: int = 1) -> None:
         self._warp = require("warp", extra="rl-gpu")
         self._mjw = require("mujoco_warp", extra="rl-gpu")
+        if self._warp.is_cuda_available():  # each worker of a machine has its own GPU
+            own_gpu = int(os.environ.get("LOCAL_RANK", "0")) % self._warp.get_cuda_device_count()
+            self._warp.set_device(f"cuda:{own_gpu}")
         import mujoco
 
         model = simulation.build(task)
