@@ -179,7 +179,8 @@ def test_a_gpu_trains_too() -> None:
 
 WORKER = """
 import sys
-from heptarm.rl.train import Recipe, ReachTask, train
+from heptarm.rl.task import ReachTask
+from heptarm.rl.train import Recipe, train
 from heptarm.rl.ppo import Settings
 small = Settings(envs=16, horizon=8, minibatches=2, epochs=2, hidden=(16,))
 out, rank, resume = sys.argv[1], sys.argv[2], sys.argv[3]
