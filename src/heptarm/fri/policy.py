@@ -52,11 +52,16 @@ class Filler:
         policy: the declared policy.
 
     Attributes:
+        at: when the last command was given [ns]; 0 before the first one.
+        q: its position [rad].
+        slope: its speed, told from the one before [rad/s].
+        tau: its torques [Nm].
+        wrench: its wrench [N, Nm].
         is_filled: the last wish was made without a fresh command.
         is_braking: the last wish is to brake.
     """
 
-    __slots__ = ("_at", "_q", "_slope", "_tau", "_wrench", "is_braking", "is_filled", "policy")
+    __slots__ = ("at", "is_braking", "is_filled", "policy", "q", "slope", "tau", "wrench")
 
     def __init__(self, policy: Policy) -> None:
         self.policy = policy
@@ -64,11 +69,11 @@ class Filler:
 
     def start(self) -> None:
         """Begin without any command: the interpolator is mirrored until there is one."""
-        self._at = 0
-        self._q: Sequence[float] | None = None
-        self._slope: Sequence[float] | None = None
-        self._tau: Sequence[float] | None = None
-        self._wrench: Sequence[float] | None = None
+        self.at = 0
+        self.q: Sequence[float] | None = None
+        self.slope: Sequence[float] | None = None
+        self.tau: Sequence[float] | None = None
+        self.wrench: Sequence[float] | None = None
         self.is_filled = self.is_braking = False
 
     def command(
@@ -88,16 +93,16 @@ class Filler:
             wrench: superposed wrench [N, Nm].
         """
         if q is not None:
-            gap = (at - self._at) * 1e-9
+            gap = (at - self.at) * 1e-9
             # two commands of one stream tell its speed, a pause between them does not
-            if self._q is not None and 0.0 < gap <= self.policy.patience:
-                self._slope = [(new - old) / gap for new, old in zip(q, self._q, strict=True)]
+            if self.q is not None and 0.0 < gap <= self.policy.patience:
+                self.slope = [(new - old) / gap for new, old in zip(q, self.q, strict=True)]
             else:
-                self._slope = None
-            self._q = q
-        self._tau = tau if tau is not None else self._tau
-        self._wrench = wrench if wrench is not None else self._wrench
-        self._at = at
+                self.slope = None
+            self.q = q
+        self.tau = tau if tau is not None else self.tau
+        self.wrench = wrench if wrench is not None else self.wrench
+        self.at = at
 
     def wish(self, now: int, ipo: Sequence[float]) -> Sequence[float] | None:
         """The position wanted now; None to brake.
@@ -107,9 +112,9 @@ class Filler:
             ipo: interpolator's position, which is mirrored until a position was commanded.
         """
         self.is_filled = self.is_braking = False
-        if not self._at:
+        if not self.at:
             return ipo
-        age = (now - self._at) * 1e-9
+        age = (now - self.at) * 1e-9
         late = age - self.policy.patience
         self.is_filled = late > 0.0
         missing = self.policy.missing
@@ -118,16 +123,16 @@ class Filler:
         ):
             self.is_braking = True
             return None
-        if self._q is None:
+        if self.q is None:
             return ipo
-        if missing is Missing.EXTRAPOLATE and self._slope is not None:
-            return [value + slope * age for value, slope in zip(self._q, self._slope, strict=True)]
-        return self._q
+        if missing is Missing.EXTRAPOLATE and self.slope is not None:
+            return [value + slope * age for value, slope in zip(self.q, self.slope, strict=True)]
+        return self.q
 
     def efforts(self, now: int) -> tuple[Sequence[float] | None, Sequence[float] | None]:
         """Torques and wrench wanted now; None where none was ever commanded."""
-        share = self._share((now - self._at) * 1e-9 - self.policy.patience) if self._at else 1.0
-        tau, wrench = self._tau, self._wrench
+        share = self._share((now - self.at) * 1e-9 - self.policy.patience) if self.at else 1.0
+        tau, wrench = self.tau, self.wrench
         if share == 1.0:
             return tau, wrench
         return (

@@ -223,6 +223,11 @@ class Client:
         """What the system refused the loop, in words with the remedy."""
         return (self._layout.refused.read() or "").splitlines()
 
+    @property
+    def is_native(self) -> bool:
+        """The loop's frequent turns are done by the native part."""
+        return bool(self._header[at.NATIVE])
+
     def history(self, size: int | None = None) -> list[State]:
         """The last states, oldest first; the very oldest may be overwritten meanwhile and are left out."""
         ring = self._layout.states

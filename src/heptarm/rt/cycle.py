@@ -32,6 +32,7 @@ GRACE = 50_000_000
 REPEAT_OUTPUTS = 10
 _ROW = struct.Struct(f"=18q{at.STATE_WORDS - 19}d")
 _NAN7, _NAN6 = (math.nan,) * 7, (math.nan,) * 6
+_NOTHING_SENT = (_NAN7, _NAN7, _NAN6)
 
 
 class Cycle:
@@ -44,6 +45,17 @@ class Cycle:
         policy: what is sent without fresh commands.
         law: called in every cycle of COMMANDING_ACTIVE; None takes the commands of the user's process.
         params: of the law.
+
+    Attributes:
+        layout, session, guard, filler, law: what it is made of.
+        is_ending: it brakes, whatever is commanded.
+        mirrored: last mirrored position and the message's counter; None outside COMMANDING_WAIT.
+        slope: interpolator's speed then [rad/s].
+        ticks: messages since commands became effective.
+        started: when they did [ns].
+        commands_seen: commands of the user's process that were taken.
+        outputs_seen: tick of the outputs that were taken.
+        info: robot and connection of the last message, and what seldom changes.
     """
 
     def __init__(
@@ -61,24 +73,25 @@ class Cycle:
         self.guard = Guard(limits)
         self.filler = Filler(policy)
         self.is_ending = False
-        self._law = law
+        self.law = law
         self._params = params
         self._param_tick = -1
         self._out = Output()
         self._slot = memoryview(bytearray(8 * at.STATE_WORDS))
         self._state = State(np.frombuffer(self._slot, dtype=np.float64))
-        self._commands_seen = layout.commands.count
+        self.commands_seen = layout.commands.count
         self._restarts = 0
-        self._ipo: tuple[m.Joints, int] | None = None  # last mirrored position and its sequence
-        self._slope: Sequence[float] = _NAN7
-        self._ticks = 0
-        self._started = 0
-        self._sent: tuple[Sequence[float], Sequence[float], Sequence[float]] = (_NAN7, _NAN7, _NAN6)
+        self.mirrored: tuple[m.Joints, int] | None = None  # last mirrored position and its sequence
+        self.slope: Sequence[float] = _NAN7
+        self.ticks = 0
+        self.started = 0
+        self._sent: tuple[Sequence[float], Sequence[float], Sequence[float]] = _NOTHING_SENT
         self._flags = 0
         self._answered = False
-        self._info: tuple[object, object, tuple[int, ...]] = (None, None, ())
+        self._fresh: Sample | None = None
+        self.info: tuple[object, object, tuple[int, ...]] = (None, None, ())
         self._full: tuple[Sample | None, m.Monitoring] = (None, m.Monitoring(m.Header(0, 0)))
-        self._outputs_tick = layout.outputs.tick
+        self.outputs_seen = layout.outputs.tick
         self._outputs: tuple[int, dict[str, float], dict[str, list[float]]] = (0, {}, {})
         self._inputs: tuple[m.IoValue, ...] = ()
         self._trouble = self.session.trouble
@@ -95,7 +108,8 @@ class Cycle:
         """
         session = self.session
         self._flags, self._answered, before = 0, False, session.received
-        sample = session.receive(datagram, received)
+        self._sent = _NOTHING_SENT
+        self._fresh = sample = session.receive(datagram, received)
         if sample is None:
             return None
         self._follow(sample, received, before)
@@ -130,8 +144,8 @@ class Cycle:
         if session.trouble != self._trouble:
             self._trouble = session.trouble
             self.layout.trouble.write(self._trouble)
-        if session.sample is not None:
-            self._publish(session.sample, now - session.received if self._answered else 0)
+        if self._fresh is not None:
+            self._publish(self._fresh, now - session.received if self._answered else 0)
         session.counters.save(header, at.COUNTS)
         if self.guard.was_limited:
             self._report()
@@ -165,27 +179,27 @@ class Cycle:
         if session.is_commanding:
             period = session.period * session.multiplier * 1e-9 or 1e-3
             if not guard.is_started:
-                if self._ipo is not None and not again:
-                    guard.start(self._ipo[0], self._slope, period=period)
+                if self.mirrored is not None and not again:
+                    guard.start(self.mirrored[0], self.slope, period=period)
                 elif sample.q_ipo is not None:  # the client was not there when commanding began
                     guard.start(sample.q_ipo, _ZEROS7, period=period)
                 self.filler.start()
-                self._ticks = -1
+                self.ticks = -1
                 # a command given just before the start counts, an old one does not
-                self._commands_seen = max(0, self.layout.commands.count - 1)
-                self._started = received
+                self.commands_seen = max(0, self.layout.commands.count - 1)
+                self.started = received
             elif received - before > SILENT_PERIODS * period * 1e9:
                 guard.start(guard.q, _ZEROS7, period=period)
-            self._ticks += 1
-            self._ipo = None
+            self.ticks += 1
+            self.mirrored = None
         elif session.state is m.SessionState.COMMANDING_WAIT and sample.q_ipo is not None:
-            last, self._ipo = self._ipo, (sample.q_ipo, sample.sequence)
-            self._slope = _ZEROS7
+            last, self.mirrored = self.mirrored, (sample.q_ipo, sample.sequence)
+            self.slope = _ZEROS7
             if last is not None and session.period and sample.sequence > last[1]:
                 gap = (sample.sequence - last[1]) * session.period * 1e-9
-                self._slope = tuple((new - old) / gap for new, old in zip(sample.q_ipo, last[0], strict=True))
+                self.slope = tuple((new - old) / gap for new, old in zip(sample.q_ipo, last[0], strict=True))
         else:
-            self._ipo = None
+            self.mirrored = None
 
     def _setpoint(self, sample: Sample, now: int) -> Setpoint:
         guard, ipo = self.guard, sample.q_ipo
@@ -196,7 +210,7 @@ class Cycle:
         if self.is_ending:
             wish = None
             tau, wrench = _ZEROS7, _ZEROS6
-        elif self._law is not None:
+        elif self.law is not None:
             wish, tau, wrench = self._call(sample, ipo, now)
         else:
             self._take()
@@ -218,16 +232,16 @@ class Cycle:
     def _take(self) -> None:
         """The newest command of the user's process, if there is a new one."""
         ring = self.layout.commands
-        if ring.count == self._commands_seen:
+        if ring.count == self.commands_seen:
             return
         words = ring.read(ring.count - 1)
         if words is None:  # just being written: next time
             return
-        self._commands_seen = ring.count
+        self.commands_seen = ring.count
         ints = words.view("int64")
         given, numbers = int(ints[at.C_GIVEN]), words.tolist()
         when = int(ints[at.C_AT])
-        if when + GRACE < self._started:
+        if when + GRACE < self.started:
             return
         self.filler.command(
             when,
@@ -240,31 +254,41 @@ class Cycle:
         self, sample: Sample, ipo: m.Joints, now: int
     ) -> tuple[Sequence[float] | None, Sequence[float], Sequence[float]]:
         """Let the law decide; if it fails, brake from then on."""
-        assert self._law is not None and self._params is not None
+        out = self._out
+        out.q[:], out.tau[:], out.wrench[:] = ipo, 0.0, 0.0
+        _ROW.pack_into(self._slot, 8, *self._row(sample, 0))
+        self.ask(self._state, out, now)
+        if self.is_ending:
+            return None, _ZEROS7, _ZEROS6
+        return out.q.tolist(), out.tau.tolist(), out.wrench.tolist()
+
+    def ask(self, state: State, out: Output, now: int) -> None:
+        """Call the law with its newest parameters; if it fails, brake from now on."""
+        assert self.law is not None and self._params is not None
         ring = self.layout.params
         if ring.count != self._param_tick:
             words = ring.read(ring.count - 1)
             if words is not None:
                 self._param_tick = ring.count
-                self._params._values[:] = words[1:]
-        out = self._out
-        out.q[:], out.tau[:], out.wrench[:] = ipo, 0.0, 0.0
-        _ROW.pack_into(self._slot, 8, *self._row(sample, 0))
+                self._params.replace(words[1:])
         try:
-            self._law(self._state, out, self._params)
-            return out.q.tolist(), out.tau.tolist(), out.wrench.tolist()
+            self.law(state, out, self._params)
         except Exception:
             self.tell(now, "the law failed, the arm brakes: " + traceback.format_exc(limit=-2))
             self.end()
-            return None, _ZEROS7, _ZEROS6
+
+    @property
+    def is_plain(self) -> bool:
+        """No outputs and no transformations wait to be sent."""
+        return not self._outputs[0] and not self._outputs[2]
 
     def _with_io(self, sample: Sample, setpoint: Setpoint) -> Setpoint:
         """Adds the outputs and transformations that the user's process has left."""
         note = self.layout.outputs
-        if note.tick != self._outputs_tick:
+        if note.tick != self.outputs_seen:
             text = note.read()
             if text is not None:
-                self._outputs_tick = note.tick
+                self.outputs_seen = note.tick
                 given = json.loads(text)
                 self._outputs = (REPEAT_OUTPUTS, given["io"], given["transformations"])
         left, outputs, frames = self._outputs
@@ -299,9 +323,9 @@ class Cycle:
         """The words of a state, without the sequence word."""
         session = self.session
         robot, link = sample.robot, sample.connection
-        if self._info[0] is not robot or self._info[1] is not link:
+        if self.info[0] is not robot or self.info[1] is not link:
             full = self._message(sample)
-            self._info = (robot, link, _information(full))
+            self.info = (robot, link, _information(full))
             self._read_inputs(full)
         seconds, nanos = sample.stamp
         wrench, pose, e1 = _NAN6, _NAN7, math.nan
@@ -310,8 +334,8 @@ class Cycle:
             wrench = monitor.wrench or _NAN6  # type: ignore[assignment]
             pose = monitor.pose.values if monitor.pose is not None else _NAN7  # type: ignore[assignment]
             e1 = monitor.redundancy.value if monitor.redundancy is not None else math.nan
-        overlay, safety, operation, control, drive, multiplier = self._info[2]
-        sent = self._sent if session.is_commanding else (_NAN7, _NAN7, _NAN6)
+        overlay, safety, operation, control, drive, multiplier = self.info[2]
+        sent = self._sent
         return (
             session.received,
             sample.sequence,
@@ -330,7 +354,7 @@ class Cycle:
             self._flags,
             session.reflected,
             session.sent,
-            max(0, self._ticks) if session.is_commanding else 0,
+            max(0, self.ticks) if session.is_commanding else 0,
             sample.tracking,
             *(sample.q or _NAN7),
             *(sample.tau or _NAN7),

@@ -98,6 +98,7 @@ class Layout:
             notes.append(Note(block, start=at, words=NOTE_WORDS))
             at += NOTE_WORDS
         self.config, self.trouble, self.refused, self.inputs, self.outputs = notes
+        self.outputs_at = at - NOTE_WORDS
         self.header = block.view(0, LATENCY)
         self.latency = block.view(LATENCY, BINS + 1)
         self.jitter = block.view(JITTER, BINS + 1)

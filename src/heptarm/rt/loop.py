@@ -23,7 +23,8 @@ from heptarm.io.udp import Address, UdpSocket
 from heptarm.rt import layout as at
 from heptarm.rt import realtime
 from heptarm.rt.cycle import Cycle, Law
-from heptarm.rt.state import Params
+from heptarm.rt.native import BROKEN, CALL_LAW, GIVEN_BACK, LOOK, TIMEOUT, Native, Unavailable
+from heptarm.rt.state import Output, Params, State
 
 #: A datagram is waited for this long before the loop looks around [s].
 PATIENCE = 0.05
@@ -62,11 +63,69 @@ class Loop:
         )
         self._parent: int = config["parent"]
         self._peer: Address | None = None
-        self._heard = 0
         self._deadline = 0
+        self._last = b""
 
     def run(self) -> None:
         """Answer until the user's process ends it or is gone, and the arm stands."""
+        try:
+            native = Native(self.cycle)
+        except Unavailable as reason:
+            self.cycle.tell(time.monotonic_ns(), f"the loop runs in pure Python: {reason}")
+            self._run_in_python()
+        else:
+            self.layout.header[at.NATIVE] = 1
+            self._run_native(native)
+
+    def _run_native(self, native: Native) -> None:
+        """The native part answers what is plain; the rest comes back to be handled here."""
+        header, cycle, states = self.layout.header, self.cycle, self.layout.states
+        run, send, now_ns = native.library.hf_run, native.library.hf_send, time.monotonic_ns
+        memory, reference = native.memory, native.reference
+        out = Output.on(memory.out_q, memory.out_tau, memory.out_wrench)
+        native.listen(self.socket.sock, None)
+        history = len(states.ints)
+        while True:
+            code = run(reference, _LOOK, native.sender)
+            if code == CALL_LAW:
+                cycle.ask(State(states.floats[header[at.STATES] % history]), out, memory.received)
+                memory.is_ending = cycle.is_ending
+                send(reference)
+                code = LOOK if header[at.STOP] else CALL_LAW
+            elif code == GIVEN_BACK:
+                native.take()
+                datagram, sender = native.datagram, native.heard
+                received = memory.t_received
+                if sender != self._peer and not self._accept(sender, received):
+                    native.give(self._last)
+                    continue
+                native.listen(self.socket.sock, sender)
+                octets = cycle.turn(datagram, received)
+                if octets is not None:
+                    self.socket.send(octets, sender)
+                cycle.finish(now_ns())
+                if cycle.session.sample is not None and cycle.session.received == received:
+                    self._last = datagram
+                if self._last:
+                    native.give(self._last)
+                code = LOOK if header[at.STOP] else GIVEN_BACK
+            elif code == BROKEN:
+                raise ConnectionLost(
+                    f"UDP port {self.socket.port} fails: {os.strerror(memory.t_size).lower()}"
+                )
+            if code == TIMEOUT:
+                cycle.idle(now_ns())
+                gc.collect()
+            if code in (TIMEOUT, LOOK) and (
+                self._deadline or header[at.STOP] or os.getppid() != self._parent
+            ):
+                native.take()
+                if self._is_over(now_ns()):
+                    return
+                if self._last:
+                    native.give(self._last)
+
+    def _run_in_python(self) -> None:
         header, cycle, receive, send = self.layout.header, self.cycle, self.socket.receive, self.socket.send
         now_ns, turns = time.monotonic_ns, 0
         while True:
@@ -81,7 +140,6 @@ class Loop:
             datagram, received, sender = got
             if sender != self._peer and not self._accept(sender, received):
                 continue
-            self._heard = received
             octets = cycle.turn(datagram, received)
             if octets is not None:
                 send(octets, sender)
@@ -98,7 +156,7 @@ class Loop:
             return False
         session = self.cycle.session
         if self._peer is not None:
-            if session.state is not SessionState.IDLE and now - self._heard < SILENT:
+            if session.state is not SessionState.IDLE and now - session.received < SILENT:
                 return False
             session.restart()
         self._peer = sender
@@ -112,7 +170,7 @@ class Loop:
                 return False
             self.cycle.end()
             self._deadline = now + round(BRAKING * 1e9)
-        silent = now - self._heard > 5 * PATIENCE * 1e9
+        silent = now - self.cycle.session.received > 5 * PATIENCE * 1e9
         return self.cycle.may_end or silent or now > self._deadline
 
     def close(self) -> None:

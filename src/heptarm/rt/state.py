@@ -236,6 +236,13 @@ class Output:
         self.tau: Floats = np.zeros(7)
         self.wrench: Floats = np.zeros(6)
 
+    @classmethod
+    def on(cls, q: Any, tau: Any, wrench: Any) -> Output:
+        """An output on memory that is there."""
+        made = cls()
+        made.q, made.tau, made.wrench = (np.frombuffer(part, dtype=np.float64) for part in (q, tau, wrench))
+        return made
+
 
 class Params:
     """Parameters of a law: numbers and arrays by name, all of them taken over at once.
@@ -299,6 +306,10 @@ class Params:
         for start, given in checked:
             self._values[start : start + given.size] = given
         self._changed()
+
+    def replace(self, values: Floats) -> None:
+        """Take over all values."""
+        self._values[:] = values
 
     @staticmethod
     def flat(values: Mapping[str, npt.ArrayLike]) -> tuple[Floats, dict[str, tuple[tuple[int, ...], int]]]:

@@ -1,0 +1,249 @@
+"""The native part does what the Python turn does, to the last bit: twins that see the same exchange."""
+
+from __future__ import annotations
+
+import dataclasses
+import random
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from heptarm.fri.messages import CommandMode, Quality, SessionState
+from heptarm.fri.policy import Missing, Policy
+from heptarm.fri.version import Version
+from heptarm.rt import layout as at
+from heptarm.rt.native import HANDBACK, LAW, Native, Unavailable, library
+from heptarm.rt.state import Output, State
+
+from .controller import IPO
+from .laws import offset, torque
+from .test_cycle import MS, Bench
+
+try:
+    library()
+except Unavailable as reason:
+    pytest.skip(f"no native part: {reason}", allow_module_level=True)
+
+
+class Twins:
+    """One bench in pure Python, one with the native part; everything happens to both."""
+
+    def __init__(self, **options: object) -> None:
+        policy = options.pop("policy", None)
+        self.pure, self.other = Bench(**options), Bench(**options)  # type: ignore[arg-type]
+        for bench in (self.pure, self.other):
+            if isinstance(policy, Policy):
+                bench.cycle.filler.policy = policy
+        self.native = Native(self.other.cycle)
+        self.out = Output.on(
+            self.native.memory.out_q, self.native.memory.out_tau, self.native.memory.out_wrench
+        )
+        self.plain = self.turns = 0
+        self._last = b""
+
+    def message(self, datagram: bytes, gap: int = MS) -> None:
+        """One message for both; their answers and what they publish must be equal."""
+        for bench in (self.pure, self.other):
+            bench.now += gap
+        expected = self.pure.cycle.turn(datagram, self.pure.now)
+        self.pure.cycle.finish(self.pure.now + 30_000)
+        answer = self._native(datagram)
+        assert answer == expected
+        self.turns += 1
+        first, second = self.pure.layout, self.other.layout
+        assert first.states.count == second.states.count
+        if first.states.count:
+            one, two = first.states.newest(), second.states.newest()
+            assert one is not None and two is not None
+            differ = np.flatnonzero(
+                (one.view(np.int64) != two.view(np.int64)) & ~(np.isnan(one) & np.isnan(two))
+            )
+            assert not differ.size, (differ, one[differ], two[differ])
+
+    def _native(self, datagram: bytes) -> bytes | None:
+        bench, native = self.other, self.native
+        size = native.turn(datagram, bench.now)
+        if size == HANDBACK:
+            native.take()
+            octets = bench.cycle.turn(datagram, bench.now)
+            bench.cycle.finish(bench.now + 30_000)
+            session = bench.cycle.session
+            if session.sample is not None and session.received == bench.now:
+                self._last = datagram
+            if self._last:
+                native.give(self._last)
+            return octets
+        self.plain += 1
+        if size == LAW:
+            states = bench.layout.states
+            bench.cycle.ask(State(states.floats[states.count % len(states.ints)]), self.out, bench.now)
+            native.memory.is_ending = bench.cycle.is_ending
+            size = native.answer()
+        native.finish(bench.now + 30_000)
+        return native.reply(size) if size else None
+
+    def step(self, **changes: object) -> None:
+        """The next message of the controller, after some changes."""
+        controller = self.pure.controller
+        for name, value in changes.items():
+            setattr(controller, name, value)
+        datagram = controller.datagram()
+        controller.sequence += 1
+        controller._reflected = max(0, self.pure.cycle.session.sent - 1)
+        self.message(datagram)
+
+    def command(self, **numbers: object) -> None:
+        """A command for both."""
+        words = np.zeros(at.COMMAND_WORDS)
+        given = 0
+        places = {
+            "q": (at.GIVEN_Q, at.C_Q),
+            "tau": (at.GIVEN_TAU, at.C_TAU),
+            "wrench": (at.GIVEN_WRENCH, at.C_WRENCH),
+        }
+        for name, values in numbers.items():
+            bit, start = places[name]
+            words[start : start + len(values)] = values  # type: ignore[arg-type]
+            given |= bit
+        words.view(np.int64)[at.C_AT : at.C_GIVEN + 1] = self.pure.now, given
+        for bench in (self.pure, self.other):
+            bench.layout.commands.write(words[1:])
+
+    def activate(self) -> None:
+        for state in (
+            SessionState.MONITORING_READY,
+            SessionState.COMMANDING_WAIT,
+            SessionState.COMMANDING_ACTIVE,
+        ):
+            for _ in range(4):
+                self.step(state=state)
+
+    def check(self) -> None:
+        """Counts, histograms and the guard's report are equal too."""
+        self.native.take()
+        one, two = self.pure.layout.block.ints, self.other.layout.block.ints
+        for start, end in (
+            (at.COUNTS, at.LIMITED_COUNTS),
+            (at.LIMITED_COUNTS, at.LATENCY),
+            (at.LATENCY, at.HEADER_WORDS),
+        ):
+            assert (one[start:end] == two[start:end]).all()
+        assert self.pure.cycle.guard.report.lines == self.other.cycle.guard.report.lines
+        assert self.pure.cycle.session.counters.as_dict() == self.other.cycle.session.counters.as_dict()
+        assert self.pure.cycle.guard.q == self.other.cycle.guard.q
+
+
+@pytest.mark.parametrize("wire", Version)
+@pytest.mark.parametrize("mode", [CommandMode.POSITION, CommandMode.TORQUE, CommandMode.WRENCH])
+def test_a_session_with_commands_that_need_limits(wire: Version, mode: CommandMode) -> None:
+    twins, rng = Twins(wire=wire), random.Random(1)
+    twins.pure.controller.mode = mode
+    twins.activate()
+    for k in range(600):
+        if k % 7 == 0:
+            twins.command(
+                q=[value + rng.uniform(-0.5, 0.5) for value in IPO],
+                tau=[rng.uniform(-400, 400) for _ in range(7)],
+                wrench=[rng.uniform(-200, 200) for _ in range(6)],
+            )
+        twins.step()
+    twins.check()
+    assert twins.plain > 0.95 * twins.turns, "nearly all of it without Python"
+
+
+@pytest.mark.parametrize("missing", Missing)
+def test_the_policies(missing: Missing) -> None:
+    twins = Twins(policy=Policy(missing, patience=0.02, over=0.05))
+    # the policy was read before it was set: a fresh native part sees it
+    twins.native = Native(twins.other.cycle)
+    twins.pure.controller.mode = CommandMode.TORQUE
+    twins.activate()
+    for k in range(500):
+        if k < 200 or 300 < k < 350:
+            twins.command(q=[value + 0.0001 * k for value in IPO], tau=[3.0] * 7)
+        twins.step()
+    twins.check()
+    assert twins.pure.cycle.session.counters.filled > 50
+
+
+@pytest.mark.parametrize("law", [offset, torque])
+def test_laws(law: object) -> None:
+    params = {"offset": [0.05] * 7} if law is offset else {"gain": 5.0}
+    twins = Twins(law=law, **params)
+    twins.out = Output.on(
+        twins.native.memory.out_q, twins.native.memory.out_tau, twins.native.memory.out_wrench
+    )
+    twins.pure.controller.mode = CommandMode.POSITION if law is offset else CommandMode.TORQUE
+    twins.activate()
+    for _ in range(300):
+        twins.step()
+    twins.check()
+    assert twins.plain > 250
+
+
+@settings(max_examples=25, deadline=None)
+@given(data=st.data(), wire=st.sampled_from(list(Version)))
+def test_whatever_happens(data: st.DataObject, wire: Version) -> None:
+    """States, qualities, modes, losses, repeats, silence, damage and jumps of the interpolator, in any order."""
+    twins = Twins(wire=wire)
+    kept = [b""]
+    for _ in range(data.draw(st.integers(5, 40))):
+        what = data.draw(
+            st.sampled_from(
+                ["plain"] * 4
+                + [
+                    "state",
+                    "quality",
+                    "mode",
+                    "lose",
+                    "repeat",
+                    "silence",
+                    "damage",
+                    "cut",
+                    "ipo",
+                    "command",
+                    "restart",
+                    "wild",
+                ]
+            )
+        )
+        controller = twins.pure.controller
+        if what == "state":
+            controller.state = data.draw(st.sampled_from(SessionState))
+        elif what == "quality":
+            controller.quality = data.draw(st.sampled_from(Quality))
+        elif what == "mode":
+            controller.mode = data.draw(st.sampled_from(CommandMode))
+        elif what == "lose":
+            controller.sequence += data.draw(st.integers(1, 3))
+        elif what == "restart":
+            controller.sequence = 0
+        elif what == "ipo":
+            controller.ipo = tuple(data.draw(st.floats(-2, 2)) for _ in range(7))
+        elif what in ("command", "wild"):
+            number = st.floats(-3, 3) if what == "command" else st.floats(allow_nan=True, allow_infinity=True)
+            twins.command(q=[data.draw(number) for _ in range(7)])
+        elif what == "repeat":
+            twins.message(kept[-1])
+        elif what in ("damage", "cut"):
+            octets = bytearray(controller.datagram())
+            if what == "cut":
+                octets = octets[: data.draw(st.integers(0, len(octets)))]
+            else:
+                octets[data.draw(st.integers(0, len(octets) - 1))] ^= 1 << data.draw(st.integers(0, 7))
+            twins.message(bytes(octets))
+        for _ in range(data.draw(st.integers(1, 12))):
+            kept.append(controller.datagram())
+            if what == "silence":
+                twins.pure.now += 20 * MS
+                twins.other.now += 20 * MS
+                what = "plain"
+            twins.step()
+    twins.check()
+
+
+def test_memory_is_mirrored_word_by_word() -> None:
+    assert library().hf_size() % 8 == 0
+    assert dataclasses.is_dataclass(Policy)
