@@ -21,6 +21,7 @@ rl_app = App(name="rl", help="Train a policy that reaches targets, look how good
 app.command(rl_app)
 
 _COMMON = Group("Common options")
+_FRI = Group("FRI")
 Target = Annotated[
     str | None,
     Parameter(
@@ -51,9 +52,43 @@ def sim(
     view_port: Annotated[int, Parameter(help="Port of the view; 0 takes a free one.")] = 8080,
     key: Annotated[str, Parameter(help="Pre-shared key that clients must know.")] = "",
     verbose: Annotated[bool, Parameter(negative="", help="Show the cabinet's log.")] = False,
+    fri: Annotated[
+        str | None,
+        Parameter(
+            group=_FRI, help="Instead of a cabinet only its FRI, of this version, such as 1.15, 2.5 or 2.7."
+        ),
+    ] = None,
+    fri_command: Annotated[
+        Literal["monitor", "position", "torque", "wrench", "pose"],
+        Parameter(group=_FRI, help="What the client may command."),
+    ] = "position",
+    fri_client: Annotated[
+        str, Parameter(group=_FRI, help="HOST:PORT where the client listens.")
+    ] = "127.0.0.1:30200",
+    fri_period: Annotated[float, Parameter(group=_FRI, help="Time between two messages [ms].")] = 5.0,
+    fri_multiplier: Annotated[int, Parameter(group=_FRI, help="The client answers every n-th message.")] = 1,
+    fri_port: Annotated[
+        int | None,
+        Parameter(group=_FRI, help="UDP port to send from. Default: the client's or its neighbour."),
+    ] = None,
     json: Json = False,
 ) -> int:
-    """Run a virtual cabinet until Ctrl-C."""
+    """Run a virtual cabinet until Ctrl-C; with --fri, a bare FRI controller for any FRI client."""
+    if fri is not None:
+        from heptarm.cli import fri as controller
+
+        return controller.run(
+            version=fri,
+            model=model,
+            command=fri_command,
+            client=fri_client,
+            period=fri_period,
+            multiplier=fri_multiplier,
+            port=fri_port,
+            speed=speed,
+            verbose=verbose,
+            as_json=json,
+        )
     from heptarm.cli import sim as work
 
     return work.run(
