@@ -9,7 +9,7 @@ import logging
 import os
 import socket
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -233,7 +233,7 @@ class Driver:
 
     # --------------------------------------------------------------------------------- commands
 
-    def positions(self, names: list[str], values: list[float]) -> Array:
+    def positions(self, names: Sequence[str], values: Sequence[float]) -> Array:
         """Joint positions of a message in the arm's order, shape (7,) [rad]; joints left out stay where they are.
 
         Args:
@@ -243,17 +243,23 @@ class Driver:
         Raises:
             ShapeError: an unknown name, a name twice, or not as many numbers as names.
         """
-        order = names or list(self.configuration.joints)
+        return self._ordered(names, values, self._arm.state.q_cmd)
+
+    def velocities(self, names: Sequence[str], values: Sequence[float]) -> Array:
+        """Likewise joint velocities [rad/s]; joints left out have none."""
+        return self._ordered(names, values, np.zeros(7))
+
+    def _ordered(self, names: Sequence[str], values: Sequence[float], others: Array) -> Array:
+        joints = self.configuration.joints
+        order = list(names) or list(joints)
         if len(order) != len(values) or len(set(order)) != len(order):
             raise ShapeError(f"{len(values)} numbers for the joints {order}; one for each is wanted")
-        q = self._arm.state.q_cmd.copy()
+        result = others.copy()
         for name, value in zip(order, values):
-            if name not in self.configuration.joints:
-                raise ShapeError(
-                    f"unknown joint {name!r}", hint=f"joints are {', '.join(self.configuration.joints)}"
-                )
-            q[self.configuration.joints.index(name)] = value
-        return q
+            if name not in joints:
+                raise ShapeError(f"unknown joint {name!r}", hint=f"the joints are {', '.join(joints)}")
+            result[joints.index(name)] = value
+        return result
 
     def move(self, target: Array | Pose, *, straight: bool = False) -> MotionHandle:
         """Start a motion to joint positions or a pose; it takes the place of whatever runs.

@@ -1,0 +1,130 @@
+"""What the node is told: command and servo topics, services."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from geometry_msgs.msg import PoseStamped
+from heptarm_msgs.srv import SetNumber
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Empty
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+from heptarm.bridge.driver import Answer, Driver
+from heptarm.errors import HeptarmError, NotReady
+from heptarm_ros2 import convert
+
+if TYPE_CHECKING:
+    from heptarm_ros2.node import HeptarmNode
+
+
+class Commands:
+    """Takes commands and services to the driver. A stop never waits behind another command."""
+
+    def __init__(self, node: HeptarmNode) -> None:
+        self._node = node
+        one_by_one, at_once = MutuallyExclusiveCallbackGroup(), ReentrantCallbackGroup()
+        topics: tuple[tuple[type, str, Callable[[Driver, Any], None]], ...] = (
+            (JointState, "~/command/joint", self._command_joint),
+            (PoseStamped, "~/command/pose", self._command_pose),
+            (PoseStamped, "~/command/lin", self._command_lin),
+            (JointState, "~/servo/joint", self._servo_joint),
+            (JointState, "~/servo/velocity", self._servo_velocity),
+            (PoseStamped, "~/servo/pose", self._servo_pose),
+            (JointTrajectory, "~/joint_trajectory", self._joint_trajectory),
+        )
+        self._subscriptions = [
+            node.create_subscription(kind, name, self._guarded(name, work), 1, callback_group=one_by_one)
+            for kind, name, work in topics
+        ]
+        self._subscriptions.append(
+            node.create_subscription(
+                Empty,
+                "~/stop",
+                self._guarded("~/stop", lambda driver, _: self._stopped(driver)),
+                1,
+                callback_group=at_once,
+            )
+        )
+        self._services = [
+            node.create_service(
+                Trigger, "~/stop", self._service(lambda d, _: d.stop()), callback_group=at_once
+            ),
+            node.create_service(
+                Trigger, "~/recover", self._service(lambda d, _: d.recover()), callback_group=at_once
+            ),
+            node.create_service(
+                SetNumber,
+                "~/set_override",
+                self._service(lambda d, request: d.set_override(request.value)),
+                callback_group=at_once,
+            ),
+        ]
+
+    def destroy(self) -> None:
+        """End them."""
+        for subscription in self._subscriptions:
+            self._node.destroy_subscription(subscription)
+        for service in self._services:
+            self._node.destroy_service(service)
+
+    def _guarded(self, name: str, work: Callable[[Driver, Any], None]) -> Callable[[Any], None]:
+        """A callback that tells the log why a message was refused."""
+
+        def callback(message: Any) -> None:
+            try:
+                driver = self._node.driver
+                if driver is None:
+                    raise NotReady("the node is not configured")
+                work(driver, message)
+            except HeptarmError as error:
+                self._node.get_logger().warning(f"{name}: {error}", throttle_duration_sec=1.0)
+
+        return callback
+
+    def _service(self, work: Callable[[Driver, Any], Answer]) -> Callable[[Any, Any], Any]:
+        def callback(request: Any, response: Any) -> Any:
+            driver = self._node.driver
+            answer = Answer(False, "the node is not configured") if driver is None else work(driver, request)
+            response.success, response.message = answer.success, answer.message
+            return response
+
+        return callback
+
+    @staticmethod
+    def _stopped(driver: Driver) -> None:
+        answer = driver.stop()
+        if not answer.success:
+            raise NotReady(answer.message)
+
+    @staticmethod
+    def _command_joint(driver: Driver, message: JointState) -> None:
+        driver.move(driver.positions(message.name, message.position))
+
+    def _command_pose(self, driver: Driver, message: PoseStamped) -> None:
+        driver.move(convert.pose_value(message, driver.configuration.frame("base")))
+
+    def _command_lin(self, driver: Driver, message: PoseStamped) -> None:
+        driver.move(convert.pose_value(message, driver.configuration.frame("base")), straight=True)
+
+    @staticmethod
+    def _servo_joint(driver: Driver, message: JointState) -> None:
+        target = driver.positions(message.name, message.position)
+        driver.follow(target, driver.velocities(message.name, message.velocity) if message.velocity else None)
+
+    @staticmethod
+    def _servo_velocity(driver: Driver, message: JointState) -> None:
+        driver.follow_velocity(driver.velocities(message.name, message.velocity))
+
+    @staticmethod
+    def _servo_pose(driver: Driver, message: PoseStamped) -> None:
+        driver.follow(convert.pose_value(message, driver.configuration.frame("base")))
+
+    def _joint_trajectory(self, driver: Driver, message: JointTrajectory) -> None:
+        if not message.points and not message.joint_names:  # as in ROS 1: an empty one stops
+            self._stopped(driver)
+            return
+        driver.accept(convert.trajectory_goal(message, now=driver.now, clock=self._node.seconds()))
