@@ -35,8 +35,8 @@ class Settings:
         clip: largest change of an action's likelihood that is rewarded.
         kl: the learning rate falls above the second, rises below the first.
         spread: logarithm of the action's deviation at the beginning.
-        spread_end: its ceiling at the end; on the way there the ceiling falls in a straight line. What is left
-            of the noise is what a policy cannot be more precise than.
+        spread_end: its ceiling at the end, to which it falls during the second half: a policy is no more precise
+            than the noise it learned in, but without noise it finds nothing.
         hidden: widths of the hidden layers of both networks.
         value: weight of the value's loss.
         gradient: largest norm of the gradient.
@@ -91,6 +91,11 @@ class Settings:
                 value=getattr(self, name),
                 allowed=wanted,
             )
+
+    def ceiling(self, progress: float) -> float:
+        """The most that `spread` may be after a share of the training, 0 to 1."""
+        left = min(1.0, 2.0 * (1.0 - min(1.0, progress)))
+        return self.spread_end + (self.spread - self.spread_end) * left
 
     def as_dict(self) -> dict[str, Any]:
         """For a file."""
@@ -251,7 +256,7 @@ class Learner:
                 self.optimiser.step()
                 losses.append(float(loss.detach()))
         with torch.no_grad():
-            agent.spread.clamp_(max=s.spread + (s.spread_end - s.spread) * min(1.0, progress))
+            agent.spread.clamp_(max=s.ceiling(progress))
         count = len(kls)
         return {
             "kl": sum(kls) / count,
