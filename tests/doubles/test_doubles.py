@@ -73,9 +73,9 @@ def _command(application: str, classes: Path, *data: str) -> list[str]:
 
 
 def _run(
-    application: str, classes: Path, *data: str, project: Path | None = None
+    application: str, classes: Path, *data: str, project: Path | None = None, speed: float = 1.0
 ) -> subprocess.CompletedProcess[str]:
-    command = _command(application, classes, *data)
+    command = [*_command(application, classes, *data), "--speed", str(speed)]
     if project is not None:
         command += ["--project", str(project)]
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
@@ -124,6 +124,43 @@ def test_servo_motions_of_a_sunrise_application(tmp_path: Path) -> None:
     done = _run("sample.Serving", tmp_path, f"sample.file={said}")
     assert done.returncode == 0, done.stdout + done.stderr
     assert said.read_text().splitlines() == [f"{one} = true" for one in SERVING]
+
+
+YIELDING = (
+    "it has Sunrise's defaults",
+    "directions are set by name and by group",
+    "a copy is one of its own",
+    "a pattern is a Cartesian impedance too",
+    "values out of range are refused",
+    "and change nothing",
+    "a force moves the flange by force over stiffness, along its own axes",
+    "a torque in A turns it about z",
+    "with a reference system along that one's axes",
+    "a LIN under Cartesian impedance arrives",
+    "a desired force",
+    "a sine swings by its amplitude",
+    "about its bias, up to the force limit",
+    "a spiral holds its motion open",
+    "it goes round",
+    "and returns",
+    "a Lissajous figure in its plane",
+    "a path deviation ends the motion",
+    "a velocity ends the motion",
+    "a control force ends the motion",
+    "without the stop condition it is only limited",
+    "a pattern without an end cannot be waited for",
+    "a servo motion takes other settings",
+    "again and again",
+    "but no other kind",
+)
+
+
+def test_cartesian_impedance_of_a_sunrise_application(tmp_path: Path) -> None:
+    _compile(HERE / "java" / "Yielding.java", tmp_path)
+    said = tmp_path / "said.txt"
+    done = _run("sample.Yielding", tmp_path, f"sample.file={said}", speed=2.0)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert said.read_text().splitlines() == [f"{one} = true" for one in YIELDING]
 
 
 def test_deselecting_an_application_is_no_failure(tmp_path: Path) -> None:
