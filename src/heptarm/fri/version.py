@@ -107,7 +107,7 @@ def unwrap(datagram: bytes, version: Version) -> bytes:
         if zlib.crc32(message) != int.from_bytes(datagram[-4:], "little"):
             raise MalformedMessage("FRI 2.7 datagram: wrong CRC, it was damaged under way")
         return message
-    if datagram[:1] != b"\x0a":
+    if is_framed(datagram) or datagram[:1] != b"\x0a":
         if is_framed(datagram):
             raise MalformedMessage(
                 f'the other side speaks FRI 2.7 ("3.0"), this side FRI {version.value}: set the same version on both'

@@ -21,7 +21,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from heptarm.fri.version import Version
 from heptarm.virtual import processdata
+from heptarm.virtual.fri.sessions import Sessions
 from heptarm.virtual.pacer import Pacer
 from heptarm.virtual.plant import Plant
 
@@ -50,6 +52,9 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--key", default="", help="pre-shared key")
     parser.add_argument("--application", default="", help="class of another application; ends with it")
     parser.add_argument("--classpath", action="append", default=[], help="folder or jar with its classes")
+    parser.add_argument(
+        "--fri-version", default="1.15", help="release of the cabinet's FRI, such as 1.11 or 2.5"
+    )
     parser.add_argument("--project", type=Path, help="RoboticsAPI.data.xml with process data")
     parser.add_argument("--data", action="append", default=[], metavar="NAME=VALUE", help="process data")
     parser.add_argument(
@@ -89,17 +94,23 @@ class VirtualCabinet:
 
         self._options = options
         self.plant = Plant(options.model)
-        self.pacer = Pacer(self.plant.ring, self.plant.tick, speed=options.speed)
+        self.sessions = Sessions(self.plant, version=Version.of(options.fri_version), speed=options.speed)
+        self.pacer = Pacer(self.plant.ring, self.tick, speed=options.speed)
         jvm.start(options.classpath)
         import jpype
 
         self._system = jpype.JClass("java.lang.System")
         if not options.verbose:
             jpype.JClass("java.util.logging.LogManager").getLogManager().reset()
-        self._station = jvm.open_station(self.plant)
+        self._station = jvm.open_station(self.plant, self.sessions)
         for name, value in data.items():
             self._station.setProcessData(name, jvm.boxed(value))
         self.host = jpype.JClass("heptarm.doubles.Host")(options.application or jvm.APPLICATION)
+
+    def tick(self) -> None:
+        """One millisecond of FRI and plant."""
+        self.sessions.tick()
+        self.plant.tick()
 
     @property
     def foreign(self) -> bool:
@@ -234,7 +245,7 @@ def _end(cabinet: VirtualCabinet) -> None:
 
     threading.Thread(target=stop, daemon=True).start()
     while not done.is_set():
-        cabinet.plant.tick()
+        cabinet.tick()
         time.sleep(0.0005)
     cabinet.write_stats()
 

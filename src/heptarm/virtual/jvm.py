@@ -11,6 +11,7 @@ import re
 import shutil
 import subprocess
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from heptarm.values.arrays import Array
 from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, SineImpedance
 from heptarm.values.motion import TOOL
 from heptarm.values.pose import Pose
+from heptarm.virtual.fri.sessions import Sessions
 from heptarm.virtual.order import Order, PlanError
 from heptarm.virtual.plant import Plant
 
@@ -204,8 +206,8 @@ def _order(java: Any) -> Order:
     )
 
 
-def open_station(plant: Plant) -> Any:
-    """Give the plant to Java; returns heptarm.doubles.Station."""
+def open_station(plant: Plant, sessions: Sessions) -> Any:
+    """Give the plant and its FRI sessions to Java; returns heptarm.doubles.Station."""
     robot = plant.robot
     limits = [*robot.q_min, *robot.q_max, *robot.dq_max, *robot.tau_max]
 
@@ -224,7 +226,13 @@ def open_station(plant: Plant) -> Any:
         @jpype.JOverride  # type: ignore[untyped-decorator]
         def submit(self, order: Any) -> str | None:
             try:
-                plant.submit(_order(order))
+                made = _order(order)
+                if order.friSession:
+                    overlaid = sessions.overlaid(
+                        int(order.friSession), int(order.friCommand), made.id, made.mode, _Listener(order.listener)
+                    )
+                    made = replace(made, listener=overlaid)
+                plant.submit(made)
             except (PlanError, CommandRejected) as error:
                 return str(error)
             return None
@@ -259,6 +267,22 @@ def open_station(plant: Plant) -> Any:
             except Unreachable:
                 return None
             return jpype.JArray(jpype.JDouble)(found.tolist())
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def friOpen(self, host: Any, settings: Any, transformations: Any, channel: Any) -> int:
+            period, multiplier, port, own = (int(value) for value in settings[:])
+            return sessions.open(
+                (str(host), port),
+                period_ms=period,
+                multiplier=multiplier,
+                port=None if own < 0 else own,
+                transformations=tuple(str(name) for name in transformations),
+                channel=channel.changed,
+            )
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def friClose(self, number: int) -> None:
+            sessions.close(int(number))
 
         @jpype.JOverride  # type: ignore[untyped-decorator]
         def links(self) -> Any:

@@ -61,6 +61,7 @@ class Server:
 
     Attributes:
         controller: the session.
+        listener: see above.
         port: the own port.
         strangers: datagrams from elsewhere than the client.
 
@@ -87,7 +88,7 @@ class Server:
         self.port: int = self._socket.getsockname()[1]
         self._stamped = _ask_for_stamps(self._socket)
         self._clock, self._speed, self._origin = clock, speed, clock()
-        self._listener = listener
+        self.listener = listener
         self._scenario = scenario or Scenario()
         self._there, self._back = Line(self._scenario.to_client), Line(self._scenario.from_client)
         self._lock = threading.Lock()
@@ -153,9 +154,9 @@ class Server:
             self._troubles = []
         self._arm.overlay(action)
         self._ticks, self._before = self._ticks + 1, now
-        if self._listener is not None:
+        if self.listener is not None:
             for event in events:
-                self._listener(event)
+                self.listener(event)
 
     def _reading(self, now: int) -> Reading:
         reading = self._arm.reading()

@@ -21,9 +21,12 @@ import com.kuka.roboticsAPI.geometricModel.math.Vector;
 import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
 import com.kuka.roboticsAPI.motionModel.ErrorHandlingAction;
 import com.kuka.roboticsAPI.motionModel.IErrorHandler;
+import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
+import com.kuka.roboticsAPI.motionModel.PositionHold;
 import com.kuka.roboticsAPI.sensorModel.ForceSensorData;
 
+import heptarm.core.Fri;
 import heptarm.core.Insight;
 import heptarm.core.Job;
 import heptarm.core.Log;
@@ -33,6 +36,7 @@ import heptarm.core.Robot;
 import heptarm.core.Servo;
 import heptarm.wire.Code;
 import heptarm.wire.FrameInfo;
+import heptarm.wire.FriOpen;
 import heptarm.wire.Item;
 import heptarm.wire.Mode;
 import heptarm.wire.OperationMode;
@@ -205,6 +209,41 @@ final class SunriseRobot implements Robot, IErrorHandler {
             log.warn("a servo motion was refused by the cabinet: " + e);
             throw new Refusal(Code.EXECUTION_FAILED, String.valueOf(e.getMessage()));
         }
+    }
+
+    public void check(FriOpen open) throws Refusal {
+        Modes.check(open.mode, "mode.");
+        try {
+            SunriseFri.check(open);
+        } catch (LinkageError e) {
+            throw new Refusal(Code.UNSUPPORTED, "this cabinet lacks the option Sunrise.FRI (" + e + ")");
+        }
+    }
+
+    public Fri fri(FriOpen open, Fri.Listener listener) throws Refusal {
+        try {
+            return SunriseFri.of(open, lbr, new SunriseFri.Mover() {
+                public Job move(PositionHold hold, Job.Listener jobListener) throws Refusal {
+                    return begin(hold, jobListener);
+                }
+            }, listener);
+        } catch (LinkageError e) {
+            throw new Refusal(Code.UNSUPPORTED, "this cabinet lacks the option Sunrise.FRI (" + e + ")");
+        } catch (RuntimeException e) {
+            log.warn("an FRI session was refused by the cabinet: " + e);
+            throw new Refusal(Code.EXECUTION_FAILED, String.valueOf(e.getMessage()));
+        }
+    }
+
+    private Job begin(IMotion motion, Job.Listener listener) {
+        SunriseJob job = new SunriseJob(listener);
+        try {
+            adopt(lbr.moveAsync(motion, job), job);
+        } catch (RuntimeException e) {
+            log.warn("a motion was refused by the cabinet: " + e);
+            job.fail(e.getMessage());
+        }
+        return job;
     }
 
     private void adopt(IMotionContainer container, SunriseJob job) {

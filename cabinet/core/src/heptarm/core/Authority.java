@@ -48,6 +48,7 @@ final class Authority {
         }
         try {
             server.executor.endAll(Cause.STOPPED, why);
+            server.monitors.closeAll();
         } finally {
             free(why);
         }
@@ -76,6 +77,7 @@ final class Authority {
                 server.executor.endAll(Cause.LOST, client.name() + " was lost: " + why);
                 server.robot.stop();
             }
+            server.monitors.closeAll();
         } catch (RuntimeException e) {
             server.log.error("stopping the robot", e);
         } finally {

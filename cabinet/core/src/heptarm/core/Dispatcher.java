@@ -3,6 +3,8 @@ package heptarm.core;
 import heptarm.wire.Accepted;
 import heptarm.wire.Cancel;
 import heptarm.wire.Code;
+import heptarm.wire.FriClose;
+import heptarm.wire.FriOpen;
 import heptarm.wire.Goodbye;
 import heptarm.wire.Item;
 import heptarm.wire.Message;
@@ -90,16 +92,16 @@ final class Dispatcher {
         if (message instanceof ServoJoints) {
             ServoJoints one = (ServoJoints) message;
             joints = one.q;
-            stream = server.executor.stream(one.servo);
+            stream = streamOf(one.servo);
             target = new Stream.Target(one.q, null, null, null, one.watchdog, sent);
         } else if (message instanceof ServoJointsVelocity) {
             ServoJointsVelocity one = (ServoJointsVelocity) message;
             joints = one.q;
-            stream = server.executor.stream(one.servo);
+            stream = streamOf(one.servo);
             target = new Stream.Target(one.q, one.dq, null, null, one.watchdog, sent);
         } else {
             ServoPose one = (ServoPose) message;
-            stream = server.executor.stream(one.servo);
+            stream = streamOf(one.servo);
             target = new Stream.Target(null, null, one.xyz, one.quat, one.watchdog, sent);
         }
         if (stream == null) {
@@ -143,6 +145,10 @@ final class Dispatcher {
         } else if (message instanceof ServoClose) {
             running(((ServoClose) message).servo);
             server.executor.cancel(((ServoClose) message).servo);
+        } else if (message instanceof FriOpen) {
+            id = open((FriOpen) message);
+        } else if (message instanceof FriClose) {
+            close((FriClose) message);
         } else if (message instanceof Cancel) {
             server.executor.cancel(((Cancel) message).id);
         } else if (message instanceof Subscribe) {
@@ -174,12 +180,39 @@ final class Dispatcher {
         return new Accepted(id);
     }
 
+    /** The stream of a servo motion that runs or is about to; null if it is none, or has ended. */
+    private Stream streamOf(long servo) {
+        Activity activity = server.executor.activity(servo);
+        return activity instanceof Stream ? (Stream) activity : null;
+    }
+
     private Stream running(long servo) throws Refusal {
-        Stream stream = server.executor.stream(servo);
+        Stream stream = streamOf(servo);
         if (stream == null) {
             throw new Refusal(Code.UNKNOWN_MOTION, "servo", Long.toString(servo), "", "servo motion " + servo + " is not running");
         }
         return stream;
+    }
+
+    private long open(FriOpen open) throws Refusal {
+        ModeRules.check(open.mode, "mode.");
+        server.robot.check(open);
+        FriRun run = new FriRun(server, open);
+        if (!run.onlyMonitors()) {
+            return server.executor.open(run);
+        }
+        long id = server.executor.number();
+        server.monitors.open(id, run);
+        return id;
+    }
+
+    private void close(FriClose close) throws Refusal {
+        if (server.executor.activity(close.session) instanceof FriRun) {
+            server.executor.cancel(close.session);
+        } else if (!server.monitors.close(close.session)) {
+            throw new Refusal(Code.UNKNOWN_MOTION, "session", Long.toString(close.session), "",
+                    "FRI session " + close.session + " is not open");
+        }
     }
 
     private long run(Run run) throws Refusal {

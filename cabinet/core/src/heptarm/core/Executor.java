@@ -40,103 +40,6 @@ final class Executor {
         thread.start();
     }
 
-    /** A program and what becomes of it. Guarded by itself. */
-    private final class Program {
-        final long id;
-        final Run run;
-        final Stream stream;
-        final List<Job> jobs = new ArrayList<Job>();
-        final Job.Ended[] ended;
-        int item;
-        Cause cause;
-        String why = "";
-        int code;
-        String text = "";
-        long began;
-
-        /** Either a run of motions or a stream of targets. */
-        Program(long id, Run run, Stream stream) {
-            this.id = id;
-            this.run = run;
-            this.stream = stream;
-            this.ended = new Job.Ended[size()];
-        }
-
-        int size() {
-            return run == null ? 1 : run.items.length;
-        }
-
-        /** Ends it for a cause; the first cause counts. */
-        void end(Cause newCause, String newWhy) {
-            List<Job> all;
-            synchronized (this) {
-                if (cause == null) {
-                    cause = newCause;
-                    why = newWhy;
-                }
-                all = new ArrayList<Job>(jobs);
-                notifyAll();
-            }
-            if (stream != null) {
-                stream.close();
-            }
-            for (int i = all.size() - 1; i >= 0; i--) {
-                try {
-                    all.get(i).cancel(); // from the last, so that none of them begins while the others are cancelled
-                } catch (RuntimeException e) {
-                    server.log.error("cancelling item " + i + " of motion " + id, e);
-                }
-            }
-        }
-
-        /** Notes a job; true if the program has ended already. */
-        synchronized boolean adopt(Job job) {
-            jobs.add(job);
-            return cause != null;
-        }
-
-        synchronized Cause cause() {
-            return cause;
-        }
-
-        /** Waits for the end of an item. */
-        synchronized Job.Ended await(int index) throws InterruptedException {
-            while (ended[index] == null) {
-                wait();
-            }
-            return ended[index];
-        }
-
-        Job.Listener listener(final int index) {
-            return new Job.Listener() {
-                public void started() {
-                    synchronized (Program.this) {
-                        item = index;
-                    }
-                    server.broadcast(new MotionStarted(id, index));
-                    if (stream != null) {
-                        stream.begun();
-                    }
-                }
-
-                public void finished(Job.Ended how, int failureCode, String failure) {
-                    synchronized (Program.this) {
-                        ended[index] = how;
-                        if (how == Job.Ended.FAILED && cause == null) {
-                            cause = Cause.FAILED;
-                            code = failureCode;
-                            text = failure;
-                        }
-                        Program.this.notifyAll();
-                    }
-                    if (stream != null) {
-                        stream.over(how);
-                    }
-                }
-            };
-        }
-    }
-
     // ------------------------------------------------------------------------------- requests, from readers
 
     long add(Run run) throws Refusal {
@@ -175,32 +78,37 @@ final class Executor {
         return program.id;
     }
 
-    private Program queue(Run run, Stream stream) {
+    /** The next number of a motion or a session. */
+    synchronized long number() {
         lastId = lastId % 0xFFFFFFFFL + 1;
-        Program program = new Program(lastId, run, stream);
+        return lastId;
+    }
+
+    private Program queue(Run run, Activity activity) {
+        Program program = new Program(server, number(), run, activity);
         queue.add(program);
         notifyAll();
         return program;
     }
 
-    /** Begins a servo motion; nothing else may be under way, since it starts where the arm is now. */
-    synchronized long open(Stream stream) throws Refusal {
+    /** Begins an activity; nothing else may be under way, since it starts where the arm is now. */
+    synchronized long open(Activity activity) throws Refusal {
         if (closed) {
             throw new Refusal(Code.SHUTTING_DOWN, "the cabinet application ends");
         }
         if (running != null || !queue.isEmpty()) {
             throw new Refusal(Code.BUSY, "motion " + (running != null ? running.id : queue.peek().id)
-                    + " is running; wait for it or stop it before a servo motion begins");
+                    + " is running; wait for it or stop it before the robot is led from outside");
         }
-        Program program = queue(null, stream);
-        stream.number(program.id);
+        Program program = queue(null, activity);
+        activity.number(program.id);
         return program.id;
     }
 
-    /** The stream of a servo motion that runs or is about to; null if it is none, or has ended. */
-    synchronized Stream stream(long id) {
+    /** The activity that runs or is about to under a number; null if there is none. */
+    synchronized Activity activity(long id) {
         Program program = running != null ? running : queue.peek();
-        return program != null && program.id == id ? program.stream : null;
+        return program != null && program.id == id ? program.activity : null;
     }
 
     void cancel(long id) throws Refusal {
@@ -316,58 +224,20 @@ final class Executor {
         }
     }
 
-    /** Lets a servo motion follow its targets; one that ended because none came for long is begun anew with the next. */
-    private void serve(Program program) throws InterruptedException {
-        Stream stream = program.stream;
-        String starved = "";
-        boolean goesOn = true;
-        while (goesOn) {
-            stream.prepare();
-            synchronized (program) {
-                program.ended[0] = null;
-            }
-            try {
-                Servo servo = server.robot.servo(stream.open, program.listener(0));
-                stream.adopt(servo);
-                if (program.adopt(servo)) {
-                    servo.cancel();
-                }
-                if (stream.awaitStart()) {
-                    starved = stream.follow();
-                }
-            } catch (Refusal e) {
-                program.listener(0).finished(Job.Ended.FAILED, e.code, e.getMessage());
-            }
-            if (starved.length() > 0) {
-                program.end(Cause.STARVED, starved);
-            }
-            goesOn = program.await(0) == Job.Ended.DONE && program.cause() == null;
-            if (goesOn && !stream.awaitNext()) {
-                program.end(Cause.STARVED, "no target came for so long that the servo motion ended");
-                goesOn = false;
-            }
-        }
-        stream.tell();
-    }
-
     private void carryOut(Program program) throws InterruptedException {
-        if (program.stream != null) {
-            serve(program);
+        if (program.activity != null) {
+            program.activity.perform(program);
             return;
         }
         for (int i = 0; i < program.run.items.length; i++) {
-            synchronized (program) {
-                if (program.cause != null) {
-                    program.ended[i] = Job.Ended.CANCELLED;
-                    continue;
-                }
+            if (program.cause() != null) {
+                program.skip(i);
+                continue;
             }
             try {
                 Job job = server.robot.start(program.run.items[i],
                         program.run.items[i].mode == null ? new PositionMode() : program.run.items[i].mode, program.listener(i));
-                if (program.adopt(job)) {
-                    job.cancel();
-                }
+                program.adopt(job);
             } catch (Refusal e) {
                 program.listener(i).finished(Job.Ended.FAILED, e.code, e.getMessage());
             }

@@ -1,6 +1,7 @@
 package heptarm.core;
 
 import heptarm.wire.FrameInfo;
+import heptarm.wire.FriOpen;
 import heptarm.wire.Item;
 import heptarm.wire.Mode;
 import heptarm.wire.PoseState;
@@ -61,6 +62,12 @@ public interface Robot {
 
     /** Starts a servo motion at the present position; it takes targets once the listener has heard of its start. */
     Servo servo(ServoOpen open, Job.Listener listener) throws Refusal;
+
+    /** Checks that an FRI session can be opened here; nothing happens. */
+    void check(FriOpen open) throws Refusal;
+
+    /** Opens an FRI session; nothing moves yet. */
+    Fri fri(FriOpen open, Fri.Listener listener) throws Refusal;
 
     /** Brakes whatever moves and drops what waits. Never blocks for long. */
     void stop();

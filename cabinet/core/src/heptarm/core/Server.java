@@ -33,6 +33,7 @@ public final class Server {
     final Log log;
     final Authority authority;
     final Executor executor;
+    final FriMonitors monitors = new FriMonitors();
     final Sampler sampler;
     final Dispatcher dispatcher;
 
@@ -82,6 +83,7 @@ public final class Server {
         }
         closed = true;
         executor.close();
+        monitors.closeAll();
         try {
             robot.stop();
         } catch (RuntimeException e) { // the port and the threads end all the same

@@ -2,6 +2,7 @@ package heptarm.core;
 
 import java.util.Arrays;
 
+import heptarm.wire.Cause;
 import heptarm.wire.Code;
 import heptarm.wire.ServoOpen;
 import heptarm.wire.ServoStatus;
@@ -10,7 +11,7 @@ import heptarm.wire.ServoStatus;
  * Targets of a servo motion between the reader that brings them and the motion thread that applies them: the newest wins,
  * and each brings the time within which the next one has to come.
  */
-final class Stream {
+final class Stream implements Activity {
     private static final int AGES = 4096;
     private static final double STATUS_PERIOD = 1.0;
     /** An older target was sent by a client that does not know the cabinet's clock. */
@@ -67,7 +68,7 @@ final class Stream {
         this.watchdog = open.watchdog;
     }
 
-    void number(long accepted) {
+    public void number(long accepted) {
         id = accepted;
     }
 
@@ -114,36 +115,65 @@ final class Stream {
 
     // ------------------------------------------------------------------------------------- from the listeners
 
-    synchronized void begun() {
+    public synchronized void begun() {
         started = true;
         notifyAll();
     }
 
-    synchronized void over(Job.Ended how) {
+    public synchronized void over(Job.Ended how) {
         ended = how;
         notifyAll();
     }
 
     /** The program has ended: whoever waits here need not. */
-    synchronized void close() {
+    public synchronized void close() {
         closed = true;
         notifyAll();
     }
 
     // ---------------------------------------------------------------------------------- by the motion thread
 
+    /** Lets a servo motion follow the targets; one that ended because none came for long is begun anew with the next. */
+    public void perform(Program program) throws InterruptedException {
+        String starved = "";
+        boolean goesOn = true;
+        while (goesOn) {
+            prepare();
+            program.renew(0);
+            try {
+                Servo next = server.robot.servo(open, program.listener(0));
+                adopt(next);
+                program.adopt(next);
+                if (awaitStart()) {
+                    starved = follow();
+                }
+            } catch (Refusal e) {
+                program.fail(0, e.code, e.getMessage());
+            }
+            if (starved.length() > 0) {
+                program.end(Cause.STARVED, starved);
+            }
+            goesOn = program.await(0) == Job.Ended.DONE && program.cause() == null;
+            if (goesOn && !awaitNext()) {
+                program.end(Cause.STARVED, "no target came for so long that the servo motion ended");
+                goesOn = false;
+            }
+        }
+        tell();
+    }
+
     /** A motion is about to start; what is known of one before it does not count any more. */
-    synchronized void adopt(Servo next) {
+    private synchronized void adopt(Servo next) {
         servo = next;
     }
 
-    synchronized void prepare() {
+    private synchronized void prepare() {
         started = false;
         ended = null;
     }
 
     /** Waits for the start of the motion; false if it ended before. */
-    synchronized boolean awaitStart() throws InterruptedException {
+    private synchronized boolean awaitStart() throws InterruptedException {
         while (!started && ended == null && !closed) {
             wait();
         }
@@ -151,7 +181,7 @@ final class Stream {
     }
 
     /** Applies targets until the motion or the program ends, or until none came in time; then it returns why in words. */
-    String follow() throws InterruptedException {
+    private String follow() throws InterruptedException {
         while (true) {
             Target next;
             synchronized (this) {
@@ -174,7 +204,7 @@ final class Stream {
     }
 
     /** Waits for a target after a motion that ended by itself; null if none came in time. */
-    synchronized boolean awaitNext() throws InterruptedException {
+    private synchronized boolean awaitNext() throws InterruptedException {
         ended = null;
         return await() != null && !closed;
     }
@@ -207,7 +237,7 @@ final class Stream {
     }
 
     /** Tells everybody what was seen of the stream. */
-    void tell() {
+    private void tell() {
         told = server.clock.nanos();
         ServoStatus status;
         synchronized (this) {

@@ -47,6 +47,7 @@ final class Watchdog {
                 server.clock.sleepUntil(next);
                 try {
                     look();
+                    server.monitors.look();
                     if (++round % SAFETY_EVERY == 0) {
                         lookAtSafety();
                         failing = false;

@@ -32,6 +32,10 @@ public final class MotionOrder {
     public double[] mode;
     /** Of a servo motion: shortest trajectory, time-out after the goal, time-out of its speed [s]. */
     public double[] timing = {0.02, 30.0, 0.1};
+    /** FRI session whose client overlays the motion; 0: none. */
+    public long friSession;
+    /** What that client commands, as FRI numbers it. */
+    public int friCommand;
     public MotionListener listener;
 
     public MotionOrder(long id, String kind) {

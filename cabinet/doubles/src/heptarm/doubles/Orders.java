@@ -1,5 +1,6 @@
 package heptarm.doubles;
 
+import com.kuka.connectivity.fastRobotInterface.FRIJointOverlay;
 import com.kuka.connectivity.motionModel.directServo.DirectServo;
 import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
 import com.kuka.connectivity.motionModel.smartServo.SmartServo;
@@ -14,6 +15,7 @@ import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
 import com.kuka.roboticsAPI.motionModel.CartesianPTP;
 import com.kuka.roboticsAPI.motionModel.IMotion;
+import com.kuka.roboticsAPI.motionModel.IMotionOverlay;
 import com.kuka.roboticsAPI.motionModel.LIN;
 import com.kuka.roboticsAPI.motionModel.PTP;
 import com.kuka.roboticsAPI.motionModel.PositionHold;
@@ -34,6 +36,7 @@ public final class Orders {
         order.tcp = pose(robot.getFlange().transformationTo(moved));
         if (motion instanceof RobotMotion) {
             order.relative = ((RobotMotion<?>) motion).relativeParameters();
+            overlay(order, ((RobotMotion<?>) motion).overlay());
             order.mode = Modes.of(((RobotMotion<?>) motion).getMode(), moved, robot);
         }
         if (motion instanceof SplineMotionCP) {
@@ -75,6 +78,15 @@ public final class Orders {
             throw new IllegalArgumentException("the virtual cabinet cannot carry out a " + motion.getClass().getName());
         }
         return order;
+    }
+
+    private static void overlay(MotionOrder order, IMotionOverlay overlay) {
+        if (overlay instanceof FRIJointOverlay) {
+            order.friSession = ((FRIJointOverlay) overlay).session().number();
+            order.friCommand = ((FRIJointOverlay) overlay).mode().ordinal();
+        } else if (overlay != null) {
+            throw new IllegalArgumentException("the virtual cabinet has no overlay " + overlay.getClass().getName());
+        }
     }
 
     private static void target(MotionOrder order, AbstractFrame frame, LBR robot) {

@@ -24,6 +24,15 @@ public interface Plant {
     /** Joint positions [rad] that bring the flange to a pose in the base, nearest to others; null if there are none. */
     double[] inverse(double[] pose, double[] near);
 
+    /**
+     * Opens an FRI session to a client; returns its number.
+     *
+     * @param settings send period [ms], receive multiplier, port on the client, own port (-1: chosen)
+     */
+    long friOpen(String host, int[] settings, String[] transformations, FriChannel channel);
+
+    void friClose(long session);
+
     /** Lengths base-shoulder, shoulder-elbow, elbow-wrist, wrist-flange [m]. */
     double[] links();
 }

@@ -4,6 +4,7 @@ import java.util.ArrayDeque;
 import java.util.Arrays;
 
 import heptarm.core.Clock;
+import heptarm.core.Fri;
 import heptarm.core.Job;
 import heptarm.core.Models;
 import heptarm.core.Refusal;
@@ -11,6 +12,10 @@ import heptarm.core.Robot;
 import heptarm.core.Servo;
 import heptarm.wire.Code;
 import heptarm.wire.FrameInfo;
+import heptarm.wire.FriCommandMode;
+import heptarm.wire.FriOpen;
+import heptarm.wire.FriQuality;
+import heptarm.wire.FriSessionState;
 import heptarm.wire.Hold;
 import heptarm.wire.Item;
 import heptarm.wire.Mode;
@@ -41,6 +46,9 @@ final class FakeRobot implements Robot, Runnable {
     static final double FAILS_ON_THE_WAY = 1.5;
     static final double PLANS_SLOWLY = 1.0;
     static final double LACKS_A_CLASS = 0.75;
+    static final int NO_PORT = 1;
+    static final double NEVER = 0.1;
+    static final double FAILS_COMMANDING = 0.009;
     static final double REFUSED = 2.0;
     static final double SERVO_TIMEOUT = 0.3;
     private static final long SLOWLY_NS = 500000000L;
@@ -219,6 +227,57 @@ final class FakeRobot implements Robot, Runnable {
             jobs.add(job);
         }
         return job;
+    }
+
+    @Override
+    public void check(FriOpen open) throws Refusal {
+        if (open.command == FriCommandMode.POSE) {
+            throw new Refusal(Code.UNSUPPORTED, "command", "pose", "", "not here");
+        }
+    }
+
+    /** Its client answers after the period's time, in milliseconds times ten; one of 0.1 s never answers. */
+    @Override
+    public Fri fri(FriOpen open, Fri.Listener listener) throws Refusal {
+        if (open.port == NO_PORT) {
+            throw new Refusal(Code.EXECUTION_FAILED, "port " + open.port + " is taken");
+        }
+        listener.changed(FriSessionState.MONITORING_WAIT, FriQuality.POOR);
+        if (open.period < NEVER) {
+            Thread client = new Thread(() -> {
+                sleep((long) (open.period * 1e10));
+                listener.changed(FriSessionState.MONITORING_READY, FriQuality.GOOD);
+            });
+            client.setDaemon(true);
+            client.start();
+        }
+        return new Fri() {
+            @Override
+            public Job command(Job.Listener jobListener) {
+                listener.changed(FriSessionState.COMMANDING_WAIT, FriQuality.GOOD);
+                FakeJob job = new FakeJob(null, open.period == FAILS_COMMANDING ? 0.1 : 1e9, new Job.Listener() {
+                    @Override
+                    public void started() {
+                        jobListener.started();
+                    }
+
+                    @Override
+                    public void finished(Job.Ended how, int code, String text) {
+                        boolean bad = how == Job.Ended.DONE;
+                        jobListener.finished(bad ? Job.Ended.FAILED : how, bad ? Code.EXECUTION_FAILED : 0,
+                                bad ? "illegal axis delta" : "");
+                    }
+                });
+                synchronized (jobs) {
+                    jobs.add(job);
+                }
+                return job;
+            }
+
+            @Override
+            public void close() {
+            }
+        };
     }
 
     @Override

@@ -13,6 +13,7 @@ public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
     private double blendingCart;
     private double blendingOri;
     private IMotionControlMode mode;
+    private IMotionOverlay overlay;
 
     protected RobotMotion() {
         Arrays.fill(relative, 1.0);
@@ -66,6 +67,16 @@ public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
     public T setMode(IMotionControlMode value) {
         mode = value;
         return self();
+    }
+
+    public T addMotionOverlay(IMotionOverlay added) {
+        overlay = added;
+        return self();
+    }
+
+    /** What changes the motion while it runs; null: nothing; for the simulation. */
+    public IMotionOverlay overlay() {
+        return overlay;
     }
 
     public IMotionControlMode getMode() {

@@ -1,0 +1,132 @@
+package heptarm.core;
+
+import java.util.ArrayList;
+import java.util.List;
+
+import heptarm.wire.Cause;
+import heptarm.wire.MotionStarted;
+import heptarm.wire.Run;
+
+/** A program, either a run of motions or an activity, and what becomes of it. Guarded by itself. */
+final class Program {
+    final long id;
+    final Run run;
+    final Activity activity;
+    final Job.Ended[] ended;
+    int item;
+    Cause cause;
+    String why = "";
+    int code;
+    String text = "";
+    long began;
+    private final Server server;
+    private final List<Job> jobs = new ArrayList<Job>();
+
+    Program(Server server, long id, Run run, Activity activity) {
+        this.server = server;
+        this.id = id;
+        this.run = run;
+        this.activity = activity;
+        this.ended = new Job.Ended[size()];
+    }
+
+    int size() {
+        return run == null ? 1 : run.items.length;
+    }
+
+    /** Ends it for a cause; the first cause counts. */
+    void end(Cause newCause, String newWhy) {
+        List<Job> all;
+        synchronized (this) {
+            if (cause == null) {
+                cause = newCause;
+                why = newWhy;
+            }
+            all = new ArrayList<Job>(jobs);
+            notifyAll();
+        }
+        if (activity != null) {
+            activity.close();
+        }
+        for (int i = all.size() - 1; i >= 0; i--) {
+            try {
+                all.get(i).cancel(); // from the last, so that none of them begins while the others are cancelled
+            } catch (RuntimeException e) {
+                server.log.error("cancelling item " + i + " of motion " + id, e);
+            }
+        }
+    }
+
+    /** It fails; a cause that it ended for before counts. */
+    synchronized void fail(int index, int failureCode, String failure) {
+        ended[index] = Job.Ended.FAILED;
+        if (cause == null) {
+            cause = Cause.FAILED;
+            code = failureCode;
+            text = failure;
+        }
+        notifyAll();
+    }
+
+    /** Notes a job; one that comes too late is cancelled. */
+    void adopt(Job job) {
+        boolean late;
+        synchronized (this) {
+            jobs.add(job);
+            late = cause != null;
+        }
+        if (late) {
+            job.cancel();
+        }
+    }
+
+    synchronized Cause cause() {
+        return cause;
+    }
+
+    /** An item begins anew. */
+    synchronized void renew(int index) {
+        ended[index] = null;
+    }
+
+    /** An item that never began has ended. */
+    synchronized void skip(int index) {
+        ended[index] = Job.Ended.CANCELLED;
+    }
+
+    /** Waits for the end of an item. */
+    synchronized Job.Ended await(int index) throws InterruptedException {
+        while (ended[index] == null) {
+            wait();
+        }
+        return ended[index];
+    }
+
+    Job.Listener listener(final int index) {
+        return new Job.Listener() {
+            public void started() {
+                synchronized (Program.this) {
+                    item = index;
+                }
+                server.broadcast(new MotionStarted(id, index));
+                if (activity != null) {
+                    activity.begun();
+                }
+            }
+
+            public void finished(Job.Ended how, int failureCode, String failure) {
+                if (how == Job.Ended.FAILED) {
+                    fail(index, failureCode, failure);
+                } else {
+                    synchronized (Program.this) {
+                        ended[index] = how;
+                        Program.this.notifyAll();
+                    }
+                }
+                if (activity != null) {
+                    activity.over(how);
+                }
+            }
+        };
+    }
+}
