@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from heptarm.errors import LimitError
@@ -74,7 +74,7 @@ def requests(draw: st.DrawFn) -> list[tuple[float, ...] | None]:
     return wishes
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(wishes=requests(), period=st.sampled_from([1e-3, 2e-3, 5e-3, 1e-2, 0.1]), data=st.data())
 def test_whatever_is_asked_the_limits_hold(
     wishes: list[tuple[float, ...] | None], period: float, data: st.DataObject

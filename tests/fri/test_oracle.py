@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from heptarm.fri import codec
@@ -21,6 +21,7 @@ from . import strategies as some
 from .golden import COMMAND_1X, COMMAND_27, MONITORING_1X
 
 every_version = pytest.mark.parametrize("wire", Version)
+some_examples = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 REQ, OPT, REP = "required", "optional", "repeated"
 
@@ -226,7 +227,7 @@ def oracle_of_command(value: m.Command, classes: dict[str, Any]) -> Any:
 
 
 @every_version
-@settings(max_examples=60)
+@some_examples
 @given(data=st.data())
 def test_monitoring_messages_are_the_same_octets(wire: Version, data: st.DataObject) -> None:
     value = data.draw(some.monitorings(wire))
@@ -237,7 +238,7 @@ def test_monitoring_messages_are_the_same_octets(wire: Version, data: st.DataObj
 
 
 @every_version
-@settings(max_examples=60)
+@some_examples
 @given(data=st.data())
 def test_command_messages_are_the_same_octets(wire: Version, data: st.DataObject) -> None:
     value = data.draw(some.commands(wire))
@@ -247,7 +248,7 @@ def test_command_messages_are_the_same_octets(wire: Version, data: st.DataObject
 
 
 @every_version
-@settings(max_examples=60)
+@some_examples
 @given(data=st.data())
 def test_what_the_library_writes_is_read_packed_or_not(wire: Version, data: st.DataObject) -> None:
     monitoring, command = data.draw(some.monitorings(wire)), data.draw(some.commands(wire))

@@ -140,7 +140,7 @@ def test_its_ppo_learns_on_the_same_simulator() -> None:
             return student.predict(observation.astype(np.float32), deterministic=True)[0]
 
         before = evaluate(policy, 50, task=task).mean
-        student.learn(100_000)
+        student.learn(150_000)
     assert evaluate(policy, 50, task=task).mean < 0.5 * before
 
 

@@ -20,7 +20,7 @@ from heptarm.errors import CommandRejected, HeptarmError, LimitError
 from heptarm.rl import ppo
 from heptarm.rl.evaluate import evaluate
 from heptarm.rl.policy import Policy
-from heptarm.rl.randomise import LEVELS
+from heptarm.rl.randomise import LEVELS, MILD
 from heptarm.rl.task import ReachTask
 from heptarm.rl.train import Recipe, Row, Trained, beside, train
 
@@ -234,7 +234,8 @@ def test_two_workers_learn_one_policy_and_go_on_after_an_interruption(tmp_path: 
 @pytest.mark.slow
 def test_it_learns_in_half_a_minute() -> None:
     task = ReachTask(feature="kinematic")
-    trained = train(Recipe(task, steps=400_000, seed=1))
+    settings = ppo.Settings(action_cost=0.0, spread_end=-1.0)  # the usual ones are for a longer training
+    trained = train(Recipe(task, steps=350_000, seed=1, randomisation=MILD, settings=settings))
     report = evaluate(trained.policy, 200)
     assert report.mean < 0.03
-    assert report.success_rate > 0.8
+    assert report.success_rate > 0.9

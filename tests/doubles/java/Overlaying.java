@@ -1,0 +1,115 @@
+package sample;
+
+import static com.kuka.roboticsAPI.motionModel.BasicMotions.ptp;
+
+import java.io.PrintWriter;
+import java.util.Collections;
+import java.util.LinkedHashSet;
+import java.util.Set;
+import java.util.concurrent.TimeUnit;
+import java.util.concurrent.TimeoutException;
+
+import javax.inject.Inject;
+
+import com.kuka.common.ThreadUtil;
+import com.kuka.connectivity.fastRobotInterface.ClientCommandMode;
+import com.kuka.connectivity.fastRobotInterface.FRIChannelInformation;
+import com.kuka.connectivity.fastRobotInterface.FRIChannelInformation.FRISessionState;
+import com.kuka.connectivity.fastRobotInterface.FRIConfiguration;
+import com.kuka.connectivity.fastRobotInterface.FRIJointOverlay;
+import com.kuka.connectivity.fastRobotInterface.FRISession;
+import com.kuka.connectivity.fastRobotInterface.IFRISessionListener;
+import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.motionModel.IMotionContainer;
+import com.kuka.roboticsAPI.motionModel.PositionHold;
+import com.kuka.roboticsAPI.motionModel.controlModeModel.PositionControlMode;
+
+/** An FRI application as Sunrise programmers write it; each step leaves a line that the test reads. */
+public class Overlaying extends RoboticsAPIApplication implements IFRISessionListener {
+    @Inject
+    private LBR lbr;
+
+    private final Set<FRISessionState> seen = Collections.synchronizedSet(new LinkedHashSet<FRISessionState>());
+    private PrintWriter out;
+
+    @Override
+    public void initialize() {
+        try {
+            String file = getApplicationData().getProcessData("sample.file").getValue();
+            out = new PrintWriter(file, "UTF-8");
+        } catch (java.io.IOException e) {
+            throw new IllegalStateException(e);
+        }
+    }
+
+    @Override
+    public void run() throws Exception {
+        int port = getApplicationData().getProcessData("sample.port").getValue();
+        lbr.move(ptp(0, 0.5, 0, -1.3, 0, 0.9, 0));
+        FRIConfiguration configuration = FRIConfiguration.createRemoteConfiguration(lbr, "127.0.0.1");
+        configuration.setSendPeriodMilliSec(5);
+        configuration.setReceiveMultiplier(1);
+        configuration.setPortOnRemote(port);
+        boolean refused = false;
+        try {
+            configuration.setSendPeriodMilliSec(0);
+        } catch (IllegalArgumentException e) {
+            refused = true;
+        }
+        say("a bad period throws", refused);
+        FRISession session = new FRISession(configuration);
+        session.addFRISessionListener(this);
+        session.await(10, TimeUnit.SECONDS);
+        say("the client answers", session.getFRIChannelInformation().getLatency() >= 0);
+        double before = lbr.getCurrentJointPosition().get(6);
+        PositionHold hold = new PositionHold(new PositionControlMode(), -1, TimeUnit.SECONDS);
+        IMotionContainer container =
+                lbr.moveAsync(hold.addMotionOverlay(new FRIJointOverlay(session, ClientCommandMode.POSITION)));
+        for (int i = 0; i < 100 && lbr.getCurrentJointPosition().get(6) < before + 0.09; i++) {
+            ThreadUtil.milliSleep(50);
+        }
+        say("the client moves the arm", lbr.getCurrentJointPosition().get(6) > before + 0.09);
+        say("commanding is active",
+                session.getFRIChannelInformation().getFRISessionState() == FRISessionState.COMMANDING_ACTIVE);
+        container.cancel();
+        ThreadUtil.milliSleep(700);
+        say("cancelling the motion ends the overlay", container.isFinished() && !container.hasError());
+        say("the session monitors on",
+                session.getFRIChannelInformation().getFRISessionState() == FRISessionState.MONITORING_READY);
+        session.close();
+        ThreadUtil.milliSleep(100);
+        say("all states were told", seen.contains(FRISessionState.COMMANDING_WAIT)
+                && seen.contains(FRISessionState.COMMANDING_ACTIVE) && seen.contains(FRISessionState.IDLE));
+        configuration.setPortOnRemote(port + 1);
+        boolean late = false;
+        FRISession nobody = new FRISession(configuration);
+        try {
+            nobody.await(300, TimeUnit.MILLISECONDS);
+        } catch (TimeoutException e) {
+            late = true;
+        }
+        nobody.close();
+        say("without a client await times out", late);
+    }
+
+    @Override
+    public void onFRISessionStateChanged(FRIChannelInformation information) {
+        seen.add(information.getFRISessionState());
+    }
+
+    @Override
+    public void onFRIConnectionQualityChanged(FRIChannelInformation information) {
+    }
+
+    private void say(String what, boolean truth) {
+        out.println(what + " = " + truth);
+        out.flush();
+    }
+
+    @Override
+    public void dispose() {
+        out.close();
+        super.dispose();
+    }
+}

@@ -1,0 +1,58 @@
+"""An FRI application as Sunrise programmers write it, its client in a process of its own, real UDP between them."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+
+from heptarm.rt.client import Client
+from tests.doubles.test_doubles import HERE, _command, _compile
+
+SAID = (
+    "a bad period throws",
+    "the client answers",
+    "the client moves the arm",
+    "commanding is active",
+    "cancelling the motion ends the overlay",
+    "the session monitors on",
+    "all states were told",
+    "without a client await times out",
+)
+
+
+def _free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def test_an_fri_application_and_its_client(tmp_path: Path) -> None:
+    _compile(HERE / "java" / "Overlaying.java", tmp_path)
+    said, port = tmp_path / "said.txt", _free_port()
+    project = tmp_path / "data.xml"
+    project.write_text(
+        "<persistence><processDataContainer>"
+        f'<processData dataType="java.lang.Integer" id="sample.port" defaultValue="{port}"/>'
+        "</processDataContainer></persistence>"
+    )
+    command = _command("sample.Overlaying", tmp_path, f"sample.file={said}")
+    with (
+        Client(port, realtime=False) as client,
+        subprocess.Popen(
+            [*command, "--project", str(project)], stdout=subprocess.PIPE, text=True, env=os.environ
+        ) as application,
+    ):
+        state = client.wait("COMMANDING_ACTIVE", timeout=60.0)
+        start, began = state.q_ipo, time.monotonic()
+        while application.poll() is None and time.monotonic() - began < 60.0:
+            swing = 0.1 * (1.0 - np.cos(min(time.monotonic() - began, np.pi / 2) * 2.0)) / 2.0
+            client.command(q=start + [0, 0, 0, 0, 0, 0, swing])
+            time.sleep(0.005)
+        output = application.communicate(timeout=10)[0]
+    assert application.returncode == 0, output
+    assert said.read_text().splitlines() == [f"{one} = true" for one in SAID]
