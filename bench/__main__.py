@@ -18,6 +18,8 @@ from bench import (  # noqa: F401  they register themselves
     life,
     lost_client,
     motion,
+    rl,
+    rl_deploy,
     round_trip,
     servo,
     state_push,
