@@ -9,13 +9,14 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from math import ceil
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import LimitError, StaleState, StreamError
-from heptarm.rl.guard import Guard, Watch
+from heptarm.rl.guard import Guard
+from heptarm.rl.pilot import Decides, Pilot
 from heptarm.rl.report import Report
 from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import Array, array
@@ -35,15 +36,6 @@ WATCHDOG = 0.2
 _FINE = 4
 #: States a second per decision, so that what a decision sees is fresh.
 _STATES = 8.0
-
-
-class Decides(Protocol):
-    """What can be deployed: a `Policy`, or anything else that decides."""
-
-    task: ReachTask
-
-    def __call__(self, observation: Array, /) -> npt.NDArray[np.floating[Any]]:
-        """The action, shape (actions,), within +-1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,17 +109,17 @@ def deploy(
     begins = (
         [np.asarray(task.home)] * len(goals) if starts is None else list(np.atleast_2d(np.asarray(starts)))
     )
-    watch = Watch(settings.guard, arm.robot, period=1.0 / task.rate)
+    pilot = Pilot(policy, settings.guard)
     episodes = []
     late = 0
     arm.subscribe(rate=min(_STATES * task.rate, 500.0), groups=("joints", "motion", "safety"))
     for number, (goal, begin) in enumerate(zip(goals, begins, strict=True)):
         arm.move(ptp(begin), speed=settings.homing)
-        episode, ticks = _run(arm, policy, goal, watch, settings)
+        episode, ticks = _run(arm, pilot, goal, settings)
         episodes.append(episode)
         late += ticks
         if progress is not None:
-            progress(number, _distances(policy, episode)[-1])
+            progress(number, _distances(task, episode)[-1])
     joints = np.array([one.joints for one in episodes])
     facts = {
         "engine": "arm",
@@ -135,22 +127,22 @@ def deploy(
         "virtual": arm.is_virtual,
         "mode": "position" if settings.mode is None else repr(settings.mode),
         "latency": settings.latency,
-        "guard": dict(watch.counts),
+        "guard": dict(pilot.watch.counts),
         "late_ticks": late,
     }
     return Report(
         task,
         np.array([one.targets[-1] for one in episodes]),
-        np.array([_distances(policy, one) for one in episodes]),
+        np.array([_distances(task, one) for one in episodes]),
         task.tip(joints),
         joints=joints,
         facts=facts,
     )
 
 
-def _run(arm: Arm, policy: Decides, goal: Target, watch: Watch, settings: Settings) -> tuple[_Episode, int]:
+def _run(arm: Arm, pilot: Pilot, goal: Target, settings: Settings) -> tuple[_Episode, int]:
     """One episode; also how many of its ticks came late."""
-    task = policy.task
+    task = pilot.task
     fine = _FINE if settings.latency > 0 else 1
     delay = ceil(settings.latency * task.rate * fine - 1e-9)
     # the arm's time is what counts: a simulator may run faster than the clock on the wall
@@ -166,15 +158,13 @@ def _run(arm: Arm, policy: Decides, goal: Target, watch: Watch, settings: Settin
         acceleration=settings.acceleration,
     ) as sv:
         state = sv.start
-        command, held = state.q, task.hold(state.q)
+        pilot.begin(state.q)
         joints[0] = state.q
         for tick in range(task.steps * fine):
             step, is_decision = divmod(tick, fine)[0], tick % fine == 0
             if is_decision:
                 targets[step] = goal(step / task.rate)
-                action = policy(task.observe(state.q, state.dq, targets[step])).astype(np.float64)
-                command = watch.allow(command, task.advance(command, state.q, action, held))
-                waiting.append((tick + delay, command))
+                waiting.append((tick + delay, pilot.decide(state.q, state.dq, targets[step])))
             _send(sv, waiting, tick)
             if sv.tick() is None:
                 break
@@ -205,8 +195,8 @@ def _fresh(arm: Arm, guard: Guard) -> State:
     return state
 
 
-def _distances(policy: Decides, episode: _Episode) -> Array:
-    return policy.task.distance(policy.task.tip(episode.joints[1:]), episode.targets)
+def _distances(task: ReachTask, episode: _Episode) -> Array:
+    return task.distance(task.tip(episode.joints[1:]), episode.targets)
 
 
 def _listed(targets: npt.ArrayLike | Sequence[Target]) -> list[npt.ArrayLike | Target]:
