@@ -1,0 +1,102 @@
+"""Generates the Python code of ROS 1 interface packages without catkin.
+
+    build/ros1/bin/python scripts/ros1_interfaces.py OUTPUT PACKAGE_FOLDER...
+
+For machines that have rospy from their distribution. In a catkin workspace, catkin does this.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+#: Where Debian's packages keep the definitions of ROS' own messages.
+DEFINITIONS = Path("/usr/share")
+_STATUS = "std_msgs/Header header\nactionlib_msgs/GoalStatus status\n"
+_GOAL = "std_msgs/Header header\nactionlib_msgs/GoalID goal_id\n"
+
+
+def messages_of_action(name: str, text: str) -> dict[str, str]:
+    """The seven messages that an action stands for, by name.
+
+    Raises:
+        ValueError: the definition has not three parts.
+    """
+    parts: list[str] = [""]
+    for line in text.splitlines():
+        if line.strip() == "---":
+            parts.append("")
+        else:
+            parts[-1] += line + "\n"
+    if len(parts) != 3:
+        raise ValueError(f"{name} has {len(parts)} parts; goal, result and feedback are wanted")
+    found = dict(zip((f"{name}Goal", f"{name}Result", f"{name}Feedback"), parts))
+    found[f"{name}ActionGoal"] = f"{_GOAL}{name}Goal goal\n"
+    found[f"{name}ActionResult"] = f"{_STATUS}{name}Result result\n"
+    found[f"{name}ActionFeedback"] = f"{_STATUS}{name}Feedback feedback\n"
+    found[f"{name}Action"] = (
+        f"{name}ActionGoal action_goal\n{name}ActionResult action_result\n{name}ActionFeedback action_feedback\n"
+    )
+    return found
+
+
+def generate(source: Path, out: Path) -> int:
+    """Generate one package.
+
+    Args:
+        source: folder with msg/, srv/, action/, named as the package.
+        out: folder for the Python package.
+
+    Returns:
+        How many messages and services it has.
+
+    Raises:
+        ValueError: a definition is none.
+    """
+    generator = importlib.import_module("genpy.generator")
+    init = importlib.import_module("genpy.generate_initpy")
+    package = source.name
+    shutil.rmtree(out / package, ignore_errors=True)
+    (out / package).mkdir(parents=True)
+    (out / package / "__init__.py").touch()
+    count = 0
+    with tempfile.TemporaryDirectory(prefix="genpy_") as work:
+        places = {"msg": Path(work) / "msg", "srv": source / "srv"}
+        places["msg"].mkdir()
+        for path in source.glob("msg/*.msg"):
+            shutil.copy(path, places["msg"])
+        for path in source.glob("action/*.action"):
+            for name, text in messages_of_action(path.stem, path.read_text(encoding="utf-8")).items():
+                (places["msg"] / f"{name}.msg").write_text(text, encoding="utf-8")
+        search = {path.parent.name: [str(path)] for path in DEFINITIONS.glob("*/msg")}
+        search[package] = [str(places["msg"])]
+        for kind, maker in (("msg", generator.MsgGenerator()), ("srv", generator.SrvGenerator())):
+            files = sorted(str(path) for path in places[kind].glob(f"*.{kind}"))
+            if not files:
+                continue
+            target = out / package / kind
+            target.mkdir()
+            if maker.generate_messages(package, files, str(target), search):
+                raise ValueError(f"{package}: a definition was not understood; see above")
+            init.write_modules(str(target))
+            count += len(files)
+    return count
+
+
+def main() -> int:
+    """Generates the packages named on the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("out", type=Path)
+    parser.add_argument("packages", nargs="+", type=Path)
+    given = parser.parse_args()
+    for source in given.packages:
+        print(f"{source.name}: {generate(source, given.out)} messages and services")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,39 @@
+#!/bin/sh
+# Makes build/ros1: rospy from Debian's packages, our interfaces, our node. Where there are no such packages, it says so and
+# ends well: the tests are skipped then.
+set -eu
+cd "$(dirname "$0")/.."
+venv=build/ros1
+python=/usr/bin/python3
+packages="python3-rospy python3-actionlib python3-roslaunch python3-sensor-msgs python3-trajectory-msgs python3-diagnostic-msgs
+    python3-std-srvs python3-geometry-msgs python3-genpy python3-rostopic python3-rosservice ros-std-msgs ros-geometry-msgs
+    ros-trajectory-msgs ros-actionlib-msgs"
+
+no() {
+    echo "no ROS 1 here: $1; its tests will be skipped"
+    rm -rf $venv
+    exit 0
+}
+
+complete() {
+    $python -c "import rospy, actionlib, roslaunch, sensor_msgs, trajectory_msgs, diagnostic_msgs, std_srvs, genpy, rostopic, rosservice" 2>/dev/null &&
+        [ -d /usr/share/trajectory_msgs/msg ] && [ -d /usr/share/actionlib_msgs/msg ] && command -v roscore >/dev/null
+}
+
+[ -x $python ] || no "there is no $python"
+$python -c 'import sys; sys.exit(sys.version_info < (3, 10))' || no "$($python -V) is too old for heptarm"
+if ! complete; then
+    command -v apt-get >/dev/null && [ "$(id -u)" = 0 ] || no "rospy is missing; type: sudo apt-get install -y $(echo $packages)"
+    apt-get -qq update || no "the package lists cannot be had"
+    DEBIAN_FRONTEND=noninteractive apt-get -qq install -y --no-install-recommends python3-venv $packages >/dev/null ||
+        no "Debian's packages of ROS cannot be installed"
+    complete || no "Debian's packages of ROS are not complete"
+fi
+# Without pip of its own, which Debian keeps in a further package.
+[ -x $venv/bin/python ] || $python -m venv --system-site-packages --without-pip $venv
+.venv/bin/python -m pip --python $venv/bin/python install -q --disable-pip-version-check "numpy>=1.22,<3" "pytest>=8" "pytest-timeout>=2.3" ||
+    no "numpy and pytest cannot be installed for $($venv/bin/python -V)"
+site=$($venv/bin/python -c 'import sysconfig; print(sysconfig.get_paths()["purelib"])')
+$venv/bin/python scripts/ros1_interfaces.py "$site" ros1/interfaces/control_msgs ros1/heptarm_msgs
+printf '%s\n' "$PWD/src" "$PWD/ros1/heptarm_ros1/src" >"$site/heptarm_sources.pth"
+echo "$venv/bin/python has ROS 1 and heptarm_ros1"
