@@ -63,7 +63,7 @@ class Watch:
         self._guard, self._robot = guard, robot
         self._step = guard.speed * period
         self._low, self._high = robot.q_min + guard.margin, robot.q_max - guard.margin
-        self.counts: Counter[str] = Counter()
+        self.counts = Counter(joint=0, speed=0, box=0)
 
     def allow(self, last: Array, wanted: Array) -> Array:
         """What may be commanded, shape (7,) [rad].

@@ -1,0 +1,103 @@
+"""A policy that lives on messages: joint states and targets come, commands go. For nodes of ROS and their like."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import nan
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import LimitError, ShapeError
+from heptarm.rl.guard import Guard
+from heptarm.rl.pilot import Decides, Pilot
+from heptarm.values.arrays import Array, array
+
+
+class Follower:
+    """Follows the newest target with the newest joint states; without either it says nothing, and the arm brakes.
+
+    One thread at a time.
+
+    Args:
+        policy: what decides.
+        joints: names of the robot's seven joints from the base on.
+        guard: limits; a joint state older than its `stale` is as good as none.
+    """
+
+    def __init__(self, policy: Decides, joints: Sequence[str], *, guard: Guard | None = None) -> None:
+        self.guard = guard or Guard()
+        self.task = policy.task
+        self._pilot = Pilot(policy, self.guard)
+        self._joints = tuple(joints)
+        if len(set(self._joints)) != 7:
+            raise ShapeError(f"{list(joints)} are not seven different joints", parameter="joints")
+        self._q = self._dq = np.full(7, nan)
+        self._seen = -np.inf
+        self._target: Array | None = None
+        self._under_way = False
+
+    @property
+    def distance(self) -> float:
+        """From the flange to the target, by the newest joint state [m]; NaN without a target."""
+        if self._target is None:
+            return nan
+        return float(self.task.distance(self.task.tip(self._q), self._target))
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How often the guard stepped in."""
+        return dict(self._pilot.watch.counts)
+
+    def on_joints(
+        self, names: Sequence[str], position: Sequence[float], velocity: Sequence[float], now: float
+    ) -> None:
+        """A joint state came.
+
+        Args:
+            names: of its joints in any order; a message without all seven is another robot's and passed over.
+            position: of these joints [rad].
+            velocity: likewise [rad/s].
+            now: the time [s].
+        """
+        place = {name: index for index, name in enumerate(names)}
+        if not all(name in place for name in self._joints) or not len(position) == len(velocity) == len(
+            names
+        ):
+            return
+        order = [place[name] for name in self._joints]
+        self._q, self._dq = np.asarray(position)[order], np.asarray(velocity)[order]
+        self._seen = now
+
+    def on_target(self, target: npt.ArrayLike | None) -> None:
+        """A target came, base frame, shape (3,) [m]; None: hold.
+
+        Raises:
+            LimitError: outside the guard's box; the last target stays.
+            ShapeError: not three numbers.
+        """
+        if target is None:
+            self._target, self._under_way = None, False
+            return
+        point = array(target, 3, "target")
+        if not self.guard.contains(point):
+            raise LimitError(
+                f"the target {np.round(point, 3).tolist()} m is outside the guard's box",
+                parameter="target",
+                value=point.tolist(),
+                allowed=f"{list(self.guard.low)} to {list(self.guard.high)} m",
+            )
+        self._target = point
+
+    def command(self, now: float) -> Array | None:
+        """The next commanded joints, shape (7,) [rad]; to be asked for `task.rate` times a second.
+
+        None: there is no target, or no fresh joint state; send nothing then.
+        """
+        if self._target is None or not now - self._seen <= self.guard.stale:
+            self._under_way = False
+            return None
+        if not self._under_way:
+            self._pilot.begin(self._q)
+            self._under_way = True
+        return self._pilot.decide(self._q, self._dq, self._target)
