@@ -14,7 +14,7 @@ from heptarm.model.kinematics import jacobian
 from heptarm.values.arrays import Array
 from heptarm.virtual import plant as plant_module
 from heptarm.virtual.order import Order, PlanError
-from heptarm.virtual.path import CartesianLine
+from heptarm.virtual.path import CartesianPath
 from heptarm.virtual.planner import Plan, plan
 from heptarm.virtual.plant import Plant
 from heptarm.virtual.profile import Limits, brake, travel
@@ -121,14 +121,14 @@ def test_a_path_that_fails_under_way_brakes_the_axes_and_says_why(
 ) -> None:
     plant, ear = ready(), Ear()
     plant.submit(Order(1, "lin_rel", offset=LINE, reference=BASE, listener=ear))
-    sound = CartesianLine.at
+    sound = CartesianPath.at
 
-    def broken(self: CartesianLine, s: float, near: Array) -> Array:
+    def broken(self: CartesianPath, s: float, near: Array) -> Array:
         if s > 0.5 and how == "lost":
             raise Unreachable("too far")
         return sound(self, s, near) + (0.5 if s > 0.5 else 0.0)
 
-    monkeypatch.setattr(CartesianLine, "at", broken)
+    monkeypatch.setattr(CartesianPath, "at", broken)
     track = run(plant)
     assert ear.causes == ["started", "error"]
     assert ("too far" if how == "lost" else "violates limit") in ear.heard[-1][1]

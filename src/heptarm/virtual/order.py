@@ -7,6 +7,7 @@ from math import nan
 from typing import Protocol
 
 from heptarm.values.mode import Mode
+from heptarm.values.orientation import VARIABLE, Orientation
 
 Seven = tuple[float, ...]
 _FULL: Seven = (1.0,) * 7
@@ -40,9 +41,11 @@ class Order:
 
     Attributes:
         id: chosen by the caller, unique.
-        kind: "ptp", "lin", "lin_rel", "hold", or a servo motion: "servo" or "direct".
+        kind: "ptp", "lin", "lin_rel", "circ", "hold", or a servo motion: "servo" or "direct".
         joints: target of a ptp [rad]; None: `pose` is the target.
         pose: target of the moved frame in the base: x y z [m], quaternion x y z w.
+        via: of a circ: the auxiliary point, as `pose`.
+        orientation: how it is led along a Cartesian path.
         redundancy: E1 [rad] (NaN: keep), Status and Turn (-1: keep).
         tcp: flange to moved frame, x y z [m], quaternion.
         offset: of a lin_rel: translation and rotation in the axes of the reference.
@@ -62,6 +65,8 @@ class Order:
     kind: str
     joints: Seven | None = None
     pose: Seven | None = None
+    via: Seven | None = None
+    orientation: Orientation = VARIABLE
     redundancy: tuple[float, int, int] = (nan, -1, -1)
     tcp: Seven = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
     offset: Seven | None = None

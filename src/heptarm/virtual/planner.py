@@ -18,8 +18,10 @@ from heptarm.model.kinematics import forward
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.robot import RobotModel
+from heptarm.virtual.arc import Arc
+from heptarm.virtual.geometry import Geometry, JointTurn, Slerp, Straight, Turn
 from heptarm.virtual.order import Order, PlanError
-from heptarm.virtual.path import CartesianLine, JointLine
+from heptarm.virtual.path import CartesianPath, JointLine, JointPath
 from heptarm.virtual.profile import Limits, Profile, travel
 
 #: What a Cartesian motion does where its order says nothing: m/s, m/s², m/s³ and rad/s, rad/s², rad/s³.
@@ -48,7 +50,7 @@ class Plan:
     order: Order
     start: Array
     end: Array
-    path: JointLine | CartesianLine | None
+    path: JointPath | None
     profile: Profile | None
     braking: Limits
 
@@ -78,8 +80,8 @@ def _plan(robot: RobotModel, order: Order, start: Array) -> Plan:
         return Plan(order, start, start, None, None, Limits(1.0, 1.0, 1.0))
     if order.kind == "ptp":
         return _plan_joints(robot, order, start, _joint_target(robot, order, start))
-    if order.kind in ("lin", "lin_rel"):
-        return _plan_line(robot, order, start)
+    if order.kind in ("lin", "lin_rel", "circ"):
+        return _plan_path(robot, order, start)
     raise PlanError("planning", f"Can not plan motion: no motion of kind {order.kind!r}")
 
 
@@ -153,10 +155,9 @@ def _plan_joints(robot: RobotModel, order: Order, start: Array, end: Array) -> P
 
 
 def _target(order: Order, origin: Pose) -> Pose:
-    if order.kind == "lin":
+    if order.offset is None:
         assert order.pose is not None
         return _pose(order.pose)
-    assert order.offset is not None
     offset = _pose(order.offset)
     if order.reference is None:
         return origin @ offset
@@ -166,11 +167,47 @@ def _target(order: Order, origin: Pose) -> Pose:
     return Pose(origin.xyz + rotation(axes) @ offset.xyz, multiply(turn, origin.quat))
 
 
-def _plan_line(robot: RobotModel, order: Order, start: Array) -> Plan:
+def geometry_of(robot: RobotModel, order: Order, start: Array, origin: Pose) -> Geometry:
+    """Way of the moved frame of a lin, lin_rel or circ from a pose, its orientation led as the order says.
+
+    Raises:
+        PlanError: there is no such arc, or no joint position at its end.
+    """
+    target, led = _target(order, origin), order.orientation
+    if led.type == "ignore":
+        raise PlanError("planning", "Can not plan motion: the orientation of a motion by itself cannot be ignored")
+    turn: Turn | None = _joint_turn(robot, order, start, target) if led.type == "joint" else None
+    if order.kind == "circ":
+        assert order.via is not None
+        arc = Arc(origin.xyz, _pose(order.via).xyz, target.xyz)
+        if turn is None:
+            return arc.led(origin.quat, target.quat, led)
+        return arc.turning(turn, follows=False)
+    if turn is None:
+        turn = Slerp(origin.quat, origin.quat if led.type == "constant" else target.quat)
+    return Straight(origin.xyz, target.xyz, turn)
+
+
+def _joint_turn(robot: RobotModel, order: Order, start: Array, target: Pose) -> Turn:
+    """The orientation as the joints turn it on their way to the target."""
     tcp = _pose(order.tcp)
-    target = _target(order, Pose.from_matrix(forward(robot, start)) @ tcp)
+    e1, _, _ = order.redundancy
+    own = inverse.redundancy(robot, start.tolist())
+    r, p = inverse.rows(target @ tcp.inverse())
+    try:
+        end = inverse.raw(
+            robot, r, p, own.e1 if isnan(e1) else e1, own.status, start.tolist(), continuous=True
+        )
+    except Unreachable as error:
+        raise PlanError("unreachable", f"Can not plan motion: frame is not reachable: {error.text}") from None
+    return JointTurn(robot, start, np.array(end), tcp.quat)
+
+
+def _plan_path(robot: RobotModel, order: Order, start: Array) -> Plan:
+    tcp = _pose(order.tcp)
+    geometry = geometry_of(robot, order, start, Pose.from_matrix(forward(robot, start)) @ tcp)
     e1 = None if isnan(order.redundancy[0]) else order.redundancy[0]
-    path = CartesianLine(robot, start, target, tcp, e1)
+    path = CartesianPath(robot, start, geometry, tcp, e1)
     samples = _sample(robot, path)
     if path.length < 1e-7 and path.angle < 1e-7 and e1 is None:
         return Plan(order, start, start, None, None, Limits(1.0, 1.0, 1.0))
@@ -205,7 +242,7 @@ def _gently(robot: RobotModel, order: Order, samples: Array, limits: Limits) -> 
     return travel(Limits(limits.velocity / k, limits.acceleration / k**2, limits.jerk / k**3))
 
 
-def _sample(robot: RobotModel, path: CartesianLine) -> Array:
+def _sample(robot: RobotModel, path: CartesianPath) -> Array:
     """Joint positions along the path, shape (101, 7); refuses what cannot be led."""
     samples = [path.start]
     for index in range(1, _SAMPLES):
@@ -233,13 +270,17 @@ def _or(value: float, default: float) -> float:
     return default if isnan(value) else value
 
 
-def _cartesian_limits(order: Order, path: CartesianLine) -> Limits:
+def _cartesian_limits(order: Order, path: CartesianPath) -> Limits:
     length, angle = max(path.length, 1e-12), max(path.angle, 1e-12)
     line = (order.cart_velocity, order.cart_acceleration, order.cart_jerk)
     turn = (order.ori_velocity, order.ori_acceleration, order.ori_jerk)
     by_line = Limits(*(_or(v, d) / length for v, d in zip(line, CARTESIAN_DEFAULT, strict=True)))
     by_turn = Limits(*(_or(v, d) / angle for v, d in zip(turn, ORIENTATION_DEFAULT, strict=True)))
-    return by_line.least(by_turn)
+    limits = by_line.least(by_turn)
+    if not isinstance(path.geometry, Arc):
+        return limits
+    towards_centre = sqrt(_or(order.cart_acceleration, CARTESIAN_DEFAULT[1]) * path.geometry.radius) / length
+    return limits.least(Limits(towards_centre, inf, inf))
 
 
 def _joint_limits(

@@ -27,7 +27,7 @@ from heptarm.virtual.fri.overlay import Superposition
 from heptarm.virtual.law import Sensed
 from heptarm.virtual.load import Load
 from heptarm.virtual.order import Order, PlanError
-from heptarm.virtual.path import CartesianLine, JointLine
+from heptarm.virtual.path import JointLine, JointPath
 from heptarm.virtual.planner import Plan, plan
 from heptarm.virtual.posture import posture
 from heptarm.virtual.profile import Limits, Profile, brake, change
@@ -104,7 +104,7 @@ class _Run:
     def __init__(self, planned: Plan, serial: int) -> None:
         self.plan = planned
         self.serial = serial
-        self.path: JointLine | CartesianLine | None = planned.path
+        self.path: JointPath | None = planned.path
         self.profile: Profile | None = planned.profile
         self.failure = ""
         self.time = 0.0

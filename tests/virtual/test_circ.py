@@ -1,0 +1,130 @@
+"""Arcs of the plant are round, turn the moved frame as they were told, and stop on the arc."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from heptarm.model.kinematics import forward
+from heptarm.values.arrays import Array
+from heptarm.values.circ import arc
+from heptarm.values.orientation import Orientation
+from heptarm.values.pose import Pose
+from heptarm.virtual.order import Order, PlanError
+from heptarm.virtual.plant import Plant
+from tests.virtual.driving import Ear, numbers, ready, run
+
+TCP = Pose.xyz_abc(0.05, 0.0, 0.15, 0.3, 0.2, 0.0)
+
+
+def poses(plant: Plant, joints: Array, tcp: Pose = TCP) -> list[Pose]:
+    return [Pose.from_matrix(forward(plant.robot, q)) @ tcp for q in joints]
+
+
+def round_trip(
+    plant: Plant, angle: float, tcp: Pose = TCP, radius: float = 0.08, plane: str = "xy"
+) -> tuple[Order, Array]:
+    """An order for an arc from where the plant is, and the arc's centre."""
+    start = poses(plant, plant.snapshot.q_cmd[None], tcp)[0]
+    centre = start.xyz + {"xy": (0, radius, 0), "xz": (0, 0, -radius), "yz": (0, radius, 0)}[plane]
+    motion = arc(start, angle, centre=centre, plane=plane)
+    order = Order(1, "circ", via=numbers(motion.via), pose=numbers(motion.end), tcp=numbers(tcp))
+    return order, centre
+
+
+@pytest.mark.parametrize("plane", ["xy", "xz", "yz"])
+@pytest.mark.parametrize("angle", [1.0, -4.0, 5.8])
+def test_an_arc_is_round_on_the_measured_pose(plane: str, angle: float) -> None:
+    plant, ear = ready(), Ear()
+    order, centre = round_trip(plant, angle, plane=plane)
+    assert order.pose is not None
+    track = run(plant, replace(order, listener=ear))
+    assert ear.causes == ["started", "done"]
+    seen = poses(plant, track.q[::10])
+    spokes = np.array([pose.xyz - centre for pose in seen])
+    assert np.abs(np.linalg.norm(spokes, axis=1) - 0.08).max() <= 0.5e-3
+    normal = {"xy": 2, "xz": 1, "yz": 0}[plane]
+    assert np.abs(spokes[:, normal]).max() <= 0.5e-3
+    assert seen[-1].xyz == pytest.approx(order.pose[:3], abs=2e-4)
+    # it goes round all the way: the angles between one look and the next add up
+    turned = np.cross(spokes[:-1], spokes[1:])[:, normal] / 0.08**2 * (-1 if plane == "xz" else 1)
+    assert np.arcsin(turned).sum() == pytest.approx(angle, abs=0.01)
+
+
+@pytest.mark.parametrize("reference", ["base", "path"])
+@pytest.mark.parametrize("type_", ["variable", "constant", "joint"])
+def test_the_orientation_is_led_as_the_order_says(type_: str, reference: str) -> None:
+    if (type_, reference) == ("joint", "path"):
+        pytest.skip("the joints know no path")
+    plant = ready()
+    order, _ = round_trip(plant, 2.0)
+    assert order.pose is not None
+    end = Pose.of(order.pose[:3], order.pose[3:]) @ Pose.xyz_abc(a=0.6)
+    start = poses(plant, plant.snapshot.q_cmd[None])[0]
+    track = run(plant, replace(order, pose=numbers(end), orientation=Orientation(type_, reference)))
+    seen = poses(plant, track.q_cmd)
+    if type_ == "variable":
+        assert seen[-1].angle_to(end) < 1e-6
+    elif type_ == "joint":
+        assert seen[-1].angle_to(end) < 1e-6
+        middle = track.q_cmd[len(track.q_cmd) // 2]
+        assert np.abs(middle - (track.q_cmd[0] + track.q_cmd[-1]) / 2).max() < 0.2, "the joints went another way"
+    elif reference == "base":
+        assert max(pose.angle_to(start) for pose in seen) < 1e-6
+    else:  # as a car on a roundabout
+        assert seen[-1].angle_to(start) == pytest.approx(2.0, abs=1e-6)
+        assert seen[-1].angle_to(Pose.xyz_abc(a=2.0) @ Pose.of((0, 0, 0), start.quat)) < 1e-6
+
+
+def test_a_joint_orientation_on_a_line_ends_at_its_target() -> None:
+    plant = ready()
+    start = poses(plant, plant.snapshot.q_cmd[None])[0]
+    end = Pose(start.xyz + [0.05, 0.1, -0.1], (start @ Pose.xyz_abc(a=0.5, b=0.3)).quat)
+    order = Order(1, "lin", pose=numbers(end), tcp=numbers(TCP), orientation=Orientation("joint"))
+    track = run(plant, order)
+    seen = poses(plant, track.q_cmd)
+    way = end.xyz - start.xyz
+    for pose in seen[::20]:
+        s = (pose.xyz - start.xyz) @ way / (way @ way)
+        assert np.linalg.norm(start.xyz + s * way - pose.xyz) < 1e-6
+    assert seen[-1].angle_to(end) < 1e-6
+    run(plant, replace(order, id=2, pose=numbers(start), orientation=Orientation("constant")))
+    assert poses(plant, plant.snapshot.q_cmd[None])[0].angle_to(end) < 1e-6
+
+
+def test_speed_and_the_acceleration_towards_the_centre_are_kept() -> None:
+    plant = ready()
+    order, _ = round_trip(plant, 3.0, Pose.at())
+    track = run(plant, replace(order, cart_velocity=2.0, cart_acceleration=0.3, cart_jerk=100.0))
+    points = np.array([pose.xyz for pose in poses(plant, track.q_cmd, Pose.at())])
+    speed = np.linalg.norm(np.diff(points, axis=0), axis=1) * 1e3
+    assert speed.max() ** 2 / 0.08 == pytest.approx(0.3, rel=0.02)
+    robot = plant.robot
+    assert (np.abs(track.acceleration) <= robot.ddq_max * 1.02).all()
+    assert (np.abs(np.diff(track.acceleration, axis=0)) * 1e3 <= robot.dddq_max * 1.1).all()
+
+
+def test_three_points_on_a_line_make_no_arc() -> None:
+    plant = ready()
+    start = poses(plant, plant.snapshot.q_cmd[None])[0]
+    via, end = (Pose(start.xyz + [0, y, 0], start.quat) for y in (0.05, 0.1))
+    with pytest.raises(PlanError, match="lie on a line"):
+        plant.submit(Order(1, "circ", via=numbers(via), pose=numbers(end), tcp=numbers(TCP)))
+    with pytest.raises(PlanError, match="ignored"):
+        plant.submit(Order(1, "lin", pose=numbers(end), orientation=Orientation("ignore")))
+
+
+def test_a_stop_comes_to_rest_on_the_arc_at_any_instant() -> None:
+    random = np.random.default_rng(1)
+    for _ in range(10):
+        plant, ear = ready(), Ear()
+        order, centre = round_trip(plant, 5.0)
+        plant.submit(replace(order, listener=ear))
+        plant.step(int(random.integers(1, 900)))
+        plant.stop()
+        track = run(plant, most=700)
+        assert ear.causes[-1] == "cancelled" and np.abs(plant.snapshot.dq).max() < 2e-3
+        radii = [np.linalg.norm(pose.xyz - centre) for pose in poses(plant, track.q_cmd)]
+        assert np.abs(np.array(radii) - 0.08).max() < 1e-6
