@@ -51,6 +51,9 @@ def _figures(name: str, report: Report, limit: float, attainable: float) -> Iter
     }
     yield Figure(f"{name}_mean", "E9", 1e3 * report.mean, "mm", limit=limit, detail=detail)
     yield Figure(f"{name}_success", "E9", report.success_rate, "share", limit=0.99, least=True)
+    reached = report.time_to_reach
+    spread = {"p95_s": round(float(np.percentile(reached, 95)), 3), "worst_s": round(float(reached.max()), 3)}
+    yield Figure(f"{name}_reach", "E9", float(np.median(reached)), "s", limit=SOON, detail=spread)
     yield Figure(
         f"{name}_within_1.5_s",
         "E9",
