@@ -113,6 +113,7 @@ class _Running:
     looked: bool = False
     over: float | None = None  # when the end of the trajectory was reached
     offset: int = 0  # way-points that were left out or put before the goal's own
+    late: float = 0.0  # how long ago the goal's start was when it came
 
 
 class Runner:
@@ -170,7 +171,8 @@ class Runner:
         self._number += 1
         begin = goal.start if later else None
         offset = len(trajectory.times) - len(goal.points)
-        self._running = _Running(self._number, goal, trajectory, tolerances, begin, offset=offset)
+        late = 0.0 if goal.start is None or later else now - goal.start
+        self._running = _Running(self._number, goal, trajectory, tolerances, begin, offset=offset, late=late)
         return self._number
 
     def cancel(self, number: int, now: float) -> bool:
@@ -250,8 +252,9 @@ class Runner:
         then = max(0.0, run.tau - state.scaling * age)
         desired = way.sample(then)
         actual = Sample(state.q, state.dq, np.zeros(7))
-        index = max(0, way.index(run.tau) - run.offset)
-        feedback = Feedback(run.number, desired, actual, run.tau, now - run.begin, index)
+        index = max(way.index(run.tau), min(1, len(way.times) - 1)) - run.offset
+        elapsed = now - run.begin + run.late
+        feedback = Feedback(run.number, desired, actual, run.tau + run.late, elapsed, index)
         self._judge(run, now, desired, state)
         return feedback
 

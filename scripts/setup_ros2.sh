@@ -1,0 +1,31 @@
+#!/bin/sh
+# Makes build/ros2: rclpy from PyPI's wheels, our interfaces, our node, for machines without ROS. Where there are no
+# wheels, it says so and ends well: the tests are skipped then.
+set -eu
+cd "$(dirname "$0")/.."
+venv=build/ros2
+
+no() {
+    echo "no ROS 2 here: $1; its tests will be skipped"
+    rm -rf $venv
+    exit 0
+}
+
+[ "$(uname -s)-$(uname -m)" = Linux-x86_64 ] || no "there are wheels for Linux on x86_64 only"
+for compiler in gcc g++; do
+    command -v $compiler >/dev/null && continue
+    if command -v apt-get >/dev/null && [ "$(id -u)" = 0 ]; then
+        apt-get -q update && DEBIAN_FRONTEND=noninteractive apt-get -q install -y --no-install-recommends gcc g++
+    fi
+    command -v $compiler >/dev/null || no "$compiler is missing, which compiles the interfaces"
+done
+python=$(.venv/bin/python -c 'import sys; print(sys._base_executable)')
+[ -x $venv/bin/python ] || "$python" -m venv $venv
+$venv/bin/python -m pip install -q --disable-pip-version-check -r scripts/ros2_requirements.txt ||
+    no "the wheels cannot be installed for $($venv/bin/python -V)"
+headers=$($venv/bin/python -c 'import sysconfig; print(sysconfig.get_paths()["include"])')
+[ -e "$headers/Python.h" ] || no "Python's headers are missing (python3-dev)"
+$venv/bin/python scripts/ros2_interfaces.py ros2/interfaces/control_msgs ros2/heptarm_msgs
+site=$($venv/bin/python -c 'import sysconfig; print(sysconfig.get_paths()["purelib"])')
+printf '%s\n' "$PWD/src" "$PWD/ros2/heptarm_ros2" >"$site/heptarm_sources.pth"
+echo "$venv/bin/python has ROS 2 and heptarm_ros2"

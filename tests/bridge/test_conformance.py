@@ -1,0 +1,148 @@
+"""The cases of conformance against the runner alone, in time that is counted: what every node builds on."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+import pytest
+
+from heptarm.bridge.goal import Code, End, Goal, GoalRefused, Outcome
+from heptarm.bridge.parameters import Configuration
+from heptarm.bridge.runner import Feedback, Measured, Runner
+from heptarm.bridge.trajectory import Sample
+from heptarm.errors import HeptarmError
+from heptarm.values.robot import robot
+from tests.conformance.cases import CASES
+from tests.conformance.client import Ended, Sent, Told
+
+PERIOD = 0.01
+HOME = np.array([0, 0.5, 0, -1.5, 0, 1.0, 0])
+
+
+class Bare:
+    """A client of a runner; the arm is a few numbers."""
+
+    preempted = (Outcome.PREEMPTED,)
+    timely = True
+
+    def __init__(self) -> None:
+        self._values: dict[str, object] = {}
+        configuration = Configuration.of({})
+        self.joints = configuration.joints
+        self._runner = Runner(self.joints, robot("iiwa14"), configuration.settings)
+        self._time, self._q, self._dq = 100.0, HOME.copy(), np.zeros(7)
+        self._how, self._scaling, self._active = "follows", 1.0, True
+        self._late: deque[Sample] = deque()
+        self._ends: dict[int, End] = {}
+        self._told: dict[int, list[Feedback]] = {}
+
+    def now(self) -> float:
+        return self._time
+
+    def sleep(self, seconds: float) -> None:
+        for _ in range(round(seconds / PERIOD)):
+            self._tick()
+
+    def place(self) -> Sample:
+        return Sample(self._q.copy(), self._dq.copy(), np.zeros(7))
+
+    def send(self, goal: Goal) -> Sent:
+        try:
+            if not self._active:
+                raise GoalRefused("inactive")
+            return Sent(True, handle=self._runner.accept(goal, now=self._time, state=self._measured()))
+        except GoalRefused as error:
+            return Sent(False, error.reason)
+
+    def cancel(self, sent: Sent) -> bool:
+        assert isinstance(sent.handle, int)
+        self._runner.cancel(sent.handle, self._time)
+        return True
+
+    def result(self, sent: Sent, timeout: float = 60.0) -> Ended:
+        assert isinstance(sent.handle, int)
+        until = self._time + timeout
+        while self._time < until:
+            self._collect(self._runner.ends())
+            if sent.handle in self._ends:
+                end = self._ends[sent.handle]
+                return Ended(end.outcome, end.code, end.text)
+            self._tick()
+        raise TimeoutError("the goal does not end")
+
+    def feedback(self, sent: Sent) -> list[Told]:
+        assert isinstance(sent.handle, int)
+        return [
+            Told(
+                self.joints,
+                one.desired,
+                one.actual,
+                one.desired.q - one.actual.q,
+                one.time,
+                one.elapsed,
+                one.index,
+            )
+            for one in self._told.get(sent.handle, [])
+        ]
+
+    def behave(self, how: str) -> None:
+        self._how = how
+        self._late.clear()
+
+    def override(self, value: float) -> None:
+        self._scaling = value
+
+    def set(self, **values: object) -> bool:
+        wanted = self._values | {name.replace("__", "."): value for name, value in values.items()}
+        try:
+            self._runner.settings = Configuration.of(wanted).settings
+        except HeptarmError:
+            return False
+        self._values = wanted
+        return True
+
+    def activate(self, *, on: bool) -> None:
+        self._active = on
+        if not on:
+            self._runner.abort("deactivated", now=self._time)
+
+    def topic(self, goal: Goal) -> None:
+        if goal.points:
+            self.send(goal)
+        else:
+            self._runner.abort("stopped", now=self._time)
+
+    def _measured(self) -> Measured:
+        return Measured(self._time, self._q, self._dq, self._scaling)
+
+    def _tick(self) -> None:
+        self._time += PERIOD
+        step = self._runner.advance(self._time, self._measured())
+        self._collect(step.ends)
+        if step.feedback is not None:
+            self._told.setdefault(step.feedback.number, []).append(step.feedback)
+        if step.command is None or self._how == "frozen":
+            self._dq = np.zeros(7)
+            return
+        command = step.command
+        if self._how == "lags":
+            self._late.append(command)
+            if len(self._late) <= 40:
+                return
+            command = self._late.popleft()
+        self._dq = (command.q - self._q) / PERIOD
+        self._q = command.q + 1e-6  # no arm is exact
+
+    def _collect(self, ends: tuple[End, ...]) -> None:
+        self._ends.update({end.number: end for end in ends})
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_case(name: str) -> None:
+    CASES[name](Bare())
+
+
+def test_there_are_enough_cases_and_all_codes_are_among_their_ends() -> None:
+    assert len(CASES) >= 60
+    assert {code.name for code in Code} >= {"PATH_TOLERANCE_VIOLATED", "GOAL_TOLERANCE_VIOLATED"}
