@@ -1,0 +1,130 @@
+"""What the node is told: command and servo topics, services."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import rospy
+from geometry_msgs.msg import PoseStamped
+from heptarm_msgs.srv import SetNumber
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Empty
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory
+
+from heptarm.bridge.driver import Answer, Driver
+from heptarm.errors import HeptarmError, NotReady
+from heptarm_ros1 import convert
+
+if TYPE_CHECKING:
+    from heptarm_ros1.node import HeptarmNode
+
+Work = Callable[[Driver, Any], object]
+
+
+def _command_joint(driver: Driver, message: JointState) -> None:
+    driver.move(driver.positions(message.name, message.position))
+
+
+def _command_pose(driver: Driver, message: PoseStamped) -> None:
+    driver.move(convert.pose_value(message, driver.configuration.frame("base")))
+
+
+def _command_lin(driver: Driver, message: PoseStamped) -> None:
+    driver.move(convert.pose_value(message, driver.configuration.frame("base")), straight=True)
+
+
+def _servo_joint(driver: Driver, message: JointState) -> None:
+    target = driver.positions(message.name, message.position)
+    driver.follow(target, driver.velocities(message.name, message.velocity) if message.velocity else None)
+
+
+def _servo_velocity(driver: Driver, message: JointState) -> None:
+    driver.follow_velocity(driver.velocities(message.name, message.velocity))
+
+
+def _servo_pose(driver: Driver, message: PoseStamped) -> None:
+    driver.follow(convert.pose_value(message, driver.configuration.frame("base")))
+
+
+def _joint_trajectory(driver: Driver, message: JointTrajectory) -> None:
+    if not message.points and not message.joint_names:  # an empty one stops
+        _stop(driver, message)
+        return
+    clock = rospy.Time.now().to_sec()
+    driver.accept(convert.trajectory_goal(message, now=driver.now, clock=clock))
+
+
+def _stop(driver: Driver, message: object) -> None:
+    answer = driver.stop()
+    if not answer.success:
+        raise NotReady(answer.message)
+
+
+#: Topics: type, name, what to do.
+TOPICS: tuple[tuple[type, str, Work], ...] = (
+    (JointState, "~command/joint", _command_joint),
+    (PoseStamped, "~command/pose", _command_pose),
+    (PoseStamped, "~command/lin", _command_lin),
+    (JointState, "~servo/joint", _servo_joint),
+    (JointState, "~servo/velocity", _servo_velocity),
+    (PoseStamped, "~servo/pose", _servo_pose),
+    (JointTrajectory, "~joint_trajectory", _joint_trajectory),
+    (Empty, "~stop", _stop),
+)
+#: Services: type, name, what to do.
+SERVICES: tuple[tuple[type, str, Callable[[Driver, Any], Answer]], ...] = (
+    (Trigger, "~stop", lambda driver, _: driver.stop()),
+    (Trigger, "~recover", lambda driver, _: driver.recover()),
+    (SetNumber, "~set_override", lambda driver, request: driver.set_override(request.value)),
+)
+
+
+class Commands:
+    """Takes commands and services to the driver. A stop never waits behind another command."""
+
+    def __init__(self, node: HeptarmNode) -> None:
+        self._node = node
+        self._one_by_one = threading.Lock()
+        self._subscribers = [
+            rospy.Subscriber(name, kind, self._guarded(name, work), queue_size=1, tcp_nodelay=True)
+            for kind, name, work in TOPICS
+        ]
+        self._services = [
+            rospy.Service(name, kind, self._service(kind, work)) for kind, name, work in SERVICES
+        ]
+
+    def destroy(self) -> None:
+        """End them."""
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+        for service in self._services:
+            service.shutdown("the node was cleaned up")
+
+    def _guarded(self, name: str, work: Work) -> Callable[[Any], None]:
+        """A callback that tells the log why a message was refused."""
+
+        def callback(message: Any) -> None:
+            try:
+                driver = self._node.driver
+                if driver is None:
+                    raise NotReady("the node is not configured")
+                if work is _stop:
+                    work(driver, message)
+                    return
+                with self._one_by_one:
+                    work(driver, message)
+            except HeptarmError as error:
+                rospy.logwarn_throttle(1.0, f"{name}: {error}")
+
+        return callback
+
+    def _service(self, kind: Any, work: Callable[[Driver, Any], Answer]) -> Callable[[Any], Any]:
+        def callback(request: Any) -> Any:
+            driver = self._node.driver
+            answer = Answer(False, "the node is not configured") if driver is None else work(driver, request)
+            return kind._response_class(success=answer.success, message=answer.message)
+
+        return callback

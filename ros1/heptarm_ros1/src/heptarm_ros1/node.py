@@ -1,0 +1,244 @@
+"""The node: life cycle, parameters, and what ties the driver to ROS.
+
+ROS 1 knows no life cycle, so the node has services by the names of ROS 2's transitions.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import rospy
+from std_srvs.srv import Trigger, TriggerResponse
+
+from heptarm.bridge import parameters
+from heptarm.bridge.driver import Driver
+from heptarm.bridge.goal import End
+from heptarm.bridge.parameters import Configuration
+from heptarm.bridge.runner import Feedback
+from heptarm.errors import HeptarmError, NotReady
+from heptarm.values.state import State
+from heptarm_ros1 import settings
+from heptarm_ros1.commands import Commands
+from heptarm_ros1.publishers import Publishers
+from heptarm_ros1.trajectory import TrajectoryAction
+
+#: Pause between attempts of the autostart [s].
+_RETRY = 2.0
+
+
+class HeptarmNode:
+    """An LBR iiwa. Configuring connects, activating takes goals and commands; states come from configuring on."""
+
+    def __init__(self) -> None:
+        self.driver: Driver | None = None
+        self.configuration = Configuration.of({})
+        self._given: dict[str, Any] = {}
+        self._outputs: Publishers | None = None
+        self._inputs: Commands | None = None
+        self._lock = threading.RLock()
+        self._ending = threading.Event()
+        self._wake = threading.Event()
+        self._goals = TrajectoryAction(self, "~follow_joint_trajectory")
+        steps: tuple[tuple[str, Callable[[], str]], ...] = (
+            ("~configure", self.configure),
+            ("~activate", self.activate),
+            ("~deactivate", self.deactivate),
+            ("~cleanup", self.cleanup),
+        )
+        self._services = [rospy.Service(name, Trigger, _answered(step)) for name, step in steps]
+        self._threads = [threading.Thread(target=self._report, name="heptarm-report")]
+        if rospy.get_param("~autostart", True):
+            self._threads.append(threading.Thread(target=self._start, name="heptarm-start"))
+        for thread in self._threads:
+            thread.start()
+
+    # ------------------------------------------------------------------------------- life cycle
+
+    def _start(self) -> None:
+        """Configure and activate, again and again until it works; later the life cycle is the user's."""
+        while not self._ending.is_set():
+            try:
+                if self.driver is None:
+                    self.configure()
+                self.activate()
+                return
+            except HeptarmError as error:
+                rospy.logerr(f"not configured: {error}")
+            self._ending.wait(_RETRY)
+
+    def configure(self) -> str:
+        """Connect.
+
+        Raises:
+            HeptarmError: nobody answers, or a parameter is wrong.
+        """
+        with self._lock:
+            if self.driver is not None or self._ending.is_set():
+                return "it is configured"
+            self._given, strange = settings.read()
+            if strange:
+                rospy.logwarn(f"unknown parameters: {', '.join(strange)}")
+            self.configuration = Configuration.of(self._given)
+            self._outputs = Publishers(self.configuration)
+            try:
+                self.driver = Driver(self.configuration, self)
+            except HeptarmError:
+                self._destroy()
+                raise
+            self._inputs = Commands(self)
+            arm = self.driver.arm
+            text = f"heptarm {_version()}, {arm.robot.title}, cabinet {arm.cabinet!r} with software {arm.software}"
+            rospy.loginfo(text)
+            self._wake.set()
+            return text
+
+    def activate(self) -> str:
+        """Take goals and commands.
+
+        Raises:
+            HeptarmError: the node is not configured.
+        """
+        with self._lock:
+            self._configured().activate()
+        self._wake.set()
+        return "goals and commands are taken"
+
+    def deactivate(self) -> str:
+        """Take no more goals; what runs comes to rest.
+
+        Raises:
+            HeptarmError: the node is not configured.
+        """
+        with self._lock:
+            self._configured().deactivate()
+        self._wake.set()
+        return "no goals and commands are taken"
+
+    def cleanup(self) -> str:
+        """Disconnect."""
+        with self._lock:
+            self._destroy()
+        return "disconnected"
+
+    def close(self) -> None:
+        """Leave the arm at rest."""
+        self._ending.set()
+        self._wake.set()
+        with self._lock:
+            driver, self.driver = self.driver, None
+            if driver is not None:
+                driver.close()
+        for thread in self._threads:
+            thread.join()
+        self._goals.close()
+
+    def _configured(self) -> Driver:
+        if self.driver is None:
+            raise NotReady("the node is not configured", hint="call ~configure")
+        return self.driver
+
+    def _destroy(self) -> None:
+        driver, self.driver = self.driver, None
+        if driver is not None:
+            driver.close()
+        for one in (self._inputs, self._outputs):
+            if one is not None:
+                one.destroy()
+        self._inputs = self._outputs = None
+
+    # -------------------------------------------------------------------------- from the driver
+
+    def on_state(self, state: State) -> None:
+        """A state came."""
+        outputs = self._outputs
+        if outputs is not None and not rospy.is_shutdown():
+            outputs.state(state)
+
+    def on_feedback(self, feedback: Feedback) -> None:
+        """A goal went on."""
+        self._goals.on_feedback(feedback)
+
+    def on_end(self, end: End) -> None:
+        """A goal ended."""
+        self._goals.on_end(end)
+
+    def on_link(self, trouble: str) -> None:
+        """The connection came or went."""
+        if trouble:
+            rospy.logerr(f"the connection is lost: {trouble}")
+        else:
+            rospy.loginfo("connected")
+        self._wake.set()
+
+    # -------------------------------------------------------------------------- now and then
+
+    def _report(self) -> None:
+        """Diagnostics, the status if it has changed, and parameters that have changed."""
+        while not self._ending.is_set():
+            self._wake.wait(1.0 / self.configuration.values["diagnostics_rate"])
+            self._wake.clear()
+            try:
+                self._take_parameters()
+                self._tell()
+            except (HeptarmError, rospy.ROSException, OSError) as error:
+                if not self._ending.is_set():
+                    rospy.logwarn_throttle(10.0, f"reporting: {error}")
+
+    def _take_parameters(self) -> None:
+        """ROS 1 tells nobody of a changed parameter, so look."""
+        with self._lock:
+            if self.driver is None or self._ending.is_set():
+                return
+            given, _ = settings.read()
+            if given == self._given:
+                return
+            before, self._given = self._given, given
+            fixed = {one.name for one in parameters.PARAMETERS if one.fixed}
+            names = sorted(name for name in set(given) | set(before) if given.get(name) != before.get(name))
+            held = [name for name in names if name in fixed]
+            if held:
+                rospy.logwarn(f"{', '.join(held)} will change when the node is cleaned up and configured")
+            try:
+                wanted = {name: value for name, value in given.items() if name not in fixed}
+                kept = {name: value for name, value in self.configuration.values.items() if name in fixed}
+                configuration = Configuration.of({**kept, **wanted})
+            except HeptarmError as error:
+                rospy.logerr(f"a parameter was refused, the old ones count: {error}")
+                return
+            self.configuration = configuration
+            self.driver.configure(configuration)
+            rospy.loginfo(f"new parameters: {', '.join(names)}")
+
+    def _tell(self) -> None:
+        driver, outputs = self.driver, self._outputs
+        if driver is None or outputs is None or self._ending.is_set():
+            return
+        report = driver.report()
+        state = None
+        if not driver.trouble:
+            try:
+                state = driver.arm.state
+            except HeptarmError:
+                state = None
+        outputs.status(report, state, connected=not driver.trouble, active=driver.active)
+        outputs.diagnostics(report, driver.arm.cabinet)
+
+
+def _answered(step: Callable[[], str]) -> Callable[[Any], TriggerResponse]:
+    def callback(_: Any) -> TriggerResponse:
+        try:
+            return TriggerResponse(success=True, message=step())
+        except HeptarmError as error:
+            return TriggerResponse(success=False, message=str(error))
+
+    return callback
+
+
+def _version() -> str:
+    try:
+        return importlib.metadata.version("heptarm")
+    except importlib.metadata.PackageNotFoundError:
+        return "(from its sources)"
