@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from heptarm.arm.arm import Arm
     from heptarm.arm.connect import connect
     from heptarm.arm.feed import States
+    from heptarm.arm.fri import Fri
     from heptarm.arm.handle import MotionHandle
     from heptarm.arm.servo import JointServo, PoseServo, ServoStats
     from heptarm.arm.target import target_from_env
@@ -62,6 +63,7 @@ __all__ = [
     "CommandRejected",
     "ConnectFailed",
     "ConnectionLost",
+    "Fri",
     "HeptarmError",
     "JointServo",
     "LimitError",
@@ -109,6 +111,7 @@ _HOMES = {
     "Arm": "arm.arm",
     "connect": "arm.connect",
     "States": "arm.feed",
+    "Fri": "arm.fri",
     "MotionHandle": "arm.handle",
     "JointServo": "arm.servo",
     "PoseServo": "arm.servo",

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Literal, TypedDict, overload
 
 import numpy as np
 
-from heptarm.arm import program
+from heptarm.arm import fri_settings, program
 from heptarm.arm import servo as servo_module
 from heptarm.arm.connection import GROUPS, Connection
 from heptarm.arm.feed import States
+from heptarm.arm.fri import Fri
 from heptarm.arm.handle import MotionHandle
 from heptarm.arm.modes import mode_message
 from heptarm.arm.servo import JointServo, PoseServo
@@ -463,6 +464,36 @@ class Arm:
         )
         stream = PoseServo if kind == "pose" else JointServo
         return stream(self._connection, message, rate=hertz, watchdog=seconds)
+
+    def fri(
+        self,
+        kind: Literal["position", "torque", "wrench", "pose", "monitor"] = "position",
+        **settings: Unpack[fri_settings.FriSettings],
+    ) -> Fri:
+        """An FRI session, answered by a process of its own; it begins with the `with` block.
+
+        Args:
+            kind: what is commanded on top of a hold: joint "position", "torque" (under joint impedance), "wrench"
+                (under Cartesian impedance), "pose" (Sunrise 2.x); or "monitor", which runs beside other motions.
+            **settings: period_ms: time between two messages, 1 to 100 [ms]; 5, and 1 for a monitor.
+                multiplier: every how manieth message is answered; 1.
+                mode: control mode of the hold; None: that of `using`, otherwise position.
+                law: `law(state, out, params)`, called in the loop's process in every cycle; None: `Fri.command`.
+                params: numbers and arrays by name for the law, to be changed while it runs.
+                policy: what is sent while commands stay away, `heptarm.fri.Policy`; by default the arm brakes.
+                limits: what the guard keeps, `heptarm.fri.Limits`; the robot's, a little inside.
+                version: FRI release of the cabinet such as "1.15"; None: told from the first message.
+                host: under which address the cabinet reaches this machine; empty: as this connection does.
+                port: own UDP port; 0: any free one; None: the first free one of FRI's.
+                realtime: ask for real-time priority and locked memory. cpu: processor of the loop; None: any.
+                history: messages that are kept. timeout: how long the session may take to stand [s].
+
+        Raises:
+            CommandRejected: this cabinet has no such session; ModeConflict: not in this control mode.
+            LimitError: a value outside its range.
+        """
+        settings["mode"] = settings.get("mode") or (None if kind == "monitor" else self._mode)
+        return Fri(self._connection, fri_settings.request(self._connection, kind, **settings))
 
     def stop(self, kind: Literal["path", "fast", "after_motion"] = "path") -> None:
         """Stop whatever runs and drop what waits; anybody may, at any time, from any thread, again and again.

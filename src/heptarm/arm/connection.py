@@ -33,6 +33,8 @@ _log = logging.getLogger("heptarm.arm")
 GROUPS = ("joints", "torques", "pose", "wrench", "motion", "safety")
 #: Pauses between attempts to reconnect [s].
 _BACK_OFF, _LONGEST_BACK_OFF = 0.1, 2.0
+#: FRI sessions whose last change is remembered.
+_FRI_SESSIONS = 64
 #: Longest wait for a state before looking whether any will come [s].
 _LOOK = 0.2
 
@@ -88,6 +90,7 @@ class Connection:
         self._read: tuple[int, State] | None = None
         self._handles: dict[int, MotionHandle] = {}
         self._servo_status: wire.ServoStatus | None = None
+        self._fri_changes: dict[int, wire.FriChanged] = {}
         self._unclaimed: deque[Message] = deque(maxlen=256)
         self._lock = threading.RLock()
 
@@ -248,8 +251,13 @@ class Connection:
         self.link.expect_states(rate * self.pace)
         self.options = replace(self.options, rate=rate, groups=tuple(groups))
 
-    def run(self, message: wire.Run | wire.ServoOpen, count: int, limit: float) -> MotionHandle:
-        """Send a program of `count` motions, or a servo motion; its handle waits for up to `limit` seconds."""
+    def run(
+        self, message: wire.Run | wire.ServoOpen | wire.FriOpen, count: int, limit: float
+    ) -> MotionHandle:
+        """Send a program of `count` motions, a servo motion or an overlay.
+
+        The handle waits for up to `limit` seconds.
+        """
         handle = MotionHandle(self, count, limit)
 
         def claim(answer: Message) -> None:
@@ -263,6 +271,10 @@ class Connection:
         """What the cabinet said last of a servo motion's stream."""
         told = self._servo_status
         return told if told is not None and told.servo == number else None
+
+    def fri_change(self, number: int) -> wire.FriChanged | None:
+        """What the cabinet said last of an FRI session; its end is the last word."""
+        return self._fri_changes.get(number)
 
     def pending(self) -> float:
         """How long the programs under way may take, all together [s]."""
@@ -375,6 +387,8 @@ class Connection:
                 self._hand_over(handle, message)
         elif isinstance(message, wire.ServoStatus):
             self._servo_status = message
+        elif isinstance(message, wire.FriChanged):
+            self._note_fri(message)
         elif isinstance(message, wire.ControlChanged):
             self.controller = message.controller
             if self.controls and message.session != self.welcome.session:
@@ -384,6 +398,20 @@ class Connection:
             _log.info("safety: %s", message.text)
         elif isinstance(message, wire.Notice):
             _log.log(_LEVELS[message.severity], "cabinet: %s", message.text)
+
+    def _note_fri(self, message: wire.FriChanged) -> None:
+        _log.info(
+            "FRI session %d: %s, %s %s",
+            message.session,
+            message.state.name,
+            message.quality.name,
+            message.text,
+        )
+        changes, known = self._fri_changes, self._fri_changes.get(message.session)
+        if known is None or known.state is not wire.FriSessionState.IDLE:
+            changes[message.session] = message
+        while len(changes) > _FRI_SESSIONS:
+            del changes[next(iter(changes))]
 
     def _claim(self, handle: MotionHandle, number: int) -> None:
         handle.accepted(number)

@@ -135,3 +135,20 @@ def _advice(error: OSError, port: int) -> str:
     if error.errno == errno.EACCES:
         return "ports below 1024 are for root; FRI uses 30200 to 30209"
     return "choose another port here and in the cabinet's FRI configuration"
+
+
+def own_address(peer: str) -> str:
+    """The address of this machine from which it reaches another one; nothing is sent.
+
+    Raises:
+        ConnectFailed: there is no way to that machine, or it has no IPv4 address.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect((peer, 9))
+        except OSError as error:
+            raise ConnectFailed(
+                f"this machine's address towards {peer} is not known: {(error.strerror or str(error)).lower()}",
+                hint="name the address under which the cabinet reaches this machine",
+            ) from error
+        return str(probe.getsockname()[0])

@@ -228,6 +228,11 @@ class Client:
         """The loop's frequent turns are done by the native part."""
         return bool(self._header[at.NATIVE])
 
+    @property
+    def is_running(self) -> bool:
+        """The loop's process runs, or the client was closed in order."""
+        return self._closed or self._worker.is_alive()
+
     def history(self, size: int | None = None) -> list[State]:
         """The last states, oldest first; the very oldest may be overwritten meanwhile and are left out."""
         ring = self._layout.states

@@ -28,6 +28,8 @@ Law = Callable[[State, Output, Params], object]
 SILENT_PERIODS = 5
 #: A command given this long before commanding begins still counts [ns].
 GRACE = 50_000_000
+#: How the event begins that tells of a law which failed.
+LAW_FAILED = "the law failed, the arm brakes: "
 #: An output is written this often, since an answer may be lost.
 REPEAT_OUTPUTS = 10
 _ROW = struct.Struct(f"=18q{at.STATE_WORDS - 19}d")
@@ -273,8 +275,8 @@ class Cycle:
                 self._params.replace(words[1:])
         try:
             self.law(state, out, self._params)
-        except Exception:
-            self.tell(now, "the law failed, the arm brakes: " + traceback.format_exc(limit=-2))
+        except Exception as error:
+            self.tell(now, LAW_FAILED + _words(error))
             self.end()
 
     @property
@@ -406,6 +408,12 @@ _NOTHING = Setpoint()
 _KINDS = list(Kind)
 _ZEROS7, _ZEROS6 = (0.0,) * 7, (0.0,) * 6
 _JOINT_MODES = (m.CommandMode.POSITION, m.CommandMode.TORQUE, m.CommandMode.WRENCH)
+
+
+def _words(error: Exception) -> str:
+    """An error in one line, with where it came up."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({place.filename.rpartition('/')[2]}, line {place.lineno})"
 
 
 def _information(full: m.Monitoring) -> tuple[int, ...]:

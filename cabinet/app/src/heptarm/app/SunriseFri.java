@@ -21,6 +21,7 @@ import heptarm.wire.FriOpen;
 import heptarm.wire.FriQuality;
 import heptarm.wire.FriSessionState;
 import heptarm.wire.JointImpedance;
+import heptarm.wire.SineImpedance;
 
 /** An FRI session of Sunrise. Only this class names the option's classes, so that a cabinet without it still runs. */
 final class SunriseFri implements Fri, IFRISessionListener {
@@ -58,6 +59,11 @@ final class SunriseFri implements Fri, IFRISessionListener {
         return fri;
     }
 
+    /** What the option adds to the cabinet's capabilities. */
+    static String[] capabilities() {
+        return new String[] {"fri", "fri_monitor", "fri_position", "fri_torque", "fri_wrench"};
+    }
+
     /** Refuses what FRI cannot do. */
     static void check(FriOpen open) throws Refusal {
         double answers = open.period * open.receive_multiplier;
@@ -72,6 +78,10 @@ final class SunriseFri implements Fri, IFRISessionListener {
         if (open.command == FriCommandMode.POSE) {
             throw new Refusal(Code.UNSUPPORTED, "command", "pose", "monitor, position, wrench, torque",
                     "Cartesian pose overlays came with Sunrise 2.x; this application runs on 1.x");
+        }
+        if (open.command != FriCommandMode.MONITOR && open.mode instanceof SineImpedance) {
+            throw new Refusal(Code.MODE_CONFLICT, "mode", name(open), "PositionMode, JointImpedance, CartesianImpedance",
+                    "no overlay goes with a superposed force");
         }
         if (open.command == FriCommandMode.TORQUE && !(open.mode instanceof JointImpedance)) {
             throw new Refusal(Code.MODE_CONFLICT, "mode", name(open), "JointImpedance",

@@ -1,5 +1,7 @@
 package heptarm.app;
 
+import java.util.ArrayList;
+import java.util.Arrays;
 import java.util.IdentityHashMap;
 import java.util.Iterator;
 import java.util.List;
@@ -90,7 +92,13 @@ final class SunriseRobot implements Robot, IErrorHandler {
     }
 
     public String[] capabilities() {
-        return Motions.CAPABILITIES;
+        List<String> all = new ArrayList<String>(Arrays.asList(Motions.CAPABILITIES));
+        try {
+            all.addAll(Arrays.asList(SunriseFri.capabilities()));
+        } catch (LinkageError e) { // the option is not installed
+            return Motions.CAPABILITIES;
+        }
+        return all.toArray(new String[0]);
     }
 
     public ToolInfo[] tools() {
