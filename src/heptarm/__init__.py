@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from heptarm.values.redundancy import Redundancy
     from heptarm.values.result import Cause, Result
     from heptarm.values.state import State
+    from heptarm.values.tool import Tool, Workpiece
 
 __version__ = "0.1.0"
 
@@ -92,8 +93,10 @@ __all__ = [
     "States",
     "StreamError",
     "Timeout",
+    "Tool",
     "Unreachable",
     "VersionMismatch",
+    "Workpiece",
     "__version__",
     "arc",
     "circ",
@@ -129,6 +132,8 @@ _HOMES = {
     "Cause": "values.result",
     "Result": "values.result",
     "State": "values.state",
+    "Tool": "values.tool",
+    "Workpiece": "values.tool",
 }
 
 

@@ -97,7 +97,7 @@ def within(
         bounds = f"{'(' if above else '['}{low:g}, {high:g}]{' ' + unit if unit else ''}"
         raise LimitError(
             f"{name} is {number:g}; allowed is {bounds}",
-            code=2,
+            code=2 if math.isfinite(number) else 1,
             parameter=name,
             value=number,
             allowed=bounds,

@@ -1,0 +1,220 @@
+"""Tools and workpieces: what hangs on the flange, and the frames that it brings.
+
+::
+
+    gripper = Tool("gripper", mass=1.2, com=(0, 0, 0.06), tcp=Pose.at(0, 0, 0.12))
+
+    with arm.tool(gripper):
+        arm.move(lin_rel(z=0.05))       # the gripper's tip moves
+
+A tool's frames, centre of mass and inertia are given in the flange frame, a workpiece's in the frame that it hangs on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.values.arguments import TOOL, check_pose
+from heptarm.values.arrays import Array, Value, array, within
+from heptarm.values.links import Body
+from heptarm.values.pose import Pose
+
+#: Heaviest tool [kg], and how far its centre of mass may be from the flange along each axis [m].
+HEAVIEST = 50.0
+FARTHEST = 2.0
+#: Frames that every robot has; no tool's frame bears their names.
+FLANGE = "flange"
+BASE = "base"
+#: Between a tool's or workpiece's name and that of its frame.
+SEPARATOR = "/"
+
+_MOST_FRAMES = 32
+_LONGEST_NAME = 64
+_LONGEST_FRAME = 128
+_ORIGIN = (0.0, 0.0, 0.0)
+_NO_INERTIA = (0.0,) * 6
+_TCP = "tcp"
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class _Carried(Value):
+    name: str
+    mass: float
+    com: Array
+    inertia: Array
+    frames: tuple[tuple[str, Pose], ...]
+
+    def __init__(
+        self,
+        name: str,
+        *,
+        mass: float = 0.0,
+        com: npt.ArrayLike = _ORIGIN,
+        inertia: npt.ArrayLike = _NO_INERTIA,
+        tcp: Pose | None = None,
+        frames: Mapping[str, Pose] | None = None,
+    ) -> None:
+        _set(self, "name", _checked(name, "name", _LONGEST_NAME))
+        _set(self, "mass", within(mass, "mass", 0.0, HEAVIEST, unit="kg"))
+        _set(self, "com", array(com, 3, "com"))
+        for index, value in enumerate(self.com.tolist()):
+            within(value, f"com[{index}]", -FARTHEST, FARTHEST, unit="m")
+        _set(self, "inertia", Body(self.mass, self.com, inertia=array(inertia, 6, "inertia")).inertia)
+        _set(self, "frames", _frames(tcp, {} if frames is None else frames))
+
+    @property
+    def body(self) -> Body:
+        """Mass, centre of mass and inertia."""
+        return Body(self.mass, self.com, inertia=self.inertia)
+
+    @property
+    def frame_names(self) -> tuple[str, ...]:
+        """Names of its frames, the default one first."""
+        return tuple(name for name, _ in self.frames)
+
+    @property
+    def tcp(self) -> Pose:
+        """Its default frame: the first; without any its own origin."""
+        return self.frames[0][1] if self.frames else Pose.of(_ORIGIN)
+
+    def frame(self, name: str) -> Pose:
+        """One of its frames.
+
+        Raises:
+            CommandRejected: it has none of that name; the text lists them.
+        """
+        found = dict(self.frames).get(name)
+        if found is None:
+            raise unknown(name, "frame", self.frame_names)
+        return found
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class Tool(_Carried):
+    """A tool on the flange.
+
+    Args:
+        name: up to 64 octets, without a "/"; what the cabinet calls it.
+        mass: [kg], up to 50.
+        com: centre of mass, shape (3,) [m], within 2 m of the flange along each axis.
+        inertia: xx yy zz xy xz yz about the centre of mass, axes of the flange, shape (6,) [kg m²].
+        tcp: flange to tip; the frame "tcp", which motions move unless they say another.
+        frames: more frames, flange to frame, by name; without `tcp` the first is what motions move.
+
+    Raises:
+        ShapeError: wrong shapes, or an empty or too long name.
+        LimitError: a number outside its range, an inertia that no body has, or a name that means something else.
+        CommandRejected: two frames of one name.
+    """
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class Workpiece(_Carried):
+    """What a tool holds; it hangs on the frame that the tool moves, without a tool on the flange.
+
+    Args:
+        name: up to 64 octets, without a "/".
+        mass: [kg], up to 50.
+        com: centre of mass in the frame that it hangs on, shape (3,) [m], within 2 m of it along each axis.
+        inertia: xx yy zz xy xz yz about the centre of mass, axes of that frame, shape (6,) [kg m²].
+        tcp: that frame to a point of the workpiece; its frame "tcp".
+        frames: more frames, by name.
+
+    Raises:
+        ShapeError: wrong shapes, or an empty or too long name.
+        LimitError: a number outside its range, an inertia that no body has, or a name that means something else.
+        CommandRejected: two frames of one name.
+    """
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KnownTool(Value):
+    """A tool or workpiece that the cabinet knows by name.
+
+    Attributes:
+        name: to be given to `arm.tool`.
+        mass: [kg].
+        frames: its frames, flange to frame; the default one first.
+    """
+
+    name: str
+    mass: float
+    frames: tuple[tuple[str, Pose], ...] = ()
+
+    @property
+    def frame_names(self) -> tuple[str, ...]:
+        """Names of its frames."""
+        return tuple(name for name, _ in self.frames)
+
+
+def unknown(name: str, parameter: str, known: tuple[str, ...]) -> CommandRejected:
+    """The error of a name that nothing bears."""
+    listed = ", ".join(known) or "none"
+    return CommandRejected(
+        f"{parameter} is {name!r}; there is no such name here, there are: {listed}",
+        code=42,
+        parameter=parameter,
+        value=name,
+        allowed=listed,
+    )
+
+
+def _frames(tcp: Pose | None, more: Mapping[str, Pose]) -> tuple[tuple[str, Pose], ...]:
+    if not isinstance(more, Mapping):
+        raise ShapeError(
+            f"frames is {more!r}; poses by their names are wanted",
+            parameter="frames",
+            value=more,
+            hint='for example {"tip": Pose.at(0, 0, 0.1)}',
+        )
+    if tcp is not None and _TCP in more:
+        raise CommandRejected(
+            'the frame "tcp" is given twice', parameter="frames", hint="leave out tcp= or the frame"
+        )
+    pairs = ((_TCP, tcp), *more.items()) if tcp is not None else tuple(more.items())
+    if len(pairs) > _MOST_FRAMES:
+        raise ShapeError(
+            f"{len(pairs)} frames; at most {_MOST_FRAMES} are allowed",
+            code=3,
+            parameter="frames",
+            value=len(pairs),
+        )
+    for index, (name, pose) in enumerate(pairs):
+        at = f"frames[{index}]"
+        if _checked(name, f"{at}.name", _LONGEST_FRAME) in (TOOL, FLANGE, BASE):
+            raise LimitError(
+                f"{at}.name is {name!r}, which means something else",
+                code=2,
+                parameter=f"{at}.name",
+                value=name,
+                allowed=f'any but "{TOOL}", "{FLANGE}", "{BASE}"',
+            )
+        check_pose(pose, f"{at}.pose")
+    return pairs
+
+
+def _checked(name: str, parameter: str, longest: int) -> str:
+    if not isinstance(name, str) or not 1 <= len(name.encode()) <= longest:
+        raise ShapeError(
+            f"{parameter} is {name!r}; a name of 1 to {longest} octets is wanted",
+            code=3,
+            parameter=parameter,
+            value=name,
+        )
+    if SEPARATOR in name:
+        raise LimitError(
+            f'{parameter} is {name!r}; a name has no "{SEPARATOR}"',
+            code=2,
+            parameter=parameter,
+            value=name,
+            allowed=f'no "{SEPARATOR}"',
+        )
+    return name
+
+
+def _set(value: Value, name: str, content: object) -> None:
+    object.__setattr__(value, name, content)
