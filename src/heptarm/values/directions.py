@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arrays import Array, array, frozen, within
+from heptarm.values.arrays import Array, Value, array, frozen, within
 
 #: Index of a direction by its name.
 DIRECTIONS = {"x": 0, "y": 1, "z": 2, "c": 3, "b": 4, "a": 5}
@@ -119,3 +119,8 @@ def at(indices: Sequence[int], values: Sequence[float]) -> list[float]:
     for index, value in zip(indices, values, strict=True):
         result[index] = value
     return result
+
+
+def put(value: Value, name: str, content: object) -> None:
+    """Set a field of a frozen value that is being made."""
+    object.__setattr__(value, name, content)

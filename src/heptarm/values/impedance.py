@@ -1,0 +1,156 @@
+"""Impedance modes: the arm yields like a spring with a damper, joint by joint or at the moved frame.
+
+Ranges and defaults are those of Sunrise's control modes. Cartesian directions are in the order x y z, then about x,
+about y, about z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected, ShapeError
+from heptarm.values.arrays import Array, Value, array, within
+from heptarm.values.directions import FORCE, SPEED, WAY, each, flag, limit, one, put, six
+from heptarm.values.motion import TOOL
+
+#: Largest stiffness of a joint [Nm/rad].
+STIFFEST_JOINT = 5000.0
+#: Largest stiffness along an axis [N/m] and about one [Nm/rad].
+STIFFEST = (5000.0, 300.0)
+#: Defaults of the impedance modes.
+STIFFNESS = (2000.0, 2000.0, 2000.0, 200.0, 200.0, 200.0)
+DAMPING = 0.7
+NULLSPACE_STIFFNESS = 100.0
+#: Largest force [N] or torque [Nm], and largest value of a limit on one.
+STRONGEST = 500.0
+UNLIMITED = 1e6
+
+NO_FORCE = (0.0,) * 6
+_LONGEST_NAME = 128
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class JointImpedance(Value):
+    """A spring and a damper in every joint.
+
+    Args:
+        stiffness: [Nm/rad], one number for all joints or seven, 0 to 5000; 0 lets the joint float.
+        damping: damping ratio, one number or seven, 0 to 1.
+
+    Raises:
+        ShapeError: neither one number nor seven.
+        LimitError: one is outside its range; the text names the joint.
+    """
+
+    stiffness: Array
+    damping: Array
+
+    def __init__(self, stiffness: npt.ArrayLike, *, damping: npt.ArrayLike = DAMPING) -> None:
+        put(self, "stiffness", each(stiffness, 7, "stiffness", 0.0, STIFFEST_JOINT, "Nm/rad"))
+        put(self, "damping", each(damping, 7, "damping", 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class CartesianImpedance(Value):
+    """A spring and a damper between the moved frame and its set-point, and another that keeps the elbow.
+
+    Args:
+        stiffness: shape (6,); along the axes 0 to 5000 N/m, about them 0 to 300 Nm/rad.
+        damping: damping ratio, one number for all directions or shape (6,), 0.1 to 1.
+        nullspace_stiffness: of the spring that keeps the elbow [Nm/rad], 0 to 5000.
+        nullspace_damping: its damping ratio, 0.3 to 1.
+        additional_force: acts besides the springs, shape (6,) [N, Nm], -500 to 500.
+        max_force: largest force that the control exerts, shape (6,) [N, Nm], 0 to 1e6; NaN or None: unlimited.
+        max_force_stops: reaching it also stops the motion.
+        max_velocity: of the moved frame, shape (6,) [m/s, rad/s], up to 100; a higher one stops the motion; NaN or
+            None: unlimited.
+        max_deviation: from the set-point, shape (6,) [m, rad], up to 100; a larger one stops the motion; NaN or None:
+            unlimited.
+        frame: whose axes the directions are: "tool" (the moved frame's own), "base", or a frame's name.
+
+    Raises:
+        ShapeError: a wrong shape or type.
+        LimitError: a value outside its range.
+        CommandRejected: reaching a force shall stop the motion, but none is given.
+    """
+
+    stiffness: Array
+    damping: Array
+    nullspace_stiffness: float
+    nullspace_damping: float
+    additional_force: Array
+    max_force: Array
+    max_force_stops: bool
+    max_velocity: Array
+    max_deviation: Array
+    frame: str
+
+    def __init__(
+        self,
+        stiffness: npt.ArrayLike = STIFFNESS,
+        *,
+        damping: npt.ArrayLike = DAMPING,
+        nullspace_stiffness: float = NULLSPACE_STIFFNESS,
+        nullspace_damping: float = DAMPING,
+        additional_force: npt.ArrayLike = NO_FORCE,
+        max_force: npt.ArrayLike | None = None,
+        max_force_stops: bool = False,
+        max_velocity: npt.ArrayLike | None = None,
+        max_deviation: npt.ArrayLike | None = None,
+        frame: str = TOOL,
+    ) -> None:
+        put(self, "stiffness", _stiffness(stiffness))
+        put(self, "damping", each(damping, 6, "damping", 0.1, 1.0))
+        put(
+            self,
+            "nullspace_stiffness",
+            one(nullspace_stiffness, "nullspace_stiffness", 0.0, 5000.0, "Nm/rad"),
+        )
+        put(self, "nullspace_damping", one(nullspace_damping, "nullspace_damping", 0.3, 1.0))
+        put(
+            self,
+            "additional_force",
+            six(additional_force, "additional_force", -STRONGEST, STRONGEST, FORCE),
+        )
+        put(self, "max_force", limit(max_force, "max_force", UNLIMITED, FORCE))
+        put(self, "max_force_stops", flag(max_force_stops, "max_force_stops"))
+        put(self, "max_velocity", limit(max_velocity, "max_velocity", 100.0, SPEED, above=True))
+        put(self, "max_deviation", limit(max_deviation, "max_deviation", 100.0, WAY, above=True))
+        put(self, "frame", _name(frame))
+        if self.max_force_stops and np.isnan(self.max_force).all():
+            raise CommandRejected(
+                "max_force_stops is given without a max_force",
+                code=2,
+                parameter="max_force_stops",
+                hint="give a max_force for the directions meant",
+            )
+
+
+def _stiffness(value: npt.ArrayLike) -> Array:
+    if np.ndim(value) == 0:
+        raise ShapeError(
+            f"stiffness is {value!r}; 6 numbers are wanted",
+            parameter="stiffness",
+            value=value,
+            hint="three along the axes [N/m], three about them [Nm/rad]",
+        )
+    result = array(value, 6, "stiffness")
+    for index, entry in enumerate(result.tolist()):
+        unit = "N/m" if index < 3 else "Nm/rad"
+        within(entry, f"stiffness[{index}]", 0.0, STIFFEST[index // 3], unit=unit)
+    return result
+
+
+def _name(value: str) -> str:
+    if not isinstance(value, str) or not 1 <= len(value.encode()) <= _LONGEST_NAME:
+        raise ShapeError(
+            f"frame is {value!r}; the name of a frame is wanted, up to {_LONGEST_NAME} octets",
+            code=3,
+            parameter="frame",
+            value=value,
+            hint='for example "tool" or "base"',
+        )
+    return value
