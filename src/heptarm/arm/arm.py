@@ -9,8 +9,6 @@ from collections.abc import Callable, Iterator, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal, TypedDict, overload
 
-import numpy as np
-
 from heptarm.arm import fri_settings, program
 from heptarm.arm import servo as servo_module
 from heptarm.arm.connection import GROUPS, Connection
@@ -19,6 +17,7 @@ from heptarm.arm.fri import Fri
 from heptarm.arm.handle import MotionHandle
 from heptarm.arm.modes import mode_message
 from heptarm.arm.servo import JointServo, PoseServo
+from heptarm.arm.stopping import REST_TIMEOUT, Stopping
 from heptarm.errors import HeptarmError, ShapeError, StaleState, Timeout
 from heptarm.values.arrays import within
 from heptarm.values.mode import Mode
@@ -34,10 +33,6 @@ if TYPE_CHECKING:
 _log = logging.getLogger("heptarm.arm")
 
 _WHEN = {"queue": wire.When.QUEUE, "replace": wire.When.REPLACE, "reject": wire.When.REJECT}
-_STOPS = {kind.name.lower(): kind for kind in wire.StopKind}
-#: Below this speed of every axis the arm counts as being at rest [rad/s].
-_REST = 0.01
-_REST_TIMEOUT = 10.0
 _DAY = 86400.0
 #: States a stream of all states keeps for a slow loop.
 _STREAM_SIZE = 2000
@@ -56,7 +51,7 @@ class _ServoSettings(TypedDict, total=False):
     goal_timeout: float
 
 
-class Arm:
+class Arm(Stopping):
     """A connected arm; made by `connect`. Its methods may be called from any thread.
 
     In a `with` block it is left at rest, however the block ends.
@@ -118,7 +113,7 @@ class Arm:
         try:
             self.subscribe(rate=100.0, groups=("joints", "motion", "safety"))
             self.stop()
-            self._connection.wait_for(self._resting(), _REST_TIMEOUT)
+            self._connection.wait_for(self._resting(), REST_TIMEOUT)
             self.release_control()
         except HeptarmError as error:
             _log.warning("closing: %s", error)
@@ -271,35 +266,6 @@ class Arm:
         seconds = within(timeout, "timeout", 0.0, 1e9, unit="s")
         with self._connection.stopping_on_interrupt():
             return self._connection.wait_for(condition, seconds)
-
-    def wait_for_rest(self, *, timeout: float = _REST_TIMEOUT) -> State:
-        """Wait until nothing runs, nothing waits, and no axis turns.
-
-        Raises:
-            Timeout: the arm does not come to rest in time.
-            StaleState: the subscribed groups lack "joints" or "motion".
-        """
-        return self.wait_until(self._resting(), timeout=timeout)
-
-    def _resting(self) -> Callable[[State], bool]:
-        """A condition that holds for the second state in a row, from now on, in which the arm rests."""
-        newest = self._connection.newest()  # what was sampled before this call proves nothing
-        first = 0 if newest is None else newest.stamp
-        quiet = 0
-
-        def rests(state: State) -> bool:
-            nonlocal quiet
-            if state.joints is None or state.motion is None:
-                raise StaleState(
-                    'waiting for rest needs the groups "joints" and "motion"',
-                    hint='arm.subscribe(groups=("joints", "motion"))',
-                )
-            fast = np.abs(state.dq[np.isfinite(state.dq)])
-            calm = not state.motion.active and not state.motion.queued and bool((fast < _REST).all())
-            quiet = quiet + 1 if calm and state.joints.stamp > first else 0
-            return quiet >= 2
-
-        return rests
 
     def subscribe(self, *, rate: float = 100.0, groups: Sequence[str] = GROUPS) -> None:
         """Choose what is pushed; a new choice replaces the old.
@@ -494,38 +460,3 @@ class Arm:
         """
         settings["mode"] = settings.get("mode") or (None if kind == "monitor" else self._mode)
         return Fri(self._connection, fri_settings.request(self._connection, kind, **settings))
-
-    def stop(self, kind: Literal["path", "fast", "after_motion"] = "path") -> None:
-        """Stop whatever runs and drop what waits; anybody may, at any time, from any thread, again and again.
-
-        It returns when the cabinet has taken the order; `wait_for_rest` waits until the arm rests. If the connection
-        was lost, a new one is made for it.
-
-        Args:
-            kind: "path": brake on the path; "fast": brake as hard as the axes allow; "after_motion": finish what
-                runs and drop the rest.
-
-        Raises:
-            ConnectionLost: the cabinet cannot be reached.
-        """
-        if kind not in _STOPS:
-            raise ShapeError(
-                f"kind is {kind!r}; allowed are {', '.join(map(repr, _STOPS))}", parameter="kind"
-            )
-        self._connection.stop(_STOPS[kind])
-
-    def pause(self) -> None:
-        """Pause on the path."""
-        self._connection.request(wire.Pause())
-
-    def resume(self) -> None:
-        """Go on after a pause."""
-        self._connection.request(wire.Resume())
-
-    def set_override(self, value: float) -> None:
-        """Set the application override: a factor in [0, 1] on every programmed speed, at once.
-
-        Raises:
-            LimitError: outside [0, 1].
-        """
-        self._connection.request(wire.SetOverride(value=within(value, "override", 0.0, 1.0)))
