@@ -3169,7 +3169,7 @@ class Recover:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DefineTool:
-    """Defines or redefines a tool."""
+    """Defines or redefines a tool; one that is attached stays so. Refused while anything runs or waits."""
 
     TYPE: ClassVar[int] = 48
     KIND: ClassVar[str] = "request"
@@ -3211,7 +3211,7 @@ class DefineTool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttachTool:
-    """Attaches a tool to the flange; an empty name detaches."""
+    """Attaches a tool to the flange in place of another; an empty name detaches. A workpiece goes with its tool. Refused while anything runs or waits."""
 
     TYPE: ClassVar[int] = 49
     KIND: ClassVar[str] = "request"
@@ -3258,7 +3258,7 @@ _AttachLoad_0 = Struct(">B")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttachLoad:
-    """Attaches a workpiece to the tool; an empty name detaches."""
+    """Attaches a workpiece to the frame that the tool moves, or detaches it. Refused while anything runs or waits."""
 
     TYPE: ClassVar[int] = 50
     KIND: ClassVar[str] = "request"

@@ -6,8 +6,11 @@ public final class ModeState {
     /** [ns] */
     public final long stamp;
     public final Mode mode;
+    /** attached tool; empty: none */
     public final String tool;
+    /** attached workpiece; empty: none */
     public final String workpiece;
+    /** what motions move unless they say another: a frame of the tool's, or flange */
     public final String frame;
 
     public ModeState(long stamp, Mode mode, String tool, String workpiece, String frame) {
