@@ -12,6 +12,7 @@ import shutil
 import subprocess
 from collections.abc import Sequence
 from dataclasses import replace
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from heptarm.model.inverse import solve
 from heptarm.values.arrays import Array
 from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, SineImpedance
 from heptarm.values.motion import TOOL
+from heptarm.values.orientation import REFERENCES, TYPES, Orientation
 from heptarm.values.pose import Pose
 from heptarm.virtual.fri.sessions import Sessions
 from heptarm.virtual.order import Order, PlanError
@@ -113,6 +115,9 @@ class _Listener:
     def finished(self, cause: str, text: str) -> None:
         self._java.finished(cause, text)
 
+    def reached(self, part: int) -> None:
+        self._java.reached(part)
+
 
 def _numbers(values: Any) -> tuple[float, ...]:
     return tuple(float(v) for v in values[:])
@@ -173,8 +178,20 @@ def _mode(values: Any) -> tuple[Mode | None, tuple[float, ...] | None]:
     return pattern, axes
 
 
+def _filled(values: Any, default: float) -> tuple[float, ...]:
+    """Numbers with a default where nothing was said."""
+    return tuple(default if isnan(value) else value for value in _numbers(values))
+
+
+def _orientation(java: Any) -> Orientation:
+    kind, reference = (max(0, int(value)) for value in java[:])
+    return Orientation(TYPES[kind], REFERENCES[reference])
+
+
 def _order(java: Any) -> Order:
-    relative, cartesian = _numbers(java.relative), _numbers(java.cartesian)
+    relative, cartesian = _filled(java.relative, 1.0), _numbers(java.cartesian)
+    relative_blending, distance, turn_blending = _filled(java.blending, 0.0)
+    listener = None if java.listener is None else _Listener(java.listener)
     e1, status, turn = _numbers(java.redundancy)
     minimum_time, goal_timeout, speed_timeout = _numbers(java.timing)
     mode, axes = _mode(java.mode)
@@ -183,6 +200,8 @@ def _order(java: Any) -> Order:
         str(java.kind),
         joints=_numbers_if(java.joints),
         pose=_numbers_if(java.pose),
+        via=_numbers_if(java.via),
+        orientation=_orientation(java.orientation),
         redundancy=(e1, int(status), int(turn)),
         tcp=_numbers(java.tcp),
         offset=_numbers_if(java.offset),
@@ -196,13 +215,16 @@ def _order(java: Any) -> Order:
         ori_velocity=cartesian[3],
         ori_acceleration=cartesian[4],
         ori_jerk=cartesian[5],
+        blending=(relative_blending, distance, turn_blending),
+        parts=tuple(_order(part) for part in java.parts[:]),
         duration=float(java.duration),
         mode=mode,
         axes=axes,
         minimum_time=minimum_time,
         goal_timeout=goal_timeout,
         speed_timeout=speed_timeout,
-        listener=_Listener(java.listener),
+        listener=listener,
+        part_listener=listener,
     )
 
 

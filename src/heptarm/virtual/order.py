@@ -23,6 +23,13 @@ class Listener(Protocol):
         """The motion has ended: "done", "cancelled" or "error" with its text."""
 
 
+class PartListener(Listener, Protocol):
+    """Hears of the parts of a batch, too."""
+
+    def reached(self, part: int) -> None:
+        """A part begins, another than the first."""
+
+
 class PlanError(ValueError):
     """The motion cannot be planned; the text is of the kind that Sunrise gives.
 
@@ -41,7 +48,8 @@ class Order:
 
     Attributes:
         id: chosen by the caller, unique.
-        kind: "ptp", "lin", "lin_rel", "circ", "hold", or a servo motion: "servo" or "direct".
+        kind: "ptp", "lin", "lin_rel", "circ", "hold", or of several parts: "batch",
+            "spline" and "spline_joints"; or a servo motion: "servo" or "direct". Of a spline only: "spl".
         joints: target of a ptp [rad]; None: `pose` is the target.
         pose: target of the moved frame in the base: x y z [m], quaternion x y z w.
         via: of a circ: the auxiliary point, as `pose`.
@@ -52,6 +60,9 @@ class Order:
         reference: axes of a lin_rel's offset as a quaternion in the base; None: the moved frame's own.
         joint_velocity: fractions of each axis' maximum, as the next two.
         cart_velocity: [m/s]; then [m/s²], [m/s³]; orientation [rad/s], [rad/s²], [rad/s³].
+        blending: where it may turn into the next part of its batch: fraction of the path, distance from its end
+            [m], rotation from its end [rad]; zeros: nowhere.
+        parts: motions of a batch, segments of a spline; mode, tcp and listener of the whole count.
         duration: of a hold [s]; NaN: until cancelled.
         mode: control mode; None: position.
         axes: of the mode's frame as a quaternion in the base; None: as the mode says, "tool" or "base".
@@ -59,6 +70,7 @@ class Order:
         goal_timeout: a servo motion ends so long after its target was reached and no other came [s].
         speed_timeout: how long a servo target's velocity is kept after it was passed [s].
         listener: hears of start and end.
+        part_listener: hears of a batch's parts.
     """
 
     id: int
@@ -80,6 +92,8 @@ class Order:
     ori_velocity: float = nan
     ori_acceleration: float = nan
     ori_jerk: float = nan
+    blending: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    parts: tuple[Order, ...] = ()
     duration: float = nan
     mode: Mode | None = None
     axes: Seven | None = None
@@ -87,6 +101,7 @@ class Order:
     goal_timeout: float = 30.0
     speed_timeout: float = 0.1
     listener: Listener | None = field(default=None, compare=False)
+    part_listener: PartListener | None = field(default=None, compare=False)
 
     @property
     def is_servo(self) -> bool:

@@ -9,6 +9,7 @@ import com.kuka.roboticsAPI.executionModel.IFiredConditionInfo;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
+import com.kuka.roboticsAPI.motionModel.MotionBatch;
 
 /** A motion that the cabinet has accepted, and what becomes of it. */
 public final class Container implements IMotionContainer, MotionListener {
@@ -23,6 +24,7 @@ public final class Container implements IMotionContainer, MotionListener {
     private final IMotionContainerListener listener;
     private final Ending ending;
     private volatile ServoRuntime servo;
+    private volatile int part;
     private ExecutionState state = ExecutionState.Scheduled;
     private String error;
 
@@ -57,8 +59,27 @@ public final class Container implements IMotionContainer, MotionListener {
         activate();
         if (listener != null) {
             tell(() -> listener.onStateChanged(this, ExecutionState.Executing));
-            tell(() -> listener.motionStarted(motion));
+            tell(() -> listener.motionStarted(part(0)));
         }
+    }
+
+    @Override
+    public void reached(int next) {
+        int before = part;
+        part = next;
+        if (listener != null) {
+            for (int i = before; i < next; i++) {
+                IMotion done = part(i);
+                IMotion begun = part(i + 1);
+                tell(() -> listener.motionFinished(done));
+                tell(() -> listener.motionStarted(begun));
+            }
+        }
+    }
+
+    /** A motion of the batch; a motion by itself is its only part. */
+    private IMotion part(int index) {
+        return motion instanceof MotionBatch ? ((MotionBatch) motion).motions().get(index) : motion;
     }
 
     @Override
@@ -71,7 +92,7 @@ public final class Container implements IMotionContainer, MotionListener {
         activate();
         tell(() -> ending.ended(this));
         if (listener != null) {
-            tell(() -> listener.motionFinished(motion));
+            tell(() -> listener.motionFinished(part(part)));
             tell(() -> listener.onStateChanged(this, last));
             tell(() -> listener.containerFinished(this));
         }
@@ -156,12 +177,12 @@ public final class Container implements IMotionContainer, MotionListener {
 
     @Override
     public IMotion getCurrentMotion() {
-        return isFinished() ? null : motion;
+        return isFinished() ? null : part(part);
     }
 
     @Override
     public IMotion getLastExecutedMotion() {
-        return motion;
+        return part(part);
     }
 
     /** Conditions come with a later version; until then none can have fired. */

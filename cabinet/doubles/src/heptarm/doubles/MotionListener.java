@@ -4,6 +4,9 @@ package heptarm.doubles;
 public interface MotionListener {
     void started();
 
+    /** A part of it begins, another than the first. */
+    void reached(int part);
+
     /** The cause is done, cancelled or error. */
     void finished(String cause, String text);
 }

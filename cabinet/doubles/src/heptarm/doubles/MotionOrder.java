@@ -1,5 +1,7 @@
 package heptarm.doubles;
 
+import java.util.Arrays;
+
 /** One motion for the plant, in SI. NaN and null stand for "the default". */
 public final class MotionOrder {
     public final long id;
@@ -10,6 +12,17 @@ public final class MotionOrder {
     public double[] pose;
     /** E1 [rad], status, turn; NaN and -1 mean "keep". */
     public double[] redundancy = {Double.NaN, -1, -1};
+    /** Of a circ: the auxiliary point, as the pose. */
+    public double[] via;
+    /**
+     * How the orientation is led: variable, constant, ignored or by the joints; relative to the base or the
+     * path; -1: the usual.
+     */
+    public int[] orientation = {-1, -1};
+    /** Where it may turn into its follower: fraction of the path, [m], [rad]. */
+    public double[] blending = missing(3);
+    /** Motions of a batch, segments of a spline. */
+    public MotionOrder[] parts = {};
     /** Flange to moved frame. */
     public double[] tcp = {0, 0, 0, 0, 0, 0, 1};
     /** Of a relative motion: translation and rotation in the axes of the reference. */
@@ -17,9 +30,9 @@ public final class MotionOrder {
     /** Quaternion of the reference's axes in the base; null: the moved frame's own. */
     public double[] reference;
     /** Fractions of each axis' maximum: velocity, acceleration, jerk; seven each. */
-    public double[] relative = {1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1};
+    public double[] relative = missing(21);
     /** Velocity, acceleration, jerk [m/s ...], then those of the orientation [rad/s ...]. */
-    public double[] cartesian = {Double.NaN, Double.NaN, Double.NaN, Double.NaN, Double.NaN, Double.NaN};
+    public double[] cartesian = missing(6);
     /** Of a hold [s]; NaN: until cancelled. */
     public double duration = Double.NaN;
     /**
@@ -41,5 +54,11 @@ public final class MotionOrder {
     public MotionOrder(long id, String kind) {
         this.id = id;
         this.kind = kind;
+    }
+
+    private static double[] missing(int count) {
+        double[] numbers = new double[count];
+        Arrays.fill(numbers, Double.NaN);
+        return numbers;
     }
 }

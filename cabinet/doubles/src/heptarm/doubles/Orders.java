@@ -1,5 +1,7 @@
 package heptarm.doubles;
 
+import java.util.List;
+
 import com.kuka.connectivity.fastRobotInterface.FRIJointOverlay;
 import com.kuka.connectivity.motionModel.directServo.DirectServo;
 import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
@@ -13,14 +15,19 @@ import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
 import com.kuka.roboticsAPI.geometricModel.math.Matrix;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
+import com.kuka.roboticsAPI.motionModel.CIRC;
 import com.kuka.roboticsAPI.motionModel.CartesianPTP;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionOverlay;
 import com.kuka.roboticsAPI.motionModel.LIN;
+import com.kuka.roboticsAPI.motionModel.MotionBatch;
 import com.kuka.roboticsAPI.motionModel.PTP;
 import com.kuka.roboticsAPI.motionModel.PositionHold;
 import com.kuka.roboticsAPI.motionModel.RelativeLIN;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
+import com.kuka.roboticsAPI.motionModel.SPL;
+import com.kuka.roboticsAPI.motionModel.Spline;
+import com.kuka.roboticsAPI.motionModel.SplineJP;
 import com.kuka.roboticsAPI.motionModel.SplineMotionCP;
 
 /** Turns motions of the Sunrise API (millimetres) into the plant's orders (SI). */
@@ -34,19 +41,58 @@ public final class Orders {
     public static MotionOrder of(long id, IMotion motion, ObjectFrame moved, LBR robot) {
         MotionOrder order = make(id, motion, robot);
         order.tcp = pose(robot.getFlange().transformationTo(moved));
+        List<? extends RobotMotion<?>> parts = parts(motion);
+        order.parts = new MotionOrder[parts.size()];
+        for (int i = 0; i < order.parts.length; i++) {
+            order.parts[i] = of(id, parts.get(i), moved, robot);
+            inherit(order.parts[i], motion);
+        }
         if (motion instanceof RobotMotion) {
-            order.relative = ((RobotMotion<?>) motion).relativeParameters();
+            parametrize(order, (RobotMotion<?>) motion);
             overlay(order, ((RobotMotion<?>) motion).overlay());
             order.mode = Modes.of(((RobotMotion<?>) motion).getMode(), moved, robot);
         }
+        return order;
+    }
+
+    private static List<? extends RobotMotion<?>> parts(IMotion motion) {
+        if (motion instanceof MotionBatch) {
+            return ((MotionBatch) motion).motions();
+        }
+        if (motion instanceof Spline) {
+            return ((Spline) motion).segments();
+        }
+        return motion instanceof SplineJP ? ((SplineJP) motion).segments() : List.of();
+    }
+
+    /** What a part does not say, the whole says. */
+    private static void inherit(MotionOrder part, IMotion whole) {
+        parametrize(part, (RobotMotion<?>) whole);
+    }
+
+    /** Fills in what has not been said yet. */
+    private static void parametrize(MotionOrder order, RobotMotion<?> motion) {
+        fill(order.relative, motion.relativeParameters());
+        double[] blending = motion.blendingParameters();
+        blending[1] *= MM;
+        fill(order.blending, blending);
         if (motion instanceof SplineMotionCP) {
             double[] cartesian = ((SplineMotionCP<?>) motion).cartesianParameters();
             for (int i = 0; i < 3; i++) {
                 cartesian[i] *= MM;
             }
-            order.cartesian = cartesian;
+            fill(order.cartesian, cartesian);
+            int[] orientation = ((SplineMotionCP<?>) motion).orientationParameters();
+            for (int i = 0; i < orientation.length; i++) {
+                order.orientation[i] = order.orientation[i] < 0 ? orientation[i] : order.orientation[i];
+            }
         }
-        return order;
+    }
+
+    private static void fill(double[] gaps, double[] values) {
+        for (int i = 0; i < gaps.length; i++) {
+            gaps[i] = Double.isNaN(gaps[i]) ? values[i] : gaps[i];
+        }
     }
 
     private static MotionOrder make(long id, IMotion motion, LBR robot) {
@@ -60,6 +106,16 @@ public final class Orders {
         } else if (motion instanceof LIN) {
             order = new MotionOrder(id, "lin");
             target(order, ((LIN) motion).getDestination(), robot);
+        } else if (motion instanceof CIRC) {
+            order = new MotionOrder(id, "circ");
+            order.via = pose(((CIRC) motion).auxiliary().transformationFromWorld());
+            target(order, ((CIRC) motion).getDestination(), robot);
+        } else if (motion instanceof SPL) {
+            order = new MotionOrder(id, "spl");
+            target(order, ((SPL) motion).getDestination(), robot);
+        } else if (motion instanceof MotionBatch || motion instanceof Spline || motion instanceof SplineJP) {
+            order = new MotionOrder(id,
+                    motion instanceof MotionBatch ? "batch" : motion instanceof Spline ? "spline" : "spline_joints");
         } else if (motion instanceof RelativeLIN) {
             RelativeLIN relative = (RelativeLIN) motion;
             order = new MotionOrder(id, "lin_rel");

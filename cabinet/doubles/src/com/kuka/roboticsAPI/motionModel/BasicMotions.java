@@ -29,6 +29,18 @@ public final class BasicMotions {
         return new LIN(frame);
     }
 
+    public static CIRC circ(AbstractFrame auxiliary, AbstractFrame destination) {
+        return new CIRC(auxiliary, destination);
+    }
+
+    public static SPL spl(AbstractFrame frame) {
+        return new SPL(frame);
+    }
+
+    public static MotionBatch batch(RobotMotion<?>... motions) {
+        return new MotionBatch(motions);
+    }
+
     public static RelativeLIN linRel(double x, double y, double z) {
         return linRel(Transformation.ofTranslation(x, y, z));
     }

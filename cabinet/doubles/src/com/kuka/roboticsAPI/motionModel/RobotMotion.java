@@ -9,14 +9,12 @@ public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
     private static final int AXES = 7;
 
     private final double[] relative = new double[3 * AXES];
-    private double blendingRel;
-    private double blendingCart;
-    private double blendingOri;
+    private final double[] blending = {Double.NaN, Double.NaN, Double.NaN};
     private IMotionControlMode mode;
     private IMotionOverlay overlay;
 
     protected RobotMotion() {
-        Arrays.fill(relative, 1.0);
+        Arrays.fill(relative, Double.NaN);
     }
 
     private T setRelative(int block, String name, double[] values) {
@@ -50,17 +48,17 @@ public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
         if (!(value >= 0.0 && value <= 1.0)) {
             throw new IllegalArgumentException("blendingRel is " + value + "; it has to be in [0, 1]");
         }
-        blendingRel = value;
+        blending[0] = value;
         return self();
     }
 
     public T setBlendingCart(double millimetres) {
-        blendingCart = notNegative("blendingCart", millimetres);
+        blending[1] = notNegative("blendingCart", millimetres);
         return self();
     }
 
     public T setBlendingOri(double radians) {
-        blendingOri = notNegative("blendingOri", radians);
+        blending[2] = notNegative("blendingOri", radians);
         return self();
     }
 
@@ -83,14 +81,14 @@ public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
         return mode;
     }
 
-    /** Velocity, acceleration and jerk of each axis as fractions, 21 numbers; for the simulation. */
+    /** Velocity, acceleration and jerk of each axis as fractions, 21 numbers, NaN where nothing was set; for the simulation. */
     public double[] relativeParameters() {
         return relative.clone();
     }
 
-    /** Blending: relative, millimetres, radians; for the simulation. */
+    /** Blending: relative, millimetres, radians; NaN where nothing was set; for the simulation. */
     public double[] blendingParameters() {
-        return new double[] {blendingRel, blendingCart, blendingOri};
+        return blending.clone();
     }
 
     protected static double notNegative(String name, double value) {

@@ -5,6 +5,8 @@ import java.util.Arrays;
 /** A motion planned in space. */
 public abstract class SplineMotionCP<T extends SplineMotionCP<T>> extends RobotMotion<T> {
     private final double[] cartesian = new double[6];
+    private SplineOrientationType type;
+    private OrientationReferenceSystem reference;
 
     protected SplineMotionCP() {
         Arrays.fill(cartesian, Double.NaN);
@@ -37,6 +39,21 @@ public abstract class SplineMotionCP<T extends SplineMotionCP<T>> extends RobotM
 
     public T setOrientationJerk(double value) {
         return set(5, "orientationJerk", value);
+    }
+
+    public T setOrientationType(SplineOrientationType value) {
+        type = value;
+        return self();
+    }
+
+    public T setOrientationReferenceSystem(OrientationReferenceSystem value) {
+        reference = value;
+        return self();
+    }
+
+    /** Type and reference of the orientation as their ordinals, -1 where nothing was set; for the simulation. */
+    public int[] orientationParameters() {
+        return new int[] {type == null ? -1 : type.ordinal(), reference == null ? -1 : reference.ordinal()};
     }
 
     /** Velocity, acceleration, jerk in mm, then in rad; NaN where nothing was set; for the simulation. */

@@ -1,0 +1,20 @@
+package com.kuka.roboticsAPI.motionModel;
+
+import java.util.List;
+
+/** A spline block in space: segments that are gone through without a halt. */
+public class Spline extends SplineMotionCP<Spline> {
+    private final List<SplineMotionCP<?>> segments;
+
+    public Spline(SplineMotionCP<?>... segments) {
+        if (segments.length == 0) {
+            throw new IllegalArgumentException("a spline has at least one segment");
+        }
+        this.segments = List.of(segments);
+    }
+
+    /** For the simulation. */
+    public List<SplineMotionCP<?>> segments() {
+        return segments;
+    }
+}
