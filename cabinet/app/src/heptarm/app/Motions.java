@@ -1,5 +1,6 @@
 package heptarm.app;
 
+import static com.kuka.roboticsAPI.motionModel.BasicMotions.circ;
 import static com.kuka.roboticsAPI.motionModel.BasicMotions.lin;
 import static com.kuka.roboticsAPI.motionModel.BasicMotions.linRel;
 import static com.kuka.roboticsAPI.motionModel.BasicMotions.positionHold;
@@ -11,15 +12,19 @@ import com.kuka.roboticsAPI.deviceModel.JointPosition;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
 import com.kuka.roboticsAPI.geometricModel.Frame;
+import com.kuka.roboticsAPI.motionModel.CIRC;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.LIN;
+import com.kuka.roboticsAPI.motionModel.OrientationReferenceSystem;
 import com.kuka.roboticsAPI.motionModel.RelativeLIN;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 import com.kuka.roboticsAPI.motionModel.SplineMotionCP;
+import com.kuka.roboticsAPI.motionModel.SplineOrientationType;
 
 import heptarm.core.Refusal;
 import heptarm.wire.Blending;
 import heptarm.wire.CartesianDynamics;
+import heptarm.wire.Circ;
 import heptarm.wire.Code;
 import heptarm.wire.Hold;
 import heptarm.wire.Item;
@@ -40,7 +45,7 @@ import heptarm.wire.ServoOpen;
 
 /** Turns items of a program into Sunrise motions. What cannot be carried out is refused, never ignored. */
 final class Motions {
-    static final String[] CAPABILITIES = {"ptp", "ptp_pose", "lin", "lin_rel", "hold", "override", "pause",
+    static final String[] CAPABILITIES = {"ptp", "ptp_pose", "lin", "lin_rel", "circ", "hold", "override", "pause",
         "servo", "servo_direct", "servo_pose", "joint_impedance", "cartesian_impedance", "sine_impedance"};
 
     private static final int JOINTS = 7;
@@ -74,6 +79,10 @@ final class Motions {
             checkBlending(((Lin) motion).blending, at);
             checkRedundancy(((Lin) motion).redundancy, at);
             checkOrientation(((Lin) motion).orientation, at);
+        } else if (motion instanceof Circ) {
+            checkBlending(((Circ) motion).blending, at);
+            checkRedundancy(((Circ) motion).redundancy, at);
+            checkOrientation(((Circ) motion).orientation, at);
         } else if (motion instanceof LinRel) {
             String reference = ((LinRel) motion).reference;
             checkBlending(((LinRel) motion).blending, at);
@@ -115,8 +124,13 @@ final class Motions {
     }
 
     private static void checkOrientation(Orientation orientation, String path) throws Refusal {
-        if (orientation.type != OrientationType.VARIABLE || orientation.reference != OrientationReference.BASE) {
-            throw unsupported(path + "orientation", "orientation " + orientation.type + " relative to " + orientation.reference);
+        if (orientation.type == OrientationType.IGNORE) {
+            throw new Refusal(Code.OUT_OF_RANGE, path + "orientation.type", "ignore", "variable, constant, joint",
+                    "the orientation of a motion by itself cannot be ignored; that belongs to segments of a spline");
+        }
+        if (orientation.type == OrientationType.JOINT && orientation.reference == OrientationReference.PATH) {
+            throw new Refusal(Code.OUT_OF_RANGE, path + "orientation.reference", "path", "base",
+                    "an orientation that the joints lead is not relative to the path");
         }
     }
 
@@ -148,7 +162,16 @@ final class Motions {
             LIN line = lin(frame(one.target, one.redundancy));
             joints(line, one.joints);
             cartesian(line, one.dynamics);
+            orientation(line, one.orientation);
             return line;
+        }
+        if (motion instanceof Circ) {
+            Circ one = (Circ) motion;
+            CIRC arc = circ(new Frame(robot.getRootFrame(), Convert.transformation(one.via)), frame(one.end, one.redundancy));
+            joints(arc, one.joints);
+            cartesian(arc, one.dynamics);
+            orientation(arc, one.orientation);
+            return arc;
         }
         if (motion instanceof LinRel) {
             LinRel one = (LinRel) motion;
@@ -156,6 +179,7 @@ final class Motions {
                     : linRel(Convert.transformation(one.offset));
             joints(line, one.joints);
             cartesian(line, one.dynamics);
+            orientation(line, one.orientation);
             return line;
         }
         double duration = ((Hold) motion).duration;
@@ -186,6 +210,25 @@ final class Motions {
             result[i] = Double.isNaN(fractions[i]) ? 1.0 : fractions[i];
         }
         return result;
+    }
+
+    private static void orientation(SplineMotionCP<?> motion, Orientation led) {
+        motion.setOrientationType(type(led.type));
+        motion.setOrientationReferenceSystem(led.reference == OrientationReference.PATH ? OrientationReferenceSystem.Path
+                : OrientationReferenceSystem.Base);
+    }
+
+    private static SplineOrientationType type(OrientationType type) {
+        switch (type) {
+            case CONSTANT:
+                return SplineOrientationType.Constant;
+            case IGNORE:
+                return SplineOrientationType.Ignore;
+            case JOINT:
+                return SplineOrientationType.OriJoint;
+            default:
+                return SplineOrientationType.Variable;
+        }
     }
 
     private static void cartesian(SplineMotionCP<?> motion, CartesianDynamics dynamics) {
