@@ -2,7 +2,7 @@
 PY := .venv/bin/python
 STAMPS := build/stamps
 
-.PHONY: setup cabinet demo test lint check bench docs wheel clean
+.PHONY: setup cabinet demo test test-ros2 lint check bench docs wheel clean
 
 setup: $(STAMPS)/venv cabinet  ## virtual environment, package, compiled cabinet
 
@@ -16,6 +16,12 @@ $(STAMPS)/jdk: scripts/setup_jdk.py cabinet/toolchain.py $(STAMPS)/venv
 
 $(STAMPS)/browser: scripts/setup_browser.sh
 	scripts/setup_browser.sh
+	@mkdir -p $(STAMPS) && touch $@
+
+ROS2_PACKAGES := $(shell find ros2/interfaces ros2/heptarm_msgs -type f)
+
+$(STAMPS)/ros2: scripts/setup_ros2.sh scripts/ros2_interfaces.py scripts/ros2_requirements.txt $(ROS2_PACKAGES) $(STAMPS)/venv
+	scripts/setup_ros2.sh
 	@mkdir -p $(STAMPS) && touch $@
 
 cabinet: $(STAMPS)/jdk  ## compile the cabinet application and its doubles
@@ -34,6 +40,11 @@ check: $(STAMPS)/venv  ## the generated files agree with the schema
 
 test: setup $(STAMPS)/browser lint check  ## everything; fast tests first
 	$(PY) -m pytest
+	@$(MAKE) --no-print-directory test-ros2
+
+test-ros2: setup $(STAMPS)/ros2  ## the ROS 2 node with real rclpy, where there are wheels of it
+	@if [ -x build/ros2/bin/python ]; then build/ros2/bin/python -m pytest tests/ros2; \
+	else echo "no ROS 2 here: the tests of its node are skipped"; fi
 
 bench: setup  ## figures as JSON lines; ONLY=name runs one, LIST=1 names them
 	@$(PY) -m bench $(if $(ONLY),--only $(ONLY)) $(if $(LIST),--list)

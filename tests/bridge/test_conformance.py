@@ -13,11 +13,10 @@ from heptarm.bridge.runner import Feedback, Measured, Runner
 from heptarm.bridge.trajectory import Sample
 from heptarm.errors import HeptarmError
 from heptarm.values.robot import robot
-from tests.conformance.cases import CASES
+from tests.conformance.cases import CASES, HOME
 from tests.conformance.client import Ended, Sent, Told
 
 PERIOD = 0.01
-HOME = np.array([0, 0.5, 0, -1.5, 0, 1.0, 0])
 
 
 class Bare:

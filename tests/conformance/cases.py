@@ -20,6 +20,8 @@ CASES: dict[str, Case] = {}
 
 #: A short way for every joint, different for each so that a mix-up shows [rad].
 STEP = np.array([0.05, -0.03, 0.04, 0.06, -0.05, 0.07, 0.1])
+#: Around here the arm moves [rad].
+HOME = np.array([0.0, 0.0, 0.0, -np.pi / 2, 0.0, np.pi / 2, 0.0])
 #: An arm that has arrived is so near [rad].
 TOUCH = 0.012
 REST = (0.0,) * 7
@@ -42,9 +44,15 @@ def goal(client: Client, *points: Point, **more: object) -> Goal:
     return Goal(client.joints, points, **more)  # type: ignore[arg-type]
 
 
+def swing(client: Client) -> Array:
+    """A short way for all joints, back and forth: many cases do not lead the arm away."""
+    side = float((client.place().q - HOME) @ STEP)
+    return -STEP if side > 0.0 else STEP
+
+
 def step(client: Client, *, time: float = 0.6, size: float = 1.0, **more: object) -> Goal:
     """To a place a little away, at rest there."""
-    there = client.place().q + size * STEP
+    there = client.place().q + size * swing(client)
     return goal(client, point(time, there, dq=REST), **more)
 
 
@@ -219,7 +227,7 @@ def an_inactive_node_rejects(client: Client) -> None:
 
 @case
 def one_point(client: Client) -> None:
-    wanted = goal(client, point(0.5, client.place().q + STEP))
+    wanted = goal(client, point(0.5, client.place().q + swing(client)))
     succeeds(client, wanted)
     client.sleep(0.3)
     assert np.abs(client.place().q - last(wanted, client)).max() < TOUCH, "it holds that point"
@@ -235,7 +243,8 @@ def one_point_with_velocity(client: Client) -> None:
 @case
 def several_points(client: Client) -> None:
     here = client.place().q
-    wanted = goal(client, *(point(0.3 * (k + 1), here + STEP * np.sin(1.0 + k)) for k in range(4)))
+    path = swing(client)
+    wanted = goal(client, *(point(0.3 * (k + 1), here + path * np.sin(1.0 + k)) for k in range(4)))
     sent = succeeds(client, wanted)
     told = client.feedback(sent)
     assert told
@@ -250,21 +259,24 @@ def several_points(client: Client) -> None:
 @case
 def several_points_with_velocities(client: Client) -> None:
     here = client.place().q
-    way = [point(0.3 * k, here + 0.2 * k * STEP, dq=tuple(0.6 * STEP if k < 4 else REST)) for k in (1, 2, 3)]
-    succeeds(client, goal(client, *way, point(1.4, here + 0.9 * STEP, dq=REST)))
+    path = swing(client)
+    way = [point(0.3 * k, here + 0.2 * k * path, dq=tuple(0.6 * path if k < 4 else REST)) for k in (1, 2, 3)]
+    succeeds(client, goal(client, *way, point(1.4, here + 0.9 * path, dq=REST)))
 
 
 @case
 def points_with_accelerations(client: Client) -> None:
     here = client.place().q
-    middle = point(0.5, here + STEP / 2, dq=tuple(1.8 * STEP / 1.0), ddq=REST)
-    succeeds(client, goal(client, middle, point(1.0, here + STEP, dq=REST, ddq=REST)))
+    path = swing(client)
+    middle = point(0.5, here + path / 2, dq=tuple(1.8 * path / 1.0), ddq=REST)
+    succeeds(client, goal(client, middle, point(1.0, here + path, dq=REST, ddq=REST)))
 
 
 @case
 def the_first_point_may_be_now(client: Client) -> None:
     here = client.place().q
-    succeeds(client, goal(client, point(0.0, here, dq=REST), point(0.6, here + STEP, dq=REST)))
+    path = swing(client)
+    succeeds(client, goal(client, point(0.0, here, dq=REST), point(0.6, here + path, dq=REST)))
 
 
 @case
@@ -277,8 +289,9 @@ def a_goal_to_where_the_arm_is(client: Client) -> None:
 @case
 def joints_in_any_order(client: Client) -> None:
     here = client.place().q
+    path = swing(client)
     order = [3, 0, 6, 1, 5, 2, 4]
-    there = here + STEP
+    there = here + path
     wanted = Goal(
         tuple(client.joints[i] for i in order), (Point(0.6, tuple(there[order].tolist()), dq=REST),)
     )
@@ -289,7 +302,8 @@ def joints_in_any_order(client: Client) -> None:
 @case
 def feedback_is_in_the_arms_order_and_adds_up(client: Client) -> None:
     here = client.place().q
-    there = here + STEP
+    path = swing(client)
+    there = here + path
     backwards = tuple(reversed(client.joints))
     sent = succeeds(client, Goal(backwards, (Point(0.8, tuple(there[::-1].tolist()), dq=REST),)))
     told = client.feedback(sent)
@@ -311,7 +325,8 @@ def the_next_goal_begins_where_the_last_ended(client: Client) -> None:
 @case
 def an_empty_way_back(client: Client) -> None:
     here = client.place().q
-    way = (point(0.4, here + STEP), point(0.8, here))
+    path = swing(client)
+    way = (point(0.4, here + path), point(0.8, here))
     succeeds(client, goal(client, *way))
     assert np.abs(client.place().q - here).max() < TOUCH
 
@@ -334,11 +349,12 @@ def a_start_in_the_future_is_waited_for(client: Client) -> None:
 @case
 def a_trajectory_partly_in_the_past_is_joined(client: Client) -> None:
     here = client.place().q
+    path = swing(client)
     wanted = goal(
         client,
         point(0.0, here),
-        point(0.4, here + STEP / 4),
-        point(1.6, here + STEP),
+        point(0.4, here + path / 4),
+        point(1.6, here + path),
         start=client.now() - 0.5,
     )
     sent = succeeds(client, wanted)
@@ -350,7 +366,8 @@ def a_trajectory_partly_in_the_past_is_joined(client: Client) -> None:
 @case
 def an_end_in_the_future_is_accepted(client: Client) -> None:
     here = client.place().q
-    succeeds(client, goal(client, point(1.5, here + STEP / 2), start=client.now() - 0.2))
+    path = swing(client)
+    succeeds(client, goal(client, point(1.5, here + path / 2), start=client.now() - 0.2))
 
 
 # ------------------------------------------------------------------------------------- preemption
@@ -372,9 +389,10 @@ def a_goal_takes_the_place_of_another(client: Client) -> None:
 @case
 def many_goals_in_a_row_and_only_the_last_succeeds(client: Client) -> None:
     here = client.place().q
+    path = swing(client)
     sent = []
     for k in range(5):
-        sent.append(client.send(goal(client, point(1.0, here + STEP * (-1) ** k * 0.5, dq=REST))))
+        sent.append(client.send(goal(client, point(1.0, here + path * (-1) ** k * 0.5, dq=REST))))
         client.sleep(0.1)
     ends = [client.result(one) for one in sent]
     assert all(end.outcome in client.preempted for end in ends[:-1])
@@ -412,6 +430,7 @@ def no_jump_when_a_goal_takes_the_place_of_another(client: Client) -> None:
 @case
 def cancelling_brakes_and_holds(client: Client) -> None:
     here = client.place().q
+    path = swing(client)
     sent = client.send(step(client, time=2.0, size=2.0))
     client.sleep(1.0)
     assert client.cancel(sent)
@@ -419,7 +438,7 @@ def cancelling_brakes_and_holds(client: Client) -> None:
     assert ended.outcome is Outcome.CANCELED and ended.code is Code.SUCCESSFUL, ended
     rest = rests(client)
     assert np.abs(rest - here).max() > 0.02, "it was under way"
-    assert np.abs(rest - here - 2.0 * STEP).max() > 0.02, "it did not go to the end"
+    assert np.abs(rest - here - 2.0 * path).max() > 0.02, "it did not go to the end"
     stays(client, rest)
 
 
@@ -499,7 +518,8 @@ def wide_goal_tolerances_of_one_point(client: Client) -> None:
 @case
 def wide_goal_tolerances_of_several_points(client: Client) -> None:
     here = client.place().q
-    way = (point(0.3, here + STEP / 2), point(0.7, here + STEP))
+    path = swing(client)
+    way = (point(0.3, here + path / 2), point(0.7, here + path))
     succeeds(client, goal(client, *way, goal_tolerance=tolerances(client, 0.1)))
 
 
@@ -713,9 +733,10 @@ def a_parameter_out_of_its_range_is_refused(client: Client) -> None:
 
 def _scaled(client: Client, factor: float) -> None:
     here = client.place().q
+    path = swing(client)
     client.override(factor)
     client.sleep(0.5)
-    wanted = goal(client, point(0.8, here + STEP, dq=REST))
+    wanted = goal(client, point(0.8, here + path, dq=REST))
     for _ in range(2):
         sent = client.send(wanted)
         ended = client.result(sent)
@@ -812,12 +833,13 @@ def an_arm_at_its_goal_holds_it(client: Client) -> None:
 def a_goal_as_moveit_sends_it(client: Client) -> None:
     """All joints, stamp 0, first point now and here, full points, no tolerances."""
     here = client.place().q
+    path = swing(client)
     duration, count = 1.2, 25
     points = []
     for x in np.linspace(0.0, 1.0, count):
         s, v, a = 10 * x**3 - 15 * x**4 + 6 * x**5, 30 * x**2 * (1 - x) ** 2, 60 * x - 180 * x**2 + 120 * x**3
-        rate = STEP * v / duration
+        rate = path * v / duration
         points.append(
-            point(float(x * duration), here + s * STEP, dq=tuple(rate), ddq=tuple(STEP * a / duration**2))
+            point(float(x * duration), here + s * path, dq=tuple(rate), ddq=tuple(path * a / duration**2))
         )
     succeeds(client, goal(client, *points))

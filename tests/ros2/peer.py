@@ -1,0 +1,303 @@
+"""The other side of a node: a client of ROS 2 with everything that a test asks of it, and the node's process."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rclpy
+from action_msgs.msg import GoalStatus
+from builtin_interfaces.msg import Duration, Time
+from control_msgs.action import FollowJointTrajectory
+from control_msgs.msg import JointTolerance
+from heptarm_msgs.msg import Status
+from heptarm_msgs.srv import SetNumber
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+from rclpy.action import ActionClient
+from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from heptarm.bridge.goal import Code, Goal, Outcome, Tolerance
+from heptarm.bridge.trajectory import Sample
+from tests.conformance.client import Ended, Sent, Told
+from tests.conformance.stage import Stage
+
+#: Discovery can take some seconds, and a busy machine many more [s].
+PATIENCE = 60.0
+OUTCOMES = {
+    GoalStatus.STATUS_SUCCEEDED: Outcome.SUCCEEDED,
+    GoalStatus.STATUS_ABORTED: Outcome.ABORTED,
+    GoalStatus.STATUS_CANCELED: Outcome.CANCELED,
+}
+
+
+def until(what: Callable[[], Any], why: str, timeout: float = PATIENCE) -> Any:
+    """Wait until something is true; returns it."""
+    deadline = time.monotonic() + timeout
+    while time.monotonic() < deadline:
+        if value := what():
+            return value
+        time.sleep(0.005)
+    raise TimeoutError(why)
+
+
+class NodeProcess:
+    """The node as users start it, with parameters, in a process of its own."""
+
+    def __init__(self, target: str, *, name: str = "heptarm", **values: object) -> None:
+        self.log = Path(tempfile.mkstemp(prefix="node-", suffix=".log")[1])
+        command = [sys.executable, "-m", "heptarm_ros2.main", "--ros-args", "-r", f"__node:={name}"]
+        for key, value in ({"target": target} | values).items():
+            command += ["-p", f"{key.replace('__', '.')}:={value}"]
+        with self.log.open("w") as log:
+            self.process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
+
+    @property
+    def said(self) -> str:
+        """Its log."""
+        return self.log.read_text()
+
+    def waits_for(self, text: str) -> None:
+        """Wait until it says something."""
+        until(lambda: text in self.said or self.process.poll() is not None, f"the node does not say {text!r}")
+        assert text in self.said, self.said
+
+    def end(self, number: int = signal.SIGINT) -> int:
+        """End it; returns its exit code."""
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        try:
+            return self.process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            raise
+        finally:
+            self.log.unlink(missing_ok=True)
+
+
+class Ros:
+    """A context of ROS 2 with a node and a thread that serves it; ends in order."""
+
+    def __init__(self, name: str = "tester") -> None:
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context)
+        self.node = rclpy.create_node(name, context=self.context)
+        self._executor = MultiThreadedExecutor(num_threads=4, context=self.context)
+        self._executor.add_node(self.node)
+        self._thread = threading.Thread(target=self._spin)
+        self._thread.start()
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except ExternalShutdownException:
+            pass
+
+    def wait(self, future: Any, why: str, timeout: float = PATIENCE) -> Any:
+        """What a future brings."""
+        until(future.done, why, timeout)
+        return future.result()
+
+    def call(self, kind: type, name: str, request: Any) -> Any:
+        """Call a service."""
+        client = self.node.create_client(kind, name)
+        try:
+            until(client.service_is_ready, f"there is no service {name}")
+            return self.wait(client.call_async(request), f"{name} does not answer")
+        finally:
+            self.node.destroy_client(client)
+
+    def collect(self, kind: type, name: str, *, latched: bool = False) -> list[Any]:
+        """A list that fills with a topic's messages."""
+        found: list[Any] = []
+        durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+        self.node.create_subscription(kind, name, found.append, QoSProfile(depth=100, durability=durability))
+        return found
+
+    def close(self) -> None:
+        """End it; a thread inside an executor must not outlive its context."""
+        self._executor.shutdown()
+        self._thread.join()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self.context)
+
+
+def to_time(seconds: float) -> Time:
+    nanos = round(seconds * 1e9)
+    return Time(sec=nanos // 10**9, nanosec=nanos % 10**9)
+
+
+def to_duration(seconds: float) -> Duration:
+    nanos = round(seconds * 1e9)
+    return Duration(sec=nanos // 10**9, nanosec=nanos % 10**9)
+
+
+def trajectory(goal: Goal) -> JointTrajectory:
+    message = JointTrajectory(joint_names=list(goal.joints))
+    if goal.start is not None:
+        message.header.stamp = to_time(goal.start)
+    for point in goal.points:
+        message.points.append(
+            JointTrajectoryPoint(
+                positions=list(point.q),
+                velocities=list(point.dq),
+                accelerations=list(point.ddq),
+                effort=list(point.effort),
+                time_from_start=to_duration(point.time),
+            )
+        )
+    return message
+
+
+def _tolerance(one: Tolerance) -> JointTolerance:
+    return JointTolerance(
+        name=one.joint, position=one.position, velocity=one.velocity, acceleration=one.acceleration
+    )
+
+
+def action_goal(goal: Goal) -> FollowJointTrajectory.Goal:
+    message = FollowJointTrajectory.Goal(trajectory=trajectory(goal))
+    message.path_tolerance = [_tolerance(one) for one in goal.path_tolerance]
+    message.goal_tolerance = [_tolerance(one) for one in goal.goal_tolerance]
+    message.goal_time_tolerance = to_duration(goal.goal_time)
+    if "multi_dof_trajectory" in goal.extras:
+        message.multi_dof_trajectory.joint_names = ["base"]
+    return message
+
+
+def _sample(point: JointTrajectoryPoint) -> Sample:
+    return Sample(
+        np.array(point.positions), np.array(point.velocities), np.array(point.accelerations or [0.0] * 7)
+    )
+
+
+def _seconds(message: Any) -> float:
+    return float(message.sec + message.nanosec * 1e-9)
+
+
+def _value(value: object) -> ParameterValue:
+    if isinstance(value, bool):
+        return ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=value)
+    if isinstance(value, str):
+        return ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
+    assert isinstance(value, float)
+    return ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
+
+
+class Client:
+    """A client as the cases of conformance want it."""
+
+    preempted = (Outcome.ABORTED,)
+    timely = False
+
+    def __init__(self, ros: Ros, stage: Stage, name: str = "/heptarm", prefix: str = "") -> None:
+        self.ros, self.stage, self.name = ros, stage, name
+        self.joints = tuple(f"{prefix}A{i}" for i in range(1, 8))
+        self.states = ros.collect(JointState, "/joint_states")
+        self.status = ros.collect(Status, f"{name}/status", latched=True)
+        self._action = ActionClient(ros.node, FollowJointTrajectory, f"{name}/follow_joint_trajectory")
+        self._topic = ros.node.create_publisher(JointTrajectory, f"{name}/joint_trajectory", 1)
+        self._told: dict[int, list[Told]] = {}
+
+    def ready(self) -> None:
+        """Wait until the node is active and everything has found each other."""
+        until(self._action.server_is_ready, "there is no action server")
+        until(lambda: self.states and self.status and self.status[-1].active, "the node is not active")
+
+    def now(self) -> float:
+        return float(self.ros.node.get_clock().now().nanoseconds * 1e-9)
+
+    def sleep(self, seconds: float) -> None:
+        time.sleep(seconds)
+
+    def place(self) -> Sample:
+        count = len(self.states)
+        until(lambda: len(self.states) > count, "no joint states come")
+        message = self.states[-1]
+        assert tuple(message.name) == self.joints
+        return Sample(np.array(message.position), np.array(message.velocity), np.zeros(7))
+
+    def send(self, goal: Goal) -> Sent:
+        told: list[Told] = []
+        future = self._action.send_goal_async(
+            action_goal(goal), feedback_callback=lambda message: told.append(self._telling(message.feedback))
+        )
+        handle = self.ros.wait(future, "the goal is neither accepted nor rejected")
+        if not handle.accepted:
+            return Sent(False)
+        self._told[id(handle)] = told
+        return Sent(True, handle=(handle, handle.get_result_async()))
+
+    def cancel(self, sent: Sent) -> bool:
+        handle, _ = sent.handle  # type: ignore[misc]
+        answer = self.ros.wait(handle.cancel_goal_async(), "cancelling is not answered")
+        return bool(answer.goals_canceling)
+
+    def result(self, sent: Sent, timeout: float = PATIENCE) -> Ended:
+        _, future = sent.handle  # type: ignore[misc]
+        answer = self.ros.wait(future, "the goal does not end", timeout)
+        return Ended(OUTCOMES[answer.status], Code(answer.result.error_code), answer.result.error_string)
+
+    def feedback(self, sent: Sent) -> list[Told]:
+        handle, _ = sent.handle  # type: ignore[misc]
+        return list(self._told[id(handle)])
+
+    def behave(self, how: str) -> None:
+        self.stage.do(how)
+
+    def override(self, value: float) -> None:
+        answer = self.ros.call(SetNumber, f"{self.name}/set_override", SetNumber.Request(value=value))
+        assert answer.success, answer.message
+
+    def set(self, **values: object) -> bool:
+        request = SetParameters.Request(
+            parameters=[
+                Parameter(name=name.replace("__", "."), value=_value(value)) for name, value in values.items()
+            ]
+        )
+        answer = self.ros.call(SetParameters, f"{self.name}/set_parameters", request)
+        return all(one.successful for one in answer.results)
+
+    def activate(self, *, on: bool) -> None:
+        wanted = Transition.TRANSITION_ACTIVATE if on else Transition.TRANSITION_DEACTIVATE
+        assert self.change(wanted)
+
+    def change(self, transition: int) -> bool:
+        """Ask for a transition of the life cycle."""
+        request = ChangeState.Request(transition=Transition(id=transition))
+        return bool(self.ros.call(ChangeState, f"{self.name}/change_state", request).success)
+
+    def life(self) -> str:
+        """The state of the node's life."""
+        answer = self.ros.call(GetState, f"{self.name}/get_state", GetState.Request())
+        return str(answer.current_state.label)
+
+    def topic(self, goal: Goal) -> None:
+        until(self._topic.get_subscription_count, "nobody listens to trajectories")
+        self._topic.publish(trajectory(goal))
+
+    @staticmethod
+    def _telling(one: FollowJointTrajectory.Feedback) -> Told:
+        return Told(
+            tuple(one.joint_names),
+            _sample(one.desired),
+            _sample(one.actual),
+            np.array(one.error.positions),
+            _seconds(one.desired.time_from_start),
+            _seconds(one.actual.time_from_start),
+            one.index if hasattr(one, "index") else None,
+        )
