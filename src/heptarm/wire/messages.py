@@ -4577,6 +4577,70 @@ class Notice:
         self._check("")
 
 
+_ConditionFired_0 = Struct(">IHH")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConditionFired:
+    """A break condition has fired, and where the robot was when the application heard of it; MotionFinished follows."""
+
+    TYPE: ClassVar[int] = 104
+    KIND: ClassVar[str] = "event"
+    SOURCE: ClassVar[str] = "cabinet"
+    ROLE: ClassVar[str] = "any"
+
+    id: int
+    item: int
+    node: int
+    joints: JointState
+    torques: TorqueState
+    pose: PoseState
+    wrench: WrenchState
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_ConditionFired_0.pack(self.id, self.item, self.node))
+        self.joints._write(out)
+        self.torques._write(out)
+        self.pose._write(out)
+        self.wrench._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[ConditionFired, int]:
+        v = codec.unpack(_ConditionFired_0, data, pos)
+        pos += _ConditionFired_0.size
+        id = v[0]
+        item = v[1]
+        node = v[2]
+        joints, pos = JointState._read(data, pos)
+        torques, pos = TorqueState._read(data, pos)
+        pose, pos = PoseState._read(data, pos)
+        wrench, pos = WrenchState._read(data, pos)
+        return cls(id=id, item=item, node=node, joints=joints, torques=torques, pose=pose, wrench=wrench), pos
+
+    def _check(self, path: str) -> None:
+        self.joints._check(path + "joints.")
+        self.torques._check(path + "torques.")
+        self.pose._check(path + "pose.")
+        self.wrench._check(path + "wrench.")
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> ConditionFired:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "ConditionFired")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -4701,7 +4765,7 @@ class State:
         self._check("")
 
 
-Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Accepted | Rejected | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | SetMode | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | State
+Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Accepted | Rejected | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | SetMode | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | State
 
 #: Message classes by id.
 MESSAGES: dict[int, type[Message]] = {
@@ -4753,5 +4817,6 @@ MESSAGES: dict[int, type[Message]] = {
     101: SafetyChanged,
     102: KeyPressed,
     103: Notice,
+    104: ConditionFired,
     112: State,
 }

@@ -37,6 +37,7 @@ import heptarm.core.Refusal;
 import heptarm.core.Robot;
 import heptarm.core.Servo;
 import heptarm.wire.Code;
+import heptarm.wire.Condition;
 import heptarm.wire.FrameInfo;
 import heptarm.wire.FriOpen;
 import heptarm.wire.Item;
@@ -148,6 +149,20 @@ final class SunriseRobot implements Robot, IErrorHandler {
         ForceSensorData data = lbr.getExternalForceTorque(flange, lbr.getRootFrame());
         return new WrenchState(stamp, array(data.getForce()), array(data.getTorque()), array(data.getForceInaccuracy()),
                 array(data.getTorqueInaccuracy()));
+    }
+
+    public WrenchState readWrench(String axes, long stamp) {
+        ForceSensorData data = lbr.getExternalForceTorque(flange, "base".equals(axes) ? lbr.getRootFrame() : flange);
+        return new WrenchState(stamp, array(data.getForce()), array(data.getTorque()), array(data.getForceInaccuracy()),
+                array(data.getTorqueInaccuracy()));
+    }
+
+    public void readSignals(double[] values, int from, int count) {
+        throw new IllegalStateException("this cabinet has no signals");
+    }
+
+    public boolean watches(Condition condition) {
+        return true;
     }
 
     private static double[] array(Vector v) {

@@ -6,9 +6,11 @@ import heptarm.wire.Code;
 import heptarm.wire.FriClose;
 import heptarm.wire.FriOpen;
 import heptarm.wire.Goodbye;
+import heptarm.wire.Hold;
 import heptarm.wire.Item;
 import heptarm.wire.Message;
 import heptarm.wire.Messages;
+import heptarm.wire.PathReached;
 import heptarm.wire.Pause;
 import heptarm.wire.Ping;
 import heptarm.wire.Pong;
@@ -137,6 +139,7 @@ final class Dispatcher {
             id = run((Run) message);
         } else if (message instanceof ServoOpen) {
             ModeRules.check(((ServoOpen) message).mode, "mode.");
+            checkUntil((ServoOpen) message);
             server.robot.check((ServoOpen) message);
             id = server.executor.open(new Stream(server, (ServoOpen) message));
         } else if (message instanceof ServoSettings) {
@@ -224,9 +227,23 @@ final class Dispatcher {
                 checkJoints(((Ptp) item.motion).q, info, path + "motion.q");
             }
             ModeRules.check(item.mode, path + "mode.");
+            Conditions.check(item.until, path + "until", server.robot.signals());
+            for (int k = 0; k < item.triggers.length; k++) {
+                Conditions.check(item.triggers[k].condition, path + "triggers[" + k + "].condition", server.robot.signals());
+            }
+            if (item.motion instanceof Hold && Conditions.contains(item.until, PathReached.class)) {
+                throw new Refusal(Code.BAD_CONDITION, path + "until", "PathReached", "", "a hold has no path");
+            }
             server.robot.check(item, path);
         }
         return server.executor.add(run);
+    }
+
+    private void checkUntil(ServoOpen open) throws Refusal {
+        Conditions.check(open.until, "until", server.robot.signals());
+        if (Conditions.contains(open.until, PathReached.class)) {
+            throw new Refusal(Code.BAD_CONDITION, "until", "PathReached", "", "a servo motion has no path of its own");
+        }
     }
 
     private static void checkJoints(double[] q, RobotInfo info, String path) throws Refusal {

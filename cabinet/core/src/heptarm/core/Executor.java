@@ -6,6 +6,7 @@ import java.util.List;
 
 import heptarm.wire.Cause;
 import heptarm.wire.Code;
+import heptarm.wire.Condition;
 import heptarm.wire.ItemReached;
 import heptarm.wire.MotionFinished;
 import heptarm.wire.MotionStarted;
@@ -241,6 +242,9 @@ final class Executor {
             } catch (Refusal e) {
                 program.listener(i).finished(Job.Ended.FAILED, e.code, e.getMessage());
             }
+            if (program.run.items[i].until.nodes.length > 0) { // nothing begins behind a motion that a condition may end
+                watch(program, i);
+            }
         }
         for (int i = 0; i < program.ended.length; i++) {
             if (program.await(i) == Job.Ended.DONE && i + 1 < program.ended.length) {
@@ -249,6 +253,22 @@ final class Executor {
             if (program.cause() != null) {
                 program.end(program.cause, program.why);
             }
+        }
+    }
+
+    /** Waits for the end of a motion with a break condition; watches the condition if the robot does not. */
+    private void watch(Program program, int item) throws InterruptedException {
+        Condition until = program.run.items[item].until;
+        if (server.robot.watches(until)) {
+            program.await(item);
+            return;
+        }
+        Guard guard = new Guard(server, program, item, until);
+        guard.start();
+        try {
+            program.await(item);
+        } finally {
+            guard.close();
         }
     }
 
@@ -277,6 +297,7 @@ final class Executor {
             text = program.text.length() > 0 ? program.text : program.why;
         }
         double duration = program.began == 0 ? 0.0 : (server.clock.nanos() - program.began) * 1e-9;
-        server.broadcast(new MotionFinished(program.id, program.item, cause, -1, residual, duration, q, program.code, text));
+        int fired = cause == Cause.CONDITION ? program.fired : -1;
+        server.broadcast(new MotionFinished(program.id, program.item, cause, fired, residual, duration, q, program.code, text));
     }
 }

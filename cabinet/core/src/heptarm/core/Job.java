@@ -9,6 +9,9 @@ public interface Job {
     interface Listener {
         void started();
 
+        /** One of the job's break conditions has fired: the node of that index. It may be told of twice, or once, at the end. */
+        void fired(int node);
+
         /**
          * The job has ended.
          *

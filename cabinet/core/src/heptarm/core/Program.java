@@ -4,6 +4,7 @@ import java.util.ArrayList;
 import java.util.List;
 
 import heptarm.wire.Cause;
+import heptarm.wire.ConditionFired;
 import heptarm.wire.MotionStarted;
 import heptarm.wire.Run;
 
@@ -19,6 +20,9 @@ final class Program {
     int code;
     String text = "";
     long began;
+    int fired = -1;
+    private int firedItem;
+    private boolean isFiringTold;
     private final Server server;
     private final List<Job> jobs = new ArrayList<Job>();
 
@@ -94,12 +98,38 @@ final class Program {
         ended[index] = Job.Ended.CANCELLED;
     }
 
-    /** Waits for the end of an item. */
-    synchronized Job.Ended await(int index) throws InterruptedException {
-        while (ended[index] == null) {
-            wait();
+    /** A break condition has fired; the first time counts. */
+    synchronized void fired(int index, int node) {
+        if (fired < 0) {
+            fired = node;
+            firedItem = index;
+            notifyAll();
         }
-        return ended[index];
+    }
+
+    /** Waits for the end of an item; tells meanwhile where the robot was when a break condition fired. */
+    Job.Ended await(int index) throws InterruptedException {
+        while (true) {
+            synchronized (this) {
+                while (ended[index] == null && (fired < 0 || isFiringTold)) {
+                    wait();
+                }
+                if (fired < 0 || isFiringTold) {
+                    return ended[index];
+                }
+                isFiringTold = true;
+            }
+            tellFiring();
+        }
+    }
+
+    private void tellFiring() {
+        try {
+            server.broadcast(new ConditionFired(id, firedItem, fired, server.sampler.joints(), server.sampler.torques(),
+                    server.robot.readPose(server.clock.nanos()), server.robot.readWrench(server.clock.nanos())));
+        } catch (RuntimeException e) { // the end will be told in any case
+            server.log.error("reading the robot when a condition of motion " + id + " fired", e);
+        }
     }
 
     Job.Listener listener(final int index) {
@@ -114,10 +144,17 @@ final class Program {
                 }
             }
 
+            public void fired(int node) {
+                Program.this.fired(index, node);
+            }
+
             public void finished(Job.Ended how, int failureCode, String failure) {
                 if (how == Job.Ended.FAILED) {
                     fail(index, failureCode, failure);
                 } else {
+                    if (how == Job.Ended.CONDITION) {
+                        end(Cause.CONDITION, ""); // what is behind it does not begin
+                    }
                     synchronized (Program.this) {
                         ended[index] = how;
                         Program.this.notifyAll();

@@ -1,5 +1,6 @@
 package heptarm.core;
 
+import heptarm.wire.Condition;
 import heptarm.wire.FrameInfo;
 import heptarm.wire.FriOpen;
 import heptarm.wire.Item;
@@ -45,6 +46,15 @@ public interface Robot {
     PoseState readPose(long stamp);
 
     WrenchState readWrench(long stamp);
+
+    /** The same at the moved frame in the axes of another one: "" or "tool" (the moved frame's own), "flange", "base" or a name. */
+    WrenchState readWrench(String axes, long stamp);
+
+    /** Reads some of the signals, into their places. */
+    void readSignals(double[] values, int from, int count);
+
+    /** Whether the robot itself watches a break condition while a motion runs; otherwise the core does. */
+    boolean watches(Condition condition);
 
     SafetyState readSafety(long stamp);
 

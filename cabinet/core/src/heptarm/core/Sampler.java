@@ -66,7 +66,7 @@ final class Sampler {
     private final Gauge wrenchGauge = new Gauge(Groups.WRENCH, 0.1);
     private final Gauge motionGauge = new Gauge(Groups.MOTION, 0.05);
     private final Gauge safetyGauge = new Gauge(Groups.SAFETY, 0.1);
-    private JointState joints;
+    private volatile JointState joints;
     private TorqueState torques;
     private PoseState pose;
     private WrenchState wrench;
@@ -222,6 +222,28 @@ final class Sampler {
         double cost = System.nanoTime() - gauge.began;
         gauge.cost = Math.min(cost, gauge.cost * GROWTH + GROWTH_NS);
         gauge.next = gauge.cost < CHEAP_NS ? 0 : gauge.stamp + (long) (gauge.cost * server.clock.rate() / gauge.share);
+    }
+
+    /** The joints now, read by another thread; the newest velocity that is known. */
+    JointState joints() {
+        double[] q = new double[7];
+        double[] commanded = new double[7];
+        long now = server.clock.nanos();
+        server.robot.readJoints(q, commanded);
+        JointState newest = joints;
+        double[] unknown = new double[7];
+        java.util.Arrays.fill(unknown, Double.NaN);
+        return new JointState(now, q, commanded, newest == null ? unknown : newest.dq);
+    }
+
+    /** The torques now, read by another thread. */
+    TorqueState torques() {
+        double[] measured = new double[7];
+        double[] external = new double[7];
+        double[] commanded = new double[7];
+        long now = server.clock.nanos();
+        server.robot.readTorques(measured, external, commanded);
+        return new TorqueState(now, measured, external, commanded);
     }
 
     /** The velocity is a low-pass filtered difference, since the cabinet tells none. */

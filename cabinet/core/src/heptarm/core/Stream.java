@@ -135,6 +135,16 @@ final class Stream implements Activity {
 
     /** Lets a servo motion follow the targets; one that ended because none came for long is begun anew with the next. */
     public void perform(Program program) throws InterruptedException {
+        Guard guard = new Guard(server, program, 0, open.until);
+        try {
+            carryOut(program, guard);
+        } finally {
+            guard.close();
+        }
+        tell();
+    }
+
+    private void carryOut(Program program, Guard guard) throws InterruptedException {
         String starved = "";
         boolean goesOn = true;
         while (goesOn) {
@@ -145,6 +155,7 @@ final class Stream implements Activity {
                 adopt(next);
                 program.adopt(next);
                 if (awaitStart()) {
+                    guard.start();
                     starved = follow();
                 }
             } catch (Refusal e) {
@@ -159,7 +170,6 @@ final class Stream implements Activity {
                 goesOn = false;
             }
         }
-        tell();
     }
 
     /** A motion is about to start; what is known of one before it does not count any more. */

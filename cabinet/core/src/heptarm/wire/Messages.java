@@ -155,6 +155,9 @@ public final class Messages {
             case 103:
                 message = Notice.read(in);
                 break;
+            case 104:
+                message = ConditionFired.read(in);
+                break;
             case 112:
                 message = State.read(in);
                 break;

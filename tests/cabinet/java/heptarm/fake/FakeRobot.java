@@ -4,19 +4,24 @@ import java.util.ArrayDeque;
 import java.util.Arrays;
 
 import heptarm.core.Clock;
+import heptarm.core.Conditions;
 import heptarm.core.Fri;
 import heptarm.core.Job;
 import heptarm.core.Models;
+import heptarm.core.Readings;
 import heptarm.core.Refusal;
 import heptarm.core.Robot;
 import heptarm.core.Servo;
 import heptarm.wire.Code;
+import heptarm.wire.Condition;
 import heptarm.wire.FrameInfo;
 import heptarm.wire.FriCommandMode;
 import heptarm.wire.FriOpen;
 import heptarm.wire.FriQuality;
 import heptarm.wire.FriSessionState;
 import heptarm.wire.Hold;
+import heptarm.wire.IoDirection;
+import heptarm.wire.IoType;
 import heptarm.wire.Item;
 import heptarm.wire.Mode;
 import heptarm.wire.OperationMode;
@@ -29,6 +34,7 @@ import heptarm.wire.SafetyState;
 import heptarm.wire.ServoEngine;
 import heptarm.wire.ServoOpen;
 import heptarm.wire.SignalInfo;
+import heptarm.wire.SignalOutside;
 import heptarm.wire.ToolInfo;
 import heptarm.wire.WrenchState;
 
@@ -51,6 +57,14 @@ final class FakeRobot implements Robot, Runnable {
     static final double FAILS_COMMANDING = 0.009;
     static final double REFUSED = 2.0;
     static final double SERVO_TIMEOUT = 0.3;
+    static final double SPRING = 10.0;
+    static final double INACCURACY = 0.5;
+    static final SignalInfo[] SIGNALS = {
+        new SignalInfo("Flange.Button", IoDirection.INPUT, IoType.BOOLEAN, 0, 1),
+        new SignalInfo("Flange.Lamp", IoDirection.OUTPUT, IoType.BOOLEAN, 0, 1),
+        new SignalInfo("Cell.Count", IoDirection.OUTPUT, IoType.UNSIGNED, 0, 255),
+        new SignalInfo("Cell.Level", IoDirection.OUTPUT, IoType.ANALOG, -10, 10),
+    };
     private static final long SLOWLY_NS = 500000000L;
     private static final long TICK_NS = 2000000L;
 
@@ -58,6 +72,7 @@ final class FakeRobot implements Robot, Runnable {
     private final long getterNanos;
     private final double[] q = new double[7];
     private final ArrayDeque<FakeJob> jobs = new ArrayDeque<>();
+    private final double[] signals = new double[SIGNALS.length];
     private final RobotInfo info;
     private volatile double override = 1.0;
     private volatile boolean paused;
@@ -79,6 +94,7 @@ final class FakeRobot implements Robot, Runnable {
         double[] target;
         final double seconds;
         final Job.Listener listener;
+        Conditions.Tree[] until = new Conditions.Tree[0];
         boolean follows;
         boolean started;
         boolean cancelled;
@@ -136,6 +152,7 @@ final class FakeRobot implements Robot, Runnable {
     private void tick(double dt) {
         FakeJob job;
         boolean begins = false;
+        int node = -1;
         Job.Ended ended = null;
         synchronized (jobs) {
             job = jobs.peek();
@@ -147,7 +164,9 @@ final class FakeRobot implements Robot, Runnable {
             } else {
                 begins = !job.started;
                 job.started = true;
-                ended = move(job, dt);
+                Conditions.Tree fired = new Readings(this, clock.nanos()).first(job.until);
+                ended = fired == null ? move(job, dt) : Job.Ended.CONDITION;
+                node = fired == null ? -1 : fired.index;
             }
             if (ended != null) {
                 jobs.poll();
@@ -155,6 +174,9 @@ final class FakeRobot implements Robot, Runnable {
         }
         if (begins) {
             job.listener.started();
+        }
+        if (node >= 0) {
+            job.listener.fired(node);
         }
         if (ended == Job.Ended.FAILED) {
             job.listener.finished(ended, Code.EXECUTION_FAILED, "the drive of A7 tripped");
@@ -223,6 +245,7 @@ final class FakeRobot implements Robot, Runnable {
         }
         double seconds = item.motion instanceof Hold ? ((Hold) item.motion).duration : 0.0;
         FakeJob job = new FakeJob(target, Double.isNaN(seconds) ? 1e9 : seconds, listener);
+        job.until = watches(item.until) ? Conditions.alternatives(item.until) : new Conditions.Tree[0];
         synchronized (jobs) {
             jobs.add(job);
         }
@@ -259,6 +282,11 @@ final class FakeRobot implements Robot, Runnable {
                     @Override
                     public void started() {
                         jobListener.started();
+                    }
+
+                    @Override
+                    public void fired(int node) {
+                        jobListener.fired(node);
                     }
 
                     @Override
@@ -299,8 +327,8 @@ final class FakeRobot implements Robot, Runnable {
 
     @Override
     public void check(Item item, String path) throws Refusal {
-        if (item.until.nodes.length > 0 || item.triggers.length > 0) {
-            throw new Refusal(Code.UNSUPPORTED, path + "until", "conditions", "", "not here");
+        if (item.triggers.length > 0) {
+            throw new Refusal(Code.UNSUPPORTED, path + "triggers", "triggers", "", "not here");
         }
         if (!(item.motion instanceof Ptp || item.motion instanceof Hold)) {
             throw new Refusal(Code.UNSUPPORTED, path + "motion", item.motion.getClass().getSimpleName(), "Ptp, Hold", "not here");
@@ -320,6 +348,36 @@ final class FakeRobot implements Robot, Runnable {
     public void readTorques(double[] measured, double[] external, double[] commanded) {
         pay(2);
         Arrays.fill(commanded, Double.NaN);
+        external[6] = torque();
+    }
+
+    /** A spring at A7: the further it turns, the more it is pushed. */
+    private double torque() {
+        synchronized (jobs) {
+            return -SPRING * q[6];
+        }
+    }
+
+    /** The same spring pushes along the axis of the flange, which lies in x of the base. */
+    @Override
+    public WrenchState readWrench(String axes, long stamp) {
+        double[] force = new double[3];
+        force["base".equals(axes) ? 0 : 2] = torque();
+        return new WrenchState(stamp, force, new double[3], new double[] {INACCURACY, 0, 0}, new double[3]);
+    }
+
+    @Override
+    public void readSignals(double[] values, int from, int count) {
+        pay(count);
+        synchronized (signals) {
+            System.arraycopy(signals, from, values, from, count);
+        }
+    }
+
+    /** Number signals are the core's business. */
+    @Override
+    public boolean watches(Condition condition) {
+        return !Conditions.contains(condition, SignalOutside.class);
     }
 
     @Override
@@ -431,6 +489,6 @@ final class FakeRobot implements Robot, Runnable {
 
     @Override
     public SignalInfo[] signals() {
-        return new SignalInfo[0];
+        return SIGNALS;
     }
 }

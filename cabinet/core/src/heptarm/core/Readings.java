@@ -1,0 +1,143 @@
+package heptarm.core;
+
+import java.util.HashMap;
+import java.util.Map;
+
+import heptarm.wire.AllOf;
+import heptarm.wire.AnyOf;
+import heptarm.wire.Axis;
+import heptarm.wire.ConditionNode;
+import heptarm.wire.ForceAbove;
+import heptarm.wire.ForceOutside;
+import heptarm.wire.Inverted;
+import heptarm.wire.JointTorqueOutside;
+import heptarm.wire.NormalForceAbove;
+import heptarm.wire.ShearForceAbove;
+import heptarm.wire.SignalInfo;
+import heptarm.wire.SignalIs;
+import heptarm.wire.SignalOutside;
+import heptarm.wire.TorqueOutside;
+import heptarm.wire.WrenchState;
+
+/** What the robot says at one moment, read only as far as a condition asks for it, and each thing once. */
+public final class Readings {
+    private final Robot robot;
+    private final long stamp;
+    private final Map<String, WrenchState> wrenches = new HashMap<String, WrenchState>();
+    private double[] external;
+
+    public Readings(Robot robot, long stamp) {
+        this.robot = robot;
+        this.stamp = stamp;
+    }
+
+    /** The first of the trees that holds; null if none does. */
+    public Conditions.Tree first(Conditions.Tree[] trees) {
+        for (Conditions.Tree tree : trees) {
+            if (holds(tree)) {
+                return tree;
+            }
+        }
+        return null;
+    }
+
+    private boolean holds(Conditions.Tree tree) {
+        ConditionNode node = tree.node;
+        if (node instanceof AllOf || node instanceof AnyOf) {
+            boolean all = node instanceof AllOf;
+            for (Conditions.Tree part : tree.parts) {
+                if (holds(part) != all) {
+                    return !all;
+                }
+            }
+            return all;
+        }
+        return node instanceof Inverted ? !holds(tree.parts[0]) : leaf(node);
+    }
+
+    private boolean leaf(ConditionNode node) {
+        if (node instanceof ForceAbove) {
+            ForceAbove one = (ForceAbove) node;
+            WrenchState seen = wrench(one.frame);
+            return norm(seen.force) > one.threshold || vague(seen.force_inaccuracy, one.tolerance);
+        }
+        if (node instanceof NormalForceAbove) {
+            NormalForceAbove one = (NormalForceAbove) node;
+            WrenchState seen = wrench(one.frame);
+            return Math.abs(seen.force[one.axis.value()]) > one.threshold || vague(seen.force_inaccuracy, one.tolerance);
+        }
+        if (node instanceof ShearForceAbove) {
+            ShearForceAbove one = (ShearForceAbove) node;
+            WrenchState seen = wrench(one.frame);
+            return across(seen.force, one.axis) > one.threshold || vague(seen.force_inaccuracy, one.tolerance);
+        }
+        if (node instanceof ForceOutside) {
+            ForceOutside one = (ForceOutside) node;
+            WrenchState seen = wrench(one.frame);
+            return outside(seen.force[one.axis.value()], one.low, one.high) || vague(seen.force_inaccuracy, one.tolerance);
+        }
+        if (node instanceof TorqueOutside) {
+            TorqueOutside one = (TorqueOutside) node;
+            WrenchState seen = wrench(one.frame);
+            return outside(seen.torque[one.axis.value()], one.low, one.high) || vague(seen.torque_inaccuracy, one.tolerance);
+        }
+        if (node instanceof JointTorqueOutside) {
+            JointTorqueOutside one = (JointTorqueOutside) node;
+            return outside(external()[one.joint], one.low, one.high);
+        }
+        if (node instanceof SignalIs) {
+            return (signal(((SignalIs) node).signal) != 0.0) == ((SignalIs) node).value;
+        }
+        if (node instanceof SignalOutside) {
+            return outside(signal(((SignalOutside) node).signal), ((SignalOutside) node).low, ((SignalOutside) node).high);
+        }
+        return false; // a point on a path: that only the robot itself knows
+    }
+
+    private WrenchState wrench(String frame) {
+        WrenchState seen = wrenches.get(frame);
+        if (seen == null) {
+            seen = robot.readWrench(frame, stamp);
+            wrenches.put(frame, seen);
+        }
+        return seen;
+    }
+
+    private double[] external() {
+        if (external == null) {
+            external = new double[7];
+            robot.readTorques(new double[7], external, new double[7]);
+        }
+        return external;
+    }
+
+    private double signal(String name) {
+        SignalInfo[] all = robot.signals();
+        for (int i = 0; i < all.length; i++) {
+            if (all[i].name.equals(name)) {
+                double[] value = new double[all.length];
+                robot.readSignals(value, i, 1);
+                return value[i];
+            }
+        }
+        throw new IllegalStateException("no signal " + name);
+    }
+
+    private static boolean outside(double value, double low, double high) {
+        return !(value >= low && value <= high);
+    }
+
+    /** Whether an estimate is less accurate than is accepted. */
+    private static boolean vague(double[] inaccuracy, double tolerance) {
+        return Math.max(Math.max(inaccuracy[0], inaccuracy[1]), inaccuracy[2]) > tolerance;
+    }
+
+    private static double norm(double[] v) {
+        return Math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+    }
+
+    private static double across(double[] v, Axis axis) {
+        double along = v[axis.value()];
+        return Math.sqrt(Math.max(0.0, v[0] * v[0] + v[1] * v[1] + v[2] * v[2] - along * along));
+    }
+}
