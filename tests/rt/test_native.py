@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 
 import numpy as np
@@ -11,7 +12,8 @@ from hypothesis import strategies as st
 
 from heptarm.fri.messages import CommandMode, Quality, SessionState
 from heptarm.fri.policy import Missing, Policy
-from heptarm.fri.version import Version
+from heptarm.fri.protobuf import put_bytes, put_varint
+from heptarm.fri.version import MONITORING_ID, Version
 from heptarm.rt import layout as at
 from heptarm.rt.native import HANDBACK, LAW, Native, Unavailable, library
 from heptarm.rt.state import Output, State
@@ -24,6 +26,9 @@ try:
     library()
 except Unavailable as reason:
     pytest.skip(f"no native part: {reason}", allow_module_level=True)
+
+#: A longer search on demand.
+EXAMPLES = int(os.environ.get("HEPTARM_EXAMPLES", "25"))
 
 
 class Twins:
@@ -182,7 +187,35 @@ def test_laws(law: object) -> None:
     assert twins.plain > 250
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@pytest.mark.parametrize("wire", [Version.V1_15, Version.V2_5])
+def test_every_octet_of_a_message_damaged(wire: Version) -> None:
+    """What Python refuses, the native part refuses; a tag of zero or an illegal pose is nothing to read on in."""
+    twins = Twins(wire=wire)
+    twins.step(state=SessionState.COMMANDING_WAIT)
+    for octet in range(len(twins.pure.controller.datagram())):
+        for bit in range(8) if EXAMPLES > 25 else (3, octet % 8):
+            datagram = bytearray(twins.pure.controller.datagram())
+            datagram[octet] ^= 1 << bit
+            twins.message(bytes(datagram))
+            twins.pure.controller.sequence += 1
+            twins.step()
+    twins.check()
+
+
+@pytest.mark.parametrize("numbers", [(2**32, 0), (2**63, 0), (5, 2**64 - 1)])
+def test_numbers_of_more_than_32_bits_are_refused_and_break_nothing(numbers: tuple[int, int]) -> None:
+    twins = Twins()
+    twins.activate()
+    for sequence, reflected in (numbers, numbers[::-1]):
+        head = put_varint(1, MONITORING_ID) + put_varint(2, sequence) + put_varint(3, reflected)
+        datagram = twins.pure.controller.datagram()
+        twins.message(put_bytes(1, head) + datagram[2 + datagram[1] :])
+    twins.step()
+    assert twins.pure.cycle.session.counters.malformed == 2
+    twins.check()
+
+
+@settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data(), wire=st.sampled_from(list(Version)))
 def test_whatever_happens(data: st.DataObject, wire: Version) -> None:
     """States, qualities, modes, losses, repeats, silence, damage and jumps of the interpolator, in any order."""

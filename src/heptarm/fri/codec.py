@@ -62,6 +62,14 @@ def _integer(found: _Collected, tag: int, name: str) -> int | None:
     return None if value is None else int.from_bytes(value, "little") if isinstance(value, bytes) else value
 
 
+def _word(found: _Collected, tag: int, name: str) -> int | None:
+    """An integer of 32 bits."""
+    value = _integer(found, tag, name)
+    if value is not None and value >> 32:
+        raise MalformedMessage(f"FRI message: {name} is {value}, which is more than 32 bits hold")
+    return value
+
+
 def _needed(value: int | None, name: str) -> int:
     if value is None:
         raise MalformedMessage(f"FRI message: {name} is missing")
@@ -125,8 +133,8 @@ def _stamp(found: _Collected, tag: int) -> m.TimeStamp | None:
     if sub is None:
         return None
     return m.TimeStamp(
-        _needed(_integer(sub, 1, "seconds"), "seconds"),
-        _needed(_integer(sub, 2, "nanoseconds"), "nanoseconds"),
+        _needed(_word(sub, 1, "seconds"), "seconds"),
+        _needed(_word(sub, 2, "nanoseconds"), "nanoseconds"),
     )
 
 
@@ -175,11 +183,11 @@ def _header(found: _Collected, wanted: int) -> m.Header:
     sub = _sub(found, 1, "header")
     if sub is None:
         raise MalformedMessage("FRI message: no header")
-    seen = _integer(sub, 1, "message id")
+    seen = _word(sub, 1, "message id")
     if seen != wanted:
         raise MalformedMessage(f"FRI message: id is {seen}, {wanted} is legal here")
     return m.Header(
-        _needed(_integer(sub, 2, "sequence"), "sequence"), _needed(_integer(sub, 3, "reflected"), "reflected")
+        _needed(_word(sub, 2, "sequence"), "sequence"), _needed(_word(sub, 3, "reflected"), "reflected")
     )
 
 
@@ -232,9 +240,7 @@ def _connection(sub: _Collected) -> m.ConnectionInfo:
     state, quality = _member(sub, 1, m.SessionState, "session state"), _member(sub, 2, m.Quality, "quality")
     if state is None or quality is None:
         raise MalformedMessage("FRI message: session state or quality is missing")
-    return m.ConnectionInfo(
-        state, quality, _integer(sub, 3, "send period"), _integer(sub, 4, "receive multiplier")
-    )
+    return m.ConnectionInfo(state, quality, _word(sub, 3, "send period"), _word(sub, 4, "receive multiplier"))
 
 
 def decode_monitoring(datagram: bytes, version: Version) -> m.Monitoring:

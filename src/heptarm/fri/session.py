@@ -440,7 +440,7 @@ def reflected_in(datagram: bytes, *, framed: bool) -> int:
         value, pos = read_varint(datagram, pos + 1, end)
         if key == 0x18:
             reflected = value
-    return reflected
+    return reflected if reflected < _WRAP else -1
 
 
 def _is_legal(datagram: bytes) -> bool:

@@ -191,7 +191,7 @@ class _Layout:
         sequence, pos = _varint_at(message, 8)
         if message[pos] != 0x18:
             return None
-        _, pos = _varint_at(message, pos + 1)
+        reflected, pos = _varint_at(message, pos + 1)
         if pos != 2 + message[1] or not message.startswith(self._before, pos):
             return None
         size, pos = _varint_at(message, pos + len(self._before))
@@ -210,6 +210,8 @@ class _Layout:
             return None
         nanoseconds, pos = _varint_at(message, pos + 1)
         if pos != end or len(message) - end != self._back.size:
+            return None
+        if (sequence | reflected | seconds | nanoseconds) >> 32:
             return None
         back = self._back.unpack_from(message, end)
         if back[::2] != self._back_runs:

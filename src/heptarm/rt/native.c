@@ -78,7 +78,7 @@ static int varint(struct part *p, uint64_t *value) {
 
 /* The next field: its key, and its number or its octets. */
 static int field(struct part *p, uint64_t *key, uint64_t *number, struct part *octets) {
-    if (!varint(p, key)) return 0;
+    if (!varint(p, key) || *key >> 3 == 0) return 0;
     uint64_t size;
     switch (*key & 7) {
     case 0: return varint(p, number);
@@ -95,21 +95,50 @@ static int field(struct part *p, uint64_t *key, uint64_t *number, struct part *o
     return 1;
 }
 
+/* Seconds and nanoseconds, and nothing else. */
+static int stamp(struct part p, word *nanos) {
+    uint64_t key, seconds, rest;
+    struct part none;
+    if (!field(&p, &key, &seconds, &none) || key != 8 || seconds >> 32) return 0;
+    if (!field(&p, &key, &rest, &none) || key != 16 || rest >> 32 || p.at < p.end) return 0;
+    *nanos = (word)(seconds * 1000000000u + rest);
+    return 1;
+}
+
+/* A redundancy's strategy and value, and nothing else. */
+static int redundancy(struct part p, double *value) {
+    uint64_t key, strategy;
+    struct part octets;
+    if (!field(&p, &key, &strategy, &octets) || key != 8 || (strategy != 0 && strategy != 4)) return 0;
+    if (!field(&p, &key, &strategy, &octets) || key != 17 || p.at < p.end) return 0;
+    memcpy(value, octets.at, 8);
+    return 1;
+}
+
+static int is_plain_name(struct part p) {
+    if (p.end - p.at > 63) return 0;
+    while (p.at < p.end)
+        if (*p.at++ > 0x7f) return 0;
+    return 1;
+}
+
 /* `count` doubles in field `tag`, packed or one by one, and nothing else but, for frames, a name and a stamp. */
 static int doubles(struct part p, int tag, int count, int frame, double *into) {
-    int found = 0;
+    int found = 0, names = 0;
+    word none;
     while (p.at < p.end) {
         uint64_t key, number;
         struct part one;
         if (!field(&p, &key, &number, &one)) return 0;
-        if (frame && (key == (1 << 3 | 2) || key == (3 << 3 | 2))) continue;
+        if (frame && key == (1 << 3 | 2) && !names++ && is_plain_name(one)) continue;
+        if (frame && key == (3 << 3 | 2) && stamp(one, &none)) continue;
         if (key >> 3 != (uint64_t)tag || (key & 7) == 0) return 0;
         int size = (one.end - one.at) / 8;
         if ((one.end - one.at) % 8 || found + size > count) return 0;
         memcpy(into + found, one.at, 8 * size);
         found += size;
     }
-    return found == count;
+    return found == count && names == frame;
 }
 
 static int same(struct part p, const word *known, word size) {
@@ -183,18 +212,9 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
                 } else if (at == 9) {
                     if (!doubles(leaf, 2, 7, 1, l->t_pose)) return 0;
                 } else if (at == 10) {
-                    uint64_t strategy;
-                    struct part value;
-                    if (!field(&leaf, &key, &strategy, &value) || key != 8 || (strategy != 0 && strategy != 4)) return 0;
-                    if (!field(&leaf, &key, &number, &value) || key != 17 || leaf.at < leaf.end) return 0;
-                    memcpy(&l->t_e1, value.at, 8);
+                    if (!redundancy(leaf, &l->t_e1)) return 0;
                 } else if (at == 15) {
-                    uint64_t seconds, nanos;
-                    struct part none;
-                    if (!field(&leaf, &key, &seconds, &none) || key != 8) return 0;
-                    if (!field(&leaf, &key, &nanos, &none) || key != 16 || leaf.at < leaf.end) return 0;
-                    if (seconds >> 32 || nanos >> 32) return 0;
-                    l->t_stamp = (word)(seconds * 1000000000u + nanos);
+                    if (!stamp(leaf, &l->t_stamp)) return 0;
                 } else {
                     return 0;
                 }
@@ -208,7 +228,13 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
                     if ((word)number != l->info[0]) return 0;
                 } else if (key == (12 << 3 | 1)) {
                     memcpy(&l->t_tracking, leaf.at, 8);
-                } else if (key != 18 && key != 26) { /* pose and redundancy of the interpolator are not needed here */
+                } else if (key == 18) { /* the interpolator's pose and redundancy are not needed, but have to be legal */
+                    double unused[7];
+                    if (!doubles(leaf, 2, 7, 1, unused)) return 0;
+                } else if (key == 26) {
+                    double unused;
+                    if (!redundancy(leaf, &unused)) return 0;
+                } else {
                     return 0;
                 }
             }
