@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, nan
 from pathlib import Path
 
@@ -19,18 +19,22 @@ import numpy as np
 from heptarm.errors import Unreachable
 from heptarm.model.kinematics import flange
 from heptarm.values.arrays import Array
-from heptarm.values.mode import Mode
+from heptarm.values.links import Body
+from heptarm.values.mode import Mode as ControlMode
 from heptarm.values.robot import RobotModel, robot
 from heptarm.virtual import ring
 from heptarm.virtual.control import Control
 from heptarm.virtual.fri.overlay import Superposition
-from heptarm.virtual.law import Sensed
+from heptarm.virtual.law import PositionLaw, Sensed
 from heptarm.virtual.load import Load
 from heptarm.virtual.order import Order, PlanError
+from heptarm.virtual.pace import Pace
 from heptarm.virtual.path import JointLine, JointPath
+from heptarm.virtual.payload import Payload
 from heptarm.virtual.planner import Plan, plan
 from heptarm.virtual.posture import posture
-from heptarm.virtual.profile import Limits, Profile, brake, change
+from heptarm.virtual.profile import Limits, Profile, brake
+from heptarm.virtual.safety import Demand, Mode, Safety
 from heptarm.virtual.servo import Follower, follower
 
 TICK_NS = 1_000_000
@@ -42,13 +46,26 @@ SETTLED_SPEED = 1e-3
 #: ... or after this many ticks.
 SETTLE_TICKS = 500
 
-#: How fast the application override and pausing change the speed: [1/s], [1/s²], [1/s³].
-OVERRIDE_SLEW = Limits(4.0, 40.0, 800.0)
+#: Highest speed of the moved frame in T1 [m/s].
+REDUCED_SPEED = 0.25
+#: A fast stop may jerk so many times more than a motion.
+FAST_JERK = 20.0
+#: After a stop on the path the brakes close when no axis is faster than this [rad/s], or after so many ticks.
+BRAKE_SPEED = 0.02
+BRAKE_TICKS = 400
 
 #: Set-points this far behind a limit are rounding errors [rad].
 ON_LIMIT = 1e-9
 #: A set-point that asks for more than this many times an axis' speed is not followed.
 OVERSPEED = 1.2
+
+_DEMANDS = {
+    Demand.EMERGENCY_STOP: ring.EMERGENCY_STOP,
+    Demand.EXTERNAL_EMERGENCY_STOP: ring.EXTERNAL_STOP,
+    Demand.OPERATOR_SAFETY: ring.SAFEGUARD_OPEN,
+    Demand.PROTECTIVE_STOP: ring.PROTECTIVE_STOP,
+    Demand.DRIVE_ERROR: ring.DRIVE_ERROR,
+}
 
 MODELS = Path(__file__).parent / "models"
 HOME = (0.0, 0.0, 0.0, -np.pi / 2, 0.0, np.pi / 2, 0.0)
@@ -135,23 +152,32 @@ class Plant:
         self.on_wake: Callable[[int], None] | None = None
         self._views()
         self._load = Load(self.model, self.data)
+        self._payload = Payload(self.model, self.data, self._mass)
+        self._payloads: deque[tuple[Callable[[Body], None], Body]] = (
+            deque()
+        )  # to be told or hung in the next tick
         self._command = [self._q.copy() for _ in range(3)]  # set-points of the last, this and the next tick
         self._control = Control(self.robot, self.model, self.data)
         self._sensed = Sensed(
             self._q, self._dq, self._mass[:7, :7], self._bias, self._passive, self._q, self._q, self._q
         )
-        self._scale = self._goal = 1.0
-        self._slew: Profile | None = None  # of the scale, while it changes
-        self._slew_time = 0.0
-        self._pace = 1.0
+        self.safety = Safety()
+        self.on_safety: Callable[[], None] | None = None  # called when what it tells has changed
+        self._flags = 0
+        self._pace = Pace(self.robot)
         self._paused = False
+        self._brakes: PositionLaw | None = None  # closed
+        self._braked = self._sensed
+        self._halted = 0  # ticks for which a stop on the path has been in force
         self._planning = threading.Lock()  # one caller plans at a time; the tick never waits for it
         self._lock = threading.Lock()  # held for a few instructions only
         self._serial = 0  # of the newest accepted order
         self._inbox: deque[tuple[int, Order, Plan | None]] = deque()
-        self._cancels: deque[tuple[int, int | None]] = deque()  # newest order at that time, which one
-        self._changes: deque[tuple[int, Mode]] = deque()  # of the control mode of an order
-        self._aborts: deque[tuple[int, str]] = deque()  # orders that somebody else ends by an error
+        # newest order at that time, which one, whether fast
+        self._cancels: deque[tuple[int, int | None, bool]] = deque()
+        self._changes: deque[tuple[int, ControlMode]] = deque()  # of the control mode of an order
+        # orders that somebody else ends by an error; 0: whichever runs
+        self._aborts: deque[tuple[int, str]] = deque()
         self._action: Superposition | None = None  # what an FRI overlay wants of the next tick
         self._overlaid = False  # whether the last set-point was an overlay's
         self._run: _Run | None = None
@@ -218,22 +244,39 @@ class Plant:
 
     def cancel(self, order_id: int | None = None) -> None:
         """Cancel an order (None: all): the running one brakes on its path, waiting ones are dropped."""
-        with self._lock:
-            self._tail = None
-            self._cancel_count += 1
-            self._cancels.append((self._serial, order_id))
+        self._cancel(order_id, fast=False)
 
     def stop(self) -> None:
         """Cancel everything."""
         self.cancel(None)
+
+    def stop_fast(self) -> None:
+        """Cancel everything; what runs leaves its path, since every axis brakes as hard as it may."""
+        self._cancel(None, fast=True)
+
+    def _cancel(self, order_id: int | None, *, fast: bool) -> None:
+        with self._lock:
+            self._tail = None
+            self._cancel_count += 1
+            self._cancels.append((self._serial, order_id, fast))
 
     def pause(self) -> None:
         """Come to rest on the path, keeping all orders."""
         self._paused = True
 
     def resume(self) -> None:
-        """Go on after a pause."""
+        """Go on after a pause, or after a stop that nobody demands any more."""
         self._paused = False
+        self.safety.resume()
+
+    def acknowledge(self) -> None:
+        """Acknowledge errors whose cause has gone."""
+        self.safety.withdraw(Demand.DRIVE_ERROR)
+
+    def trip(self, text: str) -> None:
+        """An error of the drives: what runs fails, every axis brakes by itself, and the drives stay off."""
+        self.safety.demand(Demand.DRIVE_ERROR)
+        self.abort(0, text)
 
     def apply_wrench(
         self,
@@ -246,12 +289,27 @@ class Plant:
         wrench = np.concatenate([np.asarray(force, dtype=np.float64), np.asarray(torque, dtype=np.float64)])
         self._load.push(wrench, self.tick_count * TICK + duration)
 
-    def change_mode(self, order_id: int, mode: Mode) -> None:
+    def carries(self, load: Body) -> None:
+        """Tell the controller what hangs on the flange; it does hang there unless `hang` says otherwise."""
+        self._payloads.append((self._payload.declare, load))
+
+    def hang(self, load: Body) -> None:
+        """Hang something on the flange without telling the controller; declarations change nothing there any more."""
+        self._payloads.append((self._payload.hang, load))
+
+    def _take_loads(self) -> None:
+        payload, sensed = self._payload, self._sensed
+        while self._payloads:
+            take, load = self._payloads.popleft()
+            take(load)
+        sensed.mass, sensed.bias, self._load.is_misjudged = payload.mass, payload.bias, payload.differs
+
+    def change_mode(self, order_id: int, mode: ControlMode) -> None:
         """Change the parameters of a running order's control mode; of another order or kind it does nothing."""
         self._changes.append((order_id, mode))
 
     def abort(self, order_id: int, text: str) -> None:
-        """End a running order by an error that somebody else has found; every axis brakes by itself."""
+        """End a running order (0: whichever runs) by an error; every axis brakes by itself."""
         self._aborts.append((order_id, text))
 
     # ------------------------------------------------------------------------------ overlays, from the tick's thread
@@ -275,24 +333,28 @@ class Plant:
     def tick(self) -> None:
         """One millisecond: set-point, control law, dynamics, state."""
         m, d = self.model, self.data
+        if self._payloads:
+            self._take_loads()
         progress, remaining = self._advance()
         mujoco.mj_step1(m, d)
         self._load.apply(self.tick_count * TICK)
         mujoco.mj_fullM(m, d, self._mass)
+        if self._payload.differs:
+            self._payload.believe()
         sensed = self._sensed
         sensed.before, sensed.now, sensed.after = self._command
         sensed.is_overlaid = self._overlaid
-        torque = self._control.torque(sensed)
+        torque = self._control.torque(sensed) if self._brakes is None else self._brakes.torque(self._braked)
         if self._overlaid and self._action is not None:
             self._control.superpose(torque, self._action)
         np.minimum(torque, self._limit, out=torque)
         np.maximum(torque, self._least, out=torque)
         self._ctrl[:] = torque
         mujoco.mj_step2(m, d)
-        self._tau_cmd = torque
+        self._tau_cmd = torque if self._brakes is None else np.zeros(7)
         # the sensors sit behind the gear: rotor inertia and gear friction are not in them
         self._tau = torque - self._armature * self._acc + self._passive
-        self._load.measure(self._mass[:7, :7] @ self._acc + self._bias - self._passive - torque)
+        self._load.measure(sensed.mass @ self._acc + sensed.bias - self._passive - torque)
         self.tick_count += 1
         self._write(self._run_id(), progress, remaining)
 
@@ -303,7 +365,7 @@ class Plant:
             self._cancel_now(*self._cancels.popleft())
         while self._aborts:
             order_id, text = self._aborts.popleft()
-            if self._run is not None and order_id == self._run_id() and not self._run.failure:
+            if self._run is not None and order_id in (0, self._run_id()) and not self._run.failure:
                 self._run.failure = text
                 if not self._overlaid and not self._run.braking:
                     self._fail(self._run, text)
@@ -311,14 +373,10 @@ class Plant:
             order_id, mode = self._changes.popleft()
             if order_id == self._run_id():
                 self._control.retune(mode)
-        goal = 0.0 if self._paused else min(1.0, max(0.0, float(self.ring.reals[ring.OVERRIDE])))
-        before = self._scale
-        if goal != self._goal or self._slew is not None:
-            self._rescale(goal)
-        self._pace = 0.5 * (before + self._scale)  # trapezoidal, so that speed is scale times the profile's
+        self._keep_pace()
         run = self._run
         if run is None:
-            run = self._next()
+            run = None if self.safety.latched else self._next()
             if run is None and self._control.stiffen():
                 self._stay()
             command = self._command
@@ -333,15 +391,36 @@ class Plant:
             self._catch(run, self._control.violation)
         return self._follow(run)
 
-    def _rescale(self, goal: float) -> None:
-        """Change the scale of time towards the override, without a jerk."""
-        if goal != self._goal or self._slew is None:
-            state = (self._scale, 0.0, 0.0) if self._slew is None else self._slew.at(self._slew_time)
-            self._goal, self._slew, self._slew_time = goal, change(state, goal, OVERRIDE_SLEW), 0.0
-        self._slew_time += TICK
-        self._scale = min(1.0, max(0.0, self._slew.at(self._slew_time)[0]))
-        if self._slew_time >= self._slew.duration:
-            self._scale, self._slew = goal, None
+    def _keep_pace(self) -> None:
+        """How fast time runs in this tick, by overrides, pauses, stops and the operation mode."""
+        safety = self.safety
+        held = self._paused or safety.latched
+        goal = 0.0 if held else safety.manual * min(1.0, max(0.0, float(self.ring.reals[ring.OVERRIDE])))
+        if safety.mode is Mode.T1 and self._run is not None:
+            tcp = self._run.plan.order.tcp[:3]
+            self._pace.advance(goal, self._command, halts=safety.latched, ceiling=REDUCED_SPEED, tcp=tcp)
+        else:
+            self._pace.advance(goal, self._command, halts=safety.latched)
+        if safety.latched or self._brakes is not None:
+            self._brake_or_open()
+
+    def _brake_or_open(self) -> None:
+        """Close the brakes when a stop has brought the arm to rest; open them when execution may go on."""
+        if not self.safety.latched:
+            self._brakes, self._halted = None, 0
+            return
+        self._halted = self._halted + 1 if self._stands else 0
+        if self._brakes is not None or not self._halted:
+            return
+        if self._halted > BRAKE_TICKS or float(np.abs(self._dq).max()) < BRAKE_SPEED:
+            here = self._q.copy()
+            self._braked = replace(self._sensed, before=here, now=here, after=here, is_overlaid=False)
+            self._brakes = PositionLaw()
+
+    @property
+    def _stands(self) -> bool:
+        """Whether the set-points rest."""
+        return bool((self._command[2] == self._command[1]).all())
 
     def _follow(self, run: _Run) -> tuple[float, float]:
         planned = run.plan
@@ -356,7 +435,7 @@ class Plant:
         if self._overlaid:
             self._overlaid = False
             self._halt(run)
-        run.time += TICK if run.braking else TICK * self._pace
+        run.time += TICK if run.braking else TICK * self._pace.factor
         if run.path is None or run.profile is None:
             if run.cancelled or run.time >= planned.duration or planned.order.kind != "hold":
                 run.ended = True
@@ -396,7 +475,7 @@ class Plant:
         run.failure = text
         self._halt(run)
 
-    def _halt(self, run: _Run) -> None:
+    def _halt(self, run: _Run, *, jerk: float = 1.0) -> None:
         """Brake every axis by itself, straight on from where the last set-points led."""
         run.braking, run.ended, run.follower = True, False, None
         here = self._command[2]
@@ -406,7 +485,9 @@ class Plant:
         if full < 1e-9:
             run.path, run.ended = None, True
             return
-        limits = Limits(2.0, float(self.robot.ddq_max.min()) / full, float(self.robot.dddq_max.min()) / full)
+        limits = Limits(
+            2.0, float(self.robot.ddq_max.min()) / full, jerk * float(self.robot.dddq_max.min()) / full
+        )
         run.profile, run.time = brake((0.0, 1.0, 0.0), limits), 0.0
 
     def _settle(self, run: _Run) -> tuple[float, float]:
@@ -453,11 +534,11 @@ class Plant:
             return self._run
         return None
 
-    def _cancel_now(self, newest: int, order_id: int | None) -> None:
+    def _cancel_now(self, newest: int, order_id: int | None, fast: bool) -> None:
         """Carry out a cancellation; orders accepted after it are not concerned."""
         run = self._run
         if run is not None and run.serial <= newest and order_id in (None, run.plan.order.id):
-            self._brake(run)
+            (self._brake_fast if fast else self._brake)(run)
         dropped: list[Order] = []
         with self._lock:
             for _ in range(len(self._inbox)):
@@ -473,9 +554,9 @@ class Plant:
         if run.cancelled or run.failure:
             return
         run.cancelled = True
-        rate = 0.0 if self._slew is None else self._slew.at(self._slew_time)[1]
+        rate = self._pace.rate
         if run.follower is not None:
-            run.follower.brake(scale=self._scale, rate=rate)
+            run.follower.brake(scale=self._pace.scale, rate=rate)
             run.braking = True
             return
         if self._overlaid:
@@ -484,10 +565,18 @@ class Plant:
             run.ended = run.ended or run.path is None
             return
         s, velocity, acceleration = run.profile.at(run.time)
-        scale = self._scale
+        scale = self._pace.scale
         state = (s, velocity * scale, acceleration * scale * scale + velocity * rate)
         run.profile = brake(state, run.plan.braking)
         run.time, run.braking = 0.0, True
+
+    def _brake_fast(self, run: _Run) -> None:
+        if run.failure or run.ended:
+            self._brake(run)
+            return
+        run.cancelled = True
+        if not self._overlaid:  # else the next tick brakes from the overlay's speed
+            self._halt(run, jerk=FAST_JERK)
 
     # ------------------------------------------------------------------------------ servo motions and yielding
 
@@ -497,7 +586,7 @@ class Plant:
         order = run.plan.order
         if target is not None and target.order == order.id and not run.cancelled:
             follower.aim(target.q, target.dq)
-        there = follower.advance(TICK if run.braking else TICK * self._pace)
+        there = follower.advance(TICK if run.braking else TICK * self._pace.factor)
         run.ended = follower.is_still if run.braking else follower.resting > order.goal_timeout
         beyond = (there > self._highest) | (there < self._lowest)
         if beyond.any():
@@ -541,13 +630,9 @@ class Plant:
         reals[44:47] = p
         reals[47:51] = _quaternion(x, y, z)
         reals[51:57] = self._load.wrench
-        flags = ring.READY | ring.BRAKES_OPEN | ring.MASTERED
-        if self._paused:
-            flags |= ring.PAUSED
-        if order:
-            flags |= ring.MOVING
-        words[ring.FLAGS] = flags
-        words[ring.MODE] = 2
+        flags = self._safety_flags()
+        words[ring.FLAGS] = flags | ring.MOVING if order else flags
+        words[ring.MODE] = self.safety.mode
         words[ring.ORDER] = order
         reals[ring.PROGRESS] = progress
         reals[ring.REMAINING] = remaining
@@ -559,6 +644,26 @@ class Plant:
         wake = self.on_wake
         if wake is not None and k * TICK_NS >= r.header[ring.WAKE]:
             wake(k * TICK_NS)
+        if flags != self._flags:
+            self._flags = flags
+            if self.on_safety is not None:
+                self.on_safety()
+
+    def _safety_flags(self) -> int:
+        safety = self.safety
+        flags = ring.MASTERED
+        if self._brakes is None:
+            flags |= ring.BRAKES_OPEN
+        if self._paused or safety.latched:
+            flags |= ring.PAUSED
+        if safety.enabled:
+            flags |= ring.ENABLED
+        if not safety.halts:
+            return flags | ring.READY
+        flags |= ring.PROTECTIVE_STOP
+        for demand in safety.demands:
+            flags |= _DEMANDS[demand]
+        return flags
 
     @property
     def snapshot(self) -> Snapshot:

@@ -1,0 +1,125 @@
+"""How fast the time of motions runs: overrides, pauses, stops on the path, reduced speed.
+
+A motion is never planned anew for any of these. Its own time runs slower, so the arm stays on its path, whatever kind
+of path that is, and goes on along it afterwards.
+"""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+
+from heptarm.model.kinematics import flange, jacobian
+from heptarm.values.arrays import Array
+from heptarm.values.robot import RobotModel
+from heptarm.virtual.profile import Limits, Profile, change
+
+TICK = 1e-3
+
+#: How fast the application override and pausing change the speed: [1/s], [1/s²], [1/s³].
+OVERRIDE_SLEW = Limits(4.0, 40.0, 800.0)
+#: Below this factor the speed at full pace cannot be told from the set-points any more.
+_FAINT = 1e-4
+#: How sharply the speed bends towards its ceiling; the higher, the sharper.
+_BEND = 8
+
+
+class Pace:
+    """Runs the time of motions.
+
+    Args:
+        robot: whose limits hold.
+
+    Attributes:
+        factor: motion time per plant time in the running tick, 0 to 1.
+        scale: the same at the end of the tick.
+        rate: its change [1/s].
+    """
+
+    def __init__(self, robot: RobotModel) -> None:
+        self._robot = robot
+        self._step = robot.ddq_max * TICK
+        self._free = 1.0  # the factor before a ceiling
+        self._goal = 1.0
+        self._slew: Profile | None = None  # while it changes
+        self._slew_time = 0.0
+        self._full: Array | None = (
+            None  # speed that the last set-points would have at full pace, shape (7,) [rad/s]
+        )
+        self.factor = self.scale = 1.0
+        self.rate = 0.0
+
+    @property
+    def rests(self) -> bool:
+        """Whether time stands still."""
+        return self.scale == 0.0 and self.factor == 0.0
+
+    def advance(
+        self,
+        goal: float,
+        command: list[Array],
+        *,
+        halts: bool = False,
+        ceiling: float = inf,
+        tcp: tuple[float, ...] = (0.0, 0.0, 0.0),
+    ) -> None:
+        """One tick.
+
+        Args:
+            goal: factor to come to without a jerk.
+            command: set-points of the last three ticks, oldest first, shape (7,) each [rad].
+            halts: come to a standstill instead, as fast as the axes may brake along the path.
+            ceiling: what the speed of a point on the flange never exceeds [m/s].
+            tcp: that point, in the flange's axes [m].
+        """
+        if halts:
+            self._halt(command)
+            return
+        full = self._ahead(command) if ceiling < inf else None
+        before = self._free
+        if goal != self._goal or self._slew is not None:
+            self._bend(goal)
+        # trapezoidal, so that speed is scale times the profile's
+        self.factor, self.scale = 0.5 * (before + self._free), self._free
+        self.rate = 0.0 if self._slew is None else self._slew.at(self._slew_time)[1]
+        if full is None:
+            self._full = None
+            return
+        axes, origin = flange(self._robot, command[2].tolist())
+        point = np.array(origin) + np.array(axes).T @ np.array(tcp)
+        way = float(np.linalg.norm(jacobian(self._robot, command[2], point)[:3] @ full))
+        cap = (1.0 + (way / ceiling) ** _BEND) ** (-1.0 / _BEND)
+        self.factor *= cap
+        self.scale *= cap
+        self.rate *= cap
+
+    def _halt(self, command: list[Array]) -> None:
+        speed, ahead = (command[2] - command[1]) / TICK, self._ahead(command)
+        factor = 0.0
+        moving = np.abs(ahead) > 1e-9
+        if moving.any():
+            # the least factor with which no axis leaves its acceleration limit
+            bounds = (speed[moving] - np.sign(ahead[moving]) * self._step[moving]) / ahead[moving]
+            factor = min(self.scale, max(0.0, float(bounds.max())))
+        self.rate = (factor - self.scale) / TICK
+        self.factor = self.scale = self._free = self._goal = factor
+        self._slew = None
+
+    def _ahead(self, command: list[Array]) -> Array:
+        """Speed that the next set-point would have at full pace, shape (7,) [rad/s]."""
+        before = self._full
+        if self.factor < _FAINT:
+            return np.zeros(7) if before is None else before
+        full: Array = (command[2] - command[1]) / (TICK * self.factor)
+        self._full = full
+        return full if before is None else 2.0 * full - before
+
+    def _bend(self, goal: float) -> None:
+        if goal != self._goal or self._slew is None:
+            state = (self._free, 0.0, 0.0) if self._slew is None else self._slew.at(self._slew_time)
+            self._goal, self._slew, self._slew_time = goal, change(state, goal, OVERRIDE_SLEW), 0.0
+        self._slew_time += TICK
+        self._free = min(1.0, max(0.0, self._slew.at(self._slew_time)[0]))
+        if self._slew_time >= self._slew.duration:
+            self._free, self._slew = goal, None
