@@ -24,6 +24,7 @@ class Load:
     Attributes:
         torque: external load acting on the joints, shape (7,) [Nm].
         wrench: force and torque acting on the flange, base axes, shape (6,) [N, Nm].
+        is_misjudged: whether the controller's model of what hangs on the flange is wrong.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -35,6 +36,7 @@ class Load:
         self._pulled = data.xfrc_applied
         self._push: Array | None = None
         self._until = inf
+        self.is_misjudged = False
         self.torque = np.zeros(7)
         self.wrench = np.zeros(6)
 
@@ -59,8 +61,9 @@ class Load:
         Args:
             inertial: M q̈ + h - τ, what the model cannot explain, shape (7,) [Nm].
         """
-        # pulls at bodies are in no vector of MuJoCo's, but in what the model cannot explain
-        self.torque = inertial if self._pulled.any() else self._applied + self._constraint
+        # pulls at bodies and unknown loads are in no vector of MuJoCo's, but in what the model cannot explain
+        explained = not self.is_misjudged and not self._pulled.any()
+        self.torque = self._applied + self._constraint if explained else inertial
         if not self.torque.any():
             self.wrench[:] = 0.0
             return

@@ -1,0 +1,129 @@
+"""What hangs on the flange, and what the controller believes to hang there.
+
+Where both agree, nobody notices more than other torques. Where they do not, the controller works with a model that is
+wrong by the difference: it takes the weight that it does not know for an external force, as a robot does.
+
+What hangs there is what was declared, unless the world says otherwise.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+
+import mujoco
+import numpy as np
+
+from heptarm.values.arrays import Array
+from heptarm.values.links import Body, symmetric
+
+#: No load at all.
+NOTHING = Body(0.0, np.zeros(3))
+
+
+class _Link:
+    """The last link of a model, to which loads are added."""
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        site = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, "flange")
+        self._body = int(model.site_bodyid[site])
+        self._at = model.site_pos[site].copy()
+        self._turn = _matrix(model.site_quat[site])
+        axes = _matrix(model.body_iquat[self._body])
+        self._mass = float(model.body_mass[self._body])
+        self._com = model.body_ipos[self._body].copy()
+        self._inertia = axes @ np.diag(model.body_inertia[self._body]) @ axes.T
+
+    def carry(self, model: mujoco.MjModel, load: Body) -> None:
+        """Give the link a load instead of the one it had."""
+        com = self._at + self._turn @ load.com
+        mass = self._mass + load.mass
+        centre = (self._mass * self._com + load.mass * com) / mass
+        inertia = self._inertia + _shift(self._mass, self._com - centre)
+        inertia += self._turn @ symmetric(load.inertia) @ self._turn.T + _shift(load.mass, com - centre)
+        moments, axes = np.linalg.eigh(inertia)
+        if np.linalg.det(axes) < 0:
+            axes[:, 0] = -axes[:, 0]
+        quat = np.zeros(4)
+        mujoco.mju_mat2Quat(quat, axes.ravel())
+        model.body_mass[self._body] = mass
+        model.body_ipos[self._body] = centre
+        model.body_inertia[self._body] = moments
+        model.body_iquat[self._body] = quat
+        mujoco.mj_setConst(model, mujoco.MjData(model))  # of scratch data: it sets their posture
+
+
+class Payload:
+    """Load of the simulated arm; to be used by the thread that ticks the plant.
+
+    Args:
+        model: MuJoCo's model of the world; its first seven joints are the arm's.
+        data: its state.
+        mass: inertia matrix of the world, shape (nv, nv), which the plant keeps up to date [kg m²].
+
+    Attributes:
+        mass: inertia matrix as the controller believes, shape (7, 7) [kg m²].
+        bias: Coriolis, centrifugal and gravity torques as it believes, shape (7,) [Nm].
+        differs: whether the controller is wrong.
+    """
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, mass: Array) -> None:
+        self._model, self._data, self._world_mass = model, data, mass
+        self._link = _Link(model)
+        self._believed = copy(model)
+        # only the arm itself counts
+        self._believed.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+        self._scratch: mujoco.MjData | None = None
+        self._full = np.zeros_like(mass)
+        self._declared = self._hanging = NOTHING
+        self._pinned: Body | None = None
+        self._agree()
+
+    def _agree(self) -> None:
+        self.differs = False
+        self.mass, self.bias = self._world_mass[:7, :7], self._data.qfrc_bias[:7]
+
+    def declare(self, load: Body) -> None:
+        """Tell the controller what hangs on the flange."""
+        self._declared = load
+        self._settle()
+
+    def hang(self, load: Body | None) -> None:
+        """Hang something on the flange, whatever the controller believes; None: what was declared."""
+        self._pinned = load
+        self._settle()
+
+    def _settle(self) -> None:
+        hanging = self._declared if self._pinned is None else self._pinned
+        if hanging != self._hanging:
+            self._hanging = hanging
+            self._link.carry(self._model, hanging)
+        if hanging == self._declared:
+            self._agree()
+            return
+        self._link.carry(self._believed, self._declared)
+        if self._scratch is None:
+            self._scratch = mujoco.MjData(self._believed)
+        self.differs = True
+        self.mass, self.bias = self._full[:7, :7], self._scratch.qfrc_bias[:7]
+
+    def believe(self) -> None:
+        """Compute the controller's model for the present posture; needed in each tick in which it differs."""
+        model, data = self._believed, self._scratch
+        assert data is not None
+        data.qpos[:] = self._data.qpos
+        data.qvel[:] = self._data.qvel
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        mujoco.mj_fullM(model, data, self._full)
+
+
+def _matrix(quat: Array) -> Array:
+    """Rotation of MuJoCo's quaternion w x y z, shape (3, 3)."""
+    matrix = np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, quat)
+    return matrix.reshape(3, 3)
+
+
+def _shift(mass: float, by: Array) -> Array:
+    """Inertia of a point of mass about another point, shape (3, 3)."""
+    return mass * (float(by @ by) * np.eye(3) - np.outer(by, by))
