@@ -21,7 +21,7 @@ import jpype.nio
 import numpy as np
 
 from heptarm import _resources
-from heptarm.errors import CommandRejected, MissingExtra, Unreachable
+from heptarm.errors import CommandRejected, HeptarmError, MissingExtra, Unreachable
 from heptarm.model.inverse import solve
 from heptarm.values.arrays import Array
 from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, SineImpedance
@@ -293,14 +293,17 @@ def open_station(plant: Plant, sessions: Sessions) -> Any:
         @jpype.JOverride  # type: ignore[untyped-decorator]
         def friOpen(self, host: Any, settings: Any, transformations: Any, channel: Any) -> int:
             period, multiplier, port, own = (int(value) for value in settings[:])
-            return sessions.open(
-                (str(host), port),
-                period_ms=period,
-                multiplier=multiplier,
-                port=None if own < 0 else own,
-                transformations=tuple(str(name) for name in transformations),
-                channel=channel.changed,
-            )
+            try:
+                return sessions.open(
+                    (str(host), port),
+                    period_ms=period,
+                    multiplier=multiplier,
+                    port=None if own < 0 else own,
+                    transformations=tuple(str(name) for name in transformations),
+                    channel=channel.changed,
+                )
+            except HeptarmError as error:  # Java would see a proxy without a word
+                raise jpype.JClass("java.lang.IllegalStateException")(str(error)) from error
 
         @jpype.JOverride  # type: ignore[untyped-decorator]
         def friClose(self, number: int) -> None:

@@ -84,7 +84,7 @@ class Server:
     ) -> None:
         self._arm = arm
         self._client = _resolved(client)
-        self._socket = _bound(bind, source_port(client) if port is None else port)
+        self._socket = _beside(bind, client) if port is None else _bound(bind, port)
         self.port: int = self._socket.getsockname()[1]
         self._stamped = _ask_for_stamps(self._socket)
         self._clock, self._speed, self._origin = clock, speed, clock()
@@ -228,6 +228,18 @@ def _bound(bind: str, port: int) -> socket.socket:
         ) from error
     sock.setblocking(False)
     return sock
+
+
+def _beside(bind: str, client: Address) -> socket.socket:
+    """A socket on the port that belongs to a client; on a neighbour if the client turns out to be on this machine."""
+    port = source_port(client)
+    try:
+        return _bound(bind, port)
+    except ConnectFailed:
+        neighbour = source_port(("localhost", port))
+        if port != client[1]:
+            raise
+        return _bound(bind, neighbour)
 
 
 def _ask_for_stamps(sock: socket.socket) -> bool:

@@ -11,17 +11,23 @@ import heptarm.wire.FriSessionState;
 final class FriRun implements Activity, Fri.Listener {
     final FriOpen open;
     private final Server server;
-    private final long deadline;
+    private long deadline;
     private long id;
     private Fri fri;
     private FriSessionState state = FriSessionState.IDLE;
     private FriQuality quality = FriQuality.POOR;
+    private boolean stood;
     private boolean closed;
 
     FriRun(Server server, FriOpen open) {
         this.server = server;
         this.open = open;
-        this.deadline = System.nanoTime() + (long) (open.timeout * 1e9); // the client's seconds, not a simulator's
+        this.deadline = patience();
+    }
+
+    /** Until when its client may stay away; the client's seconds, not a simulator's. */
+    private long patience() {
+        return System.nanoTime() + (long) (open.timeout * 1e9);
     }
 
     boolean onlyMonitors() {
@@ -62,7 +68,11 @@ final class FriRun implements Activity, Fri.Listener {
         finish(program.code, program.text);
     }
 
-    private String silence() {
+    private synchronized String silence() {
+        if (stood) {
+            return "the FRI client at " + open.host + ":" + open.port + " has not answered well for " + open.timeout
+                    + " s: the session fell to " + state + ", its quality is " + quality;
+        }
         return "no FRI client answered from " + open.host + ":" + open.port + " within " + open.timeout
                 + " s, or not well enough: the session is in " + state + ", its quality " + quality
                 + "; check address, port and firewall, and that both sides have the same FRI version";
@@ -128,6 +138,10 @@ final class FriRun implements Activity, Fri.Listener {
             if (closed || newState == state && newQuality == quality) {
                 return;
             }
+            if (stood && newState != state && newState == FriSessionState.MONITORING_WAIT) {
+                deadline = patience();
+            }
+            stood |= newState == FriSessionState.MONITORING_READY;
             state = newState;
             quality = newQuality;
             notifyAll();
