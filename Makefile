@@ -2,7 +2,7 @@
 PY := .venv/bin/python
 STAMPS := build/stamps
 
-.PHONY: setup cabinet demo test test-ros2 lint check bench docs wheel clean
+.PHONY: setup cabinet demo test test-ros2 test-ros1 lint check bench docs wheel clean
 
 setup: $(STAMPS)/venv cabinet  ## virtual environment, package, compiled cabinet
 
@@ -24,6 +24,12 @@ $(STAMPS)/ros2: scripts/setup_ros2.sh scripts/ros2_interfaces.py scripts/ros2_re
 	scripts/setup_ros2.sh
 	@mkdir -p $(STAMPS) && touch $@
 
+ROS1_PACKAGES := $(shell find ros1/interfaces -type f)
+
+$(STAMPS)/ros1: scripts/setup_ros1.sh scripts/ros1_interfaces.py $(ROS1_PACKAGES) $(ROS2_PACKAGES) $(STAMPS)/venv
+	scripts/setup_ros1.sh
+	@mkdir -p $(STAMPS) && touch $@
+
 cabinet: $(STAMPS)/jdk  ## compile the cabinet application and its doubles
 	@$(PY) cabinet/build.py
 
@@ -41,10 +47,15 @@ check: $(STAMPS)/venv  ## the generated files agree with the schema
 test: setup $(STAMPS)/browser lint check  ## everything; fast tests first
 	$(PY) -m pytest
 	@$(MAKE) --no-print-directory test-ros2
+	@$(MAKE) --no-print-directory test-ros1
 
 test-ros2: setup $(STAMPS)/ros2  ## the ROS 2 node with real rclpy, where there are wheels of it
 	@if [ -x build/ros2/bin/python ]; then build/ros2/bin/python -m pytest tests/ros2; \
 	else echo "no ROS 2 here: the tests of its node are skipped"; fi
+
+test-ros1: setup $(STAMPS)/ros1  ## the ROS 1 node with a real roscore, where there are packages of it
+	@if [ -x build/ros1/bin/python ]; then build/ros1/bin/python -m pytest tests/ros1; \
+	else echo "no ROS 1 here: the tests of its node are skipped"; fi
 
 bench: setup  ## figures as JSON lines; ONLY=name runs one, LIST=1 names them
 	@$(PY) -m bench $(if $(ONLY),--only $(ONLY)) $(if $(LIST),--list)

@@ -47,6 +47,7 @@ class HeptarmNode:
             ("~activate", self.activate),
             ("~deactivate", self.deactivate),
             ("~cleanup", self.cleanup),
+            ("~reload", self.reload),
         )
         self._services = [rospy.Service(name, Trigger, _answered(step)) for name, step in steps]
         self._threads = [threading.Thread(target=self._report, name="heptarm-report")]
@@ -123,6 +124,32 @@ class HeptarmNode:
             self._destroy()
         return "disconnected"
 
+    def reload(self) -> str:
+        """Take parameters that have changed; ROS 1 tells nobody of them, so the node looks now and then, too.
+
+        Raises:
+            HeptarmError: one is not legal, or cannot change now; the old ones count.
+        """
+        with self._lock:
+            self._configured()
+            given, strange = settings.read()
+            before = self._given
+            if given == before:
+                return "nothing has changed"
+            changed = sorted(name for name in {*given, *before} if given.get(name) != before.get(name))
+            configuration = Configuration.of(given)
+            fixed = {one.name for one in parameters.PARAMETERS if one.fixed}
+            held = [name for name in changed if name in fixed]
+            if held:
+                raise NotReady(f"{', '.join(held)} cannot change now", hint="clean the node up first")
+            self._given, self.configuration = given, configuration
+            self._configured().configure(configuration)
+        text = f"new parameters: {', '.join(changed)}"
+        if strange:
+            text += f"; unknown ones: {', '.join(strange)}"
+        rospy.loginfo(text)
+        return text
+
     def close(self) -> None:
         """Leave the arm at rest."""
         self._ending.set()
@@ -177,40 +204,24 @@ class HeptarmNode:
 
     def _report(self) -> None:
         """Diagnostics, the status if it has changed, and parameters that have changed."""
+        told = ""
         while not self._ending.is_set():
             self._wake.wait(1.0 / self.configuration.values["diagnostics_rate"])
             self._wake.clear()
             try:
-                self._take_parameters()
+                trouble = ""
+                try:
+                    if self.driver is not None:
+                        self.reload()
+                except HeptarmError as error:
+                    trouble = str(error)
+                if trouble and trouble != told:
+                    rospy.logerr(f"the old parameters count: {trouble}")
+                told = trouble
                 self._tell()
-            except (HeptarmError, rospy.ROSException, OSError) as error:
+            except (rospy.ROSException, OSError) as error:  # no master
                 if not self._ending.is_set():
                     rospy.logwarn_throttle(10.0, f"reporting: {error}")
-
-    def _take_parameters(self) -> None:
-        """ROS 1 tells nobody of a changed parameter, so look."""
-        with self._lock:
-            if self.driver is None or self._ending.is_set():
-                return
-            given, _ = settings.read()
-            if given == self._given:
-                return
-            before, self._given = self._given, given
-            fixed = {one.name for one in parameters.PARAMETERS if one.fixed}
-            names = sorted(name for name in set(given) | set(before) if given.get(name) != before.get(name))
-            held = [name for name in names if name in fixed]
-            if held:
-                rospy.logwarn(f"{', '.join(held)} will change when the node is cleaned up and configured")
-            try:
-                wanted = {name: value for name, value in given.items() if name not in fixed}
-                kept = {name: value for name, value in self.configuration.values.items() if name in fixed}
-                configuration = Configuration.of({**kept, **wanted})
-            except HeptarmError as error:
-                rospy.logerr(f"a parameter was refused, the old ones count: {error}")
-                return
-            self.configuration = configuration
-            self.driver.configure(configuration)
-            rospy.loginfo(f"new parameters: {', '.join(names)}")
 
     def _tell(self) -> None:
         driver, outputs = self.driver, self._outputs

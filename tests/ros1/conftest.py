@@ -1,0 +1,112 @@
+"""Tests with a real roscore and rospy; where there are none they are not there, and `make test-ros1` says so."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import socket
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.conformance.stage import Stage
+
+if TYPE_CHECKING:
+    from tests.ros1.peer import Client, NodeProcess
+
+collect_ignore_glob = [] if importlib.util.find_spec("rospy") else ["test_*.py"]
+
+os.environ.pop("HEPTARM_TARGET", None)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """ROS 1 is older than what Python calls deprecated."""
+    for item in items:
+        if item.path.parent == Path(__file__).parent:
+            for module in ("rospy", "rosgraph", "actionlib", "genpy", "control_msgs"):
+                item.add_marker(pytest.mark.filterwarnings(f"ignore::DeprecationWarning:{module}"))
+                item.add_marker(pytest.mark.filterwarnings(f"ignore::ResourceWarning:{module}"))
+
+
+@pytest.fixture(scope="session")
+def stage() -> Iterator[Stage]:
+    """A virtual iiwa 14 with a hand on its faults."""
+    running = Stage()
+    yield running
+    running.close()
+
+
+@pytest.fixture
+def own_stage() -> Iterator[Stage]:
+    """The same for one test alone."""
+    running = Stage()
+    yield running
+    running.close()
+
+
+@pytest.fixture(scope="session")
+def ros() -> Iterator[None]:
+    """A roscore of one's own, and this process as a node of it."""
+    from tests.ros1.peer import sources, until
+
+    with socket.socket() as door:
+        door.bind(("127.0.0.1", 0))
+        port = door.getsockname()[1]
+    home = tempfile.TemporaryDirectory(prefix="ros1-home-", ignore_cleanup_errors=True)
+    os.environ.update(
+        ROS_MASTER_URI=f"http://127.0.0.1:{port}",
+        ROS_HOSTNAME="localhost",
+        ROS_HOME=home.name,
+        ROS_LOG_DIR=home.name,
+        **sources(),
+    )
+    import rosgraph
+    import rospy
+
+    core = subprocess.Popen(
+        ["roscore", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    try:
+        until(rosgraph.is_master_online, "there is no master")
+        rospy.init_node("tester", disable_signals=True)
+        yield
+        rospy.signal_shutdown("the tests are over")
+    finally:
+        core.terminate()
+        core.wait(20)
+        home.cleanup()
+
+
+@pytest.fixture(scope="session")
+def node(ros: None, stage: Stage) -> Iterator[NodeProcess]:
+    """The node of ROS 1 for most tests, active."""
+    from tests.ros1.peer import NodeProcess
+
+    running = NodeProcess(stage.target)
+    yield running
+    assert running.end() == 0, running.said
+
+
+@pytest.fixture(scope="session")
+def _client(stage: Stage, node: NodeProcess) -> Client:
+    from tests.ros1.peer import Client
+
+    client = Client(stage)
+    client.ready()
+    return client
+
+
+@pytest.fixture
+def client(_client: Client) -> Iterator[Client]:
+    """A client of the shared node; everything is as at the start afterwards."""
+    from tests.conformance.cases import rests
+
+    yield _client
+    _client.behave("follows")
+    _client.override(1.0)
+    assert _client.reset()
+    rests(_client)

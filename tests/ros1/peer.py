@@ -1,0 +1,268 @@
+"""The other side of a node: a client of ROS 1 with everything that a test asks of it, and the node's process."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import sysconfig
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import actionlib
+import numpy as np
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal, JointTolerance
+from heptarm_msgs.msg import Status
+from heptarm_msgs.srv import SetNumber
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from heptarm.bridge.goal import Code, Goal, Outcome, Tolerance
+from heptarm.bridge.trajectory import Sample
+from tests.conformance.client import Ended, Sent, Told
+from tests.conformance.stage import ROOT, Stage
+
+#: A busy machine may need long for what is quick [s].
+PATIENCE = 60.0
+PACKAGES = ROOT / "ros1"
+NODE = PACKAGES / "heptarm_ros1" / "scripts" / "heptarm_node"
+
+
+def sources() -> dict[str, str]:
+    """Environment in which ROS' own tools find our packages and messages."""
+    return {
+        "ROS_PACKAGE_PATH": str(PACKAGES),
+        "PYTHONPATH": sysconfig.get_paths()["purelib"],
+        "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
+    }
+
+
+def until(what: Callable[[], Any], why: str, timeout: float = PATIENCE) -> Any:
+    """Wait until something is true; returns it."""
+    deadline = time.monotonic() + timeout
+    while time.monotonic() < deadline:
+        if value := what():
+            return value
+        time.sleep(0.005)
+    raise TimeoutError(why)
+
+
+class NodeProcess:
+    """The node as a process of its own."""
+
+    def __init__(self, target: str, name: str = "heptarm", *, ns: str = "/", **values: object) -> None:
+        self.log = Path(tempfile.mkstemp(prefix="heptarm-node-", suffix=".log")[1])
+        command = [sys.executable, str(NODE), f"__name:={name}", f"__ns:={ns}"]
+        for key, value in ({"target": target} | values).items():
+            command.append(f"_{key.replace('__', '/')}:={value}")
+        with self.log.open("w") as log:
+            self.process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)
+
+    @property
+    def said(self) -> str:
+        """Its log."""
+        return self.log.read_text()
+
+    def waits_for(self, text: str) -> None:
+        """Wait until it says something."""
+        until(lambda: text in self.said or self.process.poll() is not None, f"the node does not say {text!r}")
+        assert text in self.said, self.said
+
+    def end(self, number: int = signal.SIGINT) -> int:
+        """End it; returns its exit code."""
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        try:
+            return self.process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            raise
+
+
+def call(name: str, kind: Any, **request: object) -> Any:
+    """Call a service."""
+    rospy.wait_for_service(name, PATIENCE)
+    return rospy.ServiceProxy(name, kind)(**request)
+
+
+def collect(name: str, kind: Any) -> list[Any]:
+    """A list that fills with a topic's messages."""
+    found: list[Any] = []
+    rospy.Subscriber(name, kind, found.append, queue_size=100, tcp_nodelay=True)
+    return found
+
+
+def publisher(name: str, kind: Any) -> rospy.Publisher:
+    """A publisher to which somebody listens."""
+    one = rospy.Publisher(name, kind, queue_size=1, tcp_nodelay=True)
+    until(one.get_num_connections, f"nobody listens to {name}")
+    return one
+
+
+def trajectory(goal: Goal) -> JointTrajectory:
+    message = JointTrajectory(joint_names=list(goal.joints))
+    if goal.start is not None:
+        message.header.stamp = rospy.Time.from_sec(goal.start)
+    for point in goal.points:
+        message.points.append(
+            JointTrajectoryPoint(
+                positions=list(point.q),
+                velocities=list(point.dq),
+                accelerations=list(point.ddq),
+                effort=list(point.effort),
+                time_from_start=rospy.Duration.from_sec(point.time),
+            )
+        )
+    return message
+
+
+def _tolerance(one: Tolerance) -> JointTolerance:
+    return JointTolerance(
+        name=one.joint, position=one.position, velocity=one.velocity, acceleration=one.acceleration
+    )
+
+
+def action_goal(goal: Goal) -> FollowJointTrajectoryGoal:
+    return FollowJointTrajectoryGoal(
+        trajectory=trajectory(goal),
+        path_tolerance=[_tolerance(one) for one in goal.path_tolerance],
+        goal_tolerance=[_tolerance(one) for one in goal.goal_tolerance],
+        goal_time_tolerance=rospy.Duration.from_sec(goal.goal_time),
+    )
+
+
+def _sample(point: JointTrajectoryPoint) -> Sample:
+    return Sample(
+        np.array(point.positions), np.array(point.velocities), np.array(point.accelerations or [0.0] * 7)
+    )
+
+
+class Client:
+    """A client as the cases of conformance want it."""
+
+    preempted = (Outcome.PREEMPTED,)
+    timely = False
+
+    def __init__(self, stage: Stage, name: str = "/heptarm", prefix: str = "") -> None:
+        self.stage, self.name = stage, name
+        self.joints = tuple(f"{prefix}A{i}" for i in range(1, 8))
+        namespace = name.rpartition("/")[0]
+        self.states = collect(f"{namespace}/joint_states", JointState)
+        self.status = collect(f"{name}/status", Status)
+        self._action = actionlib.ActionClient(f"{name}/follow_joint_trajectory", FollowJointTrajectoryAction)
+        self._topic = rospy.Publisher(f"{name}/joint_trajectory", JointTrajectory, queue_size=1)
+        self._told: dict[int, list[Told]] = {}
+        self._changed: set[str] = set()
+
+    def ready(self) -> None:
+        """Wait until the node is active and everything has found each other."""
+        assert self._action.wait_for_server(rospy.Duration.from_sec(PATIENCE))
+        until(lambda: self.states and self.status and self.status[-1].active, "the node is not active")
+
+    def now(self) -> float:
+        return float(rospy.Time.now().to_sec())
+
+    def sleep(self, seconds: float) -> None:
+        time.sleep(seconds)
+
+    def place(self) -> Sample:
+        count = len(self.states)
+        until(lambda: len(self.states) > count, "no joint states come")
+        message = self.states[-1]
+        assert tuple(message.name) == self.joints
+        return Sample(np.array(message.position), np.array(message.velocity), np.zeros(7))
+
+    def send(self, goal: Goal) -> Sent:
+        told: list[Told] = []
+        handle = self._action.send_goal(
+            action_goal(goal), feedback_cb=lambda _, feedback: told.append(self._telling(feedback))
+        )
+        status = until(
+            lambda: handle.get_goal_status() if handle.get_goal_status() != GoalStatus.PENDING else 0,
+            "the goal is neither accepted nor rejected",
+        )
+        if status == GoalStatus.REJECTED:
+            until(lambda: handle.get_result() is not None, "a rejected goal has no result")
+            result = handle.get_result()
+            assert result.error_string, "a rejection says why"
+            return Sent(False, Code(result.error_code), handle)
+        self._told[id(handle)] = told
+        return Sent(True, handle=handle)
+
+    def cancel(self, sent: Sent) -> bool:
+        handle: Any = sent.handle
+        handle.cancel()
+        return True
+
+    def result(self, sent: Sent, timeout: float = PATIENCE) -> Ended:
+        handle: Any = sent.handle
+        done = actionlib.CommState.DONE
+        until(lambda: handle.get_comm_state() == done, "the goal does not end", timeout)
+        result = handle.get_result()
+        code = Code(result.error_code)
+        outcome = {
+            GoalStatus.SUCCEEDED: Outcome.SUCCEEDED,
+            GoalStatus.ABORTED: Outcome.ABORTED,
+            # one word for two ends; the code tells which
+            GoalStatus.PREEMPTED: Outcome.CANCELED if code is Code.SUCCESSFUL else Outcome.PREEMPTED,
+        }[handle.get_terminal_state()]
+        return Ended(outcome, code, result.error_string)
+
+    def feedback(self, sent: Sent) -> list[Told]:
+        return list(self._told[id(sent.handle)])
+
+    def behave(self, how: str) -> None:
+        self.stage.do(how)
+
+    def override(self, value: float) -> None:
+        answer = call(f"{self.name}/set_override", SetNumber, value=value)
+        assert answer.success, answer.message
+
+    def set(self, **values: object) -> bool:
+        for name, value in values.items():
+            rospy.set_param(f"{self.name}/{name.replace('__', '/')}", value)
+            self._changed.add(name)
+        if self.reload():
+            return True
+        for name in values:
+            rospy.delete_param(f"{self.name}/{name.replace('__', '/')}")
+            self._changed.discard(name)
+        return False
+
+    def reload(self) -> bool:
+        """Let the node look at its parameters."""
+        return bool(call(f"{self.name}/reload", Trigger).success)
+
+    def reset(self) -> bool:
+        """All parameters as they were."""
+        while self._changed:
+            rospy.delete_param(f"{self.name}/{self._changed.pop().replace('__', '/')}")
+        return self.reload()
+
+    def activate(self, *, on: bool) -> None:
+        answer = call(f"{self.name}/{'activate' if on else 'deactivate'}", Trigger)
+        assert answer.success, answer.message
+
+    def topic(self, goal: Goal) -> None:
+        until(self._topic.get_num_connections, "nobody listens to trajectories")
+        self._topic.publish(trajectory(goal))
+
+    @staticmethod
+    def _telling(one: Any) -> Told:
+        return Told(
+            tuple(one.joint_names),
+            _sample(one.desired),
+            _sample(one.actual),
+            np.array(one.error.positions),
+            one.desired.time_from_start.to_sec(),
+            one.actual.time_from_start.to_sec(),
+            None,
+        )
