@@ -44,9 +44,8 @@ class Pace:
         self._goal = 1.0
         self._slew: Profile | None = None  # while it changes
         self._slew_time = 0.0
-        self._full: Array | None = (
-            None  # speed that the last set-points would have at full pace, shape (7,) [rad/s]
-        )
+        self._full = np.zeros(7)  # speed that the last set-points would have at full pace [rad/s]
+        self._before = 1.0  # the factor of the last tick but one
         self.factor = self.scale = 1.0
         self.rate = 0.0
 
@@ -77,14 +76,13 @@ class Pace:
             self._halt(command)
             return
         full = self._ahead(command) if ceiling < inf else None
-        before = self._free
+        before, self._before = self._free, self.factor
         if goal != self._goal or self._slew is not None:
             self._bend(goal)
         # trapezoidal, so that speed is scale times the profile's
         self.factor, self.scale = 0.5 * (before + self._free), self._free
         self.rate = 0.0 if self._slew is None else self._slew.at(self._slew_time)[1]
         if full is None:
-            self._full = None
             return
         axes, origin = flange(self._robot, command[2].tolist())
         point = np.array(origin) + np.array(axes).T @ np.array(tcp)
@@ -102,18 +100,17 @@ class Pace:
             # the least factor with which no axis leaves its acceleration limit
             bounds = (speed[moving] - np.sign(ahead[moving]) * self._step[moving]) / ahead[moving]
             factor = min(self.scale, max(0.0, float(bounds.max())))
-        self.rate = (factor - self.scale) / TICK
+        self.rate, self._before = (factor - self.scale) / TICK, self.factor
         self.factor = self.scale = self._free = self._goal = factor
         self._slew = None
 
     def _ahead(self, command: list[Array]) -> Array:
         """Speed that the next set-point would have at full pace, shape (7,) [rad/s]."""
-        before = self._full
-        if self.factor < _FAINT:
-            return np.zeros(7) if before is None else before
-        full: Array = (command[2] - command[1]) / (TICK * self.factor)
-        self._full = full
-        return full if before is None else 2.0 * full - before
+        if self.factor < _FAINT or self._before < _FAINT:
+            return self._full
+        before, now, after = command
+        self._full = (after - now) / (TICK * self.factor)
+        return 2.0 * self._full - (now - before) / (TICK * self._before)
 
     def _bend(self, goal: float) -> None:
         if goal != self._goal or self._slew is None:

@@ -31,9 +31,10 @@ from heptarm.virtual.order import Order, PlanError
 from heptarm.virtual.pace import Pace
 from heptarm.virtual.path import JointLine, JointPath
 from heptarm.virtual.payload import Payload
-from heptarm.virtual.planner import Plan, plan
+from heptarm.virtual.planner import Plan
 from heptarm.virtual.posture import posture
-from heptarm.virtual.profile import Limits, Profile, brake
+from heptarm.virtual.profile import Limits, TimeLaw, brake
+from heptarm.virtual.route import plan
 from heptarm.virtual.safety import Demand, Mode, Safety
 from heptarm.virtual.servo import Follower, follower
 
@@ -46,8 +47,8 @@ SETTLED_SPEED = 1e-3
 #: ... or after this many ticks.
 SETTLE_TICKS = 500
 
-#: Highest speed of the moved frame in T1 [m/s].
-REDUCED_SPEED = 0.25
+#: Highest speed of the moved frame in T1 [m/s], a trifle less than the standard's 250 mm/s.
+REDUCED_SPEED = 0.249
 #: A fast stop may jerk so many times more than a motion.
 FAST_JERK = 20.0
 #: After a stop on the path the brakes close when no axis is faster than this [rad/s], or after so many ticks.
@@ -109,6 +110,7 @@ class _Run:
         "ended",
         "failure",
         "follower",
+        "part",
         "path",
         "plan",
         "profile",
@@ -122,8 +124,9 @@ class _Run:
         self.plan = planned
         self.serial = serial
         self.path: JointPath | None = planned.path
-        self.profile: Profile | None = planned.profile
+        self.profile: TimeLaw | None = planned.profile
         self.failure = ""
+        self.part = 0
         self.time = 0.0
         self.braking = False
         self.cancelled = False
@@ -444,6 +447,10 @@ class Plant:
         if run.time >= run.profile.duration:
             run.ended = True
         s = min(max(s, 0.0), 1.0)
+        while run.part < len(planned.marks) and s >= planned.marks[run.part]:
+            run.part += 1
+            if planned.order.part_listener is not None:
+                planned.order.part_listener.reached(run.part)
         # at the very end take the planned joints: the path's samples may end a rounding error beside them
         if s == 1.0 and run.path is planned.path:
             self._command[2] = planned.end
@@ -478,8 +485,9 @@ class Plant:
     def _halt(self, run: _Run, *, jerk: float = 1.0) -> None:
         """Brake every axis by itself, straight on from where the last set-points led."""
         run.braking, run.ended, run.follower = True, False, None
-        here = self._command[2]
-        speed = np.clip((here - self._command[0]) / TICK, -self.robot.dq_max, self.robot.dq_max)
+        before, now, here = self._command
+        step = here - (before if now is here else now)  # whether or not the set-points were shifted in this tick
+        speed = np.clip(step / TICK, -self.robot.dq_max, self.robot.dq_max)
         run.path = JointLine(here.copy(), here + speed)
         full = float(np.abs(speed).max())
         if full < 1e-9:
@@ -564,10 +572,13 @@ class Plant:
         if run.ended or run.profile is None or run.path is None:
             run.ended = run.ended or run.path is None
             return
-        s, velocity, acceleration = run.profile.at(run.time)
-        scale = self._pace.scale
-        state = (s, velocity * scale, acceleration * scale * scale + velocity * rate)
-        run.profile = brake(state, run.plan.braking)
+        scale, halts = self._pace.scale, run.plan.halts
+        if halts is not None:
+            run.profile = halts.brake(run.time, scale, rate)
+        else:
+            s, velocity, acceleration = run.profile.at(run.time)
+            state = (s, velocity * scale, acceleration * scale * scale + velocity * rate)
+            run.profile = brake(state, run.plan.braking)
         run.time, run.braking = 0.0, True
 
     def _brake_fast(self, run: _Run) -> None:

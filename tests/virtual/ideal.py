@@ -1,0 +1,94 @@
+"""A plant whose arm is where its set-points are: no dynamics, so that hundreds of stops take seconds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heptarm.values.arrays import Array
+from heptarm.virtual.order import Order
+from heptarm.virtual.plant import FAST_JERK, Plant
+from heptarm.virtual.safety import Demand
+from tests.virtual.driving import READY
+
+TICK = 1e-3
+LINE = (0.05, 0.25, 0.05, 0.0, 0.0, 0.0, 1.0)
+BASE = (0.0, 0.0, 0.0, 1.0)
+#: Every kind of motion, each about a second long at full speed.
+KINDS = {
+    "ptp": Order(1, "ptp", joints=(1.2, 0.2, 0.3, -1.0, 0.4, 0.5, -0.8)),
+    "lin": Order(1, "lin_rel", offset=LINE, reference=BASE),
+    "hold": Order(1, "hold"),
+    "servo": Order(1, "servo"),
+    "direct": Order(1, "direct"),
+}
+
+
+class Ideal(Plant):
+    """A plant that follows at once."""
+
+    def tick(self) -> None:
+        self._advance()
+        self._q[:] = self._command[2]
+        self._dq[:] = (self._command[2] - self._command[1]) / TICK
+        self.tick_count += 1
+
+    @property
+    def speed(self) -> Array:
+        """Of the set-points, shape (7,) [rad/s]."""
+        return self._dq.copy()
+
+    @property
+    def acceleration(self) -> Array:
+        """Of the set-points, shape (7,) [rad/s²]."""
+        before, now, after = self._command
+        return (after - 2 * now + before) / TICK**2
+
+    @property
+    def is_under_way(self) -> bool:
+        """Whether the set-points move, or a motion brakes that has not come to its end."""
+        braking = self._run is not None and self._run.cancelled and not self._run.ended
+        return braking or bool(self._dq.any())
+
+    def press(self) -> None:
+        """Press the emergency stop."""
+        self.safety.demand(Demand.EMERGENCY_STOP)
+
+    def stopping_time(self, how: str) -> float:
+        """How long a stop may take by its deceleration limit, from this tick on [s].
+
+        A stop on the path brakes with what the path's limits allow, jerk included; a servo motion with its axes'. The
+        others brake at each axis' full deceleration; on a curved path the axis that is fastest may not be the one that
+        sets the pace, so an emergency stop gets half as much again.
+        """
+        run = self._run
+        assert run is not None
+        hardest, jerk = float(self.robot.ddq_max.min()), float(self.robot.dddq_max.min())
+        fastest = float(np.abs(self.speed).max())
+        if how != "path":
+            return 1.5 * fastest / hardest + (hardest / jerk / FAST_JERK if how == "fast" else 0.0)
+        if run.follower is not None:
+            steepest = float(np.abs(self.acceleration).max())
+            return _braking(fastest, steepest, hardest, jerk)
+        if run.profile is None:
+            return 0.0
+        _, speed, acceleration = run.profile.at(run.time)
+        limits = run.plan.braking
+        return _braking(speed, abs(acceleration), limits.acceleration, limits.jerk)
+
+
+def _braking(speed: float, acceleration: float, most: float, jerk: float) -> float:
+    """Time to rest from a speed while still accelerating, with limited deceleration and jerk [s]."""
+    peak = speed + acceleration**2 / (2 * jerk)
+    return acceleration / jerk + peak / most + most / jerk
+
+
+def begin(kind: str, *, seed: int = 0) -> Ideal:
+    """A motion of a kind in its first tick; a servo motion has a far target."""
+    plant = Ideal("iiwa14", q=READY)
+    order = KINDS[kind]
+    plant.submit(order)
+    plant.tick()
+    if order.is_servo:
+        away = np.random.default_rng(seed).uniform(-0.8, 0.8, 7)
+        plant.ring.post(order.id, np.array(READY) + away)
+    return plant

@@ -1,0 +1,288 @@
+"""Stops of the safety controller: the arm keeps its path and its limits, brakes, and goes on afterwards."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from heptarm.model.kinematics import forward, jacobian
+from heptarm.values.arrays import Array
+from heptarm.values.mode import JointImpedance
+from heptarm.virtual import ring
+from heptarm.virtual.order import Order
+from heptarm.virtual.plant import REDUCED_SPEED, Plant
+from heptarm.virtual.safety import Demand, Mode, Safety
+from tests.virtual.driving import READY, Ear, ready, run
+from tests.virtual.ideal import KINDS, LINE, begin
+
+STOPS = (Demand.EMERGENCY_STOP, Demand.OPERATOR_SAFETY, Demand.PROTECTIVE_STOP)
+
+
+def flags(plant: Plant) -> int:
+    return int(plant.ring.ints[plant.tick_count % ring.SLOTS, ring.FLAGS])
+
+
+def to_standstill(plant: Plant, *, most: int = 1500) -> int:
+    ticks = 0
+    while np.abs(plant.snapshot.dq).max() > 1e-3 or not ticks:
+        plant.tick()
+        ticks += 1
+        assert ticks < most
+    return ticks
+
+
+# ------------------------------------------------------------------------------- the controller by itself
+
+
+def test_a_stop_is_latched_until_somebody_resumes() -> None:
+    safety = Safety()
+    assert not (safety.halts or safety.latched)
+    safety.demand(Demand.EMERGENCY_STOP)
+    safety.resume()
+    assert safety.halts and safety.latched  # nobody resumes while the button is pressed
+    safety.withdraw(Demand.EMERGENCY_STOP)
+    assert not safety.halts and safety.latched
+    safety.resume()
+    assert not safety.latched
+
+
+def test_the_enabling_switch_counts_in_t1_and_t2_only() -> None:
+    safety = Safety()
+    assert not safety.lacks_enabling
+    safety.choose(Mode.T2)
+    assert safety.halts and safety.lacks_enabling
+    safety.enable()
+    assert not safety.halts and safety.latched  # pressing it alone does not let the arm go on
+    safety.resume()
+    safety.release()
+    assert safety.halts and safety.latched
+    safety.choose(Mode.AUT)
+    assert not safety.halts and safety.latched
+
+
+def test_two_demands_both_have_to_go() -> None:
+    safety = Safety()
+    safety.demand(Demand.EMERGENCY_STOP)
+    safety.demand(Demand.OPERATOR_SAFETY)
+    safety.withdraw(Demand.OPERATOR_SAFETY)
+    assert safety.halts
+    safety.withdraw()
+    assert not safety.halts
+
+
+# ---------------------------------------------------------------------------------- stops on the path
+
+
+@pytest.mark.parametrize("demand", STOPS)
+def test_a_stop_brakes_closes_the_brakes_and_the_motion_goes_on_afterwards(demand: Demand) -> None:
+    plant, ear = ready(), Ear()
+    plant.submit(Order(1, "ptp", joints=KINDS["ptp"].joints, listener=ear))
+    plant.step(500)
+    speed = np.abs(plant.snapshot.dq).max()
+    plant.safety.demand(demand)
+    ticks = to_standstill(plant)
+    assert ticks * 1e-3 < speed / plant.robot.ddq_max.min() + 0.1
+    plant.step(100)
+    seen = flags(plant)
+    assert seen & ring.PROTECTIVE_STOP and seen & ring.PAUSED
+    assert not seen & (ring.READY | ring.BRAKES_OPEN)
+    assert bool(seen & ring.EMERGENCY_STOP) is (demand is Demand.EMERGENCY_STOP)
+    assert bool(seen & ring.SAFEGUARD_OPEN) is (demand is Demand.OPERATOR_SAFETY)
+    assert ear.causes == ["started"]  # the motion waits
+    plant.safety.withdraw(demand)
+    plant.step(300)
+    assert flags(plant) & (ring.READY | ring.PAUSED) == ring.READY | ring.PAUSED
+    assert np.abs(plant.snapshot.dq).max() < 1e-3
+    plant.resume()
+    run(plant)
+    assert ear.causes == ["started", "done"]
+    assert np.abs(plant.snapshot.q - KINDS["ptp"].joints).max() < 1e-4
+    assert flags(plant) & ring.BRAKES_OPEN
+
+
+@pytest.mark.parametrize("at", [60, 250, 500, 800])
+@pytest.mark.parametrize("kind", ["ptp", "lin"])
+def test_a_stop_keeps_the_path(kind: str, at: int) -> None:
+    way = np.array([plant_q for plant_q in _free_run(kind)])
+    plant = begin(kind)
+    for _ in range(at):
+        plant.tick()
+    plant.safety.demand(Demand.EMERGENCY_STOP)
+    places, accelerations = [], []
+    for _ in range(400):
+        plant.tick()
+        places.append(plant.snapshot.q_cmd)
+        accelerations.append(np.abs(plant.acceleration).max())
+    plant.safety.withdraw()
+    plant.resume()
+    while not plant.idle:
+        plant.tick()
+        places.append(plant.snapshot.q_cmd)
+    assert max(accelerations) < 1.1 * plant.robot.ddq_max.min()
+    for place in places[::25]:
+        assert _distance(way, place) < 1e-5
+    assert np.abs(places[-1] - way[-1]).max() < 1e-9
+
+
+def _free_run(kind: str) -> list[Array]:
+    plant = begin(kind)
+    seen = [plant.snapshot.q_cmd]
+    while not plant.idle:
+        plant.tick()
+        seen.append(plant.snapshot.q_cmd)
+    return seen
+
+
+def _distance(way: Array, place: Array) -> float:
+    """From a place to the polygon through the places of a way [rad]."""
+    here, step = way[:-1], np.diff(way, axis=0)
+    length = np.maximum((step**2).sum(axis=1), 1e-30)
+    share = np.clip(((place - here) * step).sum(axis=1) / length, 0.0, 1.0)
+    return float(np.linalg.norm(here + share[:, None] * step - place, axis=1).min())
+
+
+def test_brakes_hold_a_soft_arm_against_a_push() -> None:
+    plant = ready()
+    plant.submit(Order(1, "hold", mode=JointImpedance(50.0)))
+    plant.step(100)
+    plant.safety.demand(Demand.EMERGENCY_STOP)
+    plant.step(500)
+    before = plant.snapshot.q
+    plant.apply_wrench((0.0, 60.0, 0.0))
+    plant.step(500)
+    state = plant.snapshot
+    assert np.abs(state.q - before).max() < 2e-3 and np.abs(state.tau_cmd).max() == 0.0
+    assert state.wrench[1] == pytest.approx(60.0, abs=1.0)  # and the sensors still feel it
+    plant.apply_wrench((0.0, 0.0, 0.0))
+    plant.safety.withdraw()
+    plant.resume()
+    plant.step(500)
+    plant.apply_wrench((0.0, 60.0, 0.0))
+    plant.step(500)
+    assert np.abs(plant.snapshot.q - before).max() > 0.02  # soft again
+    plant.stop()
+
+
+def test_what_waits_begins_after_the_stop_only() -> None:
+    plant, ear = ready(), Ear()
+    plant.safety.demand(Demand.OPERATOR_SAFETY)
+    plant.submit(Order(1, "ptp", joints=(0.1, *READY[1:]), listener=ear))
+    plant.step(200)
+    assert ear.causes == []
+    plant.safety.withdraw()
+    plant.resume()
+    run(plant)
+    assert ear.causes == ["started", "done"]
+
+
+def test_a_motion_can_be_cancelled_during_a_stop() -> None:
+    plant, ear, next_ear = ready(), Ear(), Ear()
+    plant.submit(Order(1, "ptp", joints=KINDS["ptp"].joints, listener=ear))
+    plant.submit(Order(2, "ptp", joints=READY, listener=next_ear))
+    plant.step(400)
+    plant.safety.demand(Demand.EMERGENCY_STOP)
+    plant.step(40)
+    plant.stop()
+    plant.step(1200)
+    assert plant.idle and ear.causes == ["started", "cancelled"] and next_ear.causes == ["cancelled"]
+    plant.safety.withdraw()
+    plant.resume()
+    run(plant, Order(3, "ptp", joints=READY, listener=(after := Ear())))
+    assert after.causes == ["started", "done"]
+
+
+# ----------------------------------------------------------------------------- drives, modes, overrides
+
+
+def test_a_drive_error_fails_what_runs_and_has_to_be_acknowledged() -> None:
+    plant, ear = ready(), Ear()
+    plant.submit(Order(1, "ptp", joints=KINDS["ptp"].joints, listener=ear))
+    plant.step(400)
+    plant.trip("drive error in A3")
+    plant.step(1200)
+    assert ear.heard[-1] == ("error", "drive error in A3") and plant.idle
+    assert flags(plant) & ring.DRIVE_ERROR and not flags(plant) & ring.READY
+    plant.resume()
+    plant.step(2)
+    assert flags(plant) & ring.PAUSED
+    plant.acknowledge()
+    plant.resume()
+    plant.step(2)
+    assert flags(plant) & (ring.READY | ring.PAUSED) == ring.READY
+    run(plant, Order(2, "ptp", joints=READY, listener=(after := Ear())))
+    assert after.causes == ["started", "done"]
+
+
+@pytest.mark.parametrize("kind", ["ptp", "lin", "servo"])
+def test_t1_keeps_the_moved_frame_slow(kind: str) -> None:
+    fastest, last = {}, {}
+    for mode in (Mode.T1, Mode.T2):
+        plant = begin(kind)
+        plant.safety.choose(mode)
+        plant.safety.enable()
+        plant.resume()
+        speeds = []
+        for _ in range(4000):
+            plant.tick()
+            speeds.append(np.linalg.norm(jacobian(plant.robot, plant.snapshot.q_cmd)[:3] @ plant.speed))
+            if plant.idle:
+                break
+        fastest[mode], last[mode] = max(speeds), plant.snapshot.q_cmd
+    assert fastest[Mode.T1] <= REDUCED_SPEED < fastest[Mode.T2]
+    assert fastest[Mode.T1] > 0.8 * REDUCED_SPEED
+    assert np.abs(last[Mode.T1] - last[Mode.T2]).max() < 1e-6
+
+
+def test_letting_the_enabling_switch_go_pauses() -> None:
+    plant, ear = ready(), Ear()
+    plant.safety.choose(Mode.T2)
+    plant.safety.enable()
+    plant.resume()
+    plant.submit(Order(1, "lin_rel", offset=LINE, reference=(0.0, 0.0, 0.0, 1.0), listener=ear))
+    plant.step(400)
+    plant.safety.release()
+    to_standstill(plant)
+    begun = forward(plant.robot, plant.snapshot.q)
+    plant.safety.enable()
+    plant.step(200)
+    assert np.abs(forward(plant.robot, plant.snapshot.q) - begun).max() < 1e-3
+    plant.resume()
+    run(plant)
+    assert ear.causes == ["started", "done"]
+
+
+def test_the_manual_override_slows_down_on_top_of_the_applications() -> None:
+    durations = []
+    for manual, override in ((1.0, 1.0), (0.5, 1.0), (0.5, 0.5)):
+        plant = begin("ptp")
+        plant.safety.manual, plant.override = manual, override
+        ticks = 0
+        while not plant.idle:
+            plant.tick()
+            ticks += 1
+        durations.append(ticks)
+    full, half, quarter = durations
+    assert 1.5 < half / full < 2.3 and 1.6 < quarter / half < 2.3
+
+
+# ---------------------------------------------------------------------- stops at any instant (line 19)
+
+
+@pytest.mark.parametrize("how", ["path", "fast", "emergency"])
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_a_stop_at_any_instant_ends_in_time(kind: str, how: str) -> None:
+    random = np.random.default_rng(len(kind) * 10 + len(how))
+    for instant in random.integers(1, 700, 8).tolist():  # the benchmark takes 200
+        plant = begin(kind, seed=instant)
+        for _ in range(instant):
+            plant.tick()
+        allowed = plant.stopping_time(how) + 0.02
+        {"path": plant.stop, "fast": plant.stop_fast, "emergency": plant.press}[how]()
+        steepest = ticks = 0.0
+        while plant.is_under_way:
+            plant.tick()
+            ticks += 1
+            steepest = max(steepest, float(np.abs(plant.acceleration).max()))
+            assert ticks * 1e-3 <= allowed, f"instant {instant}: speed {np.abs(plant.speed).max():.3f} rad/s"
+        # a direct servo motion changes its acceleration at once: there a tick may see both
+        assert steepest <= plant.robot.ddq_max.min() * (2.0 if kind == "direct" else 1.06)
