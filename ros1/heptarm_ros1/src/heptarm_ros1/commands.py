@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -49,15 +50,17 @@ def _servo_pose(driver: Driver, message: PoseStamped) -> None:
     driver.follow(convert.pose_value(message, driver.configuration.frame("base")))
 
 
-def _joint_trajectory(driver: Driver, message: JointTrajectory) -> None:
-    if not message.points and not message.joint_names:  # an empty one stops
-        _stop(driver, message)
+def joint_trajectory(driver: Driver, message: JointTrajectory) -> None:
+    """Follow a trajectory of the topic; an empty one stops."""
+    if not message.points and not message.joint_names:
+        stop(driver, message)
         return
     clock = rospy.Time.now().to_sec()
     driver.accept(convert.trajectory_goal(message, now=driver.now, clock=clock))
 
 
-def _stop(driver: Driver, message: object) -> None:
+def stop(driver: Driver, message: object) -> None:
+    """Stop whatever runs."""
     answer = driver.stop()
     if not answer.success:
         raise NotReady(answer.message)
@@ -71,8 +74,8 @@ TOPICS: tuple[tuple[type, str, Work], ...] = (
     (JointState, "~servo/joint", _servo_joint),
     (JointState, "~servo/velocity", _servo_velocity),
     (PoseStamped, "~servo/pose", _servo_pose),
-    (JointTrajectory, "~joint_trajectory", _joint_trajectory),
-    (Empty, "~stop", _stop),
+    (JointTrajectory, "~joint_trajectory", joint_trajectory),
+    (Empty, "~stop", stop),
 )
 #: Services: type, name, what to do.
 SERVICES: tuple[tuple[type, str, Callable[[Driver, Any], Answer]], ...] = (
@@ -82,16 +85,39 @@ SERVICES: tuple[tuple[type, str, Callable[[Driver, Any], Answer]], ...] = (
 )
 
 
+def subscriber(
+    node: HeptarmNode, one_by_one: threading.Lock, kind: type, name: str, work: Work
+) -> rospy.Subscriber:
+    """A subscriber that tells the log why a message was refused; a stop never waits behind another command.
+
+    Args:
+        node: whose driver is told.
+        one_by_one: held by a command.
+        kind: type of the messages.
+        name: of the topic.
+        work: what to do.
+    """
+
+    def callback(message: Any) -> None:
+        try:
+            driver = node.driver
+            if driver is None:
+                raise NotReady("the node is not configured")
+            with contextlib.nullcontext() if work is stop else one_by_one:
+                work(driver, message)
+        except HeptarmError as error:
+            rospy.logwarn_throttle(1.0, f"{name}: {error}")
+
+    return rospy.Subscriber(name, kind, callback, queue_size=1, tcp_nodelay=True)
+
+
 class Commands:
-    """Takes commands and services to the driver. A stop never waits behind another command."""
+    """Takes commands and services to the driver."""
 
     def __init__(self, node: HeptarmNode) -> None:
         self._node = node
-        self._one_by_one = threading.Lock()
-        self._subscribers = [
-            rospy.Subscriber(name, kind, self._guarded(name, work), queue_size=1, tcp_nodelay=True)
-            for kind, name, work in TOPICS
-        ]
+        one_by_one = threading.Lock()
+        self._subscribers = [subscriber(node, one_by_one, *topic) for topic in TOPICS]
         self._services = [
             rospy.Service(name, kind, self._service(kind, work)) for kind, name, work in SERVICES
         ]
@@ -102,24 +128,6 @@ class Commands:
             subscriber.unregister()
         for service in self._services:
             service.shutdown("the node was cleaned up")
-
-    def _guarded(self, name: str, work: Work) -> Callable[[Any], None]:
-        """A callback that tells the log why a message was refused."""
-
-        def callback(message: Any) -> None:
-            try:
-                driver = self._node.driver
-                if driver is None:
-                    raise NotReady("the node is not configured")
-                if work is _stop:
-                    work(driver, message)
-                    return
-                with self._one_by_one:
-                    work(driver, message)
-            except HeptarmError as error:
-                rospy.logwarn_throttle(1.0, f"{name}: {error}")
-
-        return callback
 
     def _service(self, kind: Any, work: Callable[[Driver, Any], Answer]) -> Callable[[Any], Any]:
         def callback(request: Any) -> Any:

@@ -20,8 +20,9 @@ from heptarm.bridge.parameters import Configuration
 from heptarm.bridge.runner import Feedback
 from heptarm.errors import HeptarmError, NotReady
 from heptarm.values.state import State
-from heptarm_ros1 import settings
+from heptarm_ros1 import peers, settings
 from heptarm_ros1.commands import Commands
+from heptarm_ros1.peers import Peers
 from heptarm_ros1.publishers import Publishers
 from heptarm_ros1.trajectory import TrajectoryAction
 
@@ -38,10 +39,12 @@ class HeptarmNode:
         self._given: dict[str, Any] = {}
         self._outputs: Publishers | None = None
         self._inputs: Commands | None = None
+        self._peers: Peers | None = None
         self._lock = threading.RLock()
         self._ending = threading.Event()
         self._wake = threading.Event()
-        self._goals = TrajectoryAction(self, "~follow_joint_trajectory")
+        # actionlib cannot end a server, so they live as long as the node, and reject while it is not configured
+        self._goals = TrajectoryAction(self, ("~follow_joint_trajectory", *peers.actions()))
         steps: tuple[tuple[str, Callable[[], str]], ...] = (
             ("~configure", self.configure),
             ("~activate", self.activate),
@@ -84,6 +87,7 @@ class HeptarmNode:
                 rospy.logwarn(f"unknown parameters: {', '.join(strange)}")
             self.configuration = Configuration.of(self._given)
             self._outputs = Publishers(self.configuration)
+            self._peers = Peers(self)
             try:
                 self.driver = Driver(self.configuration, self)
             except HeptarmError:
@@ -171,18 +175,18 @@ class HeptarmNode:
         driver, self.driver = self.driver, None
         if driver is not None:
             driver.close()
-        for one in (self._inputs, self._outputs):
+        for one in (self._inputs, self._outputs, self._peers):
             if one is not None:
                 one.destroy()
-        self._inputs = self._outputs = None
+        self._inputs = self._outputs = self._peers = None
 
     # -------------------------------------------------------------------------- from the driver
 
     def on_state(self, state: State) -> None:
         """A state came."""
-        outputs = self._outputs
-        if outputs is not None and not rospy.is_shutdown():
-            outputs.state(state)
+        for outputs in (self._outputs, self._peers):
+            if outputs is not None and not rospy.is_shutdown():
+                outputs.state(state)
 
     def on_feedback(self, feedback: Feedback) -> None:
         """A goal went on."""

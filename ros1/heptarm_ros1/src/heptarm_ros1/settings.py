@@ -8,18 +8,22 @@ from typing import Any
 import rospy
 
 from heptarm.bridge import parameters
+from heptarm.bridge.names import PRESETS
 
 #: What others keep below the node's name.
 _FOREIGN = ("follow_joint_trajectory",)
 
 
 def read() -> tuple[dict[str, Any], tuple[str, ...]]:
-    """The private parameters that are set.
+    """The private parameters that are set, with the defaults of another driver's names under them.
 
     Returns:
         Those that the node has, by their names with dots; and the names that it does not know.
     """
     found = dict(_flat(rospy.get_param("~", {})))
+    preset = PRESETS.get(str(found.get("names", "")))
+    if preset is not None:
+        found = {**preset.defaults, **found}
     known = {one.name for one in parameters.PARAMETERS}
     joints = found.get(
         "joint_names", next(one.default for one in parameters.PARAMETERS if one.name == "joint_names")

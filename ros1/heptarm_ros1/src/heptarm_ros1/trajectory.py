@@ -5,6 +5,7 @@ from __future__ import annotations
 import queue
 import threading
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import rospy
@@ -26,10 +27,10 @@ class TrajectoryAction:
 
     Args:
         node: whose driver runs the goals.
-        name: of the action.
+        names: of the action; a server each.
     """
 
-    def __init__(self, node: HeptarmNode, name: str) -> None:
+    def __init__(self, node: HeptarmNode, names: Sequence[str]) -> None:
         self._node = node
         self._lock = threading.Lock()
         self._handles: dict[int, Any] = {}
@@ -38,10 +39,12 @@ class TrajectoryAction:
         self._news: queue.SimpleQueue[Feedback | End | None] = queue.SimpleQueue()
         self._teller = threading.Thread(target=self._tell, name="heptarm-goals")
         self._teller.start()
-        self._server = ActionServer(
-            name, FollowJointTrajectoryAction, self._on_goal, self._on_cancel, auto_start=False
-        )
-        self._server.start()
+        self._servers = [
+            ActionServer(name, FollowJointTrajectoryAction, self._on_goal, self._on_cancel, auto_start=False)
+            for name in names
+        ]
+        for server in self._servers:
+            server.start()
 
     def close(self) -> None:
         """Tell the last news."""

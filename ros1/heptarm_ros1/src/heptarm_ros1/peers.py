@@ -1,0 +1,88 @@
+"""Topics under the names of other drivers; see `heptarm.bridge.names`."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING, Any
+
+import rospy
+from geometry_msgs.msg import Pose, Wrench
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Empty
+from trajectory_msgs.msg import JointTrajectory
+
+from heptarm.bridge import names
+from heptarm.bridge.driver import Driver
+from heptarm.bridge.names import PRESETS, Entry, Meaning
+from heptarm.values.state import State
+from heptarm_ros1 import commands, convert
+from heptarm_ros1.publishers import publisher
+
+if TYPE_CHECKING:
+    from heptarm_ros1.node import HeptarmNode
+
+
+def actions() -> tuple[str, ...]:
+    """Names of the trajectory action by the parameter `names`."""
+    preset = PRESETS.get(str(rospy.get_param("~names", "heptarm")))
+    entries = () if preset is None else preset.entries
+    return tuple(entry.name for entry in entries if entry.meaning is Meaning.FOLLOW)
+
+
+class Peers:
+    """Publishes and takes what the parameter `names` asks for."""
+
+    def __init__(self, node: HeptarmNode) -> None:
+        self._joints = node.configuration.joints
+        entries = PRESETS[node.configuration.values["names"]].entries
+        kinds = {Meaning.JOINT_STATES: JointState, Meaning.POSE: Pose, Meaning.WRENCH: Wrench}
+        self._publishers = [
+            (entry, publisher(kinds[entry.meaning], entry.name)) for entry in entries if entry.is_published
+        ]
+        works: dict[Meaning, tuple[type, commands.Work]] = {
+            Meaning.STOP: (Empty, commands.stop),
+            Meaning.JOINT: (JointState, _joint),
+            Meaning.CARTESIAN: (Pose, _cartesian),
+            Meaning.TRAJECTORY: (JointTrajectory, commands.joint_trajectory),
+        }
+        one_by_one = threading.Lock()
+        self._subscribers = [
+            commands.subscriber(
+                node, one_by_one, works[entry.meaning][0], entry.name, works[entry.meaning][1]
+            )
+            for entry in entries
+            if entry.meaning in works
+        ]
+
+    def state(self, state: State) -> None:
+        """Publish a state."""
+        for entry, one in self._publishers:
+            message = self._message(entry, state)
+            if message is not None:
+                one.publish(message)
+
+    def _message(self, entry: Entry, state: State) -> Any:
+        if entry.meaning is Meaning.POSE:
+            return None if state.cartesian is None else convert.pose_message(state.pose)
+        if entry.meaning is Meaning.WRENCH:
+            return None if state.external is None else convert.wrench_message(state)
+        message = convert.joint_state(state, self._joints, convert.stamp(state.age))
+        if entry.external and state.torques is not None:
+            message.effort = state.tau_ext.tolist()
+        return message
+
+    def destroy(self) -> None:
+        """End them."""
+        for _, one in self._publishers:
+            one.unregister()
+        for subscriber in self._subscribers:
+            subscriber.unregister()
+
+
+def _joint(driver: Driver, message: JointState) -> None:
+    driver.move(names.joint_target(driver, message.name, message.position))
+
+
+def _cartesian(driver: Driver, message: Pose) -> None:
+    place, turn = message.position, message.orientation
+    driver.move(names.pose_target(driver, (place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)))

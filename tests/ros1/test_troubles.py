@@ -1,0 +1,125 @@
+"""What goes wrong: power cuts, emergency stops, killed clients, wrong parameters."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+
+from heptarm.bridge.goal import Code, Outcome
+from tests.conformance.cases import rests, step
+from tests.conformance.stage import Stage
+from tests.ros1.peer import Client, NodeProcess, collect, until
+
+CLIENT = """
+import actionlib, rospy, sys
+from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectoryPoint
+rospy.init_node("victim", anonymous=True)
+here = rospy.wait_for_message("/joint_states", JointState)
+goal = FollowJointTrajectoryGoal()
+goal.trajectory.joint_names = here.name
+there = [q + 0.1 for q in here.position]
+goal.trajectory.points = [JointTrajectoryPoint(positions=there, time_from_start=rospy.Duration(2.0))]
+client = actionlib.SimpleActionClient("/heptarm/follow_joint_trajectory", FollowJointTrajectoryAction)
+client.wait_for_server()
+client.send_goal(goal, feedback_cb=lambda _: print("moving", flush=True))
+rospy.spin()
+"""
+
+
+def test_a_killed_client_leaves_a_node_that_lives(client: Client) -> None:
+    here = rests(client)
+    victim = subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(CLIENT)], stdout=subprocess.PIPE, text=True
+    )
+    assert victim.stdout is not None and victim.stdout.readline() == "moving\n"
+    victim.send_signal(signal.SIGKILL)
+    victim.wait()
+    victim.stdout.close()
+    there = rests(client)  # its goal is finished, as upstream's servers do
+    assert np.abs(there - here - 0.1).max() < 0.02
+    assert client.result(client.send(step(client, size=-1.0))).code is Code.SUCCESSFUL
+
+
+@pytest.fixture
+def other(ros: None, own_stage: Stage) -> Client:
+    """A client of another arm's node, which may come to harm."""
+    node = NodeProcess(own_stage.target, ns="/other", prefix="other_")
+    client = Client(own_stage, name="/other/heptarm", prefix="other_")
+    client.ready()
+    yield client
+    assert node.end(signal.SIGTERM) == 0, node.said
+
+
+def test_an_emergency_stop_ends_the_goal(other: Client) -> None:
+    sent = other.send(step(other, time=5.0, size=3.0))
+    until(lambda: other.feedback(sent), "the goal does not begin")
+    other.stage.do("press")
+    ended = other.result(sent)
+    assert ended.outcome is Outcome.ABORTED and ended.code is Code.INVALID_GOAL
+    until(lambda: other.status[-1].emergency_stop, "the status does not tell")
+    refused = other.send(step(other))
+    assert not refused.accepted and refused.code is Code.INVALID_GOAL
+    other.stage.do("release")
+    until(lambda: not other.status[-1].emergency_stop, "the status does not tell")
+    rests(other)
+    assert other.result(other.send(step(other))).code is Code.SUCCESSFUL
+
+
+def test_a_cabinet_without_power_and_back(other: Client) -> None:
+    reports = collect("/diagnostics", DiagnosticArray)
+    sent = other.send(step(other, time=5.0, size=3.0))
+    until(lambda: other.feedback(sent), "the goal does not begin")
+    other.stage.kill()
+    ended = other.result(sent)
+    assert ended.outcome is Outcome.ABORTED and ended.code is Code.INVALID_GOAL
+    until(lambda: not other.status[-1].connected, "the status does not tell")
+    count = len(other.states)
+    until(lambda: any(one.status[0].level == 2 for one in reports), "diagnostics do not tell")
+    refused = other.send(step_anywhere(other))
+    assert not refused.accepted
+    assert len(other.states) == count, "a state is not repeated"
+    other.stage.restart()
+    until(lambda: other.status[-1].connected, "the node does not reconnect")
+    rests(other)
+    times = [message.header.stamp.to_nsec() for message in other.states]
+    assert len(set(times)) == len(times)
+    assert other.result(other.send(step(other))).code is Code.SUCCESSFUL
+
+
+def step_anywhere(client: Client):
+    from heptarm.bridge.goal import Goal, Point
+
+    return Goal(client.joints, (Point(5.0, (0.0,) * 7),))
+
+
+def test_a_node_without_a_cabinet_waits_for_one(ros: None) -> None:
+    node = NodeProcess("127.0.0.1:9", name="lonely")
+    node.waits_for("not configured")
+    time.sleep(0.1)
+    assert node.end() == 0, node.said
+
+
+def test_a_wrong_parameter_is_refused_in_words(ros: None, stage: Stage) -> None:
+    node = NodeProcess(stage.target, name="wrong", servo__rate=-3)
+    node.waits_for("servo.rate is -3")
+    assert node.end() == 0, node.said
+
+
+def test_the_arm_comes_to_rest_when_the_node_ends(ros: None, own_stage: Stage) -> None:
+    node = NodeProcess(own_stage.target, ns="/ending")
+    client = Client(own_stage, name="/ending/heptarm")
+    client.ready()
+    sent = client.send(step(client, time=5.0, size=3.0))
+    until(lambda: client.feedback(sent), "the goal does not begin")
+    assert node.end(signal.SIGINT) == 0, node.said
+    ended = client.result(sent)
+    assert ended.outcome is Outcome.ABORTED, ended
