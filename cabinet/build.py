@@ -53,6 +53,7 @@ PARTS = (
     Part("core", "heptarm-core.jar", forbidden=("com/kuka/", "heptarm/app/", "heptarm/doubles/")),
     Part("doubles", "heptarm-doubles-not-for-robots.jar", needs=("core",), for_robot=False),
     Part("app", "heptarm-app.jar", needs=("core", "doubles"), forbidden=("heptarm/doubles/",)),
+    Part("samples", "heptarm-samples.jar", needs=("core", "doubles", "app"), forbidden=("heptarm/doubles/",)),
 )
 
 

@@ -86,7 +86,7 @@ def test_compiling_against_java_7_keeps_newer_descriptors_out(jdk: toolchain.Jdk
     assert ("java/nio/ByteBuffer", "flip", "()Ljava/nio/Buffer;") in members
 
 
-@pytest.mark.parametrize("jar", ["heptarm-core.jar", "heptarm-app.jar"])
+@pytest.mark.parametrize("jar", ["heptarm-core.jar", "heptarm-app.jar", "heptarm-samples.jar"])
 def test_every_class_for_the_robot_is_java_6(jar: str) -> None:
     with zipfile.ZipFile(JARS / jar) as file:
         classes = [classfile.read(file.read(name)) for name in file.namelist() if name.endswith(".class")]

@@ -22,6 +22,7 @@ app.command(rl_app)
 
 _COMMON = Group("Common options")
 _FRI = Group("FRI")
+_APP = Group("Your own application")
 Target = Annotated[
     str | None,
     Parameter(
@@ -52,6 +53,18 @@ def sim(
     view_port: Annotated[int, Parameter(help="Port of the view; 0 takes a free one.")] = 8080,
     key: Annotated[str, Parameter(help="Pre-shared key that clients must know.")] = "",
     verbose: Annotated[bool, Parameter(negative="", help="Show the cabinet's log.")] = False,
+    application: Annotated[
+        Path | None,
+        Parameter(
+            name="--app", group=_APP, help="Compile and run this folder's Sunrise application instead."
+        ),
+    ] = None,
+    app_class: Annotated[
+        str, Parameter(group=_APP, help="Its class, where there are several applications.")
+    ] = "",
+    app_data: Annotated[
+        tuple[str, ...], Parameter(group=_APP, help="Process data as NAME=VALUE; may be given again.")
+    ] = (),
     fri: Annotated[
         str | None,
         Parameter(
@@ -73,7 +86,13 @@ def sim(
     ] = None,
     json: Json = False,
 ) -> int:
-    """Run a virtual cabinet until Ctrl-C; with --fri, a bare FRI controller for any FRI client."""
+    """Run a virtual cabinet until Ctrl-C; with --fri, a bare FRI controller; with --app, your own application."""
+    if application is not None:
+        from heptarm.cli import sim as cabinet
+
+        return cabinet.run_application(
+            folder=application, main=app_class, data=app_data, model=model, speed=speed, as_json=json
+        )
     if fri is not None:
         from heptarm.cli import fri as controller
 

@@ -6,7 +6,9 @@ import json
 import signal
 import subprocess
 import sys
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from heptarm.cli.output import emit
@@ -65,6 +67,57 @@ def run(
             return cabinet.wait()
         except KeyboardInterrupt:
             return 0
+
+
+def run_application(
+    *,
+    folder: Path,
+    main: str,
+    data: tuple[str, ...],
+    model: str,
+    speed: float,
+    as_json: bool,
+) -> int:
+    """Compile somebody else's application and run it to its end; returns the exit code.
+
+    Raises:
+        HeptarmError: it does not compile, or there is no such application; the text says why.
+    """
+    from heptarm.virtual.application import compile_application
+
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with TemporaryDirectory(prefix="heptarm-") as out:
+        application = compile_application(folder, Path(out), main=main)
+        command = [sys.executable, "-m", "heptarm.virtual.cabinet", "--parent-pipe", "--verbose"]
+        command += ["--model", model, "--speed", str(speed), "--application", application.main]
+        command += ["--classpath", out]
+        for jar in sorted(folder.rglob("*.jar")):
+            command += ["--classpath", str(jar)]
+        command += ["--project", str(application.project)] if application.project else []
+        for one in data:
+            command += ["--data", one]
+        if not as_json:
+            print(f"{application.main} runs on a virtual {model}; Ctrl-C deselects it.", flush=True)
+        with _child(command) as cabinet:
+            try:
+                assert cabinet.stdout is not None
+                said = cabinet.stdout.read()  # until it ends; closing its input would end it
+                cabinet.wait()
+            except KeyboardInterrupt:
+                return 0
+        failure = _failure(said)
+        if as_json:
+            emit({"application": application.main, "ended": not failure, "error": failure})
+        elif failure:
+            print(f"heptarm: {application.main} ended with an error: {failure}", file=sys.stderr)
+        return 1 if failure or cabinet.returncode else 0
+
+
+def _failure(said: str) -> str:
+    for line in said.splitlines():
+        with suppress(ValueError):
+            return str(dict(json.loads(line)).get("error", ""))
+    return ""
 
 
 class _child(subprocess.Popen[str]):

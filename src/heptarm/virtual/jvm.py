@@ -46,6 +46,7 @@ _OPTIONS = (
     "-XX:MaxMetaspaceSize=64m",
     "-Xshare:auto",
     "-Xrs",
+    "-Djava.util.logging.SimpleFormatter.format=%1$tT.%1$tL %4$s %5$s%6$s%n",
 )
 
 

@@ -86,6 +86,29 @@ final class Dispatcher {
         }
     }
 
+    /** Carries out an order that comes from the cabinet itself; returns its number, 0 where it has none. */
+    long order(Message message) throws Refusal {
+        check(message);
+        return ((Accepted) act(null, message)).id;
+    }
+
+    /** Hands over a servo target that comes from the cabinet itself. */
+    void follow(Message target, long now) throws Refusal {
+        check(target);
+        if (target instanceof ServoJoints) {
+            checkJoints(((ServoJoints) target).q, server.robot.info(), "q");
+        }
+        steer(target, now);
+    }
+
+    private static void check(Message message) throws Refusal {
+        try {
+            message.validate("");
+        } catch (Violation e) {
+            throw new Refusal(e.code, e.parameter, e.value, e.allowed, e.getMessage());
+        }
+    }
+
     /** Hands a servo target over; nothing is answered, a refused one is told of in the status of the stream. */
     private void steer(Message message, long sent) {
         Stream stream;

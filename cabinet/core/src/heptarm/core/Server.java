@@ -39,6 +39,7 @@ public final class Server {
 
     private final Watchdog watchdog;
     private final List<Client> clients = new CopyOnWriteArrayList<Client>();
+    private final List<Hearer> hearers = new CopyOnWriteArrayList<Hearer>();
     private final AtomicInteger sessions = new AtomicInteger();
     private ServerSocket socket;
     private Thread acceptor;
@@ -61,9 +62,7 @@ public final class Server {
         socket = new ServerSocket();
         socket.setReuseAddress(true);
         socket.bind(new InetSocketAddress(InetAddress.getByName(config.bind), config.port), MAX_CLIENTS);
-        executor.start();
-        sampler.start();
-        watchdog.start();
+        begin();
         acceptor = new Thread(new Runnable() {
             public void run() {
                 accept();
@@ -74,6 +73,13 @@ public final class Server {
         log.info("heptarm " + Config.VERSION + " listens on " + config.bind + ":" + socket.getLocalPort()
                 + ", protocol " + Protocol.MAJOR + "." + Protocol.MINOR);
         return socket.getLocalPort();
+    }
+
+    /** Starts the threads that move the robot and watch it; without {@link #start} there is no network. */
+    void begin() {
+        executor.start();
+        sampler.start();
+        watchdog.start();
     }
 
     /** Stops motion, says goodbye to all clients, closes the port, ends all threads. */
@@ -90,7 +96,9 @@ public final class Server {
             log.error("stopping the robot", e);
         }
         try {
-            socket.close();
+            if (socket != null) {
+                socket.close();
+            }
         } catch (IOException e) {
             log.error("closing the port", e);
         }
@@ -164,8 +172,24 @@ public final class Server {
         }
     }
 
+    /** Somebody in the cabinet itself who hears of every event, from the thread that tells it. */
+    interface Hearer {
+        void heard(Message event);
+    }
+
+    void listen(Hearer hearer) {
+        hearers.add(hearer);
+    }
+
+    void forget(Hearer hearer) {
+        hearers.remove(hearer);
+    }
+
     /** Sends an event to every open session. */
     void broadcast(Message event) {
+        for (Hearer hearer : hearers) {
+            hearer.heard(event);
+        }
         byte[] body = event.body();
         for (Client client : clients) {
             if (client.isOpen()) {

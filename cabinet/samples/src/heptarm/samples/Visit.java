@@ -1,0 +1,80 @@
+package heptarm.samples;
+
+import javax.inject.Inject;
+
+import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+
+import heptarm.app.CabinetArm;
+import heptarm.core.Arm;
+import heptarm.core.Handle;
+import heptarm.core.Move;
+import heptarm.core.Refusal;
+import heptarm.wire.MotionFinished;
+import heptarm.wire.Pose;
+
+/** Visits places one after the other, blocking and not, and shows how a refusal reads. Everything in SI. */
+public class Visit extends RoboticsAPIApplication {
+    private static final Move HOME = Move.ptp(0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0).speed(0.5);
+
+    @Inject
+    private LBR lbr;
+    private Arm arm;
+
+    @Override
+    public void initialize() {
+        arm = CabinetArm.of(lbr, getApplicationControl(), getLogger());
+    }
+
+    @Override
+    public void run() throws Exception {
+        arm.move(HOME);
+        square();
+        interrupted();
+        refused();
+    }
+
+    /** Four motions as one program: the call returns when the last one has ended. */
+    private void square() throws Refusal, InterruptedException {
+        Move side = Move.linRel(0.1, 0.0, 0.0).along("base").velocity(0.2);
+        MotionFinished end = arm.move(side, Move.linRel(0.0, 0.1, 0.0).along("base").velocity(0.2),
+                Move.linRel(-0.1, 0.0, 0.0).along("base").velocity(0.2), Move.linRel(0.0, -0.1, 0.0).along("base").velocity(0.2));
+        say("square", end.cause + " after " + Math.round(end.duration) + " s");
+    }
+
+    /** A motion that is watched while it runs, and cancelled half way. */
+    private void interrupted() throws Refusal, InterruptedException {
+        Pose before = new Pose(arm.pose().xyz, arm.pose().quat);
+        Handle down = arm.start(Move.linRel(0.0, 0.0, -0.2).along("base").velocity(0.1));
+        while (!down.isFinished() && arm.pose().xyz[2] > before.xyz[2] - 0.1) {
+            Thread.sleep(5);
+        }
+        down.cancel();
+        say("interrupted", down.await().cause + " " + Math.round(100 * (before.xyz[2] - arm.pose().xyz[2])) + " cm below");
+        arm.move(Move.lin(before).velocity(0.2));
+    }
+
+    /** What cannot be done is refused before anything moves. */
+    private void refused() throws InterruptedException {
+        try {
+            arm.move(Move.ptp(0.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0));
+        } catch (Refusal e) {
+            say("refused", e.parameter + ": " + e.getMessage());
+        }
+    }
+
+    private void say(String what, String text) {
+        getLogger().info(what + " = " + text);
+    }
+
+    @Override
+    public void dispose() {
+        try {
+            if (arm != null) {
+                arm.close();
+            }
+        } finally {
+            super.dispose();
+        }
+    }
+}

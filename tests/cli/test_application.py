@@ -1,0 +1,129 @@
+"""`heptarm sim --app`: applications of other people, and those written on heptarm's core without any network."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from heptarm.errors import CommandRejected
+from heptarm.virtual.application import compile_application, find
+
+ROOT = Path(__file__).parents[2]
+SAMPLES = ROOT / "cabinet" / "samples"
+
+needs_javac = pytest.mark.skipif(shutil.which("javac") is None, reason="no javac here")
+
+FOREIGN = """
+package lab;
+
+import javax.inject.Inject;
+import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import static com.kuka.roboticsAPI.motionModel.BasicMotions.ptp;
+
+public class Nod extends RoboticsAPIApplication {
+    @Inject
+    private LBR robot;
+
+    @Override
+    public void run() {
+        int times = getApplicationData().getProcessData("lab.times").getValue();
+        for (int i = 0; i < times; i++) {
+            robot.move(ptp(0, 0.2, 0, -0.2, 0, 0, 0).setJointVelocityRel(0.5));
+            robot.move(ptp(0, 0, 0, 0, 0, 0, 0).setJointVelocityRel(0.5));
+        }
+        getLogger().info("nodded " + times + " times");
+        // class Ghost extends RoboticsAPIApplication is only a comment
+        if (times > 5) {
+            throw new IllegalStateException("a stiff neck");
+        }
+    }
+}
+"""
+PROJECT = """
+<persistence><processDataContainer>
+<processData dataType="java.lang.Integer" id="lab.times" defaultValue="1" value="2"/>
+</processDataContainer></persistence>
+"""
+
+
+def sim(folder: Path, *options: str, speed: str = "5") -> subprocess.CompletedProcess[str]:
+    command = [
+        sys.executable,
+        "-m",
+        "heptarm.cli.main",
+        "sim",
+        "--app",
+        str(folder),
+        "--speed",
+        "5",
+        *options,
+    ]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Path:
+    (tmp_path / "src" / "lab").mkdir(parents=True)
+    (tmp_path / "src" / "lab" / "Nod.java").write_text(FOREIGN)
+    (tmp_path / "RoboticsAPI.data.xml").write_text(PROJECT)
+    return tmp_path
+
+
+@needs_javac
+def test_a_foreign_application_runs_with_its_own_process_data(lab: Path) -> None:
+    done = sim(lab)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "lab.Nod runs" in done.stdout
+    assert "nodded 2 times" in done.stderr
+
+
+@needs_javac
+def test_its_error_is_told_and_process_data_can_be_given(lab: Path) -> None:
+    done = sim(lab, "--app-data", "lab.times=6", speed="0")
+    assert done.returncode == 1
+    assert "a stiff neck" in done.stderr
+
+
+@needs_javac
+def test_what_does_not_compile_is_told_with_the_compilers_words(lab: Path) -> None:
+    (lab / "src" / "lab" / "Bad.java").write_text("class Bad { int x = nothing; }")
+    with pytest.raises(CommandRejected, match=r"(?s)does not compile.*nothing"):
+        compile_application(lab, lab)
+
+
+def test_applications_are_found_and_one_has_to_be_chosen(lab: Path) -> None:
+    assert find(lab) == ["lab.Nod"]
+    assert find(SAMPLES) == ["heptarm.samples.Stir", "heptarm.samples.Visit"]
+    with pytest.raises(CommandRejected, match="2 applications.*Stir, heptarm.samples.Visit"):
+        compile_application(SAMPLES, lab)
+    with pytest.raises(CommandRejected, match="no application Nothing"):
+        compile_application(SAMPLES, lab, main="Nothing")
+    with pytest.raises(CommandRejected, match="no Java sources"):
+        compile_application(ROOT / "docs", lab)
+
+
+@needs_javac
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        (
+            "Visit",
+            (
+                "square = FINISHED",
+                "interrupted = CANCELLED",
+                "refused = items[0].motion.q[1]: A2 would be at",
+            ),
+        ),
+        ("Stir", ("stirred = CANCELLED", "mm to the side", "ready = true")),
+    ],
+)
+def test_an_application_on_heptarms_core_needs_no_network(name: str, said: tuple[str, ...]) -> None:
+    done = sim(SAMPLES, "--app-class", name, speed="2")
+    assert done.returncode == 0, done.stdout + done.stderr
+    for text in said:
+        assert text in done.stderr
