@@ -24,6 +24,7 @@ from heptarm import _resources
 from heptarm.errors import CommandRejected, HeptarmError, MissingExtra, Unreachable
 from heptarm.model.inverse import solve
 from heptarm.values.arrays import Array
+from heptarm.values.links import Body
 from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, SineImpedance
 from heptarm.values.motion import TOOL
 from heptarm.values.orientation import REFERENCES, TYPES, Orientation
@@ -46,7 +47,6 @@ _OPTIONS = (
     "-XX:MaxMetaspaceSize=64m",
     "-Xshare:auto",
     "-Xrs",
-    "-Djava.util.logging.SimpleFormatter.format=%1$tT.%1$tL %4$s %5$s%6$s%n",
 )
 
 
@@ -309,6 +309,14 @@ def open_station(plant: Plant, sessions: Sessions) -> Any:
         @jpype.JOverride  # type: ignore[untyped-decorator]
         def friClose(self, number: int) -> None:
             sessions.close(int(number))
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def carries(self, values: Any) -> None:
+            mass, *rest = _numbers(values)
+            try:
+                plant.carries(Body(mass, np.array(rest[:3]), inertia=np.array(rest[3:])))
+            except HeptarmError as error:
+                raise jpype.JClass("java.lang.IllegalArgumentException")(str(error)) from error
 
         @jpype.JOverride  # type: ignore[untyped-decorator]
         def links(self) -> Any:

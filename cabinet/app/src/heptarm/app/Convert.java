@@ -42,8 +42,12 @@ final class Convert {
     /** Unit quaternion x y z w with w not negative; the largest component leads, so that it is accurate everywhere. */
     static double[] quaternion(Transformation t) {
         Matrix m = t.getRotationMatrix();
-        double[][] r = {{m.getElement00(), m.getElement01(), m.getElement02()},
-            {m.getElement10(), m.getElement11(), m.getElement12()}, {m.getElement20(), m.getElement21(), m.getElement22()}};
+        return quaternion(new double[][] {{m.getElement00(), m.getElement01(), m.getElement02()},
+            {m.getElement10(), m.getElement11(), m.getElement12()}, {m.getElement20(), m.getElement21(), m.getElement22()}});
+    }
+
+    /** The same of a rotation matrix. */
+    static double[] quaternion(double[][] r) {
         double trace = r[0][0] + r[1][1] + r[2][2];
         int lead = 3;
         double most = trace;

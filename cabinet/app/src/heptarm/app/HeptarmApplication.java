@@ -29,7 +29,8 @@ public class HeptarmApplication extends RoboticsAPIApplication {
         Config config = new Config(text("heptarm.bind", "0.0.0.0"), (int) number("heptarm.port", Protocol.PORT),
                 text("heptarm.key", ""), text("heptarm.allow", ""), number("heptarm.heartbeat", 0.5),
                 number("heptarm.max_rate", 200.0));
-        server = new Server(new SunriseRobot(lbr, getApplicationControl(), log), config, Clocks.find(), log);
+        Tools tools = new Tools(lbr, getApplicationData(), text("heptarm.tools", ""), text("heptarm.frames", ""), log);
+        server = new Server(new SunriseRobot(lbr, tools, getApplicationControl(), log), config, Clocks.find(), log);
         try {
             UserKeys.publish(this, server, log);
         } catch (LinkageError e) { // an old cabinet; everything else works without them

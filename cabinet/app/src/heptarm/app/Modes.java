@@ -1,8 +1,9 @@
 package heptarm.app;
 
-import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.CartDOF;
 import com.kuka.roboticsAPI.geometricModel.CartPlane;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.AbstractMotionControlMode;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.CartesianImpedanceControlMode;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.CartesianSineImpedanceControlMode;
@@ -11,7 +12,6 @@ import com.kuka.roboticsAPI.motionModel.controlModeModel.PositionControlMode;
 
 import heptarm.core.Refusal;
 import heptarm.wire.CartesianImpedance;
-import heptarm.wire.Code;
 import heptarm.wire.JointImpedance;
 import heptarm.wire.Mode;
 import heptarm.wire.SineImpedance;
@@ -24,14 +24,14 @@ final class Modes {
     /** In a direction without a limit where another has one [N, Nm, mm, rad, ...]. */
     private static final double OFF = 1e6;
 
-    private final LBR robot;
+    private final Tools tools;
 
-    Modes(LBR robot) {
-        this.robot = robot;
+    Modes(Tools tools) {
+        this.tools = tools;
     }
 
-    /** Refuses a mode whose frame is not known here. */
-    static void check(Mode mode, String path) throws Refusal {
+    /** Refuses a mode whose directions cannot be had while a frame is moved. */
+    void check(Mode mode, ObjectFrame moved, String path) throws Refusal {
         String at = path;
         CartesianImpedance spring = null;
         if (mode instanceof SineImpedance) {
@@ -40,13 +40,13 @@ final class Modes {
         } else if (mode instanceof CartesianImpedance) {
             spring = (CartesianImpedance) mode;
         }
-        if (spring != null && spring.frame.length() > 0 && !"tool".equals(spring.frame) && !"base".equals(spring.frame)) {
-            throw new Refusal(Code.UNKNOWN_NAME, at + "frame", spring.frame, "tool, base", "no frame " + spring.frame);
+        if (spring != null) {
+            tools.checkAxes(spring.frame, moved, at + "frame");
         }
     }
 
     /** The Sunrise mode of a checked one; null is position control. */
-    AbstractMotionControlMode of(Mode mode) {
+    AbstractMotionControlMode of(Mode mode) throws Refusal {
         if (mode instanceof JointImpedance) {
             JointImpedance spring = (JointImpedance) mode;
             JointImpedanceControlMode joints = new JointImpedanceControlMode(spring.stiffness.length);
@@ -73,7 +73,7 @@ final class Modes {
         return new PositionControlMode();
     }
 
-    private void set(CartesianImpedanceControlMode spring, CartesianImpedance from) {
+    private void set(CartesianImpedanceControlMode spring, CartesianImpedance from) throws Refusal {
         for (int i = 0; i < DIRECTIONS.length; i++) {
             spring.parametrize(DIRECTIONS[i]).setStiffness(from.stiffness[i]);
             spring.parametrize(DIRECTIONS[i]).setDamping(from.damping[i]);
@@ -93,8 +93,9 @@ final class Modes {
             double[] most = six(from.max_deviation, true);
             spring.setMaxPathDeviation(most[0], most[1], most[2], most[3], most[4], most[5]);
         }
-        if ("base".equals(from.frame)) {
-            spring.setReferenceSystem(robot.getRootFrame());
+        AbstractFrame axes = tools.reference(from.frame);
+        if (axes != null) {
+            spring.setReferenceSystem(axes);
         }
     }
 

@@ -11,6 +11,7 @@ import java.util.concurrent.TimeUnit;
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
+import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.Frame;
 import com.kuka.roboticsAPI.motionModel.CIRC;
 import com.kuka.roboticsAPI.motionModel.IMotion;
@@ -46,22 +47,24 @@ import heptarm.wire.ServoOpen;
 /** Turns items of a program into Sunrise motions. What cannot be carried out is refused, never ignored. */
 final class Motions {
     static final String[] CAPABILITIES = {"ptp", "ptp_pose", "lin", "lin_rel", "circ", "hold", "override", "pause",
-        "servo", "servo_direct", "servo_pose", "joint_impedance", "cartesian_impedance", "sine_impedance"};
+        "servo", "servo_direct", "servo_pose", "joint_impedance", "cartesian_impedance", "sine_impedance",
+        "tools", "workpieces", "frames"};
 
     private static final int JOINTS = 7;
 
     private final LBR robot;
+    private final Tools tools;
     private final Modes modes;
 
-    Motions(LBR robot) {
+    Motions(LBR robot, Tools tools) {
         this.robot = robot;
-        this.modes = new Modes(robot);
+        this.tools = tools;
+        this.modes = new Modes(tools);
     }
 
     /** Refuses what this cabinet cannot carry out. */
     void check(Item item, String path) throws Refusal {
-        checkFrame(item.frame, path);
-        Modes.check(item.mode, path + "mode.");
+        modes.check(item.mode, tools.moved(item.frame), path + "mode.");
         if (item.until.nodes.length > 0) {
             throw unsupported(path + "until", "break conditions");
         }
@@ -84,12 +87,8 @@ final class Motions {
             checkRedundancy(((Circ) motion).redundancy, at);
             checkOrientation(((Circ) motion).orientation, at);
         } else if (motion instanceof LinRel) {
-            String reference = ((LinRel) motion).reference;
             checkBlending(((LinRel) motion).blending, at);
             checkOrientation(((LinRel) motion).orientation, at);
-            if (reference.length() > 0 && !"tool".equals(reference) && !"base".equals(reference)) {
-                throw new Refusal(Code.UNKNOWN_NAME, at + "reference", reference, "tool, base", "no frame " + reference);
-            }
         } else if (!(motion instanceof Hold)) {
             throw unsupported(path + "motion", motion.getClass().getSimpleName());
         }
@@ -97,19 +96,12 @@ final class Motions {
 
     /** Refuses a servo motion that this cabinet cannot carry out. */
     void check(ServoOpen open) throws Refusal {
-        checkFrame(open.frame, "");
-        Modes.check(open.mode, "mode.");
+        modes.check(open.mode, tools.moved(open.frame), "mode.");
         if (open.engine == ServoEngine.LIN) {
             throw unsupported("engine", "the servo engine \"lin\"");
         }
         if (open.until.nodes.length > 0) {
             throw unsupported("until", "break conditions");
-        }
-    }
-
-    private static void checkFrame(String frame, String path) throws Refusal {
-        if (frame.length() > 0 && !"flange".equals(frame)) {
-            throw new Refusal(Code.UNKNOWN_NAME, path + "frame", frame, "flange", "no frame " + frame + " can be moved here");
         }
     }
 
@@ -142,13 +134,13 @@ final class Motions {
     }
 
     /** The Sunrise motion of a checked item. */
-    IMotion motion(Item item, Mode mode) {
+    IMotion motion(Item item, Mode mode) throws Refusal {
         RobotMotion<?> motion = motion(item);
         motion.setMode(modes.of(mode));
         return motion;
     }
 
-    private RobotMotion<?> motion(Item item) {
+    private RobotMotion<?> motion(Item item) throws Refusal {
         Motion motion = item.motion;
         if (motion instanceof Ptp) {
             return joints(ptp(new JointPosition(((Ptp) motion).q)), ((Ptp) motion).dynamics);
@@ -175,8 +167,9 @@ final class Motions {
         }
         if (motion instanceof LinRel) {
             LinRel one = (LinRel) motion;
-            RelativeLIN line = "base".equals(one.reference) ? linRel(Convert.transformation(one.offset), robot.getRootFrame())
-                    : linRel(Convert.transformation(one.offset));
+            AbstractFrame axes = tools.reference(one.reference);
+            RelativeLIN line = axes == null ? linRel(Convert.transformation(one.offset))
+                    : linRel(Convert.transformation(one.offset), axes);
             joints(line, one.joints);
             cartesian(line, one.dynamics);
             orientation(line, one.orientation);

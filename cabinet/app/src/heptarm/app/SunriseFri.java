@@ -30,7 +30,7 @@ final class SunriseFri implements Fri, IFRISessionListener {
     private static final double SLOWEST_TORQUE = 0.005;
 
     private final FriOpen open;
-    private final LBR robot;
+    private final Modes modes;
     private final Mover mover;
     private final Fri.Listener listener;
     private final FRISession session;
@@ -40,9 +40,9 @@ final class SunriseFri implements Fri, IFRISessionListener {
         Job move(PositionHold hold, Job.Listener listener) throws Refusal;
     }
 
-    private SunriseFri(FriOpen open, LBR robot, Mover mover, Fri.Listener listener) {
+    private SunriseFri(FriOpen open, LBR robot, Modes modes, Mover mover, Fri.Listener listener) {
         this.open = open;
-        this.robot = robot;
+        this.modes = modes;
         this.mover = mover;
         this.listener = listener;
         FRIConfiguration configuration = FRIConfiguration.createRemoteConfiguration(robot, open.host);
@@ -53,8 +53,8 @@ final class SunriseFri implements Fri, IFRISessionListener {
         session.addFRISessionListener(this);
     }
 
-    static SunriseFri of(FriOpen open, LBR robot, Mover mover, Fri.Listener listener) {
-        SunriseFri fri = new SunriseFri(open, robot, mover, listener);
+    static SunriseFri of(FriOpen open, LBR robot, Modes modes, Mover mover, Fri.Listener listener) {
+        SunriseFri fri = new SunriseFri(open, robot, modes, mover, listener);
         fri.tell(fri.session.getFRIChannelInformation()); // what happened before the listener was there
         return fri;
     }
@@ -107,7 +107,7 @@ final class SunriseFri implements Fri, IFRISessionListener {
     }
 
     public Job command(Job.Listener jobListener) throws Refusal {
-        PositionHold hold = new PositionHold(new Modes(robot).of(open.mode), -1, TimeUnit.SECONDS);
+        PositionHold hold = new PositionHold(modes.of(open.mode), -1, TimeUnit.SECONDS);
         hold.addMotionOverlay(new FRIJointOverlay(session, mode()));
         return mover.move(hold, jobListener);
     }

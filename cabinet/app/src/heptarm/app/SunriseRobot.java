@@ -16,6 +16,7 @@ import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseSafetyState;
 import com.kuka.roboticsAPI.deviceModel.Device;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
+import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.Frame;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
@@ -56,7 +57,7 @@ import heptarm.wire.WrenchState;
 /** The robot of the cabinet behind the core's seam. */
 final class SunriseRobot implements Robot, IErrorHandler {
     private final LBR lbr;
-    private final ObjectFrame flange;
+    private final Tools tools;
     private final SunriseExecutionService execution;
     private final IApplicationControl control;
     private final Log log;
@@ -66,13 +67,13 @@ final class SunriseRobot implements Robot, IErrorHandler {
     private final Map<IMotionContainer, SunriseJob> jobs = new IdentityHashMap<IMotionContainer, SunriseJob>();
     private final Map<IMotionContainer, String> orphans = new IdentityHashMap<IMotionContainer, String>();
 
-    SunriseRobot(LBR lbr, IApplicationControl control, Log log) {
+    SunriseRobot(LBR lbr, Tools tools, IApplicationControl control, Log log) {
         this.lbr = lbr;
-        this.flange = lbr.getFlange();
+        this.tools = tools;
         this.execution = (SunriseExecutionService) lbr.getController().getExecutionService();
         this.control = control;
         this.log = log;
-        this.motions = new Motions(lbr);
+        this.motions = new Motions(lbr, tools);
         this.info = Models.describe(lbr.getName(), lbr.getJointLimits().getMinJointPosition().get(),
                 lbr.getJointLimits().getMaxJointPosition().get());
         Iterator<Insight> found = ServiceLoader.load(Insight.class, Insight.class.getClassLoader()).iterator();
@@ -103,11 +104,23 @@ final class SunriseRobot implements Robot, IErrorHandler {
     }
 
     public ToolInfo[] tools() {
-        return new ToolInfo[0];
+        return tools.templates();
+    }
+
+    public ToolInfo template(String name) {
+        return tools.template(name);
+    }
+
+    public void attach(ToolInfo tool, String moved) throws Refusal {
+        tools.attach(tool, moved);
+    }
+
+    public void load(ToolInfo workpiece) throws Refusal {
+        tools.load(workpiece);
     }
 
     public FrameInfo[] frames() {
-        return new FrameInfo[0];
+        return tools.taught();
     }
 
     public SignalInfo[] signals() {
@@ -131,8 +144,9 @@ final class SunriseRobot implements Robot, IErrorHandler {
 
     public PoseState readPose(long stamp) {
         // relative to the robot's own base: the world's axes are others when it hangs from a wall
-        Frame measured = lbr.getCurrentCartesianPosition(flange, lbr.getRootFrame());
-        Frame commanded = lbr.getCommandedCartesianPosition(flange, lbr.getRootFrame());
+        ObjectFrame moved = tools.moved();
+        Frame measured = lbr.getCurrentCartesianPosition(moved, lbr.getRootFrame());
+        Frame commanded = lbr.getCommandedCartesianPosition(moved, lbr.getRootFrame());
         IRedundancyCollection collection = measured.getRedundancyInformationForDevice(lbr);
         Redundancy redundancy = new Redundancy(Double.NaN, -1, -1);
         if (collection instanceof LBRE1Redundancy) {
@@ -146,13 +160,19 @@ final class SunriseRobot implements Robot, IErrorHandler {
     }
 
     public WrenchState readWrench(long stamp) {
-        ForceSensorData data = lbr.getExternalForceTorque(flange, lbr.getRootFrame());
+        ForceSensorData data = lbr.getExternalForceTorque(tools.moved(), lbr.getRootFrame());
         return new WrenchState(stamp, array(data.getForce()), array(data.getTorque()), array(data.getForceInaccuracy()),
                 array(data.getTorqueInaccuracy()));
     }
 
     public WrenchState readWrench(String axes, long stamp) {
-        ForceSensorData data = lbr.getExternalForceTorque(flange, "base".equals(axes) ? lbr.getRootFrame() : flange);
+        AbstractFrame turned;
+        try {
+            turned = tools.reference(axes);
+        } catch (Refusal e) {
+            throw new IllegalArgumentException(e.getMessage());
+        }
+        ForceSensorData data = lbr.getExternalForceTorque(tools.moved(), turned == null ? tools.moved() : turned);
         return new WrenchState(stamp, array(data.getForce()), array(data.getTorque()), array(data.getForceInaccuracy()),
                 array(data.getTorqueInaccuracy()));
     }
@@ -208,7 +228,7 @@ final class SunriseRobot implements Robot, IErrorHandler {
     public Job start(Item item, Mode mode, Job.Listener listener) throws Refusal {
         SunriseJob job = new SunriseJob(listener);
         try {
-            adopt(lbr.moveAsync(motions.motion(item, mode), job), job);
+            adopt(tools.moved(item.frame).moveAsync(motions.motion(item, mode), job), job);
         } catch (RuntimeException e) {
             log.warn("a motion was refused by the cabinet: " + e);
             job.fail(e.getMessage());
@@ -223,8 +243,8 @@ final class SunriseRobot implements Robot, IErrorHandler {
     public Servo servo(ServoOpen open, Job.Listener listener) throws Refusal {
         SunriseJob job = new SunriseJob(listener);
         try {
-            SunriseServo servo = SunriseServo.of(open, lbr, job);
-            adopt(lbr.moveAsync(servo.motion(), job), job);
+            SunriseServo servo = SunriseServo.of(open, lbr, tools, job);
+            adopt(servo.start(), job);
             return servo;
         } catch (LinkageError e) {
             throw new Refusal(Code.UNSUPPORTED, "this cabinet lacks the option Sunrise.Servoing (" + e + ")");
@@ -235,7 +255,7 @@ final class SunriseRobot implements Robot, IErrorHandler {
     }
 
     public void check(FriOpen open) throws Refusal {
-        Modes.check(open.mode, "mode.");
+        new Modes(tools).check(open.mode, tools.moved(), "mode.");
         try {
             SunriseFri.check(open);
         } catch (LinkageError e) {
@@ -245,7 +265,7 @@ final class SunriseRobot implements Robot, IErrorHandler {
 
     public Fri fri(FriOpen open, Fri.Listener listener) throws Refusal {
         try {
-            return SunriseFri.of(open, lbr, new SunriseFri.Mover() {
+            return SunriseFri.of(open, lbr, new Modes(tools), new SunriseFri.Mover() {
                 public Job move(PositionHold hold, Job.Listener jobListener) throws Refusal {
                     return begin(hold, jobListener);
                 }
@@ -261,7 +281,7 @@ final class SunriseRobot implements Robot, IErrorHandler {
     private Job begin(IMotion motion, Job.Listener listener) {
         SunriseJob job = new SunriseJob(listener);
         try {
-            adopt(lbr.moveAsync(motion, job), job);
+            adopt(tools.moved().moveAsync(motion, job), job);
         } catch (RuntimeException e) {
             log.warn("a motion was refused by the cabinet: " + e);
             job.fail(e.getMessage());

@@ -9,7 +9,8 @@ import com.kuka.connectivity.motionModel.smartServo.SmartServo;
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.Frame;
-import com.kuka.roboticsAPI.motionModel.IMotion;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 
 import heptarm.core.Refusal;
 import heptarm.core.Servo;
@@ -23,17 +24,21 @@ import heptarm.wire.ServoOpen;
 /** A servo motion of Sunrise. Only this class names the option's classes, so that a cabinet without it still runs. */
 final class SunriseServo implements Servo {
     private final LBR robot;
+    private final Tools tools;
+    private final ObjectFrame moved;
     private final SunriseJob job;
     private final ServoMotion<?> motion;
 
-    private SunriseServo(LBR robot, SunriseJob job, ServoMotion<?> motion) {
+    private SunriseServo(LBR robot, Tools tools, ObjectFrame moved, SunriseJob job, ServoMotion<?> motion) {
         this.robot = robot;
+        this.tools = tools;
+        this.moved = moved;
         this.job = job;
         this.motion = motion;
     }
 
     /** A servo motion at the present position. */
-    static SunriseServo of(ServoOpen open, LBR robot, SunriseJob job) throws Refusal {
+    static SunriseServo of(ServoOpen open, LBR robot, Tools tools, SunriseJob job) throws Refusal {
         JointPosition here = robot.getCurrentJointPosition();
         ServoMotion<?> motion = open.engine == ServoEngine.DIRECT ? new DirectServo(here) : new SmartServo(here);
         motion.setJointVelocityRel(open.velocity);
@@ -41,17 +46,18 @@ final class SunriseServo implements Servo {
         motion.setMinimumTrajectoryExecutionTime(open.min_trajectory_time);
         motion.setTimeoutAfterGoalReach(open.goal_timeout);
         if (open.mode != null && !(open.mode instanceof PositionMode)) {
-            if (!ServoMotion.validateForImpedanceMode(robot)) {
+            if (!ServoMotion.validateForImpedanceMode(tools.carrier())) {
                 throw new Refusal(Code.NOT_READY, "impedance control cannot begin: the arm has to rest, away from a singularity,"
                         + " with nothing pushing it and the load data right (less than 10 Nm external torque in every joint)");
             }
-            motion.setMode(new Modes(robot).of(open.mode));
+            motion.setMode(new Modes(tools).of(open.mode));
         }
-        return new SunriseServo(robot, job, motion);
+        return new SunriseServo(robot, tools, tools.moved(open.frame), job, motion);
     }
 
-    IMotion motion() {
-        return motion;
+    /** Begins it. */
+    IMotionContainer start() {
+        return moved.moveAsync(motion, job);
     }
 
     public void cancel() {
@@ -88,9 +94,10 @@ final class SunriseServo implements Servo {
     }
 
     public void change(Mode mode) throws Refusal {
-        Modes.check(mode, "mode.");
+        Modes modes = new Modes(tools);
+        modes.check(mode, moved, "mode.");
         try {
-            motion.getRuntime().changeControlModeSettings(new Modes(robot).of(mode));
+            motion.getRuntime().changeControlModeSettings(modes.of(mode));
         } catch (RuntimeException e) {
             throw refusal(e);
         }

@@ -8,8 +8,10 @@ import heptarm.wire.FriOpen;
 import heptarm.wire.Goodbye;
 import heptarm.wire.Hold;
 import heptarm.wire.Item;
+import heptarm.wire.LinRel;
 import heptarm.wire.Message;
 import heptarm.wire.Messages;
+import heptarm.wire.Mode;
 import heptarm.wire.PathReached;
 import heptarm.wire.Pause;
 import heptarm.wire.Ping;
@@ -29,6 +31,7 @@ import heptarm.wire.ServoPose;
 import heptarm.wire.ServoSettings;
 import heptarm.wire.SetOverride;
 import heptarm.wire.ShowMessage;
+import heptarm.wire.SineImpedance;
 import heptarm.wire.Stop;
 import heptarm.wire.Subscribe;
 import heptarm.wire.TakeControl;
@@ -161,12 +164,13 @@ final class Dispatcher {
         } else if (message instanceof Run) {
             id = run((Run) message);
         } else if (message instanceof ServoOpen) {
-            ModeRules.check(((ServoOpen) message).mode, "mode.");
+            server.rack.checkMoved(((ServoOpen) message).frame, "frame");
+            checkMode(((ServoOpen) message).mode, "mode.");
             checkUntil((ServoOpen) message);
             server.robot.check((ServoOpen) message);
             id = server.executor.open(new Stream(server, (ServoOpen) message));
         } else if (message instanceof ServoSettings) {
-            ModeRules.check(((ServoSettings) message).mode, "mode.");
+            checkMode(((ServoSettings) message).mode, "mode.");
             running(((ServoSettings) message).servo).change(((ServoSettings) message).mode);
         } else if (message instanceof ServoClose) {
             running(((ServoClose) message).servo);
@@ -195,6 +199,8 @@ final class Dispatcher {
             server.robot.resume();
         } else if (message instanceof SetOverride) {
             server.robot.setOverride(((SetOverride) message).value);
+        } else if (Fitting.concerns(message)) {
+            Fitting.make(server, message);
         } else if (message instanceof Recover) {
             server.robot.recover();
         } else if (message instanceof ShowMessage) {
@@ -221,7 +227,7 @@ final class Dispatcher {
     }
 
     private long open(FriOpen open) throws Refusal {
-        ModeRules.check(open.mode, "mode.");
+        checkMode(open.mode, "mode.");
         server.robot.check(open);
         FriRun run = new FriRun(server, open);
         if (!run.onlyMonitors()) {
@@ -249,7 +255,11 @@ final class Dispatcher {
             if (item.motion instanceof Ptp) {
                 checkJoints(((Ptp) item.motion).q, info, path + "motion.q");
             }
-            ModeRules.check(item.mode, path + "mode.");
+            server.rack.checkMoved(item.frame, path + "frame");
+            if (item.motion instanceof LinRel) {
+                server.rack.checkReference(((LinRel) item.motion).reference, path + "motion.reference");
+            }
+            checkMode(item.mode, path + "mode.");
             Conditions.check(item.until, path + "until", server.robot.signals());
             for (int k = 0; k < item.triggers.length; k++) {
                 Conditions.check(item.triggers[k].condition, path + "triggers[" + k + "].condition", server.robot.signals());
@@ -267,6 +277,11 @@ final class Dispatcher {
         if (Conditions.contains(open.until, PathReached.class)) {
             throw new Refusal(Code.BAD_CONDITION, "until", "PathReached", "", "a servo motion has no path of its own");
         }
+    }
+
+    private void checkMode(Mode mode, String path) throws Refusal {
+        ModeRules.check(mode, path);
+        server.rack.checkReference(ModeRules.frame(mode), path + (mode instanceof SineImpedance ? "base.frame" : "frame"));
     }
 
     private static void checkJoints(double[] q, RobotInfo info, String path) throws Refusal {

@@ -8,6 +8,7 @@ import heptarm.wire.Cause;
 import heptarm.wire.Code;
 import heptarm.wire.Condition;
 import heptarm.wire.ItemReached;
+import heptarm.wire.Mode;
 import heptarm.wire.MotionFinished;
 import heptarm.wire.MotionStarted;
 import heptarm.wire.PositionMode;
@@ -104,6 +105,31 @@ final class Executor {
         Program program = queue(null, activity);
         activity.number(program.id);
         return program.id;
+    }
+
+    /** Something that must not happen while the arm moves. */
+    interface Change {
+        void make() throws Refusal;
+    }
+
+    /** Makes a change while nothing runs or waits, and keeps anything from beginning meanwhile. */
+    synchronized void whileIdle(Change change) throws Refusal {
+        if (running != null || !queue.isEmpty()) {
+            throw new Refusal(Code.BUSY, "motion " + (running != null ? running.id : queue.peek().id)
+                    + " is running; wait for it or stop it before the load changes");
+        }
+        change.make();
+    }
+
+    /** Control mode of what runs; position control while nothing does. */
+    synchronized Mode mode() {
+        Mode mode = null;
+        if (running != null && running.activity != null) {
+            mode = running.activity.mode();
+        } else if (running != null) {
+            mode = running.run.items[running.item].mode;
+        }
+        return mode == null ? new PositionMode() : mode;
     }
 
     /** The activity that runs or is about to under a number; null if there is none. */

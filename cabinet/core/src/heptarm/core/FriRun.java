@@ -38,6 +38,10 @@ final class FriRun implements Activity, Fri.Listener {
         id = accepted;
     }
 
+    public heptarm.wire.Mode mode() {
+        return open.mode;
+    }
+
     /** Opens the session. */
     void start() throws Refusal {
         Fri opened = server.robot.fri(open, this);

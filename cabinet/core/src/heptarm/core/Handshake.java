@@ -28,7 +28,7 @@ import heptarm.wire.WireException;
 final class Handshake {
     private static final SecureRandom RANDOM = new SecureRandom();
     private static final int ALL_GROUPS = Groups.JOINTS | Groups.TORQUES | Groups.POSE | Groups.WRENCH | Groups.MOTION
-            | Groups.SAFETY;
+            | Groups.SAFETY | Groups.MODE;
 
     private final Server server;
     private final Client client;
@@ -127,7 +127,7 @@ final class Handshake {
         RobotInfo info = robot.info();
         String cabinet = robot.cabinet();
         String[] capabilities = robot.capabilities();
-        ToolInfo[] tools = robot.tools();
+        ToolInfo[] tools = server.rack.known();
         FrameInfo[] frames = robot.frames();
         SignalInfo[] signals = robot.signals();
         boolean isVirtual = robot.isVirtual();

@@ -31,11 +31,21 @@ public interface Robot {
     /** What can be asked for: names of motions, modes and functions. */
     String[] capabilities();
 
+    /** Templates of the project, as far as the robot knows their names. */
     ToolInfo[] tools();
 
     FrameInfo[] frames();
 
     SignalInfo[] signals();
+
+    /** The tool that a template of the project describes; null if there is no such template. */
+    ToolInfo template(String name);
+
+    /** Attaches a tool in place of another, null: none, and takes a workpiece off; from now on motions move that frame. */
+    void attach(ToolInfo tool, String moved) throws Refusal;
+
+    /** Attaches a workpiece to the moved frame; null: takes it off. */
+    void load(ToolInfo workpiece) throws Refusal;
 
     /** Measured and commanded joint positions [rad]. */
     void readJoints(double[] q, double[] commanded);

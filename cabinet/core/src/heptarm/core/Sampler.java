@@ -5,6 +5,7 @@ import java.util.concurrent.ConcurrentHashMap;
 
 import heptarm.wire.Groups;
 import heptarm.wire.JointState;
+import heptarm.wire.ModeState;
 import heptarm.wire.MotionState;
 import heptarm.wire.PoseState;
 import heptarm.wire.SafetyState;
@@ -72,6 +73,7 @@ final class Sampler {
     private WrenchState wrench;
     private MotionState motion;
     private SafetyState safety;
+    private ModeState mode;
 
     private final Server server;
     private final Map<Client, Subscription> subscriptions = new ConcurrentHashMap<Client, Subscription>();
@@ -206,7 +208,11 @@ final class Sampler {
             safety = robot.readSafety(safetyGauge.stamp);
             end(safetyGauge);
         }
-        return choose(new State(joints, torques, pose, wrench, motion, safety, null, null), groups);
+        if ((groups & Groups.MODE) != 0) { // the core knows it by itself
+            String[] fitted = server.rack.fitted();
+            mode = new ModeState(server.clock.nanos(), server.executor.mode(), fitted[0], fitted[1], fitted[2]);
+        }
+        return choose(new State(joints, torques, pose, wrench, motion, safety, null, mode), groups);
     }
 
     private boolean begin(Gauge gauge, int groups, long now) {
@@ -273,6 +279,7 @@ final class Sampler {
     private static State choose(State all, int groups) {
         return new State((groups & Groups.JOINTS) != 0 ? all.joints : null, (groups & Groups.TORQUES) != 0 ? all.torques : null,
                 (groups & Groups.POSE) != 0 ? all.pose : null, (groups & Groups.WRENCH) != 0 ? all.wrench : null,
-                (groups & Groups.MOTION) != 0 ? all.motion : null, (groups & Groups.SAFETY) != 0 ? all.safety : null, null, null);
+                (groups & Groups.MOTION) != 0 ? all.motion : null, (groups & Groups.SAFETY) != 0 ? all.safety : null, null,
+                (groups & Groups.MODE) != 0 ? all.mode : null);
     }
 }

@@ -33,6 +33,7 @@ public final class Server {
     final Log log;
     final Authority authority;
     final Executor executor;
+    final Rack rack;
     final FriMonitors monitors = new FriMonitors();
     final Sampler sampler;
     final Dispatcher dispatcher;
@@ -52,6 +53,7 @@ public final class Server {
         this.log = log;
         this.authority = new Authority(this);
         this.executor = new Executor(this);
+        this.rack = new Rack(robot);
         this.sampler = new Sampler(this);
         this.dispatcher = new Dispatcher(this);
         this.watchdog = new Watchdog(this);

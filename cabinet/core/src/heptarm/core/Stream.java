@@ -50,6 +50,7 @@ final class Stream implements Activity {
     private long id;
     private Servo servo;
     private Target pending;
+    private heptarm.wire.Mode mode;
     private double watchdog;
     private boolean started;
     private Job.Ended ended;
@@ -65,11 +66,16 @@ final class Stream implements Activity {
     Stream(Server server, ServoOpen open) {
         this.server = server;
         this.open = open;
+        this.mode = open.mode;
         this.watchdog = open.watchdog;
     }
 
     public void number(long accepted) {
         id = accepted;
+    }
+
+    public synchronized heptarm.wire.Mode mode() {
+        return mode;
     }
 
     // -------------------------------------------------------------------------------------- from the readers
@@ -93,24 +99,27 @@ final class Stream implements Activity {
         text = why.getMessage();
     }
 
-    void change(heptarm.wire.Mode mode) throws Refusal {
+    void change(heptarm.wire.Mode newer) throws Refusal {
         Servo running;
         synchronized (this) {
             running = started && ended == null ? servo : null;
         }
         String kind = open.mode == null ? "PositionMode" : open.mode.getClass().getSimpleName();
-        if (!mode.getClass().getSimpleName().equals(kind)) {
-            throw new Refusal(Code.MODE_CONFLICT, "mode", mode.getClass().getSimpleName(), kind,
+        if (!newer.getClass().getSimpleName().equals(kind)) {
+            throw new Refusal(Code.MODE_CONFLICT, "mode", newer.getClass().getSimpleName(), kind,
                     "a running servo motion keeps the kind of its control mode; close it and open another one");
         }
-        if (!ModeRules.frame(mode).equals(ModeRules.frame(open.mode))) {
-            throw new Refusal(Code.MODE_CONFLICT, "mode.frame", ModeRules.frame(mode), ModeRules.frame(open.mode),
+        if (!ModeRules.frame(newer).equals(ModeRules.frame(open.mode))) {
+            throw new Refusal(Code.MODE_CONFLICT, "mode.frame", ModeRules.frame(newer), ModeRules.frame(open.mode),
                     "a running servo motion keeps the frame of its control mode; close it and open another one");
         }
         if (running == null) {
             throw new Refusal(Code.MODE_CONFLICT, "servo", Long.toString(id), "", "servo motion " + id + " is not running");
         }
-        running.change(mode);
+        running.change(newer);
+        synchronized (this) {
+            mode = newer;
+        }
     }
 
     // ------------------------------------------------------------------------------------- from the listeners

@@ -7,6 +7,8 @@ import java.util.logging.Logger;
 
 import com.kuka.roboticsAPI.applicationModel.IApplicationControl;
 import com.kuka.roboticsAPI.applicationModel.IApplicationData;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+import com.kuka.roboticsAPI.geometricModel.World;
 import com.kuka.roboticsAPI.motionModel.ErrorHandlingAction;
 import com.kuka.roboticsAPI.motionModel.IErrorHandler;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
@@ -69,6 +71,28 @@ public final class Desk implements IApplicationData, IApplicationControl {
         }
         override = value;
         station.ring.setOverride(value);
+    }
+
+    @Override
+    @SuppressWarnings("unchecked")
+    public <T> T createFromTemplate(String name) {
+        Template template = station.templates.get(name);
+        if (template == null) {
+            throw new PersistenceException("no template " + name);
+        }
+        return (T) template.make(name);
+    }
+
+    @Override
+    public ObjectFrame getFrame(String path) {
+        ObjectFrame found = World.Current.getRootFrame();
+        for (String part : path.split("/")) {
+            found = part.length() == 0 || found == null ? found : found.getChild(part);
+        }
+        if (found == null || found == World.Current.getRootFrame()) {
+            throw new PersistenceException("no frame " + path);
+        }
+        return found;
     }
 
     @Override

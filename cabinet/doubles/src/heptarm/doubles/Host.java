@@ -3,6 +3,7 @@ package heptarm.doubles;
 import java.lang.reflect.Field;
 
 import javax.inject.Inject;
+import javax.inject.Named;
 
 import com.kuka.roboticsAPI.applicationModel.IApplicationControl;
 import com.kuka.roboticsAPI.applicationModel.IApplicationData;
@@ -10,6 +11,7 @@ import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplicationState;
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
 import com.kuka.roboticsAPI.uiModel.IApplicationUI;
 import com.kuka.task.ITaskLogger;
 
@@ -43,6 +45,9 @@ public final class Host {
                 }
                 field.setAccessible(true);
                 Object found = field.getType() == IApplicationControl.class ? desk : null;
+                if (field.isAnnotationPresent(Named.class) && PhysicalObject.class.isAssignableFrom(field.getType())) {
+                    found = desk.createFromTemplate(field.getAnnotation(Named.class).value());
+                }
                 for (int i = 0; i < types.length && found == null; i++) {
                     found = field.getType().isAssignableFrom(types[i]) ? offers[i] : null;
                 }

@@ -47,12 +47,27 @@ public final class Orders {
             order.parts[i] = of(id, parts.get(i), moved, robot);
             inherit(order.parts[i], motion);
         }
+        if (motion instanceof RelativeLIN) {
+            turn(order, (RelativeLIN) motion, moved, robot);
+        }
         if (motion instanceof RobotMotion) {
             parametrize(order, (RobotMotion<?>) motion);
             overlay(order, ((RobotMotion<?>) motion).overlay());
             order.mode = Modes.of(((RobotMotion<?>) motion).getMode(), moved, robot);
         }
         return order;
+    }
+
+    /** An offset in the axes of another frame that moves along, in the moved frame's own: queued, the arm will be elsewhere. */
+    private static void turn(MotionOrder order, RelativeLIN motion, ObjectFrame moved, LBR robot) {
+        for (AbstractFrame one = motion.getReference(); one != null; one = one.getParent()) {
+            if (one == robot.getFlange()) {
+                Transformation to = moved.transformationTo(motion.getReference());
+                Transformation turn = Transformation.ofRad(0, 0, 0, to.getAlphaRad(), to.getBetaRad(), to.getGammaRad());
+                order.offset = pose(turn.compose(motion.getOffset()).compose(turn.invert()));
+                order.reference = null;
+            }
+        }
     }
 
     private static List<? extends RobotMotion<?>> parts(IMotion motion) {

@@ -33,6 +33,9 @@ public interface Plant {
 
     void friClose(long session);
 
+    /** What the controller believes to hang on the flange: mass, centre of mass, inertia as in {@link Burden#of}. */
+    void carries(double[] body);
+
     /** Lengths base-shoulder, shoulder-elbow, elbow-wrist, wrist-flange [m]. */
     double[] links();
 }

@@ -8,6 +8,8 @@ import java.util.concurrent.Executors;
 
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+import com.kuka.roboticsAPI.geometricModel.World;
 
 /** The one simulated cabinet of this JVM: plant, ring, robot, process data, and the thread that calls listeners. */
 public final class Station {
@@ -17,6 +19,7 @@ public final class Station {
     public final Ring ring;
     public final TickHub hub;
     public final Map<String, Object> processData = new ConcurrentHashMap<>();
+    public final Map<String, Template> templates = new ConcurrentHashMap<>();
     public final ExecutorService dispatch;
     public final Controller controller;
     public final LBR robot;
@@ -45,6 +48,32 @@ public final class Station {
             throw new IllegalStateException("no virtual cabinet is open");
         }
         return current;
+    }
+
+    /** Waits until what was just told to the plant counts in its states. */
+    public void settle() {
+        try {
+            hub.sleep((ring.newest() + 2) * Ring.TICK_NS);
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
+        }
+    }
+
+    /** A template of the project: frames by path, the transformation of each from its parent. */
+    public void addTemplate(String name, Template template) {
+        templates.put(name, template);
+    }
+
+    /** A taught frame of the project, by its path. */
+    public void addFrame(String path, double[] fromParent) {
+        ObjectFrame parent = World.Current.getRootFrame();
+        String[] parts = path.split("/");
+        for (int i = 0; i < parts.length - 1; i++) {
+            if (parts[i].length() > 0) {
+                parent = parent.getChild(parts[i]);
+            }
+        }
+        parent.add(parts[parts.length - 1], Template.transformation(fromParent));
     }
 
     public void setProcessData(String name, Object value) {

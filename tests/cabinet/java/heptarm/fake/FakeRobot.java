@@ -25,6 +25,7 @@ import heptarm.wire.IoType;
 import heptarm.wire.Item;
 import heptarm.wire.Mode;
 import heptarm.wire.OperationMode;
+import heptarm.wire.Pose;
 import heptarm.wire.PoseState;
 import heptarm.wire.Ptp;
 import heptarm.wire.Redundancy;
@@ -57,6 +58,7 @@ final class FakeRobot implements Robot, Runnable {
     static final double FAILS_COMMANDING = 0.009;
     static final double REFUSED = 2.0;
     static final double SERVO_TIMEOUT = 0.3;
+    static final double UNLUCKY = 13.0;
     static final double SPRING = 10.0;
     static final double INACCURACY = 0.5;
     static final SignalInfo[] SIGNALS = {
@@ -479,7 +481,30 @@ final class FakeRobot implements Robot, Runnable {
 
     @Override
     public ToolInfo[] tools() {
-        return new ToolInfo[0];
+        return new ToolInfo[] {template("listed")};
+    }
+
+    /** The project has two templates, one of whose names the robot knows. */
+    @Override
+    public ToolInfo template(String name) {
+        if (!"listed".equals(name) && !"hidden".equals(name)) {
+            return null;
+        }
+        Pose tip = new Pose(new double[] {0.0, 0.0, 0.1}, new double[] {0.0, 0.0, 0.0, 1.0});
+        return new ToolInfo(name, 1.0, new double[3], new double[6], new FrameInfo[] {new FrameInfo("tip", tip)});
+    }
+
+    /** A tool of 13 kg falls off. */
+    @Override
+    public void attach(ToolInfo tool, String moved) throws Refusal {
+        if (tool != null && tool.mass == UNLUCKY) {
+            throw new Refusal(Code.EXECUTION_FAILED, "it does not hold");
+        }
+    }
+
+    @Override
+    public void load(ToolInfo workpiece) throws Refusal {
+        attach(workpiece, "");
     }
 
     @Override

@@ -17,7 +17,7 @@ import com.kuka.roboticsAPI.executionModel.CommandInvalidException;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.Frame;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
-import com.kuka.roboticsAPI.geometricModel.World;
+import com.kuka.roboticsAPI.geometricModel.Workpiece;
 import com.kuka.roboticsAPI.geometricModel.math.Matrix;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.geometricModel.math.Vector;
@@ -28,6 +28,7 @@ import com.kuka.roboticsAPI.sensorModel.ForceSensorData;
 import com.kuka.roboticsAPI.sensorModel.TorqueSensorData;
 
 import heptarm.doubles.Arm;
+import heptarm.doubles.Burden;
 import heptarm.doubles.Container;
 import heptarm.doubles.Desk;
 import heptarm.doubles.MotionOrder;
@@ -57,8 +58,8 @@ public class LBR extends Robot {
         super(name, controller);
         this.station = station;
         arm = new Arm(station.plant.links());
-        root = new ObjectFrame("Root", World.Current.getRootFrame(), () -> Transformation.IDENTITY, this);
-        flange = new ObjectFrame("Flange", root, () -> Orders.transformation(numbers(Ring.POSE, 7)), this);
+        root = getRootFrame();
+        flange = new ObjectFrame("Flange", this, () -> root, () -> Orders.transformation(numbers(Ring.POSE, 7)));
     }
 
     private double[] numbers(int word, int count) {
@@ -75,8 +76,25 @@ public class LBR extends Robot {
         return flange;
     }
 
-    public ObjectFrame getRootFrame() {
-        return root;
+    /** Motions of the robot itself move its flange. */
+    @Override
+    public ObjectFrame getDefaultMotionFrame() {
+        return flange;
+    }
+
+    /** It stands in the origin of the world, whatever it is told. */
+    @Override
+    public void attachTo(AbstractFrame frame) {
+    }
+
+    /** Kept for safety functions, which the simulation does not have. */
+    public void setSafetyWorkpiece(Workpiece workpiece) {
+    }
+
+    /** Something was attached or detached: the controller takes the load over; for the simulation. */
+    public void carries() {
+        station.plant.carries(Burden.of(flange, getChildren()));
+        station.settle();
     }
 
     public int getJointCount() {
@@ -144,9 +162,9 @@ public class LBR extends Robot {
     /** External wrench at the origin of a frame, in the axes of another (null: of the same). */
     public ForceSensorData getExternalForceTorque(AbstractFrame measureFrame, AbstractFrame orientationFrame) {
         double[] wrench = numbers(Ring.WRENCH, 6);
-        Transformation at = measureFrame.transformationFromWorld();
-        double[] flangePose = numbers(Ring.POSE, 3);
-        double[] lever = {flangePose[0] - at.getX() * 1e-3, flangePose[1] - at.getY() * 1e-3, flangePose[2] - at.getZ() * 1e-3};
+        Transformation here = flange.transformationFromWorld();
+        Transformation at = here.compose(flange.transformationTo(measureFrame));
+        double[] lever = {(here.getX() - at.getX()) * 1e-3, (here.getY() - at.getY()) * 1e-3, (here.getZ() - at.getZ()) * 1e-3};
         double[] torque = {wrench[3] + lever[1] * wrench[2] - lever[2] * wrench[1],
             wrench[4] + lever[2] * wrench[0] - lever[0] * wrench[2], wrench[5] + lever[0] * wrench[1] - lever[1] * wrench[0]};
         Matrix axes = (orientationFrame == null ? at : orientationFrame.transformationFromWorld()).getRotationMatrix();
@@ -202,22 +220,6 @@ public class LBR extends Robot {
             }
         }
         return Math.abs(numbers(Ring.Q, AXES)[3]) > SINGULAR;
-    }
-
-    public IMotionContainer move(IMotion motion) {
-        return moveFrame(flange, motion, null);
-    }
-
-    public IMotionContainer moveAsync(IMotion motion) {
-        return moveFrameAsync(flange, motion, null);
-    }
-
-    public IMotionContainer move(IMotion motion, IMotionContainerListener listener) {
-        return moveFrame(flange, motion, listener);
-    }
-
-    public IMotionContainer moveAsync(IMotion motion, IMotionContainerListener listener) {
-        return moveFrameAsync(flange, motion, listener);
     }
 
     /** Blocks until the motion has ended; an error is thrown. */

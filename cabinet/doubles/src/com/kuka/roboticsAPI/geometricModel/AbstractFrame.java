@@ -1,6 +1,8 @@
 package com.kuka.roboticsAPI.geometricModel;
 
+import java.util.ArrayList;
 import java.util.HashMap;
+import java.util.List;
 import java.util.Map;
 
 import com.kuka.roboticsAPI.deviceModel.Device;
@@ -26,9 +28,26 @@ public abstract class AbstractFrame {
         return parent == null ? fromParent() : parent.transformationFromWorld().compose(fromParent());
     }
 
-    /** The other frame as seen from this one. */
+    /** The other frame as seen from this one; by way of the nearest frame that both hang on, so that a moving robot blurs nothing. */
     public Transformation transformationTo(AbstractFrame other) {
-        return transformationFromWorld().invert().compose(other.transformationFromWorld());
+        List<AbstractFrame> mine = new ArrayList<>();
+        for (AbstractFrame frame = this; frame != null; frame = frame.getParent()) {
+            mine.add(frame);
+        }
+        AbstractFrame common = other;
+        while (common != null && !mine.contains(common)) {
+            common = common.getParent();
+        }
+        return from(common).invert().compose(other.from(common));
+    }
+
+    /** This frame as seen from one that it hangs on; null: from the world. */
+    private Transformation from(AbstractFrame above) {
+        if (this == above) {
+            return Transformation.IDENTITY;
+        }
+        AbstractFrame parent = getParent();
+        return parent == null || parent == above ? fromParent() : parent.from(above).compose(fromParent());
     }
 
     public double distanceTo(AbstractFrame other) {

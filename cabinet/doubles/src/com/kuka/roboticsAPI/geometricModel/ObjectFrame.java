@@ -1,8 +1,13 @@
 package com.kuka.roboticsAPI.geometricModel;
 
+import java.util.ArrayList;
+import java.util.Collection;
+import java.util.List;
+import java.util.concurrent.CopyOnWriteArrayList;
 import java.util.function.Supplier;
 
 import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
@@ -11,16 +16,18 @@ import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
 /** A frame of an object. Where the object moves, so does the frame. */
 public class ObjectFrame extends AbstractFrame {
     private final String name;
-    private final AbstractFrame parent;
+    private final SceneGraphObject owner;
+    private final Supplier<? extends AbstractFrame> parent;
     private final Supplier<Transformation> fromParent;
-    private final LBR robot;
+    private final List<ObjectFrame> children = new CopyOnWriteArrayList<>();
 
-    /** Made by the objects that have frames; the robot is the one that moves it, null if none does. */
-    public ObjectFrame(String name, AbstractFrame parent, Supplier<Transformation> fromParent, LBR robot) {
+    /** Made by the objects that have frames; the parent of an object's root is what the object is attached to. */
+    public ObjectFrame(String name, SceneGraphObject owner, Supplier<? extends AbstractFrame> parent,
+            Supplier<Transformation> fromParent) {
         this.name = name;
+        this.owner = owner;
         this.parent = parent;
         this.fromParent = fromParent;
-        this.robot = robot;
     }
 
     public String getName() {
@@ -29,12 +36,51 @@ public class ObjectFrame extends AbstractFrame {
 
     @Override
     public AbstractFrame getParent() {
-        return parent;
+        return parent.get();
     }
 
     @Override
     Transformation fromParent() {
         return fromParent.get();
+    }
+
+    /** The child frame of a name; null if there is none. */
+    public ObjectFrame getChild(String wanted) {
+        for (ObjectFrame child : children) {
+            if (child.name.equals(wanted)) {
+                return child;
+            }
+        }
+        return null;
+    }
+
+    public Collection<ObjectFrame> getChildren() {
+        return new ArrayList<>(children);
+    }
+
+    /** A new child frame; for the simulation. */
+    public ObjectFrame add(String childName, ITransformation fromHere) {
+        if (childName.length() == 0 || getChild(childName) != null) {
+            throw new IllegalArgumentException("a frame " + childName + " of " + name + " exists already");
+        }
+        Transformation fixed = Transformation.of(fromHere);
+        ObjectFrame child = new ObjectFrame(childName, owner, () -> this, () -> fixed);
+        children.add(child);
+        return child;
+    }
+
+    SceneGraphObject owner() {
+        return owner;
+    }
+
+    /** The robot that carries it; null if none does. */
+    LBR robot() {
+        for (AbstractFrame frame = this; frame != null; frame = frame.getParent()) {
+            if (frame instanceof ObjectFrame && ((ObjectFrame) frame).owner instanceof LBR) {
+                return (LBR) ((ObjectFrame) frame).owner;
+            }
+        }
+        return null;
     }
 
     public Frame copyWithRedundancy() {
@@ -44,6 +90,7 @@ public class ObjectFrame extends AbstractFrame {
     }
 
     private LBR mover() {
+        LBR robot = robot();
         if (robot == null) {
             throw new IllegalStateException("the frame " + name + " is not attached to a robot");
         }

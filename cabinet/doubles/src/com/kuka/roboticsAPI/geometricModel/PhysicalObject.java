@@ -1,8 +1,66 @@
 package com.kuka.roboticsAPI.geometricModel;
 
-/** An object with frames. */
-public abstract class PhysicalObject extends SceneGraphObject {
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
+import com.kuka.roboticsAPI.motionModel.IMotion;
+import com.kuka.roboticsAPI.motionModel.IMotionContainer;
+import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
+
+/** An object with a load. Motions of the object move its default motion frame. */
+public abstract class PhysicalObject extends SpatialObject {
+    private final LoadData load;
+    private volatile ObjectFrame moved;
+
     protected PhysicalObject(String name) {
+        this(name, new LoadData());
+    }
+
+    protected PhysicalObject(String name, LoadData load) {
         super(name);
+        this.load = load;
+    }
+
+    public LoadData getLoadData() {
+        return load;
+    }
+
+    /** The frame that motions of the object move; its root unless another was chosen. */
+    public ObjectFrame getDefaultMotionFrame() {
+        ObjectFrame chosen = moved;
+        return chosen == null ? getRootFrame() : chosen;
+    }
+
+    public void setDefaultMotionFrame(ObjectFrame frame) {
+        if (frame.owner() != this) {
+            throw new IllegalArgumentException("the frame " + frame.getName() + " does not belong to " + getName());
+        }
+        moved = frame;
+    }
+
+    public ObjectFrame addDefaultMotionFrame(String name, ITransformation fromRoot) {
+        ObjectFrame frame = addChildFrame(name, fromRoot);
+        moved = frame;
+        return frame;
+    }
+
+    /** The robot that carries it; null if none does. For the simulation. */
+    public LBR carrier() {
+        return getRootFrame().robot();
+    }
+
+    public IMotionContainer move(IMotion motion) {
+        return getDefaultMotionFrame().move(motion);
+    }
+
+    public IMotionContainer moveAsync(IMotion motion) {
+        return getDefaultMotionFrame().moveAsync(motion);
+    }
+
+    public IMotionContainer move(IMotion motion, IMotionContainerListener listener) {
+        return getDefaultMotionFrame().move(motion, listener);
+    }
+
+    public IMotionContainer moveAsync(IMotion motion, IMotionContainerListener listener) {
+        return getDefaultMotionFrame().moveAsync(motion, listener);
     }
 }

@@ -6,7 +6,7 @@ import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 public final class World {
     public static final World Current = new World();
 
-    private final ObjectFrame root = new ObjectFrame("WorldOrigin", null, () -> Transformation.IDENTITY, null);
+    private final ObjectFrame root = new ObjectFrame("WorldOrigin", null, () -> null, () -> Transformation.IDENTITY);
 
     private World() {
     }

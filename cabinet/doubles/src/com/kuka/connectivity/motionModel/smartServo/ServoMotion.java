@@ -7,7 +7,6 @@ import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 
 import heptarm.doubles.ServoRuntime;
-import heptarm.doubles.Station;
 
 /** A motion that follows destinations given while it runs; {@code T} is its own type, so that setters chain. */
 public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<T> {
@@ -22,7 +21,10 @@ public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<
 
     /** Whether a servo motion under impedance control may begin now: at rest, nothing pushes, not singular, the load data right. */
     public static boolean validateForImpedanceMode(PhysicalObject object) {
-        LBR robot = Station.current().robot;
+        LBR robot = object.carrier();
+        if (robot == null) {
+            throw new IllegalArgumentException(object.getName() + " is not attached to a robot");
+        }
         return robot.isFitForImpedance();
     }
 

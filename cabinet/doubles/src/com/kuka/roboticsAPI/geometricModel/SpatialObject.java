@@ -1,0 +1,99 @@
+package com.kuka.roboticsAPI.geometricModel;
+
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
+import com.kuka.roboticsAPI.geometricModel.math.Transformation;
+import com.kuka.roboticsAPI.persistenceModel.PersistenceException;
+
+/** An object with frames that can be attached to a frame of another one. */
+public abstract class SpatialObject extends SceneGraphObject {
+    private final ObjectFrame root;
+    private volatile AbstractFrame attachedTo;
+
+    protected SpatialObject(String name) {
+        super(name);
+        root = new ObjectFrame(name, this, this::holder, () -> Transformation.IDENTITY);
+    }
+
+    private AbstractFrame holder() {
+        AbstractFrame held = attachedTo;
+        return held == null ? World.Current.getRootFrame() : held;
+    }
+
+    public ObjectFrame getRootFrame() {
+        return root;
+    }
+
+    /** A frame by its path, with or without a leading slash. */
+    public ObjectFrame getFrame(String path) {
+        ObjectFrame found = root;
+        for (String part : path.split("/")) {
+            if (part.length() > 0) {
+                found = found.getChild(part);
+                if (found == null) {
+                    throw new PersistenceException("no frame " + path + " of " + getName());
+                }
+            }
+        }
+        return found;
+    }
+
+    public ObjectFrame addChildFrame(String name, ITransformation fromRoot) {
+        return root.add(name, fromRoot);
+    }
+
+    /** Attaches this object's root to a frame; it leaves where it was. */
+    public void attachTo(AbstractFrame frame) {
+        for (AbstractFrame one = frame; one != null; one = one.getParent()) {
+            if (owner(one) == this) {
+                throw new IllegalArgumentException(getName() + " cannot be attached to itself");
+            }
+        }
+        LBR before = release();
+        attachedTo = frame;
+        if (owner(frame) != null) {
+            owner(frame).adopt(this);
+        }
+        LBR now = root.robot();
+        if (before != null && before != now) {
+            before.carries();
+        }
+        if (now != null) {
+            now.carries();
+        }
+    }
+
+    public void detach() {
+        LBR before = release();
+        if (before != null) {
+            before.carries();
+        }
+    }
+
+    /** Returns the robot that it was on; null if it was on none. */
+    private LBR release() {
+        AbstractFrame held = attachedTo;
+        if (held == null) {
+            return null;
+        }
+        LBR robot = root.robot();
+        if (owner(held) != null) {
+            owner(held).abandon(this);
+        }
+        attachedTo = null;
+        return robot;
+    }
+
+    /** Detaches all that is attached to this object. */
+    public void detachAll() {
+        for (SceneGraphObject child : getChildren()) {
+            if (child instanceof SpatialObject) {
+                ((SpatialObject) child).detach();
+            }
+        }
+    }
+
+    private static SceneGraphObject owner(AbstractFrame frame) {
+        return frame instanceof ObjectFrame ? ((ObjectFrame) frame).owner() : null;
+    }
+}

@@ -1,0 +1,12 @@
+package com.kuka.roboticsAPI.geometricModel;
+
+/** A tool: frames, and a load that counts while it is attached to a robot. */
+public class Tool extends PhysicalObject {
+    public Tool(String name) {
+        super(name);
+    }
+
+    public Tool(String name, LoadData load) {
+        super(name, load);
+    }
+}
