@@ -47,6 +47,7 @@ _OPTIONS = (
     "-XX:MaxMetaspaceSize=64m",
     "-Xshare:auto",
     "-Xrs",
+    "-Djava.util.logging.SimpleFormatter.format=%1$tT.%1$tL %4$s %5$s%6$s%n",
 )
 
 
@@ -269,6 +270,18 @@ def open_station(plant: Plant, sessions: Sessions) -> Any:
             plant.cancel(None)
 
         @jpype.JOverride  # type: ignore[untyped-decorator]
+        def stopFast(self) -> None:
+            plant.stop_fast()
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def acknowledge(self) -> None:
+            plant.acknowledge()
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def clipManualOverride(self, most: float) -> None:
+            plant.safety.manual = min(plant.safety.manual, float(most))
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
         def pause(self) -> None:
             plant.pause()
 
@@ -326,4 +339,5 @@ def open_station(plant: Plant, sessions: Sessions) -> Any:
     station = jpype.JClass("heptarm.doubles.Station").open(memory, Proxy())
     hub = station.hub
     plant.on_wake = hub.tick
+    plant.on_safety = station.safetyChanged
     return station

@@ -165,7 +165,7 @@ class Plant:
             self._q, self._dq, self._mass[:7, :7], self._bias, self._passive, self._q, self._q, self._q
         )
         self.safety = Safety()
-        self.on_safety: Callable[[], None] | None = None  # called when what it tells has changed
+        self.on_safety: Callable[[int, int], None] | None = None  # called with flags and mode that have changed
         self._flags = 0
         self._pace = Pace(self.robot)
         self._paused = False
@@ -655,10 +655,11 @@ class Plant:
         wake = self.on_wake
         if wake is not None and k * TICK_NS >= r.header[ring.WAKE]:
             wake(k * TICK_NS)
+        flags |= int(self.safety.mode) << 32  # a mode by itself is news, too
         if flags != self._flags:
             self._flags = flags
             if self.on_safety is not None:
-                self.on_safety()
+                self.on_safety(flags, int(self.safety.mode))
 
     def _safety_flags(self) -> int:
         safety = self.safety

@@ -7,4 +7,10 @@ public interface Insight {
 
     /** Progress of the running motion in [0, 1] and its remaining time [s]. */
     void readProgress(double[] progressAndRemaining);
+
+    /** Bits of the safety state that the API does not tell: the brakes. */
+    int safetyBits();
+
+    /** Cancels everything; every axis brakes as hard as it may. */
+    void stopFast();
 }

@@ -74,6 +74,29 @@ public final class Desk implements IApplicationData, IApplicationControl {
     }
 
     @Override
+    public void clipApplicationOverride(double most) {
+        setApplicationOverride(Math.min(override, most));
+    }
+
+    @Override
+    public void clipManualOverride(double most) {
+        if (!(most >= 0.0 && most <= 1.0)) {
+            throw new IllegalArgumentException("the manual override would be clipped at " + most + "; it has to be in [0, 1]");
+        }
+        station.plant.clipManualOverride(most);
+    }
+
+    @Override
+    public void pause() {
+        station.plant.pause();
+    }
+
+    @Override
+    public void halt() {
+        station.plant.pause();
+    }
+
+    @Override
     @SuppressWarnings("unchecked")
     public <T> T createFromTemplate(String name) {
         Template template = station.templates.get(name);

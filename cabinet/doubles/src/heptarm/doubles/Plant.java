@@ -14,9 +14,18 @@ public interface Plant {
 
     void cancelAll();
 
+    /** Cancels everything; what runs leaves its path, every axis brakes as hard as it may. */
+    void stopFast();
+
     void pause();
 
     void resume();
+
+    /** Acknowledges errors whose cause has gone. */
+    void acknowledge();
+
+    /** Lowers the override at the smartPAD to at most this. */
+    void clipManualOverride(double most);
 
     /** Changes the parameters of a running order's control mode, see {@link MotionOrder#mode}. */
     void changeMode(long id, double[] mode);

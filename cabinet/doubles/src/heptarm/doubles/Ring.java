@@ -34,6 +34,11 @@ public final class Ring {
     public static final int MOVING = 8;
     public static final int MASTERED = 16;
     public static final int EMERGENCY_STOP = 32;
+    public static final int ENABLED = 64;
+    public static final int EXTERNAL_STOP = 128;
+    public static final int SAFEGUARD_OPEN = 256;
+    public static final int PROTECTIVE_STOP = 512;
+    public static final int DRIVE_ERROR = 1024;
 
     static final long TICK_NS = 1000000L;
 

@@ -7,6 +7,7 @@ import java.util.concurrent.ExecutorService;
 import java.util.concurrent.Executors;
 
 import com.kuka.roboticsAPI.controllerModel.Controller;
+import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseController;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.World;
@@ -23,6 +24,7 @@ public final class Station {
     public final ExecutorService dispatch;
     public final Controller controller;
     public final LBR robot;
+    public final SafetyNews safety = new SafetyNews(this);
 
     private Station(ByteBuffer memory, Plant plant) {
         this.plant = plant;
@@ -33,7 +35,7 @@ public final class Station {
             thread.setDaemon(true);
             return thread;
         });
-        this.controller = new Controller("KUKA_Sunrise_Cabinet_1", this);
+        this.controller = new SunriseController("KUKA_Sunrise_Cabinet_1", this);
         this.robot = new LBR(plant.title().replace(' ', '_') + "_1", controller, this);
     }
 
@@ -74,6 +76,11 @@ public final class Station {
             }
         }
         parent.add(parts[parts.length - 1], Template.transformation(fromParent));
+    }
+
+    /** The safety state has changed; called by the plant's thread. */
+    public void safetyChanged(long flags, long mode) {
+        safety.changed(flags, mode);
     }
 
     public void setProcessData(String name, Object value) {

@@ -1,6 +1,7 @@
 package com.kuka.roboticsAPI.applicationModel;
 
 import com.kuka.roboticsAPI.controllerModel.Controller;
+import com.kuka.roboticsAPI.controllerModel.recovery.IRecovery;
 import com.kuka.roboticsAPI.deviceModel.Device;
 import com.kuka.roboticsAPI.uiModel.IApplicationUI;
 import com.kuka.task.ITaskLogger;
@@ -33,6 +34,11 @@ public abstract class RoboticsAPIApplication {
 
     public IApplicationControl getApplicationControl() {
         return desk;
+    }
+
+    /** What has to be done before the application may go on; an arm that keeps its path needs nothing. */
+    public IRecovery getRecovery() {
+        return () -> false;
     }
 
     public IApplicationUI getApplicationUI() {

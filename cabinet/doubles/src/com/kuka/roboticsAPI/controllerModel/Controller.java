@@ -28,6 +28,14 @@ public class Controller {
         return Collections.<Device>singletonList(station.robot);
     }
 
+    public void addControllerListener(IControllerStateListener listener) {
+        station.safety.states.add(listener);
+    }
+
+    public void removeControllerListener(IControllerStateListener listener) {
+        station.safety.states.remove(listener);
+    }
+
     public IExecutionService getExecutionService() {
         return execution;
     }

@@ -1,5 +1,6 @@
 package com.kuka.roboticsAPI.controllerModel.sunrise;
 
+import com.kuka.roboticsAPI.controllerModel.IExecutionListener;
 import com.kuka.roboticsAPI.controllerModel.IExecutionService;
 
 import heptarm.doubles.Ring;
@@ -7,6 +8,8 @@ import heptarm.doubles.Station;
 
 /** Pausing, resuming and cancelling what the cabinet executes. */
 public final class SunriseExecutionService implements IExecutionService {
+    private static final double AT_REST = 0.001;
+
     private final Station station;
 
     public SunriseExecutionService(Station station) {
@@ -21,11 +24,39 @@ public final class SunriseExecutionService implements IExecutionService {
         return (flags() & Ring.PAUSED) != 0;
     }
 
+    /** Whether execution is paused and the arm rests. */
+    public boolean isPausedAndStopped() {
+        double[] speed = new double[7];
+        station.ring.read(Ring.DQ, speed);
+        for (double one : speed) {
+            if (Math.abs(one) > AT_REST) {
+                return false;
+            }
+        }
+        return isPaused();
+    }
+
+    public void addExecutionListener(IExecutionListener listener) {
+        station.safety.executions.add(listener);
+    }
+
+    public void removeExecutionListener(IExecutionListener listener) {
+        station.safety.executions.remove(listener);
+    }
+
+    public void clearExecutionContainerQueues() {
+        station.plant.cancelAll();
+    }
+
     public void startPause() {
         station.plant.pause();
     }
 
+    /** Lets execution go on unless a stop is demanded; without motion: what was under way is dropped before. */
     public void resumeExecution(ResumeMode mode) {
+        if (mode == ResumeMode.NoMotion) {
+            station.plant.cancelAll();
+        }
         station.plant.resume();
     }
 

@@ -43,22 +43,25 @@ public final class SunriseSafetyState implements ISafetyState {
 
     @Override
     public EmergencyStop getEmergencyStopEx() {
-        return EmergencyStop.INACTIVE;
+        return has(Ring.EXTERNAL_STOP) ? EmergencyStop.ACTIVE : EmergencyStop.INACTIVE;
     }
 
     @Override
     public SafetyStopType getSafetyStopSignal() {
-        return has(Ring.EMERGENCY_STOP) ? SafetyStopType.STOP1 : SafetyStopType.NOSTOP;
+        if (has(Ring.DRIVE_ERROR)) {
+            return SafetyStopType.STOP0;
+        }
+        return has(Ring.PROTECTIVE_STOP) ? SafetyStopType.STOP1 : SafetyStopType.NOSTOP;
     }
 
     @Override
     public OperatorSafety getOperatorSafetyState() {
-        return OperatorSafety.OPERATOR_SAFETY_CLOSED;
+        return has(Ring.SAFEGUARD_OPEN) ? OperatorSafety.OPERATOR_SAFETY_OPEN : OperatorSafety.OPERATOR_SAFETY_CLOSED;
     }
 
     @Override
     public EnablingDeviceState getEnablingDeviceState() {
-        return EnablingDeviceState.NONE;
+        return has(Ring.ENABLED) ? EnablingDeviceState.NORMAL : EnablingDeviceState.NONE;
     }
 
     @Override

@@ -1,0 +1,20 @@
+package com.kuka.roboticsAPI.controllerModel.sunrise;
+
+import com.kuka.roboticsAPI.controllerModel.Controller;
+import com.kuka.roboticsAPI.controllerModel.DispatchedEventData;
+import com.kuka.roboticsAPI.controllerModel.IControllerStateListener;
+import com.kuka.roboticsAPI.controllerModel.StatePortData;
+import com.kuka.roboticsAPI.deviceModel.Device;
+
+/** Hears of the safety state, of readiness and of field buses. */
+public interface ISunriseControllerStateListener extends IControllerStateListener {
+    void onSafetyStateChanged(Device device, SunriseSafetyState safetyState);
+
+    void onIsReadyToMoveChanged(Device device, boolean isReadyToMove);
+
+    void onStatePortChangeReceived(Controller controller, StatePortData data);
+
+    void onFieldBusDeviceConfigurationChangeReceived(String controllerName, DispatchedEventData data);
+
+    void onFieldBusDeviceIdentificationRequestReceived(String controllerName, DispatchedEventData data);
+}

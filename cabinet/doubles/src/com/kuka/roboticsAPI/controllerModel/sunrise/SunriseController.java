@@ -1,0 +1,20 @@
+package com.kuka.roboticsAPI.controllerModel.sunrise;
+
+import com.kuka.roboticsAPI.controllerModel.Controller;
+
+import heptarm.doubles.Station;
+
+/** The cabinet of an LBR. */
+public class SunriseController extends Controller {
+    private final Station station;
+
+    public SunriseController(String name, Station station) {
+        super(name, station);
+        this.station = station;
+    }
+
+    /** Acknowledges errors whose cause has gone. */
+    public void acknowledgeError() {
+        station.plant.acknowledge();
+    }
+}
