@@ -105,8 +105,10 @@ def _address(text: str) -> Target:
 
 def _check(options: tuple[tuple[str, str], ...]) -> None:
     for name, value in options:
+        if name == "box":
+            continue  # the cabinet looks at it
         if name != "speed":
-            raise ValueError(f"there is no option {name!r}; there is speed")
+            raise ValueError(f"there is no option {name!r}; there are speed and box")
         try:
             good = 0.01 <= float(value) <= 100.0
         except ValueError:

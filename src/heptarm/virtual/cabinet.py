@@ -26,6 +26,7 @@ from heptarm.virtual import processdata
 from heptarm.virtual.fri.sessions import Sessions
 from heptarm.virtual.pacer import Pacer
 from heptarm.virtual.plant import Plant
+from heptarm.virtual.world import Box
 
 log = logging.getLogger("heptarm.virtual")
 
@@ -56,6 +57,13 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
         "--fri-version", default="1.15", help="release of the cabinet's FRI, such as 1.11 or 2.5"
     )
     parser.add_argument("--project", type=Path, help="RoboticsAPI.data.xml with process data")
+    parser.add_argument(
+        "--box",
+        action="append",
+        default=[],
+        metavar="X,Y,Z,LENGTH,WIDTH,HEIGHT",
+        help="a box that stands around the arm [m]",
+    )
     parser.add_argument("--data", action="append", default=[], metavar="NAME=VALUE", help="process data")
     parser.add_argument(
         "--stats", type=Path, help="write the loop's statistics here at the end and on SIGUSR1"
@@ -93,7 +101,7 @@ class VirtualCabinet:
         from heptarm.virtual import jvm
 
         self._options = options
-        self.plant = Plant(options.model)
+        self.plant = Plant(options.model, boxes=[Box.of(text) for text in options.box])
         self.sessions = Sessions(self.plant, version=Version.of(options.fri_version), speed=options.speed)
         self.pacer = Pacer(self.plant.ring, self.tick, speed=options.speed)
         jvm.start(options.classpath)
@@ -205,6 +213,8 @@ def main(argv: list[str] | None = None) -> int:
     logging.basicConfig(level=logging.INFO if options.verbose else logging.WARNING, stream=sys.stderr)
     try:
         data = process_data(options)
+        for text in options.box:
+            Box.of(text)
     except (ValueError, OSError) as error:
         print(json.dumps({"ready": False, "error": str(error)}), flush=True)
         return 2

@@ -12,6 +12,7 @@ import shutil
 import subprocess
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from math import isnan
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,7 @@ from heptarm.values.motion import TOOL
 from heptarm.values.orientation import REFERENCES, TYPES, Orientation
 from heptarm.values.pose import Pose
 from heptarm.virtual.fri.sessions import Sessions
-from heptarm.virtual.order import Order, PlanError
+from heptarm.virtual.order import Order, PlanError, Watch
 from heptarm.virtual.plant import Plant
 
 #: Oldest Java that runs the doubles.
@@ -185,6 +186,16 @@ def _filled(values: Any, default: float) -> tuple[float, ...]:
     return tuple(default if isnan(value) else value for value in _numbers(values))
 
 
+def _watches(java: Any) -> tuple[Watch, ...]:
+    """Triggers, then break conditions: one that is both is told of before it ends the motion."""
+    found = []
+    for breaks, conditions in ((False, java.triggers), (True, java.breaks)):
+        for index in range(len(conditions)):
+            fired = partial(java.listener.fired, breaks, index)
+            found.append(Watch(_numbers(conditions[index]), fired, breaks))
+    return tuple(found)
+
+
 def _orientation(java: Any) -> Orientation:
     kind, reference = (max(0, int(value)) for value in java[:])
     return Orientation(TYPES[kind], REFERENCES[reference])
@@ -226,6 +237,7 @@ def _order(java: Any) -> Order:
         goal_timeout=goal_timeout,
         speed_timeout=speed_timeout,
         listener=listener,
+        watches=_watches(java),
         part_listener=listener,
     )
 
@@ -294,6 +306,14 @@ def open_station(plant: Plant, sessions: Sessions) -> Any:
             mode, _ = _mode(values)
             if mode is not None:
                 plant.change_mode(int(order_id), mode)
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def watch(self, condition: Any, at_once: bool, listener: Any) -> int:
+            return plant.lookout.observe(_numbers(condition), listener.changed, at_once=bool(at_once))
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
+        def unwatch(self, number: int) -> None:
+            plant.lookout.forget(int(number))
 
         @jpype.JOverride  # type: ignore[untyped-decorator]
         def inverse(self, pose: Any, near: Any) -> Any:

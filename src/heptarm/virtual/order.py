@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import nan
 from typing import Protocol
@@ -20,7 +21,7 @@ class Listener(Protocol):
         """The motion begins."""
 
     def finished(self, cause: str, text: str) -> None:
-        """The motion has ended: "done", "cancelled" or "error" with its text."""
+        """The motion has ended: "done", "cancelled", "condition" (one broke it) or "error" with its text."""
 
 
 class PartListener(Listener, Protocol):
@@ -40,6 +41,21 @@ class PlanError(ValueError):
     def __init__(self, kind: str, text: str) -> None:
         super().__init__(text)
         self.kind = kind
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """A condition that is watched while a motion runs.
+
+    Attributes:
+        condition: as heptarm.virtual.condition reads it.
+        fired: called when it holds for the first time, by the thread that ticks the plant; must not block.
+        breaks: it ends the motion.
+    """
+
+    condition: tuple[float, ...]
+    fired: Callable[[], None]
+    breaks: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +87,7 @@ class Order:
         speed_timeout: how long a servo target's velocity is kept after it was passed [s].
         listener: hears of start and end.
         part_listener: hears of a batch's parts.
+        watches: break conditions and triggers.
     """
 
     id: int
@@ -102,6 +119,7 @@ class Order:
     speed_timeout: float = 0.1
     listener: Listener | None = field(default=None, compare=False)
     part_listener: PartListener | None = field(default=None, compare=False)
+    watches: tuple[Watch, ...] = field(default=(), compare=False)
 
     @property
     def is_servo(self) -> bool:

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import inf, nan
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -23,6 +22,7 @@ from heptarm.values.links import Body
 from heptarm.values.mode import Mode as ControlMode
 from heptarm.values.robot import RobotModel, robot
 from heptarm.virtual import ring
+from heptarm.virtual.condition import Lookout, Watching
 from heptarm.virtual.control import Control
 from heptarm.virtual.fri.overlay import Superposition
 from heptarm.virtual.law import PositionLaw, Sensed
@@ -37,6 +37,7 @@ from heptarm.virtual.profile import Limits, TimeLaw, brake
 from heptarm.virtual.route import plan
 from heptarm.virtual.safety import Demand, Mode, Safety
 from heptarm.virtual.servo import Follower, follower
+from heptarm.virtual.world import Box, compiled
 
 TICK_NS = 1_000_000
 TICK = 1e-3
@@ -68,7 +69,6 @@ _DEMANDS = {
     Demand.DRIVE_ERROR: ring.DRIVE_ERROR,
 }
 
-MODELS = Path(__file__).parent / "models"
 HOME = (0.0, 0.0, 0.0, -np.pi / 2, 0.0, np.pi / 2, 0.0)
 
 
@@ -106,6 +106,7 @@ class _Run:
 
     __slots__ = (
         "braking",
+        "broken",
         "cancelled",
         "ended",
         "failure",
@@ -118,6 +119,7 @@ class _Run:
         "settling",
         "started",
         "time",
+        "watches",
     )
 
     def __init__(self, planned: Plan, serial: int) -> None:
@@ -134,6 +136,8 @@ class _Run:
         self.settling = 0
         self.started = False
         self.follower: Follower | None = None
+        self.broken = False
+        self.watches: tuple[Watching, ...] = ()
 
 
 class Plant:
@@ -142,11 +146,14 @@ class Plant:
     Args:
         model: "iiwa7" or "iiwa14".
         q: joint positions at the start, shape (7,) [rad].
+        boxes: what stands around it.
     """
 
-    def __init__(self, model: str = "iiwa14", *, q: tuple[float, ...] = HOME) -> None:
+    def __init__(
+        self, model: str = "iiwa14", *, q: tuple[float, ...] = HOME, boxes: Sequence[Box] = ()
+    ) -> None:
         self.robot: RobotModel = robot(model)
-        self.model = mujoco.MjModel.from_xml_path(str(MODELS / f"{model.replace('med', 'iiwa')}.xml"))
+        self.model = compiled(model, boxes)
         self.data = mujoco.MjData(self.model)
         self.data.qpos[:7] = q
         mujoco.mj_forward(self.model, self.data)
@@ -161,6 +168,7 @@ class Plant:
         )  # to be told or hung in the next tick
         self._command = [self._q.copy() for _ in range(3)]  # set-points of the last, this and the next tick
         self._control = Control(self.robot, self.model, self.data)
+        self.lookout = Lookout(self.robot, self.ring.signals)
         self._sensed = Sensed(
             self._q, self._dq, self._mass[:7, :7], self._bias, self._passive, self._q, self._q, self._q
         )
@@ -377,6 +385,8 @@ class Plant:
             if order_id == self._run_id():
                 self._control.retune(mode)
         self._keep_pace()
+        if self.lookout.is_busy or (self._run is not None and self._run.watches):
+            self._look()
         run = self._run
         if run is None:
             run = None if self.safety.latched else self._next()
@@ -393,6 +403,20 @@ class Plant:
         if self._control.violation:
             self._catch(run, self._control.violation)
         return self._follow(run)
+
+    def _look(self) -> None:
+        """Look at the conditions; one that breaks the running motion brakes it on its path."""
+        run = self._run
+        watches = () if run is None or run.braking or run.ended else run.watches
+        elapsed = 0.0 if run is None else run.time
+        breaks = self.lookout.look(
+            self._q, self._load.torque, self._load.wrench, watches=watches, elapsed=elapsed
+        )
+        if breaks and run is not None and not run.cancelled and not run.failure:
+            run.broken = True
+            with self._lock:
+                self._tail = None
+            self._brake(run)
 
     def _keep_pace(self) -> None:
         """How fast time runs in this tick, by overrides, pauses, stops and the operation mode."""
@@ -505,7 +529,8 @@ class Plant:
         at_rest = not self._control.is_stiff or float(np.abs(self._q - self._command[2]).max()) <= SETTLED
         at_rest = at_rest and float(np.abs(self._dq).max()) <= SETTLED_SPEED
         if at_rest or run.settling >= SETTLE_TICKS:
-            cause = "error" if run.failure else "cancelled" if run.cancelled else "done"
+            cause = "condition" if run.broken else "cancelled" if run.cancelled else "done"
+            cause = "error" if run.failure else cause
             self._end(cause, run.failure)
         return (nan if run.cancelled or run.failure else 1.0), 0.0
 
@@ -537,6 +562,7 @@ class Plant:
                     if serial == self._serial:
                         self._tail = planned.end
             self._run = _Run(planned, serial)
+            self._run.watches = self.lookout.begin(planned)
             if order.is_servo:
                 self._run.follower = follower(self.robot, order, here)
             return self._run

@@ -2,7 +2,8 @@
 
 Eight-octet words, native order. Each slot is guarded by a sequence word (odd while it is written), so a
 reader knows a torn slot. Behind the slots lies a box for the other direction: the newest servo target, guarded in
-the same way. The layout here and in heptarm.doubles.Ring (Java) is the same.
+the same way. Then comes the IO image, one real a signal, which both sides read and write. The layout here and in
+heptarm.doubles.Ring (Java) is the same.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ SLOTS = 256
 WORDS = 64
 HEADER_WORDS = 8
 BOX_WORDS = 32
-SIZE = 8 * (HEADER_WORDS + SLOTS * WORDS + BOX_WORDS)
+SIGNALS = 512
+SIZE = 8 * (HEADER_WORDS + SLOTS * WORDS + BOX_WORDS + SIGNALS)
 
 # words of the header
 NEWEST, SLOT_COUNT, ANCHOR, RATE, WAKE, OVERRIDE = range(6)
@@ -57,6 +59,7 @@ class Ring:
         reals: header words as floats, for rate and override.
         ints: slots as integers, shape (256, 64).
         floats: the same words as floats.
+        signals: values of the IO image, shape (512,).
     """
 
     def __init__(self) -> None:
@@ -65,9 +68,11 @@ class Ring:
         reals = np.frombuffer(self.memory, dtype=np.float64)
         self.header = words[:HEADER_WORDS]
         self.reals = reals[:HEADER_WORDS]
-        self.ints = words[HEADER_WORDS:-BOX_WORDS].reshape(SLOTS, WORDS)
-        self.floats = reals[HEADER_WORDS:-BOX_WORDS].reshape(SLOTS, WORDS)
-        self._box, self._box_reals = words[-BOX_WORDS:], reals[-BOX_WORDS:]
+        box = HEADER_WORDS + SLOTS * WORDS
+        self.ints = words[HEADER_WORDS:box].reshape(SLOTS, WORDS)
+        self.floats = reals[HEADER_WORDS:box].reshape(SLOTS, WORDS)
+        self._box, self._box_reals = words[box : box + BOX_WORDS], reals[box : box + BOX_WORDS]
+        self.signals = reals[box + BOX_WORDS :]
         self._box_seen = 0
         self.header[NEWEST] = -1
         self.header[SLOT_COUNT] = SLOTS

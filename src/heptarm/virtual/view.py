@@ -19,7 +19,7 @@ import numpy as np
 
 from heptarm.errors import require
 from heptarm.values.arrays import Array
-from heptarm.virtual.plant import MODELS
+from heptarm.virtual.world import MODELS
 
 _RATE = 30.0
 _COLOURS = {"silver": (192, 194, 199), "orange": (255, 107, 10), "dark": (64, 64, 69)}

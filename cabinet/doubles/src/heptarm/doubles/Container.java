@@ -1,15 +1,22 @@
 package heptarm.doubles;
 
+import java.util.Collections;
+import java.util.IdentityHashMap;
+import java.util.Set;
 import java.util.concurrent.TimeUnit;
 import java.util.concurrent.TimeoutException;
 
 import com.kuka.roboticsAPI.commandModel.IControllerCommand;
+import com.kuka.roboticsAPI.conditionModel.ICallbackAction;
+import com.kuka.roboticsAPI.conditionModel.ICondition;
+import com.kuka.roboticsAPI.conditionModel.ITriggerAction;
 import com.kuka.roboticsAPI.executionModel.ExecutionState;
 import com.kuka.roboticsAPI.executionModel.IFiredConditionInfo;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
 import com.kuka.roboticsAPI.motionModel.MotionBatch;
+import com.kuka.roboticsAPI.motionModel.RobotMotion;
 
 /** A motion that the cabinet has accepted, and what becomes of it. */
 public final class Container implements IMotionContainer, MotionListener {
@@ -25,6 +32,8 @@ public final class Container implements IMotionContainer, MotionListener {
     private final Ending ending;
     private volatile ServoRuntime servo;
     private volatile int part;
+    private final Set<ICondition> fired = Collections.newSetFromMap(new IdentityHashMap<>());
+    private ICondition broken;
     private ExecutionState state = ExecutionState.Scheduled;
     private String error;
 
@@ -84,7 +93,7 @@ public final class Container implements IMotionContainer, MotionListener {
 
     @Override
     public void finished(String cause, String text) {
-        ExecutionState last = "done".equals(cause) ? ExecutionState.Finished
+        ExecutionState last = "done".equals(cause) || "condition".equals(cause) ? ExecutionState.Finished
                 : "cancelled".equals(cause) ? ExecutionState.Cancelled : ExecutionState.Error;
         if (!change(last, last == ExecutionState.Error ? text : null)) {
             return;
@@ -185,10 +194,32 @@ public final class Container implements IMotionContainer, MotionListener {
         return part(part);
     }
 
-    /** Conditions come with a later version; until then none can have fired. */
     @Override
-    public IFiredConditionInfo getFiredBreakConditionInfo() {
-        return null;
+    public void fired(boolean breaks, int index) {
+        RobotMotion<?> whole = (RobotMotion<?>) motion;
+        ICondition condition = breaks ? whole.breakConditions().get(index) : whole.triggerConditions().get(index);
+        synchronized (this) {
+            fired.add(condition);
+            broken = breaks && broken == null ? condition : broken;
+        }
+        if (!breaks) {
+            ITriggerAction action = whole.action(index);
+            if (action instanceof ICallbackAction) {
+                tell(() -> ((ICallbackAction) action).onTriggerFired(() -> this));
+            }
+        }
+    }
+
+    @Override
+    public synchronized boolean hasFired(ICondition condition) {
+        return fired.contains(condition);
+    }
+
+    /** What ended the motion; null while it runs, and if no condition did. */
+    @Override
+    public synchronized IFiredConditionInfo getFiredBreakConditionInfo() {
+        ICondition condition = broken;
+        return condition == null || !isFinished() ? null : () -> condition;
     }
 
     @Override

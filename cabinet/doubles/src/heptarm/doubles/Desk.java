@@ -9,6 +9,7 @@ import com.kuka.roboticsAPI.applicationModel.IApplicationControl;
 import com.kuka.roboticsAPI.applicationModel.IApplicationData;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.World;
+import com.kuka.roboticsAPI.conditionModel.ObserverManager;
 import com.kuka.roboticsAPI.motionModel.ErrorHandlingAction;
 import com.kuka.roboticsAPI.motionModel.IErrorHandler;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
@@ -22,6 +23,7 @@ public final class Desk implements IApplicationData, IApplicationControl {
 
     public final ITaskLogger logger = new JulLogger();
     public final Pad pad = new Pad();
+    public final ObserverManager observers = new ObserverManager();
     private final Station station;
     private final Runnable terminate;
     private volatile IErrorHandler errorHandler;

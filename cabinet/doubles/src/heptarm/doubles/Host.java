@@ -9,6 +9,7 @@ import com.kuka.roboticsAPI.applicationModel.IApplicationControl;
 import com.kuka.roboticsAPI.applicationModel.IApplicationData;
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplicationState;
+import com.kuka.roboticsAPI.conditionModel.ObserverManager;
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
@@ -36,8 +37,9 @@ public final class Host {
     }
 
     private void inject(Station station) throws IllegalAccessException {
-        Object[] offers = {station.robot, station.controller, desk, desk.logger, desk.pad};
-        Class<?>[] types = {LBR.class, Controller.class, IApplicationData.class, ITaskLogger.class, IApplicationUI.class};
+        Object[] offers = {station.robot, station.controller, desk, desk.logger, desk.pad, desk.observers};
+        Class<?>[] types = {LBR.class, Controller.class, IApplicationData.class, ITaskLogger.class, IApplicationUI.class,
+            ObserverManager.class};
         for (Class<?> c = application.getClass(); c != RoboticsAPIApplication.class; c = c.getSuperclass()) {
             for (Field field : c.getDeclaredFields()) {
                 if (!field.isAnnotationPresent(Inject.class)) {
@@ -77,6 +79,7 @@ public final class Host {
     }
 
     private void dispose() {
+        desk.observers.close();
         try {
             application.dispose();
         } catch (RuntimeException e) {

@@ -7,6 +7,9 @@ public interface MotionListener {
     /** A part of it begins, another than the first. */
     void reached(int part);
 
-    /** The cause is done, cancelled or error. */
+    /** A break condition or a trigger has fired, the one of that index. */
+    void fired(boolean breaks, int index);
+
+    /** The cause is done, cancelled, condition or error. */
     void finished(String cause, String text);
 }

@@ -49,6 +49,10 @@ public final class MotionOrder {
     public long friSession;
     /** What that client commands, as FRI numbers it. */
     public int friCommand;
+    /** Break conditions, see {@link ConditionOrder}. */
+    public double[][] breaks = {};
+    /** Conditions of triggers. */
+    public double[][] triggers = {};
     public MotionListener listener;
 
     public MotionOrder(long id, String kind) {

@@ -6,6 +6,7 @@ import com.kuka.connectivity.fastRobotInterface.FRIJointOverlay;
 import com.kuka.connectivity.motionModel.directServo.DirectServo;
 import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
 import com.kuka.connectivity.motionModel.smartServo.SmartServo;
+import com.kuka.roboticsAPI.conditionModel.ICondition;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
@@ -46,12 +47,17 @@ public final class Orders {
         for (int i = 0; i < order.parts.length; i++) {
             order.parts[i] = of(id, parts.get(i), moved, robot);
             inherit(order.parts[i], motion);
+            if (order.parts[i].breaks.length + order.parts[i].triggers.length > 0) {
+                throw new IllegalArgumentException("the virtual cabinet watches conditions of a whole batch or spline only");
+            }
         }
         if (motion instanceof RelativeLIN) {
             turn(order, (RelativeLIN) motion, moved, robot);
         }
         if (motion instanceof RobotMotion) {
             parametrize(order, (RobotMotion<?>) motion);
+            order.breaks = conditions(((RobotMotion<?>) motion).breakConditions(), robot);
+            order.triggers = conditions(((RobotMotion<?>) motion).triggerConditions(), robot);
             overlay(order, ((RobotMotion<?>) motion).overlay());
             order.mode = Modes.of(((RobotMotion<?>) motion).getMode(), moved, robot);
         }
@@ -68,6 +74,14 @@ public final class Orders {
                 order.reference = null;
             }
         }
+    }
+
+    private static double[][] conditions(List<ICondition> all, LBR robot) {
+        double[][] numbers = new double[all.size()][];
+        for (int i = 0; i < numbers.length; i++) {
+            numbers[i] = ConditionOrder.of(all.get(i), robot);
+        }
+        return numbers;
     }
 
     private static List<? extends RobotMotion<?>> parts(IMotion motion) {

@@ -30,6 +30,15 @@ public interface Plant {
     /** Changes the parameters of a running order's control mode, see {@link MotionOrder#mode}. */
     void changeMode(long id, double[] mode);
 
+    /**
+     * Watches a condition (see {@link ConditionOrder}) until {@link #unwatch}, whatever moves; returns its number, never 0.
+     *
+     * @param atOnce tell, too, if it holds already
+     */
+    long watch(double[] condition, boolean atOnce, ConditionListener listener);
+
+    void unwatch(long number);
+
     /** Joint positions [rad] that bring the flange to a pose in the base, nearest to others; null if there are none. */
     double[] inverse(double[] pose, double[] near);
 

@@ -1,5 +1,6 @@
 package com.kuka.roboticsAPI.applicationModel;
 
+import com.kuka.roboticsAPI.conditionModel.ObserverManager;
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.controllerModel.recovery.IRecovery;
 import com.kuka.roboticsAPI.deviceModel.Device;
@@ -43,6 +44,10 @@ public abstract class RoboticsAPIApplication {
 
     public IApplicationUI getApplicationUI() {
         return desk.pad;
+    }
+
+    public ObserverManager getObserverManager() {
+        return desk.observers;
     }
 
     public Controller getController(String name) {

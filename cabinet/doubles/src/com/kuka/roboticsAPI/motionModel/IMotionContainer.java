@@ -4,6 +4,7 @@ import java.util.concurrent.TimeUnit;
 import java.util.concurrent.TimeoutException;
 
 import com.kuka.roboticsAPI.commandModel.IControllerCommand;
+import com.kuka.roboticsAPI.conditionModel.ICondition;
 import com.kuka.roboticsAPI.executionModel.ExecutionState;
 import com.kuka.roboticsAPI.executionModel.IExecutionContainer;
 import com.kuka.roboticsAPI.executionModel.IFiredConditionInfo;
@@ -25,6 +26,8 @@ public interface IMotionContainer extends IExecutionContainer {
     boolean hasError();
 
     String getErrorMessage();
+
+    boolean hasFired(ICondition condition);
 
     IFiredConditionInfo getFiredBreakConditionInfo();
 

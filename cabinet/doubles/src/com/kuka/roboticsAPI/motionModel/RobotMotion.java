@@ -1,7 +1,11 @@
 package com.kuka.roboticsAPI.motionModel;
 
 import java.util.Arrays;
+import java.util.List;
+import java.util.concurrent.CopyOnWriteArrayList;
 
+import com.kuka.roboticsAPI.conditionModel.ICondition;
+import com.kuka.roboticsAPI.conditionModel.ITriggerAction;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
 
 /** A motion of a robot with the parameters that all of them share. */
@@ -12,6 +16,9 @@ public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
     private final double[] blending = {Double.NaN, Double.NaN, Double.NaN};
     private IMotionControlMode mode;
     private IMotionOverlay overlay;
+    private final List<ICondition> breaks = new CopyOnWriteArrayList<>();
+    private final List<ICondition> triggers = new CopyOnWriteArrayList<>();
+    private final List<ITriggerAction> actions = new CopyOnWriteArrayList<>();
 
     protected RobotMotion() {
         Arrays.fill(relative, Double.NaN);
@@ -65,6 +72,34 @@ public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
     public T setMode(IMotionControlMode value) {
         mode = value;
         return self();
+    }
+
+    /** Ends the motion when a condition holds; several: when one of them does. */
+    public T breakWhen(ICondition condition) {
+        breaks.add(condition);
+        return self();
+    }
+
+    /** Does something when a condition holds for the first time; the motion goes on. */
+    public T triggerWhen(ICondition condition, ITriggerAction action) {
+        triggers.add(condition);
+        actions.add(action);
+        return self();
+    }
+
+    /** For the simulation. */
+    public List<ICondition> breakConditions() {
+        return breaks;
+    }
+
+    /** Conditions of the triggers; for the simulation. */
+    public List<ICondition> triggerConditions() {
+        return triggers;
+    }
+
+    /** What a trigger does; for the simulation. */
+    public ITriggerAction action(int trigger) {
+        return actions.get(trigger);
     }
 
     public T addMotionOverlay(IMotionOverlay added) {

@@ -1,0 +1,56 @@
+package com.kuka.roboticsAPI.conditionModel;
+
+import java.util.Date;
+
+import heptarm.doubles.ConditionListener;
+import heptarm.doubles.Station;
+
+/** Watches a condition, whether a motion runs or not. Made by an ObserverManager. */
+public class ConditionObserver {
+    /** Hears of every edge. */
+    interface Hearer {
+        void edge(ConditionObserver observer, Date time, boolean value);
+    }
+
+    private final Station station;
+    private final double[] condition;
+    private final boolean onEnable;
+    private final Hearer hearer;
+    private long watch;
+
+    ConditionObserver(Station station, double[] condition, boolean onEnable, Hearer hearer) {
+        this.station = station;
+        this.condition = condition;
+        this.onEnable = onEnable;
+        this.hearer = hearer;
+    }
+
+    public synchronized void enable() {
+        if (watch == 0) {
+            watch = station.plant.watch(condition, onEnable, new ConditionListener() {
+                @Override
+                public void changed(boolean holds) {
+                    Date now = new Date();
+                    station.dispatch.execute(() -> hear(now, holds));
+                }
+            });
+        }
+    }
+
+    private void hear(Date time, boolean holds) {
+        if (isEnabled()) {
+            hearer.edge(this, time, holds);
+        }
+    }
+
+    public synchronized void disable() {
+        if (watch != 0) {
+            station.plant.unwatch(watch);
+            watch = 0;
+        }
+    }
+
+    public synchronized boolean isEnabled() {
+        return watch != 0;
+    }
+}

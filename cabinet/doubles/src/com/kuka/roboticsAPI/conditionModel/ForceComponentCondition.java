@@ -1,0 +1,37 @@
+package com.kuka.roboticsAPI.conditionModel;
+
+import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+import com.kuka.roboticsAPI.geometricModel.math.CoordinateAxis;
+
+import heptarm.doubles.Estimated;
+
+/** A component of the external force lies outside a band [N]. */
+public class ForceComponentCondition extends Estimated {
+    private final CoordinateAxis axis;
+    private final double[] band;
+
+    public ForceComponentCondition(AbstractFrame measured, CoordinateAxis axis, double low, double high) {
+        this(measured, null, axis, low, high);
+    }
+
+    public ForceComponentCondition(AbstractFrame measured, CoordinateAxis axis, double low, double high, double tolerance) {
+        this(measured, null, axis, low, high, tolerance);
+    }
+
+    public ForceComponentCondition(AbstractFrame measured, AbstractFrame orientation, CoordinateAxis axis, double low, double high) {
+        super(measured, orientation);
+        this.axis = axis;
+        this.band = band(low, high);
+    }
+
+    public ForceComponentCondition(AbstractFrame measured, AbstractFrame orientation, CoordinateAxis axis, double low, double high,
+            double tolerance) {
+        this(measured, orientation, axis, low, high);
+        tolerance(tolerance);
+    }
+
+    /** Axis and band; for the simulation. */
+    public double[] numbers() {
+        return new double[] {axis.ordinal(), band[0], band[1]};
+    }
+}

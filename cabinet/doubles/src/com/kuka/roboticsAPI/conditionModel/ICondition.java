@@ -1,0 +1,12 @@
+package com.kuka.roboticsAPI.conditionModel;
+
+/** Something that holds or does not while a motion runs. */
+public interface ICondition {
+    ICondition or(ICondition... others);
+
+    ICondition and(ICondition... others);
+
+    ICondition xor(ICondition other);
+
+    ICondition invert();
+}

@@ -1,0 +1,90 @@
+package com.kuka.roboticsAPI.conditionModel;
+
+import java.util.Collection;
+import java.util.concurrent.CopyOnWriteArrayList;
+import java.util.concurrent.CountDownLatch;
+import java.util.concurrent.TimeUnit;
+
+import heptarm.doubles.ConditionOrder;
+import heptarm.doubles.Desk;
+import heptarm.doubles.Station;
+
+/** Watches conditions for an application. */
+public class ObserverManager {
+    private final Station station = Station.current();
+    private final Collection<ConditionObserver> observers = new CopyOnWriteArrayList<>();
+
+    public ConditionObserver createConditionObserver(ICondition condition, NotificationType type, IRisingEdgeListener listener) {
+        return make(condition, type, (observer, time, value) -> {
+            if (value) {
+                listener.onRisingEdge(observer, time, 0);
+            }
+        });
+    }
+
+    public ConditionObserver createConditionObserver(ICondition condition, NotificationType type, IFallingEdgeListener listener) {
+        return make(condition, type, (observer, time, value) -> {
+            if (!value) {
+                listener.onFallingEdge(observer, time, 0);
+            }
+        });
+    }
+
+    public ConditionObserver createConditionObserver(ICondition condition, NotificationType type, IAnyEdgeListener listener) {
+        return make(condition, type, (observer, time, value) -> listener.onAnyEdge(observer, time, 0, value));
+    }
+
+    private ConditionObserver make(ICondition condition, NotificationType type, ConditionObserver.Hearer hearer) {
+        boolean onEnable = type == NotificationType.OnEnable || type == NotificationType.All;
+        ConditionObserver made = new ConditionObserver(station, ConditionOrder.of(condition, station.robot), onEnable,
+                (observer, time, value) -> {
+                    try {
+                        hearer.edge(observer, time, value);
+                    } catch (RuntimeException e) {
+                        Desk.current().logger.error("an observer's listener ended with an error", e);
+                    }
+                });
+        observers.add(made);
+        return made;
+    }
+
+    /** Waits until a condition holds. */
+    public void waitFor(ICondition condition) {
+        waitFor(condition, Long.MAX_VALUE, TimeUnit.NANOSECONDS);
+    }
+
+    /** Waits for it until some time has passed; false: it does not hold yet. */
+    public boolean waitFor(ICondition condition, long time, TimeUnit unit) {
+        CountDownLatch held = new CountDownLatch(1);
+        double[] numbers = ConditionOrder.of(condition, station.robot);
+        long watch = station.plant.watch(numbers, true, holds -> {
+            if (holds) {
+                held.countDown();
+            }
+        });
+        try {
+            return held.await(time, unit);
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
+            throw new IllegalStateException("interrupted while waiting for a condition", e);
+        } finally {
+            station.plant.unwatch(watch);
+        }
+    }
+
+    public void removeConditionObserver(ConditionObserver observer) {
+        observer.disable();
+        observers.remove(observer);
+    }
+
+    public Collection<ConditionObserver> getRegisteredConditionObservers() {
+        return java.util.List.copyOf(observers);
+    }
+
+    /** The application has ended; for the simulation. */
+    public void close() {
+        for (ConditionObserver one : observers) {
+            removeConditionObserver(one);
+        }
+    }
+}

@@ -1,0 +1,8 @@
+package com.kuka.roboticsAPI.executionModel;
+
+import com.kuka.roboticsAPI.motionModel.IMotionContainer;
+
+/** Which trigger has fired. */
+public interface IFiredTriggerInfo {
+    IMotionContainer getMotionContainer();
+}
