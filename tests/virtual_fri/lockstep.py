@@ -1,0 +1,124 @@
+"""The client's loop (law, guard, policy, session) and the controller on the simulated arm, on one clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.fri.guard import Limits
+from heptarm.fri.messages import CommandMode
+from heptarm.fri.policy import Missing, Policy
+from heptarm.fri.version import Version
+from heptarm.io.shared import Block
+from heptarm.rt import layout as at
+from heptarm.rt.cycle import Cycle, Law
+from heptarm.rt.state import Params
+from heptarm.values.arrays import Array
+from heptarm.values.mode import Mode, Position
+from heptarm.virtual.fri.configuration import Configuration
+from heptarm.virtual.fri.controller import TICK_NS, Controller
+from heptarm.virtual.fri.events import OverlayEnded
+from heptarm.virtual.fri.overlay import MotionOverlay
+from heptarm.virtual.fri.plant_arm import PlantArm
+from heptarm.virtual.fri.standalone import control_of
+from heptarm.virtual.plant import Plant, Snapshot
+from tests.virtual_fri.rig import READY, State
+
+#: The client's clock begins here [ns].
+EPOCH = 10**12
+
+
+class Lockstep:
+    """A session at 1 kHz; each answer arrives half a tick after its message.
+
+    Args:
+        law: of the client; None: it takes `command`.
+        params: of the law.
+        command: what is commanded.
+        control: control mode of the hold underneath.
+        q: where the arm stands at first, shape (7,) [rad].
+
+    Attributes:
+        track: the plant after each tick since commands became effective.
+        ends: of overlays.
+    """
+
+    def __init__(
+        self,
+        law: Law | None = None,
+        params: Mapping[str, npt.ArrayLike] | None = None,
+        *,
+        command: CommandMode = CommandMode.POSITION,
+        control: Mode | None = None,
+        q: tuple[float, ...] = READY,
+    ) -> None:
+        values, schema = Params.flat(params or {})
+        block = Block(at.Layout.words(history=64, params=values.size))
+        block.unlink()
+        self.layout = at.Layout(block, history=64, params=values.size)
+        self.layout.params.write(values)
+        self.plant = Plant("iiwa14", q=q)
+        self.cycle = Cycle(
+            self.layout,
+            version=None,
+            limits=Limits.of(self.plant.robot),
+            policy=Policy(Missing.HOLD, patience=1e6),
+            law=law,
+            params=Params(np.zeros(values.size), schema),
+        )
+        self.track: list[Snapshot] = []
+        self.ends: list[OverlayEnded] = []
+        self._arm = PlantArm(self.plant)
+        self._controller = Controller(Configuration(Version.V1_15, 1), self.plant.robot)
+        self._answer: bytes | None = None
+        self._controller.open()
+        self._until(State.MONITORING_READY)
+        control = control or Position()
+        self._arm.hold(control)
+        self._controller.start(MotionOverlay(command, control_of(control)))
+        self._until(State.COMMANDING_ACTIVE)
+        self.start: Array = self.plant.snapshot.q_cmd
+        self.track.clear()
+
+    def run(self, seconds: float) -> None:
+        """Let time pass."""
+        for _ in range(round(seconds * 1e3)):
+            self._tick()
+
+    def command(self, q: npt.ArrayLike) -> None:
+        """What a user's process leaves for the loop, shape (7,) [rad]."""
+        words = np.zeros(at.COMMAND_WORDS)
+        words[at.C_Q : at.C_Q + 7] = q
+        words.view(np.int64)[at.C_AT : at.C_GIVEN + 1] = EPOCH + self.plant.time_ns, at.GIVEN_Q
+        self.layout.commands.write(words[1:])
+
+    @property
+    def limited(self) -> list[str]:
+        """What the guard has limited, in words."""
+        return self.cycle.guard.report.lines
+
+    def _until(self, state: State) -> None:
+        for _ in range(3000):
+            if self._controller.state is state:
+                return
+            self._tick()
+        raise AssertionError(f"{self._controller.state.name} instead of {state.name}")
+
+    def _tick(self) -> None:
+        plant, controller, now = self.plant, self._controller, self.plant.time_ns
+        if self._answer is not None:
+            controller.receive(self._answer, now - TICK_NS // 2)
+            self._answer = None
+        datagram = controller.tick(self._arm.reading(), now)
+        self._arm.overlay(controller.superposition)
+        for event in controller.events():
+            if isinstance(event, OverlayEnded):
+                self.ends.append(event)
+                self._arm.release()
+        plant.tick()
+        self.track.append(plant.snapshot)
+        if datagram is not None:
+            self._answer = self.cycle.turn(datagram, EPOCH + now)
+            self.cycle.finish(EPOCH + now + TICK_NS // 20)
