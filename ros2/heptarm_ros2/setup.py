@@ -20,5 +20,7 @@ setup(
     maintainer_email="heptarm@example.org",
     description="The heptarm node: a KUKA LBR iiwa in ROS 2, real or virtual",
     license="Apache-2.0",
-    entry_points={"console_scripts": ["heptarm_node = heptarm_ros2.main:main"]},
+    entry_points={
+        "console_scripts": ["heptarm_node = heptarm_ros2.main:main", "reach = heptarm_ros2.reach:main"]
+    },
 )

@@ -1,0 +1,50 @@
+"""The reach policy over ROS 1: joint states in, servo targets out, targets that come and change."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PointStamped, PoseStamped
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Empty, Float64
+
+from heptarm.rl.task import ReachTask
+from tests.ros1.peer import NODE, PATIENCE, Client, collect, publisher, until
+
+
+@pytest.fixture
+def reach(ros: None) -> Iterator[None]:
+    process = subprocess.Popen([sys.executable, str(NODE.with_name("reach"))])
+    yield
+    process.terminate()
+    process.wait(PATIENCE)
+
+
+def target(x: float, y: float, z: float) -> PointStamped:
+    message = PointStamped()
+    message.point.x, message.point.y, message.point.z = x, y, z
+    return message
+
+
+def test_it_reaches_targets_one_after_the_other_and_holds(client: Client, reach: None) -> None:
+    home = list(ReachTask().home)
+    states = collect("/joint_states", JointState)
+    distances = collect("/reach/distance", Float64)
+    poses = collect("/heptarm/pose", PoseStamped)
+    targets, hold = publisher("/reach/target", PointStamped), publisher("/reach/hold", Empty)
+    ptp = publisher("/heptarm/command/joint", JointState)
+    ptp.publish(JointState(name=list(client.joints), position=home))
+    until(lambda: states and np.abs(np.array(states[-1].position) - home).max() < 1e-3, "not at home")
+    for point in ((0.6, 0.15, 0.35), (0.55, -0.1, 0.5)):
+        targets.publish(target(*point))
+        until(lambda: distances and distances[-1].data < 0.01, f"{point} is not reached")
+        place = poses[-1].pose.position
+        assert np.linalg.norm(np.array([place.x, place.y, place.z]) - point) < 0.02
+        distances.clear()
+    targets.publish(target(3.0, 0.0, 0.4))  # refused; the last one stays
+    hold.publish(Empty())
+    until(lambda: np.abs(states[-1].velocity).max() < 1e-3, "the arm does not come to rest")
