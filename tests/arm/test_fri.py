@@ -96,7 +96,7 @@ def test_the_simple_form_commands_in_the_loop_and_the_next_session_needs_nothing
                 rt.command(q=goal)
                 if np.abs(s.q - goal).max() < 2e-3:
                     break
-            ports.add(rt._client.port)
+            ports.add(rt.client.port)
         assert rt.next() is None  # and nothing more comes
     assert len(ports) == 1
     assert rt.limited and "A7" in rt.report  # a jump was asked for; the guard made a motion of it
@@ -298,7 +298,7 @@ def test_a_loop_that_is_killed_loses_the_quality_and_the_next_one_works(arm: ha.
         arm.fri("position", period_ms=LONG, law=swing, params={"amplitude": 0.05}) as rt,
     ):
         rt.wait(0.5)
-        os.kill(int(rt._client._header[at.PID]), signal.SIGKILL)
+        os.kill(int(rt.client._header[at.PID]), signal.SIGKILL)
         assert not rt.wait(20.0)
     arm.wait_for_rest()
     with arm.fri("position", period_ms=LONG) as rt:
@@ -310,7 +310,7 @@ def test_a_loop_that_stands_still_ends_a_monitor_too(arm: ha.Arm) -> None:
         pytest.raises(ha.QualityLost, match="has not answered well for 3.0 s.*quality is (POOR|FAIR)"),
         arm.fri("monitor", period_ms=LONG, timeout=3.0) as rt,
     ):
-        pid = int(rt._client._header[at.PID])
+        pid = int(rt.client._header[at.PID])
         os.kill(pid, signal.SIGSTOP)
         try:
             assert not rt.wait(30.0)

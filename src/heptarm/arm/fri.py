@@ -197,7 +197,7 @@ class Fri:
             raise self._connection.end() or self._explained(None, hint)
 
     def _end(self) -> None:
-        client, self._closed = self._client, True
+        client, self._closed = self.client, True
         try:
             if self._number and self._stands:
                 with contextlib.suppress(CommandRejected):  # it has just ended by itself
@@ -216,7 +216,7 @@ class Fri:
             return QualityLost(text or "the FRI session was ended by the cabinet", code=code, hint=hint)
         if error is None:
             return StreamError(text or "the FRI session was ended by the cabinet", code=code, hint=hint)
-        limited = self._client.limited
+        limited = self.client.limited
         guard = f"the guard had limited: {'; '.join(limited[:3])}" if limited else ""
         return MotionAborted(
             text, result=error.result, history=error.history, code=code, hint=guard or error.hint
@@ -234,7 +234,7 @@ class Fri:
 
     def _why(self) -> str:
         """What spoilt the session, as far as this side can tell."""
-        return advice(self._client, host=self._host)
+        return advice(self.client, host=self._host)
 
     @property
     def _stands(self) -> bool:
@@ -260,7 +260,8 @@ class Fri:
     # --------------------------------------------------------------------------------- the loop
 
     @property
-    def _client(self) -> Client:
+    def client(self) -> Client:
+        """The client behind the session: the loop's process, its shared memory and its port."""
         if self._made is None:
             raise LocalProtocolError("the FRI session has not begun; use it in a with block")
         return self._made
@@ -275,7 +276,7 @@ class Fri:
     @property
     def state(self) -> FriState:
         """The newest message of the cabinet; never a question to it."""
-        return self._client.state
+        return self.client.state
 
     def next(self) -> FriState | None:
         """The newest message that was not returned before; waits for one. None when the session has ended.
@@ -288,7 +289,7 @@ class Fri:
         deadline = clock.nanos() + round(_PATIENCE * 1e9)
         while self.active:
             try:
-                state = self._client.next(timeout=_LOOK)
+                state = self.client.next(timeout=_LOOK)
             except Timeout:
                 if clock.nanos() > deadline:
                     raise
@@ -351,53 +352,53 @@ class Fri:
                 "the law commands in this session", hint="change rt.params, or open it without a law"
             )
         if self._stands:
-            self._client.command(q=q, tau=tau, wrench=wrench)
+            self.client.command(q=q, tau=tau, wrench=wrench)
 
     @property
     def params(self) -> Params:
         """Parameters of the law; assign to one to change it while the law runs."""
-        return self._client.params
+        return self.client.params
 
     @property
     def inputs(self) -> dict[str, float]:
         """The signals that the cabinet sends in this session, by name."""
-        return self._client.inputs
+        return self.client.inputs
 
     def output(self, name: str, value: float) -> None:
         """Set an output that the session offers."""
-        self._client.output(name, value)
+        self.client.output(name, value)
 
     # ------------------------------------------------------------------------------- the report
 
     @property
     def session(self) -> SessionState:
         """State of the session."""
-        return self._client.session
+        return self.client.session
 
     @property
     def quality(self) -> Quality:
         """Quality of the connection, as the cabinet names it."""
-        return self._client.quality
+        return self.client.quality
 
     @property
     def stats(self) -> Stats:
         """Counts, latency and jitter so far; also after the block."""
-        return self._client.stats
+        return self.client.stats
 
     @property
     def limited(self) -> list[str]:
         """What the guard has limited, one line for each axis and quantity; also after the block."""
-        return self._client.limited
+        return self.client.limited
 
     @property
     def refused(self) -> list[str]:
         """What the system refused the loop, such as real-time priority, in words with the remedy."""
-        return self._client.refused
+        return self.client.refused
 
     @property
     def report(self) -> str:
         """How it went so far, in some lines for a person; also after the block."""
-        return "\n".join(summary(self._client, before=self._before))
+        return "\n".join(summary(self.client, before=self._before))
 
     def events(self) -> list[Event]:
         """What happened since the last call, oldest first."""
@@ -407,14 +408,14 @@ class Fri:
         return taken
 
     def _listen(self) -> None:
-        for event in self._client.events():
+        for event in self.client.events():
             self._events.append(event)
             if event.kind is Kind.CLIENT and event.text.startswith(LAW_FAILED):
                 self._failure = self._failure or event.text
 
     def history(self, size: int | None = None) -> list[FriState]:
         """The last messages, oldest first."""
-        return self._client.history(size)
+        return self.client.history(size)
 
     def __repr__(self) -> str:
         """Short form."""

@@ -24,7 +24,7 @@ def advice(client: Client, *, host: str) -> str:
     if not client.is_running:
         return "the loop's process has ended: was it killed, or is there too little memory?"
     if not stats.received:
-        return client.trouble if stats.malformed else silence(host, client.port)
+        return strangers(client) if stats.malformed else silence(host, client.port)
     if client.trouble:
         return client.trouble
     state = client.state
@@ -44,6 +44,17 @@ def silence(host: str, port: int) -> str:
         f"no FRI message arrived on UDP port {port}: see that the cabinet can reach {host or 'this machine'} (address, "
         "netmask, and the network card that FRI uses there, KONI or X66), that a firewall lets UDP in, and that the "
         "cabinet's FRI application runs and sends to this address and port"
+    )
+
+
+def strangers(client: Client) -> str:
+    """What to do when datagrams arrive, and none of them is a message that this client understands."""
+    trouble = client.trouble
+    if "version" in trouble:
+        return trouble
+    return (
+        f"{client.stats.malformed} datagrams arrived on UDP port {client.port}, and none was an FRI message: "
+        "something else sends there; choose another port"
     )
 
 

@@ -28,6 +28,25 @@ _OLD_MS = 20.0
 
 
 @dataclass(frozen=True, slots=True)
+class Look:
+    """How to look at FRI.
+
+    Attributes:
+        listens: wait for the messages of whatever application runs on the cabinet, instead of opening a session.
+        port: own UDP port; None: the first free one of FRI's, 30200 for one who listens.
+        period_ms: of a session that is opened.
+        version: FRI release that the cabinet should speak; None: any.
+        seconds: how long to look [s].
+    """
+
+    listens: bool
+    port: int | None
+    period_ms: int
+    version: str | None
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
 class Verdict:
     """What was looked at, how it is ("ok", "note" or "bad"), and what to do."""
 
@@ -37,14 +56,18 @@ class Verdict:
     remedy: str = ""
 
 
-def run(*, target: str | None, as_json: bool) -> int:
-    """Look at everything; the exit code is 1 if something is bad."""
+def run(*, target: str | None, as_json: bool, fri: Look | None = None) -> int:
+    """Look at everything, with `fri` also at FRI; the exit code is 1 if something is bad."""
     target = target or os.environ.get(VARIABLE, "").strip() or None
     verdicts = [check() for check in (_python, _extras, _java, _jars, _priority)]
-    if target is None:
+    if target is None or (fri is not None and fri.listens):
         verdicts.append(_port())
     else:
         verdicts += _target(target)
+    if fri is not None:
+        from heptarm.cli.fri_doctor import look
+
+        verdicts += look(fri, target=None if fri.listens else target)
     if as_json:
         for verdict in verdicts:
             emit(asdict(verdict))

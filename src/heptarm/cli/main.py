@@ -374,12 +374,81 @@ def stop(*, target: Target = None, json: Json = False) -> int:
     return work.stop(target=target, as_json=json)
 
 
+FriPort = Annotated[
+    int | None, Parameter(group=_FRI, help="Own UDP port. Default: the first free one of 30200 to 30209.")
+]
+FriPeriod = Annotated[int, Parameter(group=_FRI, help="Time between two messages [ms].")]
+FriVersion = Annotated[
+    str | None, Parameter(group=_FRI, help="FRI release that the cabinet speaks. Default: whichever it is.")
+]
+FriListen = Annotated[
+    bool,
+    Parameter(
+        group=_FRI,
+        negative="",
+        help="Open no session; listen to the FRI application that runs on the cabinet.",
+    ),
+]
+
+
 @app.command
-def doctor(*, target: Target = None, json: Json = False) -> int:
-    """Check the installation, and a target if one is given: one verdict and one remedy a line."""
+def doctor(
+    *,
+    fri: Annotated[bool, Parameter(group=_FRI, negative="", help="Also look at FRI.")] = False,
+    listen: FriListen = False,
+    fri_port: FriPort = None,
+    fri_period: FriPeriod = 1,
+    fri_version: FriVersion = None,
+    seconds: Annotated[float, Parameter(group=_FRI, help="How long to look at FRI [s].")] = 5.0,
+    target: Target = None,
+    json: Json = False,
+) -> int:
+    """Check the installation, and a target if one is given: one verdict and one remedy a line.
+
+    With --fri also the connection for FRI: a session of the target, or with --listen what some other application
+    on the cabinet sends.
+    """
     from heptarm.cli import doctor as work
 
-    return work.run(target=target, as_json=json)
+    listens = listen or (target is None and not os.environ.get("HEPTARM_TARGET"))
+    look = work.Look(listens, fri_port, fri_period, fri_version, seconds)
+    return work.run(target=target, as_json=json, fri=look if fri else None)
+
+
+@app.command
+def bench(
+    *,
+    fri: Annotated[bool, Parameter(group=_FRI, negative="", help="Measure FRI.")] = False,
+    listen: FriListen = False,
+    fri_command: Annotated[
+        Literal["monitor", "position"],
+        Parameter(group=_FRI, help="Only monitor, or hold the position by commands."),
+    ] = "monitor",
+    fri_port: FriPort = None,
+    fri_period: FriPeriod = 1,
+    fri_version: FriVersion = None,
+    duration: Annotated[float, Parameter(help="How long to measure [s].")] = 10.0,
+    plot: Annotated[Path | None, Parameter(help="Save histogram and course as a picture.")] = None,
+    yes: Yes = False,
+    target: Target = None,
+    json: Json = False,
+) -> int:
+    """Measure how fast and how reliably FRI messages are answered, and name what spoils it; exit code for CI."""
+    from heptarm.cli import fri_bench as work
+
+    return work.run(
+        fri=fri,
+        listen=listen,
+        command=fri_command,
+        port=fri_port,
+        period_ms=fri_period,
+        version=fri_version,
+        duration=duration,
+        plot=plot,
+        yes=yes,
+        target=target,
+        as_json=json,
+    )
 
 
 @app.command(name="install-cabinet")
