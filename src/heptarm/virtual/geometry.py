@@ -115,3 +115,8 @@ def product(a: Quat, b: Quat) -> Quat:
         w * k + x * j - y * i + z * r,
         w * r - x * i - y * j - z * k,
     )
+
+
+def left(sigma: float) -> float:
+    """What is left of the first path's zone at a place in a blend, from 1 to 0; its slope is -2 at first, at last 0."""
+    return 1.0 - sigma * (2.0 + sigma * sigma * (sigma - 2.0))

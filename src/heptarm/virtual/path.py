@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from math import pi
 from typing import Protocol
 
@@ -12,7 +13,7 @@ from heptarm.model.kinematics import Vec
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
-from heptarm.virtual.geometry import Geometry, Quat, product
+from heptarm.virtual.geometry import Geometry, Quat, left, product
 
 
 class JointPath(Protocol):
@@ -53,6 +54,7 @@ class CartesianPath:
     Attributes:
         length: [m].
         angle: by which the moved frame turns [rad].
+        status: of the arm at the start.
     """
 
     def __init__(
@@ -65,9 +67,25 @@ class CartesianPath:
         to_flange = tcp.inverse()
         self._offset: Vec = tuple(to_flange.xyz.tolist())
         self._turned: Quat | None = tuple(to_flange.quat.tolist()) if to_flange.quat[3] < 1.0 else None
-        self._status = inverse.status_of(robot, start.tolist())
-        self._e1 = inverse.arm_angle(robot, start.tolist(), bool(self._status & 1))
+        self.status = inverse.status_of(robot, start.tolist())
+        self._e1 = inverse.arm_angle(robot, start.tolist(), bool(self.status & 1))
         self._turn = 0.0 if e1 is None else (e1 - self._e1 + pi) % (2 * pi) - pi
+        self._arm = self._linear
+
+    def _linear(self, s: float) -> float:
+        return self._e1 + s * self._turn
+
+    def joined(self, other: CartesianPath, geometry: Geometry, last: float, first: float) -> CartesianPath:
+        """The blend of this path's last share into another's first, the arm angle blended like the geometry."""
+        result = copy(self)
+        result.geometry, result.length, result.angle = geometry, geometry.length, geometry.angle
+        mine, others = self._linear, other._linear
+
+        def arm(s: float) -> float:
+            return mine(1.0 - last * left(s)) + others(first * left(1.0 - s)) - other._linear(0.0)
+
+        result._arm = arm
+        return result
 
     def at(self, s: float, near: Array) -> Array:
         """Joint positions next to `near`, shape (7,) [rad]; plain floats inside, since the tick waits for it.
@@ -84,8 +102,8 @@ class CartesianPath:
         )
         if self._turned is not None:
             r = _rows(product(quat, self._turned))
-        e1 = self._e1 + s * self._turn
-        return np.array(inverse.raw(self._robot, r, p, e1, self._status, near.tolist(), continuous=True))
+        e1 = self._arm(s)
+        return np.array(inverse.raw(self._robot, r, p, e1, self.status, near.tolist(), continuous=True))
 
 
 def _rows(quat: Quat) -> inverse.Rows:

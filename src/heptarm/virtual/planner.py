@@ -19,10 +19,11 @@ from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.robot import RobotModel
 from heptarm.virtual.arc import Arc
+from heptarm.virtual.chain import Halts
 from heptarm.virtual.geometry import Geometry, JointTurn, Slerp, Straight, Turn
 from heptarm.virtual.order import Order, PlanError
 from heptarm.virtual.path import CartesianPath, JointLine, JointPath
-from heptarm.virtual.profile import Limits, Profile, travel
+from heptarm.virtual.profile import Limits, Profile, TimeLaw, travel
 
 #: What a Cartesian motion does where its order says nothing: m/s, m/s², m/s³ and rad/s, rad/s², rad/s³.
 CARTESIAN_DEFAULT = (1.0, 4.0, 40.0)
@@ -45,14 +46,18 @@ class Plan:
         path: joint positions over s; None for a hold.
         profile: s over time; None for a hold.
         braking: limits of s when it is cancelled.
+        halts: of a path with parts: where it rests on the way, and its limits of s when it is cancelled.
+        marks: s at which the parts of a batch begin, without the first.
     """
 
     order: Order
     start: Array
     end: Array
     path: JointPath | None
-    profile: Profile | None
+    profile: TimeLaw | None
     braking: Limits
+    halts: Halts | None = None
+    marks: tuple[float, ...] = ()
 
     @property
     def duration(self) -> float:
@@ -75,17 +80,17 @@ def plan(robot: RobotModel, order: Order, start: Array) -> Plan:
 
 
 def _plan(robot: RobotModel, order: Order, start: Array) -> Plan:
-    _check_speeds(order)
+    check_speeds(order)
     if order.kind == "hold" or order.is_servo:
         return Plan(order, start, start, None, None, Limits(1.0, 1.0, 1.0))
     if order.kind == "ptp":
-        return _plan_joints(robot, order, start, _joint_target(robot, order, start))
+        return _plan_joints(robot, order, start, joint_target(robot, order, start))
     if order.kind in ("lin", "lin_rel", "circ"):
         return _plan_path(robot, order, start)
     raise PlanError("planning", f"Can not plan motion: no motion of kind {order.kind!r}")
 
 
-def _check_speeds(order: Order) -> None:
+def check_speeds(order: Order) -> None:
     """Refuse speeds that no profile can have; the upper end is the caller's business."""
     fractions = (*order.joint_velocity, *order.joint_acceleration, *order.joint_jerk)
     if not all(0.0 < value <= 1.0 for value in fractions):
@@ -100,7 +105,12 @@ def _pose(values: tuple[float, ...]) -> Pose:
     return Pose.of(values[:3], values[3:])
 
 
-def _joint_target(robot: RobotModel, order: Order, start: Array) -> Array:
+def joint_target(robot: RobotModel, order: Order, start: Array) -> Array:
+    """Joint positions at the end of a ptp, shape (7,) [rad].
+
+    Raises:
+        PlanError: they are outside the limits, or the pose is not reachable.
+    """
     if order.joints is not None:
         target = np.array(order.joints)
     else:
@@ -118,11 +128,12 @@ def _joint_target(robot: RobotModel, order: Order, start: Array) -> Array:
             raise PlanError(
                 "unreachable", f"Can not plan motion: frame is not reachable: {error.text}"
             ) from None
-    _check_limits(robot, target)
+    check_limits(robot, target)
     return target
 
 
-def _check_limits(robot: RobotModel, q: Array) -> None:
+def check_limits(robot: RobotModel, q: Array) -> None:
+    """Refuse joint positions that the robot cannot have."""
     outside = [i for i in range(7) if not robot.q_min[i] - 1e-9 <= q[i] <= robot.q_max[i] + 1e-9]
     if outside:
         axes = " ".join(f"A{i + 1}" for i in outside)
@@ -203,15 +214,23 @@ def _joint_turn(robot: RobotModel, order: Order, start: Array, target: Pose) -> 
     return JointTurn(robot, start, np.array(end), tcp.quat)
 
 
-def _plan_path(robot: RobotModel, order: Order, start: Array) -> Plan:
+def cartesian_path(robot: RobotModel, order: Order, start: Array) -> CartesianPath:
+    """Path of a lin, lin_rel or circ.
+
+    Raises:
+        PlanError: see `geometry_of`.
+    """
     tcp = _pose(order.tcp)
     geometry = geometry_of(robot, order, start, Pose.from_matrix(forward(robot, start)) @ tcp)
-    e1 = None if isnan(order.redundancy[0]) else order.redundancy[0]
-    path = CartesianPath(robot, start, geometry, tcp, e1)
+    return CartesianPath(robot, start, geometry, tcp, None if isnan(order.redundancy[0]) else order.redundancy[0])
+
+
+def _plan_path(robot: RobotModel, order: Order, start: Array) -> Plan:
+    path, e1 = cartesian_path(robot, order, start), order.redundancy[0]
     samples = _sample(robot, path)
-    if path.length < 1e-7 and path.angle < 1e-7 and e1 is None:
+    if path.length < 1e-7 and path.angle < 1e-7 and isnan(e1):
         return Plan(order, start, start, None, None, Limits(1.0, 1.0, 1.0))
-    wanted = _cartesian_limits(order, path)
+    wanted = cartesian_limits(order, path)
     shares = [np.array(x) for x in (order.joint_velocity, order.joint_acceleration, order.joint_jerk)]
     possible = _joint_limits(robot, samples, *shares)
     braking = _joint_limits(robot, samples, np.ones(7), np.ones(7), np.ones(7))
@@ -261,7 +280,7 @@ def _sample(robot: RobotModel, path: CartesianPath) -> Array:
                 f"Can not plan motion: A{int(step.argmax()) + 1} would have to jump at {100 * s:.0f} % of the path "
                 "(singularity)",
             )
-        _check_limits(robot, q)
+        check_limits(robot, q)
         samples.append(q)
     return np.array(samples)
 
@@ -270,7 +289,8 @@ def _or(value: float, default: float) -> float:
     return default if isnan(value) else value
 
 
-def _cartesian_limits(order: Order, path: CartesianPath) -> Limits:
+def cartesian_limits(order: Order, path: CartesianPath) -> Limits:
+    """What an order allows along its path, as limits of s."""
     length, angle = max(path.length, 1e-12), max(path.angle, 1e-12)
     line = (order.cart_velocity, order.cart_acceleration, order.cart_jerk)
     turn = (order.ori_velocity, order.ori_acceleration, order.ori_jerk)

@@ -6,6 +6,7 @@ Ruckig computes both in one dimension, where it is exact and needs no intermedia
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Trajectory
 
@@ -25,6 +26,30 @@ class Limits:
             min(self.acceleration, other.acceleration),
             min(self.jerk, other.jerk),
         )
+
+
+class TimeLaw(Protocol):
+    """s over time; the attribute duration is when it has come to its end [s]."""
+
+    duration: float
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        """s, ds/dt, d²s/dt² at a time [s]; beyond the end it keeps its last values."""
+
+
+class Rest:
+    """What is left of a law up to a time [s], gone through at a share of its speed."""
+
+    __slots__ = ("_begin", "_law", "_scale", "duration")
+
+    def __init__(self, law: TimeLaw, begin: float, end: float, scale: float) -> None:
+        self._law, self._begin, self._scale = law, begin, scale
+        self.duration = (end - begin) / scale
+
+    def at(self, time: float) -> tuple[float, float, float]:
+        """s, ds/dt, d²s/dt² at a time [s]."""
+        place, speed, acceleration = self._law.at(self._begin + min(time, self.duration) * self._scale)
+        return place, speed * self._scale, acceleration * self._scale**2
 
 
 #: Where two kinds of profile meet exactly, as for 0.2 rad at 10 rad/s² and 100 rad/s³, Ruckig may find
