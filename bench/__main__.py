@@ -13,6 +13,7 @@ import sys
 
 from bench import (  # noqa: F401  they register themselves
     fri_codec,
+    fri_faults,
     fri_hold,
     fri_loop,
     garbage,

@@ -1,0 +1,112 @@
+"""What can go wrong in a session, again and again: it ends as designed, its cause in words, and the next one works."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+from heptarm.fri import messages as m
+from heptarm.fri.session import Session
+from heptarm.fri.version import Version
+from heptarm.virtual.fri.configuration import Configuration
+from heptarm.virtual.fri.faults import Faults, Line, translate
+from heptarm.virtual.fri.overlay import MotionOverlay
+from tests.virtual_fri.pair import Pair
+from tests.virtual_fri.rig import State
+
+QUALITY = "possible connection problem"
+
+
+def _lines(pair: Pair, **faults: float) -> None:
+    pair.there, pair.back = (Line(Faults(seed=random.randrange(10**6), **faults)) for _ in range(2))
+
+
+def lossy(pair: Pair) -> str:
+    """A tenth of all datagrams is lost."""
+    _lines(pair, loss=0.1)
+    return QUALITY
+
+
+def bursts(pair: Pair) -> str:
+    """Datagrams are held back for 5 ms and arrive together."""
+    _lines(pair, burst=0.1, burst_time=0.005)
+    return QUALITY
+
+
+def silent(pair: Pair) -> str:
+    """200 ms in which nothing arrives."""
+    _lines(pair, loss=1.0)
+    pair.run(200)
+    return QUALITY
+
+
+def stopped(pair: Pair) -> str:
+    """A safety stop."""
+    pair.arm.safety = random.choice((m.Safety.STOP_0, m.Safety.STOP_1, m.Safety.STOP_2))
+    return "safety stop"
+
+
+def mute(pair: Pair) -> str:
+    """The client answers no more."""
+    pair.alive = False
+    return QUALITY
+
+
+def jumping(pair: Pair) -> str:
+    """A client without a guard asks for a leap."""
+    pair.setpoint.q = (1.0,) * 7
+    return "Illegal axis delta"
+
+
+def foreign(pair: Pair) -> str:
+    """The cabinet speaks another version for a while, so that the client understands nothing."""
+    whole = pair.there.send
+
+    def send(datagram: bytes, now: int) -> None:
+        whole(translate(datagram, Version.V1_15, Version.V2_7), now)
+
+    pair.session = Session(Version.V1_15)
+    pair.there.send = send  # type: ignore[method-assign]
+    return QUALITY
+
+
+FAULTS: tuple[Callable[[Pair], str], ...] = (lossy, bursts, silent, stopped, mute, jumping, foreign)
+
+
+def again(fault: Callable[[Pair], str], times: int) -> int:
+    """Let it happen so many times in one session of the controller; returns how often all went as designed."""
+    random.seed(7)
+    pair = Pair(Configuration(Version.V1_15))
+    for turn in range(1, times + 1):
+        pair.active(MotionOverlay())
+        text = fault(pair)
+        for _ in range(2000):
+            if len(pair.ends) == turn:
+                break
+            pair.run(1)
+        end = pair.ends[-1]
+        assert len(pair.ends) == turn and end.is_error and text in end.text
+        assert pair.controller.state in (State.MONITORING_WAIT, State.MONITORING_READY)
+        if fault is foreign:
+            assert "the other side speaks FRI 2.7" in pair.session.trouble
+        pair.there, pair.back = Line(), Line()
+        pair.arm.safety, pair.setpoint.q = m.Safety.NORMAL_OPERATION, None
+        if not pair.alive or fault is foreign:
+            pair.session, pair.alive = Session(), True
+        pair.run(130)  # what was lost has left the window
+    pair.active(MotionOverlay())
+    return len(pair.ends)
+
+
+def garbage(times: int) -> int:
+    """Garbage to both sides in a session that stands; it goes on, and every piece is counted."""
+    generator, pair = random.Random(5), Pair(Configuration(Version.V2_7))
+    pair.active(MotionOverlay())
+    for turn in range(1, times + 1):
+        for _ in range(10):
+            pair.controller.receive(generator.randbytes(generator.randrange(1500)), pair.now)
+            pair.session.receive(generator.randbytes(generator.randrange(1500)), pair.now)
+        pair.run(2)
+        assert pair.controller.state is pair.session.state is State.COMMANDING_ACTIVE
+        assert pair.controller.traffic.refused == pair.session.counters.malformed == 10 * turn
+    return times
