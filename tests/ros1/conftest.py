@@ -40,9 +40,9 @@ def stage() -> Iterator[Stage]:
     running.close()
 
 
-@pytest.fixture
-def own_stage() -> Iterator[Stage]:
-    """The same for one test alone."""
+@pytest.fixture(scope="session")
+def spare() -> Iterator[Stage]:
+    """A second one, for tests that start a node of their own; they leave nobody in control of it."""
     running = Stage()
     yield running
     running.close()

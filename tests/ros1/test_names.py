@@ -34,8 +34,8 @@ def arrives(states: list[JointState], joint: int, value: float) -> None:
     until(lambda: abs(states[-1].position[joint] - value) < 2e-3, f"joint {joint} does not arrive")
 
 
-def test_a_program_for_libiiwa(ros: None, own_stage: Stage) -> None:
-    node, states = started(own_stage, "libiiwa")
+def test_a_program_for_libiiwa(ros: None, spare: Stage) -> None:
+    node, states = started(spare, "libiiwa")
     poses = collect("/libiiwa/iiwa/state/end_effector_pose", Pose)
     wrenches = collect("/libiiwa/iiwa/state/end_effector_wrench", Wrench)
     until(lambda: poses and wrenches, "no pose comes")
@@ -58,8 +58,8 @@ def test_a_program_for_libiiwa(ros: None, own_stage: Stage) -> None:
     assert node.end() == 0, node.said
 
 
-def test_a_program_for_iiwa_stack(ros: None, own_stage: Stage) -> None:
-    node, states = started(own_stage, "iiwa_stack")
+def test_a_program_for_iiwa_stack(ros: None, spare: Stage) -> None:
+    node, states = started(spare, "iiwa_stack")
     controller = "/iiwa_stack/iiwa/PositionJointInterface_trajectory_controller"
     follow(f"{controller}/follow_joint_trajectory", states)
     there = list(states[-1].position)

@@ -50,10 +50,10 @@ def test_a_killed_client_leaves_a_node_that_lives(client: Client) -> None:
 
 
 @pytest.fixture
-def other(ros: None, own_stage: Stage) -> Client:
+def other(ros: None, spare: Stage) -> Client:
     """A client of another arm's node, which may come to harm."""
-    node = NodeProcess(own_stage.target, ns="/other", prefix="other_")
-    client = Client(own_stage, name="/other/heptarm", prefix="other_")
+    node = NodeProcess(spare.target, ns="/other", prefix="other_")
+    client = Client(spare, name="/other/heptarm", prefix="other_")
     client.ready()
     yield client
     assert node.end(signal.SIGTERM) == 0, node.said
@@ -114,9 +114,9 @@ def test_a_wrong_parameter_is_refused_in_words(ros: None, stage: Stage) -> None:
     assert node.end() == 0, node.said
 
 
-def test_the_arm_comes_to_rest_when_the_node_ends(ros: None, own_stage: Stage) -> None:
-    node = NodeProcess(own_stage.target, ns="/ending")
-    client = Client(own_stage, name="/ending/heptarm")
+def test_the_arm_comes_to_rest_when_the_node_ends(ros: None, spare: Stage) -> None:
+    node = NodeProcess(spare.target, ns="/ending")
+    client = Client(spare, name="/ending/heptarm")
     client.ready()
     sent = client.send(step(client, time=5.0, size=3.0))
     until(lambda: client.feedback(sent), "the goal does not begin")
