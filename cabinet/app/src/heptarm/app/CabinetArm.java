@@ -15,6 +15,6 @@ public final class CabinetArm {
     /** To be closed in the application's dispose(). */
     public static Arm of(LBR lbr, IApplicationControl control, ITaskLogger logger) {
         Log log = new TaskLog(logger, true);
-        return Arm.alone(new SunriseRobot(lbr, control, log), log);
+        return Arm.alone(new SunriseRobot(lbr, new Tools(lbr, null, "", "", log), control, log), log);
     }
 }

@@ -34,6 +34,7 @@ final class Tools {
     private volatile ObjectFrame moved;
 
     /**
+     * @param data of the project; null: its templates and frames are not asked for
      * @param listed names of the project's tool templates, with commas between them
      * @param frames paths of the project's taught frames, likewise
      */
@@ -77,7 +78,7 @@ final class Tools {
     /** The tool of a template; null if the project has none of that name. */
     synchronized ToolInfo template(String name) {
         Tool made = templates.get(name);
-        if (made == null) {
+        if (made == null && data != null) {
             try {
                 Object any = data.<Object>createFromTemplate(name);
                 made = any instanceof Tool ? (Tool) any : null;

@@ -210,7 +210,7 @@ final class Sampler {
         }
         if ((groups & Groups.MODE) != 0) { // the core knows it by itself
             String[] fitted = server.rack.fitted();
-            mode = new ModeState(server.clock.nanos(), server.executor.mode(), fitted[0], fitted[1], fitted[2]);
+            mode = new ModeState(now, server.executor.mode(), fitted[0], fitted[1], fitted[2]);
         }
         return choose(new State(joints, torques, pose, wrench, motion, safety, null, mode), groups);
     }
