@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 
 import numpy as np
@@ -40,8 +41,13 @@ def test_it_reaches_targets_one_after_the_other_and_holds(client: Client, reach:
     ptp.publish(JointState(name=list(client.joints), position=home))
     until(lambda: states and np.abs(np.array(states[-1].position) - home).max() < 1e-3, "not at home")
     for point in ((0.6, 0.15, 0.35), (0.55, -0.1, 0.5)):
-        targets.publish(target(*point))
-        until(lambda: distances and distances[-1].data < 0.01, f"{point} is not reached")
+
+        def reached(point: tuple[float, float, float] = point) -> bool:
+            targets.publish(target(*point))  # again and again: the first may come before they know each other
+            time.sleep(0.2)
+            return bool(distances) and distances[-1].data < 0.01
+
+        until(reached, f"{point} is not reached")
         place = poses[-1].pose.position
         assert np.linalg.norm(np.array([place.x, place.y, place.z]) - point) < 0.02
         distances.clear()
