@@ -47,7 +47,7 @@ import heptarm.wire.ServoOpen;
 /** Turns items of a program into Sunrise motions. What cannot be carried out is refused, never ignored. */
 final class Motions {
     static final String[] CAPABILITIES = {"ptp", "ptp_pose", "lin", "lin_rel", "circ", "hold", "override", "pause",
-        "servo", "servo_direct", "servo_pose", "joint_impedance", "cartesian_impedance", "sine_impedance",
+        "servo", "servo_direct", "servo_pose", "conditions", "joint_impedance", "cartesian_impedance", "sine_impedance",
         "tools", "workpieces", "frames"};
 
     private static final int JOINTS = 7;
@@ -65,9 +65,6 @@ final class Motions {
     /** Refuses what this cabinet cannot carry out. */
     void check(Item item, String path) throws Refusal {
         modes.check(item.mode, tools.moved(item.frame), path + "mode.");
-        if (item.until.nodes.length > 0) {
-            throw unsupported(path + "until", "break conditions");
-        }
         if (item.triggers.length > 0) {
             throw unsupported(path + "triggers", "triggers");
         }
@@ -100,9 +97,6 @@ final class Motions {
         if (open.engine == ServoEngine.LIN) {
             throw unsupported("engine", "the servo engine \"lin\"");
         }
-        if (open.until.nodes.length > 0) {
-            throw unsupported("until", "break conditions");
-        }
     }
 
     private static Refusal unsupported(String parameter, String what) {
@@ -134,7 +128,7 @@ final class Motions {
     }
 
     /** The Sunrise motion of a checked item. */
-    IMotion motion(Item item, Mode mode) throws Refusal {
+    RobotMotion<?> motion(Item item, Mode mode) throws Refusal {
         RobotMotion<?> motion = motion(item);
         motion.setMode(modes.of(mode));
         return motion;

@@ -5,6 +5,7 @@ import com.kuka.roboticsAPI.executionModel.IExecutionContainer;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
+import com.kuka.roboticsAPI.motionModel.RobotMotion;
 
 import heptarm.core.Job;
 import heptarm.wire.Code;
@@ -12,12 +13,19 @@ import heptarm.wire.Code;
 /** A motion container of Sunrise as a job of the core. It ends once, whoever hears of it first. */
 final class SunriseJob implements Job, IMotionContainerListener {
     private final Job.Listener listener;
+    private BreakConditions until;
     private IMotionContainer container;
     private boolean cancelled;
     private boolean ended;
 
     SunriseJob(Job.Listener listener) {
         this.listener = listener;
+    }
+
+    /** A motion that conditions may end. */
+    void guard(RobotMotion<?> motion, BreakConditions conditions) {
+        until = conditions;
+        conditions.watch(motion, listener);
     }
 
     /** The container, once moveAsync has returned it. */
@@ -82,6 +90,9 @@ final class SunriseJob implements Job, IMotionContainerListener {
             wanted = cancelled;
         }
         if (finished.getFiredBreakConditionInfo() != null) {
+            if (until != null) {
+                until.tell(finished, listener);
+            }
             end(Ended.CONDITION, 0, "");
         } else {
             end(wanted ? Ended.CANCELLED : Ended.DONE, 0, "");

@@ -27,6 +27,7 @@ import com.kuka.roboticsAPI.motionModel.IErrorHandler;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.PositionHold;
+import com.kuka.roboticsAPI.motionModel.RobotMotion;
 import com.kuka.roboticsAPI.sensorModel.ForceSensorData;
 
 import heptarm.core.Fri;
@@ -182,7 +183,7 @@ final class SunriseRobot implements Robot, IErrorHandler {
     }
 
     public boolean watches(Condition condition) {
-        return true;
+        return BreakConditions.can(condition);
     }
 
     private static double[] array(Vector v) {
@@ -228,7 +229,9 @@ final class SunriseRobot implements Robot, IErrorHandler {
     public Job start(Item item, Mode mode, Job.Listener listener) throws Refusal {
         SunriseJob job = new SunriseJob(listener);
         try {
-            adopt(tools.moved(item.frame).moveAsync(motions.motion(item, mode), job), job);
+            RobotMotion<?> motion = motions.motion(item, mode);
+            job.guard(motion, BreakConditions.of(item.until, tools.moved(item.frame), tools));
+            adopt(tools.moved(item.frame).moveAsync(motion, job), job);
         } catch (RuntimeException e) {
             log.warn("a motion was refused by the cabinet: " + e);
             job.fail(e.getMessage());

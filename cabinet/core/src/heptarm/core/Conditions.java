@@ -8,12 +8,15 @@ import heptarm.wire.AnyOf;
 import heptarm.wire.Code;
 import heptarm.wire.Condition;
 import heptarm.wire.ConditionNode;
+import heptarm.wire.ForceAbove;
 import heptarm.wire.ForceOutside;
 import heptarm.wire.Inverted;
 import heptarm.wire.IoType;
 import heptarm.wire.JointTorqueOutside;
+import heptarm.wire.NormalForceAbove;
 import heptarm.wire.PathReached;
 import heptarm.wire.PathReference;
+import heptarm.wire.ShearForceAbove;
 import heptarm.wire.SignalInfo;
 import heptarm.wire.SignalIs;
 import heptarm.wire.SignalOutside;
@@ -106,6 +109,23 @@ public final class Conditions {
             throw new Refusal(Code.BAD_CONDITION, path + ".nodes", Integer.toString(held), "1",
                     "the nodes leave " + held + " results; they have to leave one");
         }
+    }
+
+    /** Name of the frame whose axes a leaf means; empty where it means none, or the moved frame's. */
+    static String frame(ConditionNode node) {
+        if (node instanceof ForceAbove) {
+            return ((ForceAbove) node).frame;
+        }
+        if (node instanceof NormalForceAbove) {
+            return ((NormalForceAbove) node).frame;
+        }
+        if (node instanceof ShearForceAbove) {
+            return ((ShearForceAbove) node).frame;
+        }
+        if (node instanceof ForceOutside) {
+            return ((ForceOutside) node).frame;
+        }
+        return node instanceof TorqueOutside ? ((TorqueOutside) node).frame : "";
     }
 
     private static void check(ConditionNode node, String at, SignalInfo[] signals) throws Refusal {

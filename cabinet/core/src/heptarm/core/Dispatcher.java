@@ -3,6 +3,7 @@ package heptarm.core;
 import heptarm.wire.Accepted;
 import heptarm.wire.Cancel;
 import heptarm.wire.Code;
+import heptarm.wire.Condition;
 import heptarm.wire.FriClose;
 import heptarm.wire.FriOpen;
 import heptarm.wire.Goodbye;
@@ -260,9 +261,9 @@ final class Dispatcher {
                 server.rack.checkReference(((LinRel) item.motion).reference, path + "motion.reference");
             }
             checkMode(item.mode, path + "mode.");
-            Conditions.check(item.until, path + "until", server.robot.signals());
+            checkCondition(item.until, path + "until");
             for (int k = 0; k < item.triggers.length; k++) {
-                Conditions.check(item.triggers[k].condition, path + "triggers[" + k + "].condition", server.robot.signals());
+                checkCondition(item.triggers[k].condition, path + "triggers[" + k + "].condition");
             }
             if (item.motion instanceof Hold && Conditions.contains(item.until, PathReached.class)) {
                 throw new Refusal(Code.BAD_CONDITION, path + "until", "PathReached", "", "a hold has no path");
@@ -272,8 +273,15 @@ final class Dispatcher {
         return server.executor.add(run);
     }
 
+    private void checkCondition(Condition condition, String path) throws Refusal {
+        Conditions.check(condition, path, server.robot.signals());
+        for (int i = 0; i < condition.nodes.length; i++) {
+            server.rack.checkReference(Conditions.frame(condition.nodes[i]), path + ".nodes[" + i + "].frame");
+        }
+    }
+
     private void checkUntil(ServoOpen open) throws Refusal {
-        Conditions.check(open.until, "until", server.robot.signals());
+        checkCondition(open.until, "until");
         if (Conditions.contains(open.until, PathReached.class)) {
             throw new Refusal(Code.BAD_CONDITION, "until", "PathReached", "", "a servo motion has no path of its own");
         }

@@ -1,0 +1,152 @@
+package heptarm.app;
+
+import com.kuka.roboticsAPI.conditionModel.ForceComponentCondition;
+import com.kuka.roboticsAPI.conditionModel.ForceCondition;
+import com.kuka.roboticsAPI.conditionModel.ICallbackAction;
+import com.kuka.roboticsAPI.conditionModel.ICondition;
+import com.kuka.roboticsAPI.conditionModel.JointTorqueCondition;
+import com.kuka.roboticsAPI.conditionModel.MotionPathCondition;
+import com.kuka.roboticsAPI.conditionModel.ReferenceType;
+import com.kuka.roboticsAPI.conditionModel.TorqueComponentCondition;
+import com.kuka.roboticsAPI.deviceModel.JointEnum;
+import com.kuka.roboticsAPI.executionModel.IFiredTriggerInfo;
+import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+import com.kuka.roboticsAPI.geometricModel.math.CoordinateAxis;
+import com.kuka.roboticsAPI.motionModel.IMotionContainer;
+import com.kuka.roboticsAPI.motionModel.RobotMotion;
+
+import heptarm.core.Conditions;
+import heptarm.core.Job;
+import heptarm.core.Refusal;
+import heptarm.wire.AllOf;
+import heptarm.wire.Axis;
+import heptarm.wire.Condition;
+import heptarm.wire.ConditionNode;
+import heptarm.wire.ForceAbove;
+import heptarm.wire.ForceOutside;
+import heptarm.wire.Inverted;
+import heptarm.wire.JointTorqueOutside;
+import heptarm.wire.NormalForceAbove;
+import heptarm.wire.PathReached;
+import heptarm.wire.PathReference;
+import heptarm.wire.ShearForceAbove;
+import heptarm.wire.SignalOutside;
+import heptarm.wire.TorqueOutside;
+
+/**
+ * Break conditions of a motion as those of Sunrise. Each alternative is one by itself, so that Sunrise can say which fired; a
+ * trigger on the same condition tells at once, while the motion still brakes.
+ */
+final class BreakConditions {
+    private final Conditions.Tree[] trees;
+    private final ICondition[] conditions;
+
+    private BreakConditions(Conditions.Tree[] trees, ICondition[] conditions) {
+        this.trees = trees;
+        this.conditions = conditions;
+    }
+
+    /** Whether Sunrise can watch it. */
+    static boolean can(Condition condition) {
+        return !Conditions.contains(condition, SignalOutside.class);
+    }
+
+    /** The conditions of a checked one for a motion of a frame; none if Sunrise cannot watch it. */
+    static BreakConditions of(Condition until, AbstractFrame moved, Tools tools) throws Refusal {
+        Conditions.Tree[] trees = can(until) ? Conditions.alternatives(until) : new Conditions.Tree[0];
+        ICondition[] made = new ICondition[trees.length];
+        for (int i = 0; i < trees.length; i++) {
+            made[i] = make(trees[i], moved, tools);
+        }
+        return new BreakConditions(trees, made);
+    }
+
+    /** Lets a motion be ended by them. */
+    void watch(RobotMotion<?> motion, final Job.Listener listener) {
+        for (int i = 0; i < conditions.length; i++) {
+            final int node = trees[i].index;
+            motion.breakWhen(conditions[i]);
+            motion.triggerWhen(conditions[i], new ICallbackAction() {
+                public void onTriggerFired(IFiredTriggerInfo info) {
+                    listener.fired(node);
+                }
+            });
+        }
+    }
+
+    /** Says which one has ended a motion. */
+    void tell(IMotionContainer ended, Job.Listener listener) {
+        for (int i = 0; i < conditions.length; i++) {
+            if (ended.hasFired(conditions[i])) {
+                listener.fired(trees[i].index);
+                return;
+            }
+        }
+    }
+
+    private static ICondition make(Conditions.Tree tree, AbstractFrame moved, Tools tools) throws Refusal {
+        if (tree.parts.length == 0) {
+            return leaf(tree.node, moved, tools);
+        }
+        ICondition first = make(tree.parts[0], moved, tools);
+        if (tree.node instanceof Inverted) {
+            return first.invert();
+        }
+        ICondition[] others = new ICondition[tree.parts.length - 1];
+        for (int i = 0; i < others.length; i++) {
+            others[i] = make(tree.parts[i + 1], moved, tools);
+        }
+        return tree.node instanceof AllOf ? first.and(others) : first.or(others);
+    }
+
+    private static ICondition leaf(ConditionNode node, AbstractFrame moved, Tools tools) throws Refusal {
+        if (node instanceof ForceAbove) {
+            ForceAbove one = (ForceAbove) node;
+            AbstractFrame axes = axes(one.frame, moved, tools);
+            return Double.isNaN(one.tolerance) ? ForceCondition.createSpatialForceCondition(moved, axes, one.threshold)
+                    : ForceCondition.createSpatialForceCondition(moved, axes, one.threshold, one.tolerance);
+        }
+        if (node instanceof NormalForceAbove) {
+            NormalForceAbove one = (NormalForceAbove) node;
+            AbstractFrame axes = axes(one.frame, moved, tools);
+            return Double.isNaN(one.tolerance)
+                    ? ForceCondition.createNormalForceCondition(moved, axes, axis(one.axis), one.threshold)
+                    : ForceCondition.createNormalForceCondition(moved, axes, axis(one.axis), one.threshold, one.tolerance);
+        }
+        if (node instanceof ShearForceAbove) {
+            ShearForceAbove one = (ShearForceAbove) node;
+            AbstractFrame axes = axes(one.frame, moved, tools);
+            return Double.isNaN(one.tolerance)
+                    ? ForceCondition.createShearForceCondition(moved, axes, axis(one.axis), one.threshold)
+                    : ForceCondition.createShearForceCondition(moved, axes, axis(one.axis), one.threshold, one.tolerance);
+        }
+        if (node instanceof ForceOutside) {
+            ForceOutside one = (ForceOutside) node;
+            AbstractFrame axes = axes(one.frame, moved, tools);
+            return Double.isNaN(one.tolerance) ? new ForceComponentCondition(moved, axes, axis(one.axis), one.low, one.high)
+                    : new ForceComponentCondition(moved, axes, axis(one.axis), one.low, one.high, one.tolerance);
+        }
+        if (node instanceof TorqueOutside) {
+            TorqueOutside one = (TorqueOutside) node;
+            AbstractFrame axes = axes(one.frame, moved, tools);
+            return Double.isNaN(one.tolerance) ? new TorqueComponentCondition(moved, axes, axis(one.axis), one.low, one.high)
+                    : new TorqueComponentCondition(moved, axes, axis(one.axis), one.low, one.high, one.tolerance);
+        }
+        if (node instanceof JointTorqueOutside) {
+            JointTorqueOutside one = (JointTorqueOutside) node;
+            return new JointTorqueCondition(JointEnum.values()[one.joint], one.low, one.high);
+        }
+        PathReached one = (PathReached) node;
+        return new MotionPathCondition(one.reference == PathReference.START ? ReferenceType.START : ReferenceType.DEST,
+                Convert.toMillimetres(one.distance), Math.round(one.delay * 1000));
+    }
+
+    private static AbstractFrame axes(String name, AbstractFrame moved, Tools tools) throws Refusal {
+        AbstractFrame found = tools.reference(name);
+        return found == null ? moved : found;
+    }
+
+    private static CoordinateAxis axis(Axis axis) {
+        return axis == Axis.X ? CoordinateAxis.X : axis == Axis.Y ? CoordinateAxis.Y : CoordinateAxis.Z;
+    }
+}
