@@ -45,14 +45,14 @@ class HeptarmNode:
         self._wake = threading.Event()
         # actionlib cannot end a server, so they live as long as the node, and reject while it is not configured
         self._goals = TrajectoryAction(self, ("~follow_joint_trajectory", *peers.actions()))
-        steps: tuple[tuple[str, Callable[[], str]], ...] = (
-            ("~configure", self.configure),
-            ("~activate", self.activate),
-            ("~deactivate", self.deactivate),
-            ("~cleanup", self.cleanup),
-            ("~reload", self.reload),
+        steps: tuple[tuple[type, str, Callable[[], str]], ...] = (
+            (Trigger, "~configure", self.configure),
+            (Trigger, "~activate", self.activate),
+            (Trigger, "~deactivate", self.deactivate),
+            (Trigger, "~cleanup", self.cleanup),
+            (Trigger, "~reload", self.reload),
         )
-        self._services = [rospy.Service(name, Trigger, _answered(step)) for name, step in steps]
+        self._services = [rospy.Service(name, kind, _answered(step)) for kind, name, step in steps]
         self._threads = [threading.Thread(target=self._report, name="heptarm-report")]
         if rospy.get_param("~autostart", True):
             self._threads.append(threading.Thread(target=self._start, name="heptarm-start"))

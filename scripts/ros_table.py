@@ -1,0 +1,254 @@
+"""Writes docs/reference/ros.md: what the nodes of both ROS have, read from their sources, and what it is in Python.
+
+    .venv/bin/python scripts/ros_table.py [--check]
+
+Nothing of ROS is imported: a declaration is a message type beside a name, in a call or in a table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import inspect
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "src"))
+
+from heptarm.arm.arm import Arm  # noqa: E402
+from heptarm.bridge.names import PRESETS  # noqa: E402
+from heptarm.bridge.parameters import PARAMETERS, Parameter, of_joints  # noqa: E402
+
+PAGE = ROOT / "docs" / "reference" / "ros.md"
+SOURCES = {
+    "ROS 2": ROOT / "ros2" / "heptarm_ros2" / "heptarm_ros2",
+    "ROS 1": ROOT / "ros1" / "heptarm_ros1" / "src" / "heptarm_ros1",
+}
+#: Modules of other nodes, and other drivers' names, which have a table of their own.
+OTHERS = ("reach.py", "peers.py")
+KINDS = ("publishes", "subscribes", "service", "action")
+#: The life cycle of ROS 2 is rclpy's; in ROS 1 it is a handful of services.
+LIFE = {
+    "~configure": "change_state",
+    "~activate": "change_state",
+    "~deactivate": "change_state",
+    "~cleanup": "change_state",
+    "~reload": "set_parameters",
+}
+#: Members of `heptarm.Arm` and what they are in ROS, by the names of ROS 2.
+API = {
+    "state": ("~/state", "joint_states", "~/external_torques", "~/pose", "~/wrench", "~/status"),
+    "states": ("~/state", "joint_states"),
+    "wait_until": ("~/state", "~/status"),
+    "subscribe": ("parameter `state_rate`",),
+    "move": ("~/move_joints", "~/move_pose", "~/command/joint", "~/command/pose", "~/command/lin"),
+    "start": ("~/command/joint", "~/command/pose", "~/command/lin"),
+    "servo": ("~/servo/joint", "~/servo/velocity", "~/servo/pose", "~/follow_joint_trajectory"),
+    "stop": ("~/stop",),
+    "set_override": ("~/set_override",),
+    "speed": ("parameter `speed`",),
+    "reconnect": ("by itself", "~/recover"),
+    "take_control": ("~/recover",),
+    "resume": ("~/recover", "~/resume"),
+    "pause": ("~/pause",),
+    "connected": ("~/status",),
+    "in_control": ("~/status",),
+    "cabinet": ("/diagnostics",),
+    "open": ("~/change_state",),
+    "close": ("~/change_state",),
+    "release_control": ("~/change_state",),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """A topic, a service or an action of a node.
+
+    Attributes:
+        name: as in ROS 2, "~/" for the node's own.
+        kind: one of `KINDS`.
+        type: "package/Type".
+    """
+
+    name: str
+    kind: str
+    type: str
+
+
+def declared(folder: Path) -> dict[tuple[str, str], Declared]:
+    """Everything that the sources in a folder declare, by kind and name."""
+    found = {}
+    for path in sorted(folder.glob("*.py")):
+        if path.name not in OTHERS:
+            for one in _of(ast.parse(path.read_text(encoding="utf-8"))):
+                found[one.kind, one.name] = one
+    return found
+
+
+def _of(tree: ast.Module) -> Iterator[Declared]:
+    types = {}  # of ROS: how they are called here, where they come from
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            package, _, kind = node.module.partition(".")
+            if kind in ("msg", "srv", "action"):
+                for name in node.names:
+                    types[name.asname or name.name] = (kind, f"{package}/{name.name}")
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Tuple):
+            entries, called = list(node.elts), ""
+        elif isinstance(node, ast.Call):
+            entries = list(node.args)
+            called = ast.unparse(node.func).rpartition(".")[2]
+        else:
+            continue
+        if called == "TrajectoryAction":
+            entries = [
+                one for entry in entries for one in (entry.elts if isinstance(entry, ast.Tuple) else [entry])
+            ]
+            for entry in entries:
+                if isinstance(entry, ast.Constant) and str(entry.value).startswith("~"):
+                    yield Declared(_name(str(entry.value)), "action", "control_msgs/FollowJointTrajectory")
+            continue
+        named = [entry.id for entry in entries if isinstance(entry, ast.Name) and entry.id in types]
+        texts = [
+            entry.value
+            for entry in entries
+            if isinstance(entry, ast.Constant) and isinstance(entry.value, str)
+        ]
+        if len(named) != 1 or len(texts) != 1:
+            continue
+        kind, kept = types[named[0]]
+        if kind == "srv":
+            yield Declared(_name(texts[0]), "service", kept)
+        elif kind == "action" or kept.endswith("Action"):
+            yield Declared(_name(texts[0]), "action", kept.removesuffix("Action"))
+        elif "publisher" in called:
+            yield Declared(_name(texts[0]), "publishes", kept)
+        else:
+            yield Declared(_name(texts[0]), "subscribes", kept)
+
+
+def _name(text: str) -> str:
+    return f"~/{text[1:].lstrip('/')}" if text.startswith("~") else text
+
+
+def ros1(name: str) -> str:
+    """A name of ROS 2 as ROS 1 writes it."""
+    return f"~{name[2:]}" if name.startswith("~/") else name
+
+
+def api() -> Iterator[tuple[str, str]]:
+    """The public members of `heptarm.Arm` and what they are in ROS; empty: nothing."""
+    both = {name for tables in (declared(folder) for folder in SOURCES.values()) for _, name in tables}
+    for name, member in inspect.getmembers(Arm):
+        if name.startswith("_"):
+            continue
+        parts = []
+        for one in API.get(name, ()):
+            if one == "~/change_state":
+                parts.append("the life cycle")
+            elif not one.startswith("~/") or one in both:
+                parts.append(one if " " in one else f"`{one}`")
+        call = f"{name}()" if inspect.isfunction(member) else name
+        yield call, ", ".join(parts)
+
+
+def _range(one: Parameter) -> str:
+    if one.choices:
+        return ", ".join(f"`{choice}`" for choice in one.choices)
+    return f"{one.low:g} to {one.high:g}" if isinstance(one.default, float) else ""
+
+
+def _default(one: Parameter) -> str:
+    if isinstance(one.default, list):
+        return f"`{one.default[0]}` to `{one.default[-1]}`"
+    return f"`{one.default!r}`" if isinstance(one.default, str) else f"`{str(one.default).lower()}`"
+
+
+def page() -> str:
+    """The page's text."""
+    tables = {ros: declared(folder) for ros, folder in SOURCES.items()}
+    lines = [
+        "# ROS: topics, services, actions, parameters",
+        "",
+        "Made by `scripts/ros_table.py` from the sources of both nodes. `~/` stands for the node's own name,",
+        "`/heptarm` unless it is given another; ROS 1 writes `~pose` where ROS 2 writes `~/pose`, and slashes for the dots of",
+        "parameters.",
+        "",
+        "## What the nodes have",
+        "",
+        "| name | what | type | ROS 2 | ROS 1 |",
+        "|---|---|---|---|---|",
+    ]
+    keys = sorted({*tables["ROS 2"], *tables["ROS 1"]}, key=lambda key: (KINDS.index(key[0]), key[1]))
+    for key in keys:
+        two, one = (tables[ros].get(key) for ros in ("ROS 2", "ROS 1"))
+        any_one = two or one
+        assert any_one is not None
+        life = LIFE.get(ros1(key[1])) if two is None else None
+        there = "yes" if two else f"`~/{life}`" if life else "no"
+        lines.append(f"| `{key[1]}` | {key[0]} | `{any_one.type}` | {there} | {'yes' if one else 'no'} |")
+    lines += [
+        "",
+        "## From Python to ROS",
+        "",
+        "What members of `heptarm.Arm` are in ROS. Where there is nothing, it is for Python alone so far.",
+        "",
+        "| Python | ROS |",
+        "|---|---|",
+        *(f"| `{name}` | {what or '-'} |" for name, what in api()),
+        "",
+        "## Parameters",
+        "",
+        "The same in both. Those marked *live* count at once, the others when the node is configured the next time.",
+        "",
+        "| name | default | legal | meaning |",
+        "|---|---|---|---|",
+    ]
+    for one_parameter in (*PARAMETERS, *of_joints(["<joint>"])):
+        live = "" if one_parameter.fixed else " *Live.*"
+        text = one_parameter.text[0].upper() + one_parameter.text[1:]
+        lines.append(
+            f"| `{one_parameter.name}` | {_default(one_parameter)} | {_range(one_parameter)} | {text}.{live} |"
+        )
+    lines += [
+        "",
+        "## Names of other drivers",
+        "",
+        "With the parameter `names`, the node has these, too, relative to its namespace; see",
+        "[Coming from other drivers](../guide/migration.md).",
+        "",
+        "| `names` | name | type | heptarm's own |",
+        "|---|---|---|---|",
+        *(
+            f"| `{preset}` | `{entry.name}` | `{entry.type}` | `{entry.ours}` |"
+            for preset, names in PRESETS.items()
+            for entry in names.entries
+        ),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def main() -> int:
+    """Writes the page, or says whether it is what would be written."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument(
+        "--check", action="store_true", help="write nothing; fail if the page is not up to date"
+    )
+    text = page()
+    if parser.parse_args().check:
+        if not PAGE.exists() or PAGE.read_text(encoding="utf-8") != text:
+            print(f"{PAGE.relative_to(ROOT)} is not up to date: run scripts/ros_table.py", file=sys.stderr)
+            return 1
+        return 0
+    PAGE.write_text(text, encoding="utf-8")
+    print(PAGE.relative_to(ROOT))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

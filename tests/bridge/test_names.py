@@ -1,0 +1,48 @@
+"""Targets as programs for libiiwa give them: NaN keeps."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from heptarm.bridge.names import PRESETS, joint_target, pose_target
+from heptarm.errors import ShapeError
+from heptarm.values.pose import Pose
+
+HERE = np.arange(7) * 0.1
+POSE = Pose.of([0.4, 0.1, 0.5], [1.0, 0.0, 0.0, 0.0])
+NAN = math.nan
+
+
+class FakeDriver:
+    """A driver of an arm that stands still."""
+
+    arm = SimpleNamespace(state=SimpleNamespace(q_cmd=HERE, pose_cmd=POSE))
+
+    def positions(self, names, values):
+        assert not names
+        return np.array(values)
+
+
+def test_nan_keeps_a_joint() -> None:
+    target = joint_target(FakeDriver(), [], [NAN, 1.0, NAN, NAN, NAN, NAN, NAN])
+    assert target[1] == 1.0 and (np.delete(target, 1) == np.delete(HERE, 1)).all()
+
+
+@pytest.mark.parametrize("quat", [(NAN,) * 4, (0.0,) * 4])
+def test_no_orientation_keeps_it(quat) -> None:
+    assert pose_target(FakeDriver(), (NAN, NAN, 0.3), quat) == Pose.of([0.4, 0.1, 0.3], POSE.quat)
+
+
+def test_half_an_orientation_is_none() -> None:
+    with pytest.raises(ShapeError, match="four numbers"):
+        pose_target(FakeDriver(), (0.4, 0.1, 0.5), (NAN, 0.0, 0.0, 1.0))
+
+
+def test_every_driver_has_joint_states_and_the_action() -> None:
+    for name, preset in PRESETS.items():
+        types = {entry.type for entry in preset.entries}
+        assert name == "heptarm" or {"sensor_msgs/JointState", "control_msgs/FollowJointTrajectory"} <= types
