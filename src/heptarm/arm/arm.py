@@ -12,16 +12,18 @@ from typing import TYPE_CHECKING, Literal, TypedDict, overload
 from heptarm.arm import fri_settings, program
 from heptarm.arm import servo as servo_module
 from heptarm.arm.connection import GROUPS, Connection
+from heptarm.arm.equipment import Equipment
 from heptarm.arm.feed import States
 from heptarm.arm.fri import Fri
 from heptarm.arm.handle import MotionHandle
 from heptarm.arm.modes import mode_message
 from heptarm.arm.servo import JointServo, PoseServo
 from heptarm.arm.stopping import REST_TIMEOUT, Stopping
+from heptarm.arm.tooling import Tooling
 from heptarm.errors import HeptarmError, ShapeError, StaleState, Timeout
 from heptarm.values.arrays import within
 from heptarm.values.mode import Mode
-from heptarm.values.motion import Motion
+from heptarm.values.motion import TOOL, Motion
 from heptarm.values.result import Result
 from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
@@ -49,9 +51,10 @@ class _ServoSettings(TypedDict, total=False):
     acceleration: float
     min_trajectory_time: float | None
     goal_timeout: float
+    moving: str
 
 
-class Arm(Stopping):
+class Arm(Equipment, Stopping):
     """A connected arm; made by `connect`. Its methods may be called from any thread.
 
     In a `with` block it is left at rest, however the block ends.
@@ -59,6 +62,7 @@ class Arm(Stopping):
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
+        self._tooling = Tooling(connection)
         self._speed = 1.0
         self._mode: Mode | None = None
 
@@ -81,6 +85,7 @@ class Arm(Stopping):
             ConnectFailed: nobody answers.
             NotInControl: another client has taken control meanwhile.
         """
+        self._tooling.forget()
         self._connection.reopen()
 
     def take_control(self) -> None:
@@ -89,6 +94,7 @@ class Arm(Stopping):
         Raises:
             NotInControl: another client controls the robot; the text names it.
         """
+        self._tooling.forget()
         self._connection.take_control()
 
     def release_control(self) -> None:
@@ -368,6 +374,7 @@ class Arm(Stopping):
         if speed is not None:
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
         chosen = mode_message(mode or self._mode)
+        self._tooling.check(motions, mode or self._mode)
         message = wire.Run(items=program.items(motions, self.robot, ceiling, mode=chosen), when=_WHEN[when])
         return self._connection.run(message, len(motions), self._limit(motions, ceiling))
 
@@ -396,11 +403,12 @@ class Arm(Stopping):
         acceleration: float = 0.2,
         min_trajectory_time: float | None = None,
         goal_timeout: float = 300.0,
+        moving: str = TOOL,
     ) -> JointServo | PoseServo:
         """A stream of targets that the arm follows; it begins with the `with` block.
 
         Args:
-            kind: what the targets are: "joint" positions or "pose" of the flange.
+            kind: what the targets are: "joint" positions or "pose" of the moved frame.
             rate: ticks per second of the loop [Hz].
             watchdog: within this time after a target the next one has to come, or the arm stops [s], 0.005 to 2;
                 None: five periods, and at least 0.05 s.
@@ -412,6 +420,7 @@ class Arm(Stopping):
             min_trajectory_time: no trajectory to a target is shorter [s]; None: a period and 5 ms.
             goal_timeout: after so long at its target without another one the cabinet's servo motion ends [s]; the
                 next target begins a new one.
+            moving: the moved frame: "tool" (the attached tool's, without one the flange), "flange" or a frame's name.
 
         Raises:
             LimitError: a value outside its range.
@@ -427,7 +436,10 @@ class Arm(Stopping):
             acceleration=acceleration,
             min_trajectory_time=min_trajectory_time,
             goal_timeout=goal_timeout,
+            moving=moving,
         )
+        self._tooling.check_moved(moving, "moving")
+        self._tooling.check_mode(mode or self._mode)
         stream = PoseServo if kind == "pose" else JointServo
         return stream(self._connection, message, rate=hertz, watchdog=seconds)
 

@@ -42,7 +42,7 @@ def connect(
         control: take control; otherwise observe (and stop). One client at a time controls.
         timeout: how long to wait for the connection and for the answer to each request [s].
         state_rate: states pushed per second [Hz]; 0 for none.
-        groups: what a state contains: "joints", "torques", "pose", "wrench", "motion", "safety".
+        groups: what a state contains: "joints", "torques", "pose", "wrench", "motion", "safety", "mode".
         on_disconnect: what the cabinet does with accepted motions when this client is lost: "stop" or "finish".
         watchdog: silence after which the cabinet counts this client as lost, [0.1, 10] s.
 

@@ -30,7 +30,7 @@ from heptarm.wire.messages import Message
 _log = logging.getLogger("heptarm.arm")
 
 #: What a state contains unless something else is asked for.
-GROUPS = ("joints", "torques", "pose", "wrench", "motion", "safety")
+GROUPS = ("joints", "torques", "pose", "wrench", "motion", "safety", "mode")
 #: Pauses between attempts to reconnect [s].
 _BACK_OFF, _LONGEST_BACK_OFF = 0.1, 2.0
 #: FRI sessions whose last change is remembered.

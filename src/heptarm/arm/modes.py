@@ -47,6 +47,53 @@ def mode_message(mode: Mode | None) -> wire.Mode | None:
     )
 
 
+def read_mode(told: wire.Mode) -> Mode:
+    """The mode that a message tells."""
+    if isinstance(told, wire.JointImpedance):
+        return JointImpedance(told.stiffness, damping=told.damping)
+    if isinstance(told, wire.CartesianImpedance):
+        return _read_cartesian(told)
+    if isinstance(told, wire.SineImpedance):
+        return SineImpedance(
+            _read_cartesian(told.base),
+            amplitude=told.amplitude,
+            frequency=told.frequency,
+            phase=told.phase,
+            bias=told.bias,
+            force_limit=told.force_limit,
+            position_limit=told.position_limit,
+            total_time=told.total_time,
+            rise_time=told.rise_time,
+            hold_time=told.hold_time,
+            fall_time=told.fall_time,
+            stay_active=told.stay_active,
+        )
+    if isinstance(told, wire.SpiralPattern):
+        return SineImpedance.spiral(
+            told.plane.name.lower(),
+            frequency=told.frequency,
+            amplitude=told.amplitude,
+            stiffness=told.stiffness,
+            total_time=told.total_time,
+        )
+    return Position()
+
+
+def _read_cartesian(told: wire.CartesianImpedance) -> CartesianImpedance:
+    return CartesianImpedance(
+        told.stiffness,
+        damping=told.damping,
+        nullspace_stiffness=told.nullspace_stiffness,
+        nullspace_damping=told.nullspace_damping,
+        additional_force=told.additional_force,
+        max_force=told.max_force,
+        max_force_stops=told.max_force_stops,
+        max_velocity=told.max_velocity,
+        max_deviation=told.max_deviation,
+        frame=told.frame or TOOL,
+    )
+
+
 def _cartesian(mode: CartesianImpedance) -> wire.CartesianImpedance:
     return wire.CartesianImpedance(
         stiffness=tuple(mode.stiffness.tolist()),

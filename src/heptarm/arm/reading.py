@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from heptarm.arm.modes import read_mode
 from heptarm.errors import ConnectFailed, RemoteProtocolError
 from heptarm.values import state as values
 from heptarm.values.arrays import Array
@@ -34,7 +35,15 @@ def read_state(body: bytes, offset: ClockOffset, clock: Callable[[], int]) -> va
         stamp = max(
             (
                 group.stamp
-                for group in (told.joints, told.torques, told.pose, told.wrench, told.motion, told.safety)
+                for group in (
+                    told.joints,
+                    told.torques,
+                    told.pose,
+                    told.wrench,
+                    told.motion,
+                    told.safety,
+                    told.mode,
+                )
                 if group is not None
             ),
             default=0,
@@ -46,6 +55,7 @@ def read_state(body: bytes, offset: ClockOffset, clock: Callable[[], int]) -> va
             external=None if told.wrench is None else _wrench(told.wrench),
             motion=None if told.motion is None else _motion(told.motion),
             status=None if told.safety is None else _safety(told.safety),
+            control=None if told.mode is None else _control(told.mode),
             sampled=offset.to_ours(stamp),
             clock=clock,
         )
@@ -120,6 +130,10 @@ def _wrench(told: wire.WrenchState) -> values.Wrench:
         _array(told.force_inaccuracy),
         _array(told.torque_inaccuracy),
     )
+
+
+def _control(told: wire.ModeState) -> values.Control:
+    return values.Control(told.stamp, read_mode(told.mode), told.tool, told.workpiece, told.frame)
 
 
 def _motion(told: wire.MotionState) -> values.Motion:

@@ -24,6 +24,7 @@ import numpy.typing as npt
 from heptarm.arm.handle import MotionHandle
 from heptarm.arm.modes import mode_message
 from heptarm.errors import HeptarmError, LimitError, LocalProtocolError, ShapeError, Timeout
+from heptarm.values.arguments import TOOL, check_name
 from heptarm.values.arrays import Array, array, within
 from heptarm.values.mode import Mode
 from heptarm.values.pose import Pose
@@ -357,12 +358,14 @@ def open_message(
     acceleration: float,
     min_trajectory_time: float | None,
     goal_timeout: float,
+    moving: str = TOOL,
 ) -> tuple[wire.ServoOpen, float, float]:
     """The message that opens a servo motion, its rate [Hz] and its watchdog [s], all checked; see `Arm.servo`."""
     if engine not in ENGINES:
         raise ShapeError(
             f"engine is {engine!r}; allowed are {', '.join(map(repr, ENGINES))}", parameter="engine"
         )
+    check_name(moving, "moving")
     if kind not in ("joint", "pose"):
         raise ShapeError(f"kind is {kind!r}; allowed are 'joint', 'pose'", parameter="kind")
     hertz = within(rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
@@ -383,6 +386,7 @@ def open_message(
     return (
         wire.ServoOpen(
             engine=ENGINES[engine],
+            frame="" if moving == TOOL else moving,
             mode=mode_message(mode),
             velocity=within(speed, "speed", 0.0, 1.0, above=True),
             acceleration=within(acceleration, "acceleration", 0.0, 1.0, above=True),

@@ -13,6 +13,10 @@ from heptarm.wire.messages import PORT
 #: Environment variable that names the default target.
 VARIABLE = "HEPTARM_TARGET"
 
+#: Options of a private virtual cabinet besides its speed: a box around the arm; what hangs on the flange whatever the
+#: controller is told; the project's RoboticsAPI.data.xml.
+_OTHERS = ("box", "payload", "project")
+
 _EXAMPLES = (
     'examples: "172.31.1.147" or "172.31.1.147:30001" (a cabinet), "sim://iiwa14" or "sim://iiwa7?speed=5" '
     '(a private simulator), "sim://localhost:30001" (a running `heptarm sim`)'
@@ -105,10 +109,10 @@ def _address(text: str) -> Target:
 
 def _check(options: tuple[tuple[str, str], ...]) -> None:
     for name, value in options:
-        if name == "box":
+        if name in _OTHERS:
             continue  # the cabinet looks at it
         if name != "speed":
-            raise ValueError(f"there is no option {name!r}; there are speed and box")
+            raise ValueError(f"there is no option {name!r}; there are speed, {', '.join(_OTHERS)}")
         try:
             good = 0.01 <= float(value) <= 100.0
         except ValueError:

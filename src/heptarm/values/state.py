@@ -17,6 +17,7 @@ import numpy as np
 
 from heptarm.errors import StaleState
 from heptarm.values.arrays import Array, Value, frozen
+from heptarm.values.mode import Mode
 from heptarm.values.pose import Pose
 from heptarm.values.redundancy import Redundancy
 
@@ -116,6 +117,23 @@ class Wrench(Value):
         for name in ("force", "torque", "force_inaccuracy", "torque_inaccuracy"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
+    def seen(self, lever: Array, axes: Array) -> Wrench:
+        """The same load at another point in other axes.
+
+        Args:
+            lever: from that point to the present one, base axes, shape (3,) [m].
+            axes: the other axes as columns in the base frame, shape (3, 3).
+        """
+        back, arm = np.abs(axes.T), np.abs(lever)
+        reach = np.array([[0.0, arm[2], arm[1]], [arm[2], 0.0, arm[0]], [arm[1], arm[0], 0.0]])
+        return Wrench(
+            self.stamp,
+            axes.T @ self.force,
+            axes.T @ (self.torque + np.cross(lever, self.force)),
+            back @ self.force_inaccuracy,
+            back @ (self.torque_inaccuracy + reach @ self.force_inaccuracy),
+        )
+
     @property
     def array(self) -> Array:
         """Fx fy fz [N], tx ty tz [Nm], shape (6,)."""
@@ -197,6 +215,25 @@ class Safety(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Control(Value):
+    """Control mode and tool in force.
+
+    Attributes:
+        stamp: cabinet time of the sample [ns].
+        mode: control mode with its parameters, as the cabinet has it; position control while nothing runs.
+        tool: name of the attached tool; empty: none.
+        workpiece: name of the attached workpiece; empty: none.
+        frame: what motions move unless they say another: a frame of the tool's, or "flange".
+    """
+
+    stamp: int
+    mode: Mode
+    tool: str = ""
+    workpiece: str = ""
+    frame: str = "flange"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class State(Value):
     """A snapshot. The short names reach into the groups and raise StaleState if the group is missing.
 
@@ -207,6 +244,7 @@ class State(Value):
         external: wrench.
         motion: what runs.
         status: safety and readiness.
+        control: control mode and tool.
         sampled: when the newest group was sampled, on this side's clock [ns].
         clock: this side's clock [ns], for the age.
     """
@@ -217,13 +255,22 @@ class State(Value):
     external: Wrench | None = None
     motion: Motion | None = None
     status: Safety | None = None
+    control: Control | None = None
     sampled: int = 0
     clock: Callable[[], int] | None = field(default=None, repr=False, compare=False)
 
     @property
     def stamp(self) -> int:
         """Cabinet time of the newest group [ns]; 0 without any."""
-        groups = (self.joints, self.torques, self.cartesian, self.external, self.motion, self.status)
+        groups = (
+            self.joints,
+            self.torques,
+            self.cartesian,
+            self.external,
+            self.motion,
+            self.status,
+            self.control,
+        )
         return max((group.stamp for group in groups if group is not None), default=0)
 
     @property
@@ -280,6 +327,16 @@ class State(Value):
     def wrench(self) -> Wrench:
         """External force and torque."""
         return _of(self.external, "wrench")
+
+    @property
+    def mode(self) -> Mode:
+        """Control mode in force, with its parameters."""
+        return _of(self.control, "mode").mode
+
+    @property
+    def tool(self) -> str:
+        """Name of the attached tool; empty: none."""
+        return _of(self.control, "mode").tool
 
     @property
     def safety(self) -> Safety:

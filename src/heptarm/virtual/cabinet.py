@@ -22,9 +22,10 @@ from pathlib import Path
 from typing import Any
 
 from heptarm.fri.version import Version
-from heptarm.virtual import processdata
+from heptarm.virtual import processdata, templates
 from heptarm.virtual.fri.sessions import Sessions
 from heptarm.virtual.pacer import Pacer
+from heptarm.virtual.payload import hanging
 from heptarm.virtual.plant import Plant
 from heptarm.virtual.world import Box
 
@@ -56,13 +57,20 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     parser.add_argument(
         "--fri-version", default="1.15", help="release of the cabinet's FRI, such as 1.11 or 2.5"
     )
-    parser.add_argument("--project", type=Path, help="RoboticsAPI.data.xml with process data")
+    parser.add_argument(
+        "--project", type=Path, help="RoboticsAPI.data.xml with process data, templates and frames"
+    )
     parser.add_argument(
         "--box",
         action="append",
         default=[],
         metavar="X,Y,Z,LENGTH,WIDTH,HEIGHT",
         help="a box that stands around the arm [m]",
+    )
+    parser.add_argument(
+        "--payload",
+        metavar="MASS[,X,Y,Z]",
+        help="what hangs on the flange, whatever the controller is told [kg, m]",
     )
     parser.add_argument("--data", action="append", default=[], metavar="NAME=VALUE", help="process data")
     parser.add_argument(
@@ -113,6 +121,10 @@ class VirtualCabinet:
         self._station = jvm.open_station(self.plant, self.sessions)
         for name, value in data.items():
             self._station.setProcessData(name, jvm.boxed(value))
+        if options.project is not None:
+            jvm.furnish(self._station, templates.read(options.project))
+        if options.payload is not None:
+            self.plant.hang(hanging(options.payload))
         self.host = jpype.JClass("heptarm.doubles.Host")(options.application or jvm.APPLICATION)
 
     def tick(self) -> None:
@@ -215,6 +227,10 @@ def main(argv: list[str] | None = None) -> int:
         data = process_data(options)
         for text in options.box:
             Box.of(text)
+        if options.payload is not None:
+            hanging(options.payload)
+        if options.project is not None:
+            templates.read(options.project)
     except (ValueError, OSError) as error:
         print(json.dumps({"ready": False, "error": str(error)}), flush=True)
         return 2

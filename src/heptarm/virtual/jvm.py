@@ -33,6 +33,7 @@ from heptarm.values.pose import Pose
 from heptarm.virtual.fri.sessions import Sessions
 from heptarm.virtual.order import Order, PlanError, Watch
 from heptarm.virtual.plant import Plant
+from heptarm.virtual.templates import Project
 
 #: Oldest Java that runs the doubles.
 OLDEST = 17
@@ -240,6 +241,22 @@ def _order(java: Any) -> Order:
         watches=_watches(java),
         part_listener=listener,
     )
+
+
+def furnish(station: Any, project: Project) -> None:
+    """Give a station the templates and taught frames of a project."""
+    made = jpype.JClass("heptarm.doubles.Template")
+    for one in project.templates:
+        template = made(one.is_tool, one.mass, _doubles(one.centre), _doubles(one.inertia), one.moved)
+        for path, placed in one.frames:
+            template.addFrame(path, _doubles(placed))
+        station.addTemplate(one.name, template)
+    for path, placed in project.frames:
+        station.addFrame(path, _doubles(placed))
+
+
+def _doubles(values: Sequence[float]) -> Any:
+    return jpype.JArray(jpype.JDouble)(list(values))
 
 
 def open_station(plant: Plant, sessions: Sessions) -> Any:

@@ -13,11 +13,25 @@ from copy import copy
 import mujoco
 import numpy as np
 
+from heptarm.errors import HeptarmError
 from heptarm.values.arrays import Array
 from heptarm.values.links import Body, symmetric
 
 #: No load at all.
 NOTHING = Body(0.0, np.zeros(3))
+
+
+def hanging(text: str) -> Body:
+    """A load as a command line says it: mass [kg], perhaps centre of mass in the flange frame [m], with commas.
+
+    Raises:
+        ValueError: it is none; the text says why.
+    """
+    try:
+        mass, *com = (float(part) for part in text.split(","))
+        return Body(mass, np.array(com or (0.0, 0.0, 0.0)))
+    except (ValueError, HeptarmError) as error:
+        raise ValueError(f"payload {text!r}: {error}; MASS or MASS,X,Y,Z is wanted") from None
 
 
 class _Link:

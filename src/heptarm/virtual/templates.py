@@ -1,0 +1,103 @@
+"""Tool templates and taught frames of a Sunrise project: those of its RoboticsAPI.data.xml."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+from xml.etree import ElementTree
+
+#: x y z [mm], a b c [rad], as the file has them.
+Six: TypeAlias = tuple[float, ...]
+
+_KINDS = {"toolTemplate": True, "workpieceTemplate": False}
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """A tool or a workpiece.
+
+    Attributes:
+        name: what an application asks for.
+        is_tool: otherwise a workpiece.
+        mass: [kg].
+        centre: of mass and its axes, x y z [mm], a b c [rad].
+        inertia: about those axes, shape (3,) [kg m²].
+        moved: path of the default motion frame; empty: the root.
+        frames: path and transformation from the parent, x y z [mm], a b c [rad]; parents first.
+    """
+
+    name: str
+    is_tool: bool
+    mass: float
+    centre: Six
+    inertia: Six
+    moved: str
+    frames: tuple[tuple[str, Six], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Project:
+    """What a project knows of objects and places.
+
+    Attributes:
+        templates: tools and workpieces.
+        frames: taught frames: path and transformation from the parent; parents first.
+    """
+
+    templates: tuple[Template, ...] = ()
+    frames: tuple[tuple[str, Six], ...] = ()
+
+
+def read(file: Path) -> Project:
+    """Returns the templates and frames of a project file.
+
+    Raises:
+        ValueError: the file is no XML, or a number in it is none.
+        OSError: the file cannot be read.
+    """
+    try:
+        root = ElementTree.fromstring(file.read_bytes())
+        return Project(
+            tuple(_template(one) for kind in _KINDS for one in root.iter(kind)),
+            tuple(frame for world in root.iter("world") for frame in _frames(world, "")),
+        )
+    except ElementTree.ParseError as error:
+        raise ValueError(f"{file} is no project data: {error}") from error
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from error
+
+
+def _template(one: ElementTree.Element) -> Template:
+    found = one.find("loadData")
+    load = ElementTree.Element("loadData") if found is None else found
+    return Template(
+        one.get("name", ""),
+        _KINDS[one.tag],
+        _number(load, "mass"),
+        tuple(_number(load, f"cog{axis}", f"centerOfMass{axis}") for axis in "XYZABC"),
+        tuple(_number(load, f"inertia{axis}") for axis in "XYZ"),
+        one.get("defaultMotionFrameRef", "").strip("/"),
+        tuple(_frames(one, "")),
+    )
+
+
+def _frames(parent: ElementTree.Element, path: str) -> Iterator[tuple[str, Six]]:
+    for one in parent:
+        if one.tag == "frames":
+            yield from _frames(one, path)
+        elif one.tag == "frame":
+            name = f"{path}{one.get('name', '')}"
+            found = one.find("transformation")
+            placed = ElementTree.Element("transformation") if found is None else found
+            yield name, tuple(_number(placed, axis) for axis in "xyzabc")
+            yield from _frames(one, f"{name}/")
+
+
+def _number(element: ElementTree.Element, *names: str) -> float:
+    text = next((element.get(name) for name in names if element.get(name) is not None), None)
+    try:
+        return float(text or 0.0)
+    except ValueError:
+        raise ValueError(f"{element.tag} {names[0]} is {text!r}, which is no number") from None
