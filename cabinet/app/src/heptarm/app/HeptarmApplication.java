@@ -30,7 +30,9 @@ public class HeptarmApplication extends RoboticsAPIApplication {
                 text("heptarm.key", ""), text("heptarm.allow", ""), number("heptarm.heartbeat", 0.5),
                 number("heptarm.max_rate", 200.0));
         Tools tools = new Tools(lbr, getApplicationData(), text("heptarm.tools", ""), text("heptarm.frames", ""), log);
-        server = new Server(new SunriseRobot(lbr, tools, getApplicationControl(), log), config, Clocks.find(), log);
+        SunriseRobot robot = new SunriseRobot(lbr, tools, getApplicationControl(), log);
+        robot.heed(getRecovery());
+        server = new Server(robot, config, Clocks.find(), log);
         try {
             UserKeys.publish(this, server, log);
         } catch (LinkageError e) { // an old cabinet; everything else works without them

@@ -68,6 +68,12 @@ final class SunriseJob implements Job, IMotionContainerListener {
 
     /** The cabinet speaks in texts only. */
     static int code(String text) {
+        if (text.indexOf("safety stop") >= 0) {
+            return Code.SAFETY_STOP;
+        }
+        if (text.indexOf("singularity") >= 0) {
+            return text.indexOf("Can not plan") >= 0 ? Code.PLANNING_FAILED : Code.EXECUTION_FAILED;
+        }
         if (text.indexOf("violates limit") >= 0) {
             return Code.JOINT_LIMIT;
         }

@@ -9,10 +9,9 @@ import java.util.Map;
 import java.util.ServiceLoader;
 
 import com.kuka.roboticsAPI.applicationModel.IApplicationControl;
-import com.kuka.roboticsAPI.controllerModel.sunrise.ISafetyState;
+import com.kuka.roboticsAPI.controllerModel.recovery.IRecovery;
 import com.kuka.roboticsAPI.controllerModel.sunrise.ResumeMode;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseExecutionService;
-import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseSafetyState;
 import com.kuka.roboticsAPI.deviceModel.Device;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
@@ -44,11 +43,9 @@ import heptarm.wire.FrameInfo;
 import heptarm.wire.FriOpen;
 import heptarm.wire.Item;
 import heptarm.wire.Mode;
-import heptarm.wire.OperationMode;
 import heptarm.wire.PoseState;
 import heptarm.wire.Redundancy;
 import heptarm.wire.RobotInfo;
-import heptarm.wire.SafetyBits;
 import heptarm.wire.SafetyState;
 import heptarm.wire.ServoOpen;
 import heptarm.wire.SignalInfo;
@@ -65,6 +62,7 @@ final class SunriseRobot implements Robot, IErrorHandler {
     private final Motions motions;
     private final RobotInfo info;
     private final Insight insight;
+    private final SunriseSafety safety;
     private final Map<IMotionContainer, SunriseJob> jobs = new IdentityHashMap<IMotionContainer, SunriseJob>();
     private final Map<IMotionContainer, String> orphans = new IdentityHashMap<IMotionContainer, String>();
 
@@ -79,7 +77,13 @@ final class SunriseRobot implements Robot, IErrorHandler {
                 lbr.getJointLimits().getMaxJointPosition().get());
         Iterator<Insight> found = ServiceLoader.load(Insight.class, Insight.class.getClassLoader()).iterator();
         this.insight = found.hasNext() ? found.next() : null;
+        this.safety = new SunriseSafety(lbr, execution, insight);
         control.registerMoveAsyncErrorHandler(this);
+    }
+
+    /** From now on the safety state tells whether the application has to be recovered first. */
+    void heed(IRecovery recovery) {
+        safety.heed(recovery);
     }
 
     public RobotInfo info() {
@@ -191,29 +195,7 @@ final class SunriseRobot implements Robot, IErrorHandler {
     }
 
     public SafetyState readSafety(long stamp) {
-        ISafetyState safety = lbr.getSafetyState();
-        int bits = 0;
-        bits |= lbr.isReadyToMove() ? SafetyBits.READY_TO_MOVE : 0;
-        bits |= execution.isPaused() ? SafetyBits.PAUSED : 0;
-        bits |= lbr.hasActiveMotionCommand() ? SafetyBits.MOVING : 0;
-        bits |= lbr.isMastered() ? SafetyBits.MASTERED : 0;
-        boolean emergency = safety.getEmergencyStopInt() == SunriseSafetyState.EmergencyStop.ACTIVE
-                || safety.getEmergencyStopEx() == SunriseSafetyState.EmergencyStop.ACTIVE;
-        bits |= emergency ? SafetyBits.EMERGENCY_STOP : 0;
-        bits |= safety.getSafetyStopSignal() != SunriseSafetyState.SafetyStopType.NOSTOP ? SafetyBits.PROTECTIVE_STOP : 0;
-        bits |= safety.getOperatorSafetyState() != SunriseSafetyState.OperatorSafety.OPERATOR_SAFETY_CLOSED
-                ? SafetyBits.OPERATOR_SAFETY_OPEN : 0;
-        bits |= safety.getEnablingDeviceState() != SunriseSafetyState.EnablingDeviceState.NONE ? SafetyBits.ENABLING_SWITCH : 0;
-        bits |= safety.areAllAxesGMSReferenced() ? SafetyBits.TORQUE_REFERENCED : 0;
-        bits |= safety.areAllAxesPositionReferenced() ? SafetyBits.POSITION_REFERENCED : 0;
-        return new SafetyState(stamp, bits, mode(lbr.getOperationMode()));
-    }
-
-    private static OperationMode mode(com.kuka.roboticsAPI.deviceModel.OperationMode mode) {
-        if (mode == com.kuka.roboticsAPI.deviceModel.OperationMode.AUT) {
-            return OperationMode.AUT;
-        }
-        return mode == com.kuka.roboticsAPI.deviceModel.OperationMode.T2 ? OperationMode.T2 : OperationMode.T1;
+        return safety.read(stamp);
     }
 
     public void readProgress(double[] progressAndRemaining) {
@@ -344,6 +326,15 @@ final class SunriseRobot implements Robot, IErrorHandler {
         execution.cancelAll();
     }
 
+    /** A cabinet offers applications one kind of braking; only a simulated one has another. */
+    public void stopFast() {
+        if (insight != null) {
+            insight.stopFast();
+        } else {
+            stop();
+        }
+    }
+
     public void pause() {
         execution.startPause();
     }
@@ -361,13 +352,7 @@ final class SunriseRobot implements Robot, IErrorHandler {
     }
 
     public void recover() throws Refusal {
-        if (execution.isPaused()) {
-            execution.resumeExecution(ResumeMode.OnPath);
-        }
-        if (!lbr.isReadyToMove()) {
-            throw new Refusal(Code.NEEDS_OPERATOR, "release the emergency stop and the safety stops, acknowledge at the smartPAD,"
-                    + " hold the enabling switch unless the mode is AUT, and press Start");
-        }
+        safety.recover();
     }
 
     public void show(int severity, String text) {

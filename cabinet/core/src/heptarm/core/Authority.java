@@ -28,7 +28,9 @@ final class Authority {
         boolean changed = holder == null;
         if (changed && server.executor.status()[0] == 0) {
             // a pause and the override belong to a controller; the next one begins without them
-            server.robot.resume();
+            if (!server.warden.isHolding()) { // a stop is another matter
+                server.robot.resume();
+            }
             server.robot.setOverride(1.0);
         }
         holder = client;

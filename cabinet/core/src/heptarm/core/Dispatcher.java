@@ -169,6 +169,7 @@ final class Dispatcher {
             checkMode(((ServoOpen) message).mode, "mode.");
             checkUntil((ServoOpen) message);
             server.robot.check((ServoOpen) message);
+            server.warden.check();
             id = server.executor.open(new Stream(server, (ServoOpen) message));
         } else if (message instanceof ServoSettings) {
             checkMode(((ServoSettings) message).mode, "mode.");
@@ -203,7 +204,7 @@ final class Dispatcher {
         } else if (Fitting.concerns(message)) {
             Fitting.make(server, message);
         } else if (message instanceof Recover) {
-            server.robot.recover();
+            server.warden.recover();
         } else if (message instanceof ShowMessage) {
             ShowMessage note = (ShowMessage) message;
             server.robot.show(note.severity.value(), note.text);
@@ -232,6 +233,7 @@ final class Dispatcher {
         server.robot.check(open);
         FriRun run = new FriRun(server, open);
         if (!run.onlyMonitors()) {
+            server.warden.check();
             return server.executor.open(run);
         }
         long id = server.executor.number();
@@ -270,6 +272,7 @@ final class Dispatcher {
             }
             server.robot.check(item, path);
         }
+        server.warden.check();
         return server.executor.add(run);
     }
 

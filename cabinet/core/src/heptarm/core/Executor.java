@@ -157,11 +157,30 @@ final class Executor {
             return;
         }
         endAll(Cause.STOPPED, "a stop was commanded");
-        server.robot.stop();
+        if (kind == StopKind.FAST) {
+            server.robot.stopFast();
+        } else {
+            server.robot.stop();
+        }
     }
 
     void endAll(Cause cause, String why) {
-        end(take(0), cause, why);
+        endAll(cause, 0, why);
+    }
+
+    void endAll(Cause cause, int code, String why) {
+        end(take(0), cause, code, why);
+    }
+
+    /** Ends what runs if it is led from outside. */
+    void endActivity(Cause cause, int code, String why) {
+        Program program;
+        synchronized (this) {
+            program = running;
+        }
+        if (program != null && program.activity != null) {
+            program.end(cause, code, why);
+        }
     }
 
     private synchronized List<Program> take(long id) {
@@ -179,8 +198,12 @@ final class Executor {
     }
 
     private void end(List<Program> programs, Cause cause, String why) {
+        end(programs, cause, 0, why);
+    }
+
+    private void end(List<Program> programs, Cause cause, int code, String why) {
         for (Program program : programs) {
-            program.end(cause, why);
+            program.end(cause, code, why);
             boolean waiting;
             synchronized (this) {
                 waiting = program != running;

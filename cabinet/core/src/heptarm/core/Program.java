@@ -4,6 +4,7 @@ import java.util.ArrayList;
 import java.util.List;
 
 import heptarm.wire.Cause;
+import heptarm.wire.Code;
 import heptarm.wire.ConditionFired;
 import heptarm.wire.MotionStarted;
 import heptarm.wire.Run;
@@ -40,10 +41,15 @@ final class Program {
 
     /** Ends it for a cause; the first cause counts. */
     void end(Cause newCause, String newWhy) {
+        end(newCause, 0, newWhy);
+    }
+
+    void end(Cause newCause, int newCode, String newWhy) {
         List<Job> all;
         synchronized (this) {
             if (cause == null) {
                 cause = newCause;
+                code = newCode;
                 why = newWhy;
             }
             all = new ArrayList<Job>(jobs);
@@ -65,8 +71,9 @@ final class Program {
     synchronized void fail(int index, int failureCode, String failure) {
         ended[index] = Job.Ended.FAILED;
         if (cause == null) {
-            cause = Cause.FAILED;
-            code = failureCode;
+            boolean stopped = failureCode == Code.SAFETY_STOP || server.warden.isStopped();
+            cause = stopped ? Cause.SAFETY : Cause.FAILED;
+            code = stopped ? Code.SAFETY_STOP : failureCode;
             text = failure;
         }
         notifyAll();

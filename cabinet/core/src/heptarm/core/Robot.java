@@ -89,8 +89,11 @@ public interface Robot {
     /** Opens an FRI session; nothing moves yet. */
     Fri fri(FriOpen open, Fri.Listener listener) throws Refusal;
 
-    /** Brakes whatever moves and drops what waits. Never blocks for long. */
+    /** Brakes whatever moves on its path and drops what waits. Never blocks for long. */
     void stop();
+
+    /** The same, as hard as the robot can. */
+    void stopFast();
 
     void pause();
 
@@ -101,7 +104,7 @@ public interface Robot {
 
     double override();
 
-    /** Does what software may do to make the robot ready; refuses with the operator's steps otherwise. */
+    /** Acknowledges what software may, and lets execution go on; it need not have happened when this returns. */
     void recover() throws Refusal;
 
     /** Shows a text to the person at the robot. */

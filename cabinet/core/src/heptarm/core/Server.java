@@ -33,6 +33,7 @@ public final class Server {
     final Log log;
     final Authority authority;
     final Executor executor;
+    final Warden warden;
     final Rack rack;
     final FriMonitors monitors = new FriMonitors();
     final Sampler sampler;
@@ -53,6 +54,7 @@ public final class Server {
         this.log = log;
         this.authority = new Authority(this);
         this.executor = new Executor(this);
+        this.warden = new Warden(this);
         this.rack = new Rack(robot);
         this.sampler = new Sampler(this);
         this.dispatcher = new Dispatcher(this);

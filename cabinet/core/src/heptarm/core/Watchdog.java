@@ -2,8 +2,6 @@ package heptarm.core;
 
 import heptarm.wire.Code;
 import heptarm.wire.Ping;
-import heptarm.wire.SafetyChanged;
-import heptarm.wire.SafetyState;
 
 /** Watches over the clients and the robot: silence, stuck connections, changes of the safety state. */
 final class Watchdog {
@@ -16,7 +14,6 @@ final class Watchdog {
     private final Server server;
     private Thread thread;
     private volatile boolean closed;
-    private SafetyState safety;
 
     Watchdog(Server server) {
         this.server = server;
@@ -49,7 +46,7 @@ final class Watchdog {
                     look();
                     server.monitors.look();
                     if (++round % SAFETY_EVERY == 0) {
-                        lookAtSafety();
+                        server.warden.look();
                         failing = false;
                     }
                 } catch (RuntimeException e) {
@@ -85,18 +82,5 @@ final class Watchdog {
                 client.event(Ping.TYPE, new Ping(now).body());
             }
         }
-    }
-
-    private void lookAtSafety() {
-        SafetyState seen = server.robot.readSafety(server.clock.nanos());
-        int changing = ~heptarm.wire.SafetyBits.MOVING;
-        if (safety != null && ((seen.bits ^ safety.bits) & changing) == 0 && seen.mode == safety.mode) {
-            return;
-        }
-        if (safety != null) {
-            boolean ready = (seen.bits & heptarm.wire.SafetyBits.READY_TO_MOVE) != 0;
-            server.broadcast(new SafetyChanged(seen.bits, seen.mode, ready ? "the robot is ready to move" : "the robot is not ready to move"));
-        }
-        safety = seen;
     }
 }

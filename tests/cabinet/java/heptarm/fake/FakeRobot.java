@@ -78,6 +78,8 @@ final class FakeRobot implements Robot, Runnable {
     private final RobotInfo info;
     private volatile double override = 1.0;
     private volatile boolean paused;
+    private volatile int safety;
+    private volatile OperationMode operation = OperationMode.AUT;
     private volatile long blindUntil;
     private volatile long jammedUntil;
 
@@ -399,7 +401,9 @@ final class FakeRobot implements Robot, Runnable {
     @Override
     public SafetyState readSafety(long stamp) {
         pay(6);
-        return new SafetyState(stamp, SafetyBits.READY_TO_MOVE | (paused ? SafetyBits.PAUSED : 0), OperationMode.AUT);
+        int bits = safety | SafetyBits.MASTERED | (paused ? SafetyBits.PAUSED : 0);
+        boolean stopped = safety != 0 && safety != SafetyBits.ENABLING_SWITCH || operation != OperationMode.AUT && safety == 0;
+        return new SafetyState(stamp, stopped ? bits : bits | SafetyBits.READY_TO_MOVE, operation);
     }
 
     @Override
@@ -438,12 +442,43 @@ final class FakeRobot implements Robot, Runnable {
     }
 
     @Override
-    public void recover() throws Refusal {
-        throw new Refusal(Code.NEEDS_OPERATOR, "release the emergency stop");
+    public void stopFast() {
+        stop();
+    }
+
+    /** Acknowledges a safety stop that nobody has to lift. */
+    @Override
+    public void recover() {
+        safety &= ~SafetyBits.PROTECTIVE_STOP;
+        paused = false;
+    }
+
+    /** What happens at the smartPAD; a stop pauses, as on the cabinet. */
+    private void operate(String what) {
+        if ("operator: emergency stop".equals(what)) {
+            safety = SafetyBits.EMERGENCY_STOP | SafetyBits.PROTECTIVE_STOP;
+        } else if ("operator: safeguard".equals(what)) {
+            safety = SafetyBits.OPERATOR_SAFETY_OPEN | SafetyBits.PROTECTIVE_STOP;
+        } else if ("operator: safety stop".equals(what)) {
+            safety = SafetyBits.PROTECTIVE_STOP;
+        } else if ("operator: release".equals(what)) {
+            safety = 0;
+        } else if ("operator: enable".equals(what)) {
+            safety = SafetyBits.ENABLING_SWITCH;
+        } else if ("operator: T1".equals(what)) {
+            operation = OperationMode.T1;
+        } else {
+            operation = OperationMode.AUT;
+        }
+        paused = paused || safety != SafetyBits.ENABLING_SWITCH;
     }
 
     @Override
     public void show(int severity, String text) {
+        if (text.startsWith("operator: ")) {
+            operate(text);
+            return;
+        }
         long until = clock.nanos() + SLOWLY_NS;
         if ("blind".equals(text)) {
             blindUntil = until;
