@@ -16,6 +16,7 @@ import com.kuka.roboticsAPI.geometricModel.Frame;
 import com.kuka.roboticsAPI.motionModel.CIRC;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.LIN;
+import com.kuka.roboticsAPI.motionModel.MotionBatch;
 import com.kuka.roboticsAPI.motionModel.OrientationReferenceSystem;
 import com.kuka.roboticsAPI.motionModel.RelativeLIN;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
@@ -30,6 +31,7 @@ import heptarm.wire.Code;
 import heptarm.wire.Hold;
 import heptarm.wire.Item;
 import heptarm.wire.JointDynamics;
+import heptarm.wire.JointSpline;
 import heptarm.wire.Lin;
 import heptarm.wire.LinRel;
 import heptarm.wire.Mode;
@@ -43,10 +45,11 @@ import heptarm.wire.PtpPose;
 import heptarm.wire.Redundancy;
 import heptarm.wire.ServoEngine;
 import heptarm.wire.ServoOpen;
+import heptarm.wire.Spline;
 
 /** Turns items of a program into Sunrise motions. What cannot be carried out is refused, never ignored. */
 final class Motions {
-    static final String[] CAPABILITIES = {"ptp", "ptp_pose", "lin", "lin_rel", "circ", "hold", "override", "pause",
+    static final String[] CAPABILITIES = {"ptp", "ptp_pose", "lin", "lin_rel", "circ", "spline", "spline_joints", "hold", "blending", "override", "pause",
         "servo", "servo_direct", "servo_pose", "conditions", "joint_impedance", "cartesian_impedance", "sine_impedance",
         "tools", "workpieces", "frames"};
 
@@ -55,11 +58,13 @@ final class Motions {
     private final LBR robot;
     private final Tools tools;
     private final Modes modes;
+    private final Splines splines;
 
     Motions(LBR robot, Tools tools) {
         this.robot = robot;
         this.tools = tools;
         this.modes = new Modes(tools);
+        this.splines = new Splines(robot);
     }
 
     /** Refuses what this cabinet cannot carry out. */
@@ -70,23 +75,19 @@ final class Motions {
         }
         Motion motion = item.motion;
         String at = path + "motion.";
-        if (motion instanceof Ptp) {
-            checkBlending(((Ptp) motion).blending, at);
-        } else if (motion instanceof PtpPose) {
-            checkBlending(((PtpPose) motion).blending, at);
+        if (motion instanceof PtpPose) {
             checkRedundancy(((PtpPose) motion).redundancy, at);
         } else if (motion instanceof Lin) {
-            checkBlending(((Lin) motion).blending, at);
             checkRedundancy(((Lin) motion).redundancy, at);
             checkOrientation(((Lin) motion).orientation, at);
         } else if (motion instanceof Circ) {
-            checkBlending(((Circ) motion).blending, at);
             checkRedundancy(((Circ) motion).redundancy, at);
             checkOrientation(((Circ) motion).orientation, at);
         } else if (motion instanceof LinRel) {
-            checkBlending(((LinRel) motion).blending, at);
             checkOrientation(((LinRel) motion).orientation, at);
-        } else if (!(motion instanceof Hold)) {
+        } else if (motion instanceof Spline) {
+            Splines.check((Spline) motion, at);
+        } else if (!(motion instanceof Ptp || motion instanceof JointSpline || motion instanceof Hold)) {
             throw unsupported(path + "motion", motion.getClass().getSimpleName());
         }
     }
@@ -103,17 +104,15 @@ final class Motions {
         return new Refusal(Code.UNSUPPORTED, parameter, what, "", "this version of the cabinet application cannot do that yet: " + what);
     }
 
-    private static void checkBlending(Blending blending, String path) throws Refusal {
-        if (blending.relative > 0 || blending.distance > 0 || blending.orientation > 0) {
-            throw unsupported(path + "blending", "blending");
-        }
-    }
-
     private static void checkOrientation(Orientation orientation, String path) throws Refusal {
         if (orientation.type == OrientationType.IGNORE) {
             throw new Refusal(Code.OUT_OF_RANGE, path + "orientation.type", "ignore", "variable, constant, joint",
                     "the orientation of a motion by itself cannot be ignored; that belongs to segments of a spline");
         }
+        checkLead(orientation, path);
+    }
+
+    static void checkLead(Orientation orientation, String path) throws Refusal {
         if (orientation.type == OrientationType.JOINT && orientation.reference == OrientationReference.PATH) {
             throw new Refusal(Code.OUT_OF_RANGE, path + "orientation.reference", "path", "base",
                     "an orientation that the joints lead is not relative to the path");
@@ -134,14 +133,37 @@ final class Motions {
         return motion;
     }
 
+    /** The Sunrise motions of checked items that are carried out together. */
+    RobotMotion<?>[] motions(Item[] items) throws Refusal {
+        RobotMotion<?>[] result = new RobotMotion<?>[items.length];
+        for (int i = 0; i < items.length; i++) {
+            result[i] = motion(items[i]);
+        }
+        return result;
+    }
+
+    /** A batch of them. */
+    IMotion batch(RobotMotion<?>[] motions, Mode mode) throws Refusal {
+        MotionBatch batch = new MotionBatch(motions);
+        batch.setMode(modes.of(mode));
+        return batch;
+    }
+
     private RobotMotion<?> motion(Item item) throws Refusal {
         Motion motion = item.motion;
+        if (motion instanceof Spline) {
+            return splines.of((Spline) motion);
+        }
+        if (motion instanceof JointSpline) {
+            return Splines.of((JointSpline) motion);
+        }
         if (motion instanceof Ptp) {
-            return joints(ptp(new JointPosition(((Ptp) motion).q)), ((Ptp) motion).dynamics);
+            Ptp one = (Ptp) motion;
+            return blended(joints(ptp(new JointPosition(one.q)), one.dynamics), one.blending);
         }
         if (motion instanceof PtpPose) {
             PtpPose one = (PtpPose) motion;
-            return joints(ptp(frame(one.target, one.redundancy)), one.dynamics);
+            return blended(joints(ptp(frame(one.target, one.redundancy)), one.dynamics), one.blending);
         }
         if (motion instanceof Lin) {
             Lin one = (Lin) motion;
@@ -149,7 +171,7 @@ final class Motions {
             joints(line, one.joints);
             cartesian(line, one.dynamics);
             orientation(line, one.orientation);
-            return line;
+            return blended(line, one.blending);
         }
         if (motion instanceof Circ) {
             Circ one = (Circ) motion;
@@ -157,7 +179,7 @@ final class Motions {
             joints(arc, one.joints);
             cartesian(arc, one.dynamics);
             orientation(arc, one.orientation);
-            return arc;
+            return blended(arc, one.blending);
         }
         if (motion instanceof LinRel) {
             LinRel one = (LinRel) motion;
@@ -167,7 +189,7 @@ final class Motions {
             joints(line, one.joints);
             cartesian(line, one.dynamics);
             orientation(line, one.orientation);
-            return line;
+            return blended(line, one.blending);
         }
         double duration = ((Hold) motion).duration;
         long millis = Double.isNaN(duration) ? -1 : Math.max(1, Math.round(duration * 1000));
@@ -183,7 +205,20 @@ final class Motions {
         return frame;
     }
 
-    private static RobotMotion<?> joints(RobotMotion<?> motion, JointDynamics dynamics) {
+    private static RobotMotion<?> blended(RobotMotion<?> motion, Blending blending) {
+        if (blending.relative > 0) {
+            motion.setBlendingRel(blending.relative);
+        }
+        if (blending.distance > 0) {
+            motion.setBlendingCart(Convert.toMillimetres(blending.distance));
+        }
+        if (blending.orientation > 0) {
+            motion.setBlendingOri(blending.orientation);
+        }
+        return motion;
+    }
+
+    static RobotMotion<?> joints(RobotMotion<?> motion, JointDynamics dynamics) {
         motion.setJointVelocityRel(filled(dynamics.velocity));
         motion.setJointAccelerationRel(filled(dynamics.acceleration));
         motion.setJointJerkRel(filled(dynamics.jerk));
@@ -199,7 +234,7 @@ final class Motions {
         return result;
     }
 
-    private static void orientation(SplineMotionCP<?> motion, Orientation led) {
+    static void orientation(SplineMotionCP<?> motion, Orientation led) {
         motion.setOrientationType(type(led.type));
         motion.setOrientationReferenceSystem(led.reference == OrientationReference.PATH ? OrientationReferenceSystem.Path
                 : OrientationReferenceSystem.Base);
@@ -218,7 +253,7 @@ final class Motions {
         }
     }
 
-    private static void cartesian(SplineMotionCP<?> motion, CartesianDynamics dynamics) {
+    static void cartesian(SplineMotionCP<?> motion, CartesianDynamics dynamics) {
         if (!Double.isNaN(dynamics.velocity)) {
             motion.setCartVelocity(Convert.toMillimetres(dynamics.velocity));
         }

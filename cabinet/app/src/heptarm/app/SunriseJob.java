@@ -11,7 +11,7 @@ import heptarm.core.Job;
 import heptarm.wire.Code;
 
 /** A motion container of Sunrise as a job of the core. It ends once, whoever hears of it first. */
-final class SunriseJob implements Job, IMotionContainerListener {
+class SunriseJob implements Job, IMotionContainerListener {
     private final Job.Listener listener;
     private BreakConditions until;
     private IMotionContainer container;

@@ -221,6 +221,18 @@ final class SunriseRobot implements Robot, IErrorHandler {
         return job;
     }
 
+    public Job start(Item[] batch, Mode mode, Job.Listener[] listeners) throws Refusal {
+        RobotMotion<?>[] members = motions.motions(batch);
+        SunriseBatch job = new SunriseBatch(members, listeners);
+        try {
+            adopt(tools.moved(batch[0].frame).moveAsync(motions.batch(members, mode), job), job);
+        } catch (RuntimeException e) {
+            log.warn("a batch was refused by the cabinet: " + e);
+            job.fail(e.getMessage());
+        }
+        return job;
+    }
+
     public void check(ServoOpen open) throws Refusal {
         motions.check(open);
     }

@@ -9,6 +9,8 @@ import heptarm.wire.FriOpen;
 import heptarm.wire.Goodbye;
 import heptarm.wire.Hold;
 import heptarm.wire.Item;
+import heptarm.wire.JointPoint;
+import heptarm.wire.JointSpline;
 import heptarm.wire.LinRel;
 import heptarm.wire.Message;
 import heptarm.wire.Messages;
@@ -257,6 +259,11 @@ final class Dispatcher {
             String path = "items[" + i + "].";
             if (item.motion instanceof Ptp) {
                 checkJoints(((Ptp) item.motion).q, info, path + "motion.q");
+            } else if (item.motion instanceof JointSpline) {
+                JointPoint[] points = ((JointSpline) item.motion).points;
+                for (int k = 0; k < points.length; k++) {
+                    checkJoints(points[k].q, info, path + "motion.points[" + k + "].q");
+                }
             }
             server.rack.checkMoved(item.frame, path + "frame");
             if (item.motion instanceof LinRel) {

@@ -284,6 +284,12 @@ final class Executor {
                 program.skip(i);
                 continue;
             }
+            int together = Batches.length(program.run.items, i);
+            if (together > 1) {
+                Batches.start(server, program, i, together);
+                i += together - 1;
+                continue;
+            }
             try {
                 Job job = server.robot.start(program.run.items[i],
                         program.run.items[i].mode == null ? new PositionMode() : program.run.items[i].mode, program.listener(i));

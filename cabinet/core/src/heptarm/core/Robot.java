@@ -77,6 +77,9 @@ public interface Robot {
     /** Appends an item to what the robot carries out. Returns at once; planning errors come to the listener. */
     Job start(Item item, Mode mode, Job.Listener listener) throws Refusal;
 
+    /** Appends items as one batch, each blended into the next as far as it says so; each has its listener. */
+    Job start(Item[] batch, Mode mode, Job.Listener[] listeners) throws Refusal;
+
     /** Checks that a servo motion can be opened here; nothing moves. */
     void check(ServoOpen open) throws Refusal;
 

@@ -256,6 +256,20 @@ final class FakeRobot implements Robot, Runnable {
         return job;
     }
 
+    /** Its members run one after the other and are cancelled together. */
+    @Override
+    public Job start(Item[] batch, Mode mode, Job.Listener[] listeners) throws Refusal {
+        Job[] members = new Job[batch.length];
+        for (int i = 0; i < batch.length; i++) {
+            members[i] = start(batch[i], mode, listeners[i]);
+        }
+        return () -> {
+            for (int i = members.length - 1; i >= 0; i--) {
+                members[i].cancel();
+            }
+        };
+    }
+
     @Override
     public void check(FriOpen open) throws Refusal {
         if (open.command == FriCommandMode.POSE) {

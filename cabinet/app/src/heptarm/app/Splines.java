@@ -1,0 +1,105 @@
+package heptarm.app;
+
+import static com.kuka.roboticsAPI.motionModel.BasicMotions.circ;
+import static com.kuka.roboticsAPI.motionModel.BasicMotions.lin;
+import static com.kuka.roboticsAPI.motionModel.BasicMotions.ptp;
+import static com.kuka.roboticsAPI.motionModel.BasicMotions.spl;
+
+import com.kuka.roboticsAPI.deviceModel.JointPosition;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.Frame;
+import com.kuka.roboticsAPI.motionModel.PTP;
+import com.kuka.roboticsAPI.motionModel.SplineJP;
+import com.kuka.roboticsAPI.motionModel.SplineMotionCP;
+
+import heptarm.core.Refusal;
+import heptarm.wire.CartesianDynamics;
+import heptarm.wire.CircSegment;
+import heptarm.wire.JointDynamics;
+import heptarm.wire.JointPoint;
+import heptarm.wire.JointSpline;
+import heptarm.wire.LinSegment;
+import heptarm.wire.Orientation;
+import heptarm.wire.Pose;
+import heptarm.wire.SplSegment;
+import heptarm.wire.Spline;
+import heptarm.wire.SplineSegment;
+
+/** Turns splines of the protocol into those of Sunrise. */
+final class Splines {
+    private final LBR robot;
+
+    Splines(LBR robot) {
+        this.robot = robot;
+    }
+
+    static void check(Spline spline, String path) throws Refusal {
+        for (int i = 0; i < spline.segments.length; i++) {
+            Motions.checkLead(orientation(spline.segments[i]), path + "segments[" + i + "].");
+        }
+    }
+
+    com.kuka.roboticsAPI.motionModel.Spline of(Spline spline) {
+        SplineMotionCP<?>[] segments = new SplineMotionCP<?>[spline.segments.length];
+        for (int i = 0; i < segments.length; i++) {
+            segments[i] = of(spline.segments[i]);
+            Motions.cartesian(segments[i], dynamics(spline.segments[i]));
+            Motions.orientation(segments[i], orientation(spline.segments[i]));
+        }
+        com.kuka.roboticsAPI.motionModel.Spline block = new com.kuka.roboticsAPI.motionModel.Spline(segments);
+        Motions.joints(block, spline.joints);
+        Motions.cartesian(block, spline.dynamics);
+        return block;
+    }
+
+    private SplineMotionCP<?> of(SplineSegment segment) {
+        if (segment instanceof SplSegment) {
+            return spl(frame(((SplSegment) segment).target));
+        }
+        if (segment instanceof LinSegment) {
+            return lin(frame(((LinSegment) segment).target));
+        }
+        return circ(frame(((CircSegment) segment).via), frame(((CircSegment) segment).end));
+    }
+
+    private Frame frame(Pose pose) {
+        return new Frame(robot.getRootFrame(), Convert.transformation(pose));
+    }
+
+    private static CartesianDynamics dynamics(SplineSegment segment) {
+        if (segment instanceof SplSegment) {
+            return ((SplSegment) segment).dynamics;
+        }
+        return segment instanceof LinSegment ? ((LinSegment) segment).dynamics : ((CircSegment) segment).dynamics;
+    }
+
+    private static Orientation orientation(SplineSegment segment) {
+        if (segment instanceof SplSegment) {
+            return ((SplSegment) segment).orientation;
+        }
+        return segment instanceof LinSegment ? ((LinSegment) segment).orientation : ((CircSegment) segment).orientation;
+    }
+
+    static SplineJP of(JointSpline spline) {
+        PTP[] points = new PTP[spline.points.length];
+        for (int i = 0; i < points.length; i++) {
+            JointPoint point = spline.points[i];
+            points[i] = ptp(new JointPosition(point.q));
+            Motions.joints(points[i], new JointDynamics(either(point.dynamics.velocity, spline.dynamics.velocity),
+                    either(point.dynamics.acceleration, spline.dynamics.acceleration),
+                    either(point.dynamics.jerk, spline.dynamics.jerk)));
+        }
+        SplineJP block = new SplineJP(points);
+        Motions.joints(block, spline.dynamics);
+        return block;
+    }
+
+    /** What a point does not say, the spline says. */
+    private static double[] either(double[] own, double[] whole) {
+        double[] result = own.clone();
+        for (int i = 0; i < result.length; i++) {
+            result[i] = Double.isNaN(own[i]) ? whole[i] : own[i];
+        }
+        return result;
+    }
+}

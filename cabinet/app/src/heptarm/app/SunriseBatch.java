@@ -1,0 +1,72 @@
+package heptarm.app;
+
+import com.kuka.roboticsAPI.motionModel.IMotion;
+
+import heptarm.core.Job;
+
+/** A batch of Sunrise as a job of the core: its container is one, its motions are told of one by one. */
+final class SunriseBatch extends SunriseJob {
+    private final IMotion[] motions;
+    private final Parts parts;
+
+    SunriseBatch(IMotion[] motions, Job.Listener[] listeners) {
+        this(motions, new Parts(listeners));
+    }
+
+    private SunriseBatch(IMotion[] motions, Parts parts) {
+        super(parts);
+        this.motions = motions;
+        this.parts = parts;
+    }
+
+    @Override
+    public void motionStarted(IMotion motion) {
+        for (int i = 0; i < motions.length; i++) {
+            if (motions[i] == motion) {
+                parts.begin(i);
+                return;
+            }
+        }
+        parts.begin(0); // a cabinet that tells of the batch as a whole
+    }
+
+    /** Tells everybody's listener what becomes of his part, each once and in order. */
+    private static final class Parts implements Job.Listener {
+        private final Job.Listener[] listeners;
+        private int at = -1;
+
+        Parts(Job.Listener[] listeners) {
+            this.listeners = listeners;
+        }
+
+        synchronized void begin(int part) {
+            while (at < part) {
+                if (at >= 0) {
+                    listeners[at].finished(Job.Ended.DONE, 0, "");
+                }
+                at++;
+                listeners[at].started();
+            }
+        }
+
+        public void started() {
+            begin(0);
+        }
+
+        public synchronized void fired(int node) {
+            listeners[Math.max(at, 0)].fired(node);
+        }
+
+        public synchronized void finished(Job.Ended ended, int code, String text) {
+            if (ended == Job.Ended.DONE) {
+                begin(listeners.length - 1);
+            }
+            int last = Math.max(at, 0);
+            at = listeners.length;
+            for (int i = last + 1; i < listeners.length; i++) {
+                listeners[i].finished(Job.Ended.CANCELLED, 0, "");
+            }
+            listeners[last].finished(ended, code, text);
+        }
+    }
+}
