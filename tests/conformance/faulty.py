@@ -16,7 +16,8 @@ from collections import deque
 from typing import Any
 
 from heptarm.virtual import cabinet as virtual
-from heptarm.virtual import ring, servo
+from heptarm.virtual import servo
+from heptarm.virtual.safety import Demand
 
 #: So many targets late is an arm that lags.
 LAG = 40
@@ -24,7 +25,6 @@ LAG = 40
 _behaviour = "follows"
 _late: deque[tuple[Any, Any]] = deque()
 _cabinets: list[virtual.VirtualCabinet] = []
-_healthy = (ring.READY, ring.MASTERED)
 
 
 class _Cabinet(virtual.VirtualCabinet):
@@ -55,11 +55,9 @@ def _listen() -> None:
             _late.clear()
             _behaviour = word
         elif word == "press":
-            _cabinets[0].plant.pause()
-            ring.READY, ring.MASTERED = 0, _healthy[1] | ring.EMERGENCY_STOP
+            _cabinets[0].plant.safety.demand(Demand.EMERGENCY_STOP)
         elif word == "release":
-            ring.READY, ring.MASTERED = _healthy
-            _cabinets[0].plant.resume()
+            _cabinets[0].plant.safety.withdraw()
         print(word, flush=True)
     os.kill(os.getpid(), signal.SIGTERM)
 

@@ -14,8 +14,10 @@ FOREIGN = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH", "PYTHONPATH")
 
 
 def environment() -> dict[str, str]:
-    """This process' environment without what belongs to ROS."""
-    return {name: value for name, value in os.environ.items() if name not in FOREIGN}
+    """This process' environment without what belongs to ROS, and with these sources."""
+    return {name: value for name, value in os.environ.items() if name not in FOREIGN} | {
+        "PYTHONPATH": str(ROOT / "src")
+    }
 
 
 class Stage:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import pytest
@@ -15,11 +15,14 @@ from tests.conformance.stage import Stage
 if TYPE_CHECKING:
     from tests.ros2.peer import Client, NodeProcess, Ros
 
+#: The machine may be busy.
+PATIENT = {"servo__watchdog": 1.0, "watchdog": 5.0}
 collect_ignore_glob = [] if importlib.util.find_spec("rclpy") else ["test_*.py"]
 
 # a run's own domain on this machine: it neither sees nor disturbs others; children inherit it
 os.environ["ROS_DOMAIN_ID"] = str(os.getpid() % 101)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = "UDPv4"  # killed processes leave no shared memory behind
 os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="ros-log-")
 os.environ.pop("HEPTARM_TARGET", None)
 
@@ -38,11 +41,39 @@ def stage() -> Iterator[Stage]:
 
 
 @pytest.fixture
-def own_stage() -> Iterator[Stage]:
-    """The same for one test alone."""
-    running = Stage()
-    yield running
-    running.close()
+def stages() -> Iterator[Callable[..., Stage]]:
+    """Starts further cabinets for one test."""
+    running: list[Stage] = []
+
+    def start(*options: str) -> Stage:
+        running.append(Stage(*options))
+        return running[-1]
+
+    yield start
+    for one in running:
+        one.close()
+
+
+@pytest.fixture
+def own_stage(stages: Callable[..., Stage]) -> Stage:
+    """A cabinet for one test alone."""
+    return stages()
+
+
+@pytest.fixture
+def nodes() -> Iterator[Callable[..., NodeProcess]]:
+    """Starts further nodes for one test; they must end well."""
+    from tests.ros2.peer import NodeProcess
+
+    running: list[NodeProcess] = []
+
+    def start(target: str, **words: object) -> NodeProcess:
+        running.append(NodeProcess(target, **(PATIENT | words)))  # type: ignore[arg-type]
+        return running[-1]
+
+    yield start
+    for one in running:
+        one.finish()
 
 
 @pytest.fixture(scope="session")
@@ -60,9 +91,9 @@ def node(stage: Stage) -> Iterator[NodeProcess]:
     """The node of ROS 2 for most tests, active."""
     from tests.ros2.peer import NodeProcess
 
-    running = NodeProcess(stage.target)
+    running = NodeProcess(stage.target, **PATIENT)
     yield running
-    assert running.end() == 0, running.said
+    running.finish()
 
 
 @pytest.fixture(scope="session")
@@ -80,18 +111,5 @@ def client(_client: Client) -> Iterator[Client]:
     from tests.conformance.cases import rests
 
     yield _client
-    _client.behave("follows")
-    _client.override(1.0)
-    assert _client.set(**DEFAULTS)
+    _client.restore()
     rests(_client)
-
-
-#: What cases change.
-DEFAULTS: dict[str, object] = {
-    "max_deceleration_on_cancel": 2.0,
-    "allow_nonzero_velocity_at_trajectory_end": False,
-    "allow_partial_joints_goal": False,
-    "constraints__goal_time": 2.0,
-    "constraints__stopped_velocity_tolerance": 0.02,
-    "constraints__A7__trajectory": 0.0,
-}

@@ -25,7 +25,7 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.action import ActionClient
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -37,6 +37,15 @@ from tests.conformance.stage import Stage
 
 #: Discovery can take some seconds, and a busy machine many more [s].
 PATIENCE = 60.0
+#: Parameters that cases change.
+DEFAULTS: dict[str, object] = {
+    "max_deceleration_on_cancel": 2.0,
+    "allow_nonzero_velocity_at_trajectory_end": False,
+    "allow_partial_joints_goal": False,
+    "constraints__goal_time": 2.0,
+    "constraints__stopped_velocity_tolerance": 0.02,
+    "constraints__A7__trajectory": 0.0,
+}
 OUTCOMES = {
     GoalStatus.STATUS_SUCCEEDED: Outcome.SUCCEEDED,
     GoalStatus.STATUS_ABORTED: Outcome.ABORTED,
@@ -57,9 +66,18 @@ def until(what: Callable[[], Any], why: str, timeout: float = PATIENCE) -> Any:
 class NodeProcess:
     """The node as users start it, with parameters, in a process of its own."""
 
-    def __init__(self, target: str, *, name: str = "heptarm", **values: object) -> None:
+    def __init__(self, target: str, *, name: str = "heptarm", space: str = "/", **values: object) -> None:
         self.log = Path(tempfile.mkstemp(prefix="node-", suffix=".log")[1])
-        command = [sys.executable, "-m", "heptarm_ros2.main", "--ros-args", "-r", f"__node:={name}"]
+        command = [
+            sys.executable,
+            "-m",
+            "heptarm_ros2.main",
+            "--ros-args",
+            "-r",
+            f"__node:={name}",
+            "-r",
+            f"__ns:={space}",
+        ]
         for key, value in ({"target": target} | values).items():
             command += ["-p", f"{key.replace('__', '.')}:={value}"]
         with self.log.open("w") as log:
@@ -83,10 +101,15 @@ class NodeProcess:
             return self.process.wait(PATIENCE)
         except subprocess.TimeoutExpired:
             self.process.kill()
-            self.process.wait()
-            raise
-        finally:
-            self.log.unlink(missing_ok=True)
+            return self.process.wait()
+
+    def finish(self) -> None:
+        """End it and look that it ended well; the log is kept if it did not."""
+        code = self.end()
+        said = self.said
+        print(said)
+        assert code == 0, said
+        self.log.unlink()
 
 
 class Ros:
@@ -96,7 +119,8 @@ class Ros:
         self.context = rclpy.Context()
         rclpy.init(context=self.context)
         self.node = rclpy.create_node(name, context=self.context)
-        self._executor = MultiThreadedExecutor(num_threads=4, context=self.context)
+        self._clients: dict[str, Any] = {}
+        self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
         self._thread = threading.Thread(target=self._spin)
         self._thread.start()
@@ -114,12 +138,11 @@ class Ros:
 
     def call(self, kind: type, name: str, request: Any) -> Any:
         """Call a service."""
-        client = self.node.create_client(kind, name)
-        try:
-            until(client.service_is_ready, f"there is no service {name}")
-            return self.wait(client.call_async(request), f"{name} does not answer")
-        finally:
-            self.node.destroy_client(client)
+        if name not in self._clients:
+            self._clients[name] = self.node.create_client(kind, name)
+        client = self._clients[name]
+        until(client.service_is_ready, f"there is no service {name}")
+        return self.wait(client.call_async(request), f"{name} does not answer")
 
     def collect(self, kind: type, name: str, *, latched: bool = False) -> list[Any]:
         """A list that fills with a topic's messages."""
@@ -189,6 +212,11 @@ def _seconds(message: Any) -> float:
     return float(message.sec + message.nanosec * 1e-9)
 
 
+def stamp(message: Any) -> float:
+    """The time stamp of a message with a header [s]."""
+    return _seconds(message.header.stamp)
+
+
 def _value(value: object) -> ParameterValue:
     if isinstance(value, bool):
         return ParameterValue(type=ParameterType.PARAMETER_BOOL, bool_value=value)
@@ -204,14 +232,22 @@ class Client:
     preempted = (Outcome.ABORTED,)
     timely = False
 
-    def __init__(self, ros: Ros, stage: Stage, name: str = "/heptarm", prefix: str = "") -> None:
+    def __init__(
+        self,
+        ros: Ros,
+        stage: Stage | None,
+        name: str = "/heptarm",
+        prefix: str = "",
+    ) -> None:
         self.ros, self.stage, self.name = ros, stage, name
         self.joints = tuple(f"{prefix}A{i}" for i in range(1, 8))
-        self.states = ros.collect(JointState, "/joint_states")
+        self.states = ros.collect(JointState, f"{name.rpartition('/')[0]}/joint_states")
         self.status = ros.collect(Status, f"{name}/status", latched=True)
         self._action = ActionClient(ros.node, FollowJointTrajectory, f"{name}/follow_joint_trajectory")
         self._topic = ros.node.create_publisher(JointTrajectory, f"{name}/joint_trajectory", 1)
         self._told: dict[int, list[Told]] = {}
+        self._changed: set[str] = set()
+        self._how, self._override = "follows", 1.0
 
     def ready(self) -> None:
         """Wait until the node is active and everything has found each other."""
@@ -225,8 +261,8 @@ class Client:
         time.sleep(seconds)
 
     def place(self) -> Sample:
-        count = len(self.states)
-        until(lambda: len(self.states) > count, "no joint states come")
+        now = self.now()  # a busy machine may still be handing over older ones
+        until(lambda: self.states and stamp(self.states[-1]) >= now, "no joint states come")
         message = self.states[-1]
         assert tuple(message.name) == self.joints
         return Sample(np.array(message.position), np.array(message.velocity), np.zeros(7))
@@ -256,14 +292,28 @@ class Client:
         handle, _ = sent.handle  # type: ignore[misc]
         return list(self._told[id(handle)])
 
+    def restore(self) -> None:
+        """Undo what a case has changed."""
+        if self._how != "follows":
+            self.behave("follows")
+        if self._override != 1.0:
+            self.override(1.0)
+        if self._changed:
+            assert self.set(**{name: DEFAULTS[name] for name in self._changed if name in DEFAULTS})
+            self._changed.clear()
+
     def behave(self, how: str) -> None:
+        assert self.stage is not None
+        self._how = how
         self.stage.do(how)
 
     def override(self, value: float) -> None:
+        self._override = value
         answer = self.ros.call(SetNumber, f"{self.name}/set_override", SetNumber.Request(value=value))
         assert answer.success, answer.message
 
     def set(self, **values: object) -> bool:
+        self._changed |= values.keys()
         request = SetParameters.Request(
             parameters=[
                 Parameter(name=name.replace("__", "."), value=_value(value)) for name, value in values.items()

@@ -175,12 +175,12 @@ class HeptarmNode(LifecycleNode):
 
     def on_state(self, state: State) -> None:
         """A state came."""
-        if self._outputs is not None and not self._ending.is_set():
+        if self._outputs is not None and self._lives:
             self._outputs.state(state)
 
     def on_feedback(self, feedback: Feedback) -> None:
         """A goal went on."""
-        if self._goals is not None and not self._ending.is_set():
+        if self._goals is not None and self._lives:
             self._goals.on_feedback(feedback)
 
     def on_end(self, end: End) -> None:
@@ -196,6 +196,11 @@ class HeptarmNode(LifecycleNode):
             self.get_logger().info("connected")
 
     # ------------------------------------------------------------------------------------ others
+
+    @property
+    def _lives(self) -> bool:
+        """Whether there is anybody to tell: ROS may have ended before the node."""
+        return not self._ending.is_set() and bool(self.context.ok())
 
     def seconds(self) -> float:
         """ROS' time [s]."""

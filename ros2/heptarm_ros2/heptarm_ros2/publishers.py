@@ -9,6 +9,7 @@ from geometry_msgs.msg import PoseStamped, WrenchStamped
 from heptarm_msgs.msg import RobotState, Status
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
 from heptarm.bridge.report import Report
@@ -42,11 +43,18 @@ class Publishers:
         self._status = node.create_publisher(Status, "~/status", latched)
         self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._last: Status | None = None
+        self._moment: Time | None = None
 
     def state(self, state: State) -> None:
         """Publish a state, stamped with this machine's time of its measurement."""
         age = Duration(nanoseconds=max(0, round(state.age * 1e9)))
-        stamp = (self._node.get_clock().now() - age).to_msg()
+        moment = self._node.get_clock().now() - age
+        if (
+            self._moment is not None and moment <= self._moment
+        ):  # the estimate of the cabinet's clock was corrected
+            moment = self._moment + Duration(nanoseconds=1000)
+        self._moment = moment
+        stamp = moment.to_msg()
         self._joint_states.publish(convert.joint_state(state, self._joints, stamp))
         if state.torques is not None:
             self._external.publish(convert.external_torques(state, self._joints, stamp))

@@ -85,7 +85,11 @@ class Driver:
         self._handle: MotionHandle | None = None
         self._trouble = ""
         self._arm = connect(
-            values["target"] or None, key=values["key"] or None, state_rate=values["state_rate"], name=_name()
+            values["target"] or None,
+            key=values["key"] or None,
+            state_rate=values["state_rate"],
+            name=_name(),
+            watchdog=values["watchdog"],
         )
         self._arm.speed = values["speed"]
         self._execution = ServoExecution(
@@ -162,6 +166,7 @@ class Driver:
         while not self._closed.is_set():
             try:
                 for state in self._arm.states(size=16):
+                    self._guard(state)
                     self._listener.on_state(state)
             except HeptarmError as error:
                 if self._closed.is_set():
@@ -171,6 +176,12 @@ class Driver:
                 _log.exception("publishing a state")
             if not self._closed.is_set():
                 self._reconnect()
+
+    def _guard(self, state: State) -> None:
+        """A stop of the safety controller ends the goal: its time would stand still, and it would go on by surprise."""
+        safety = state.status
+        if safety is not None and (safety.emergency_stop or safety.protective_stop) and self._execution.goal:
+            self._execution.drop(report(state).text)
 
     def _lost(self, why: str) -> None:
         self._trouble = why
@@ -214,6 +225,7 @@ class Driver:
         handle = self._handle
         try:
             self._check_ready()
+            self._hold_control()
             self._stream.close()
             if handle is not None and not handle.done:
                 handle.cancel()
@@ -230,6 +242,12 @@ class Driver:
         safety = self._arm.state.status
         if safety is not None and (safety.emergency_stop or safety.protective_stop):
             raise NotReady("a stop is active", hint=report(self._arm.state).text)
+
+    def _hold_control(self) -> None:
+        """Take control again if it was lost, by a moment of silence, and nobody else has taken it."""
+        if not self._arm.in_control and not self._arm.controller:
+            self._arm.take_control()
+            _log.warning("took control again")
 
     # --------------------------------------------------------------------------------- commands
 
@@ -317,6 +335,7 @@ class Driver:
     def _check_active(self) -> None:
         if not self._active:
             raise NotReady("the node is not active", hint="activate it")
+        self._hold_control()
 
     # --------------------------------------------------------------------------------- services
 

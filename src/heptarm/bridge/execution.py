@@ -125,6 +125,7 @@ class ServoExecution:
         self._clock = clock or RealClock()
         self._changed = threading.Condition()
         self._closing = False
+        self._dropped = False
         self._servo: JointServo | None = None
         self._thread = threading.Thread(target=self._run, name="heptarm-execution")
         self._thread.start()
@@ -189,6 +190,13 @@ class ServoExecution:
             self._runner.abort(text, now=self.now)
             self._changed.notify_all()
 
+    def drop(self, text: str) -> None:
+        """Likewise, but nothing more is commanded: a stop of the safety controller holds the arm already."""
+        with self._changed:
+            self._runner.abort(text)
+            self._dropped = True
+            self._changed.notify_all()
+
     def wait_idle(self, timeout: float) -> bool:
         """Wait until nothing runs and the servo motion is closed; False: not within `timeout` [s]."""
         with self._changed:
@@ -224,6 +232,7 @@ class ServoExecution:
         """One servo motion: from the first goal to some time after the last one."""
         options = self._options
         arm = self._arm
+        self._dropped = False
         with arm.servo(
             "joint",
             rate=options.rate,
@@ -247,7 +256,7 @@ class ServoExecution:
                     servo.set(step.command.q, step.command.dq)
                 self._tell_step(step)
                 quiet = 0.0 if busy else quiet + passed
-                if not busy and (self._closing or quiet >= options.linger):
+                if not busy and (self._closing or self._dropped or quiet >= options.linger):
                     break
         with self._changed:
             if servo.result is not None and passed is None:

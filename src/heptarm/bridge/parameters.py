@@ -73,6 +73,7 @@ def _live(name: str, default: Plain, text: str, low: float = 0.0, high: float = 
 PARAMETERS = (
     Parameter("target", "", 'what to connect to, as in heptarm.connect; "": the variable HEPTARM_TARGET'),
     Parameter("key", "", "pre-shared key of the cabinet, if it has one"),
+    Parameter("watchdog", 1.0, "the cabinet stops the arm if this node is silent for so long [s]", 0.1, 10.0),
     Parameter("autostart", True, "configure and activate by itself, again and again until it works"),
     Parameter("prefix", "", "before the names of joints and frames, for several arms in one scene"),
     Parameter(

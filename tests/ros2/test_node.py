@@ -1,0 +1,260 @@
+"""The node: life cycle, parameters, states, commands, several of them, and a clean end."""
+
+from __future__ import annotations
+
+import math
+import signal
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped, WrenchStamped
+from heptarm_msgs.msg import RobotState, Status
+from lifecycle_msgs.msg import Transition
+from rcl_interfaces.srv import DescribeParameters, ListParameters
+from rclpy.qos import ReliabilityPolicy
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Empty
+from std_srvs.srv import Trigger
+
+import heptarm as ha
+from heptarm.bridge import parameters
+from tests.conformance.cases import TOUCH, rests, step, succeeds
+from tests.conformance.stage import Stage
+from tests.ros2.peer import Client, NodeProcess, Ros, until
+
+Start = Callable[..., NodeProcess]
+
+
+def seconds(message: JointState) -> float:
+    return float(message.header.stamp.sec + message.header.stamp.nanosec * 1e-9)
+
+
+# ------------------------------------------------------------------------------------------- life
+
+
+@pytest.fixture
+def sleeper(own_stage: Stage, ros: Ros, nodes: Start) -> Client:
+    """A client of a node that does nothing by itself."""
+    nodes(own_stage.target, name="sleeper", space="/alone", autostart=False)
+    return Client(ros, own_stage, "/alone/sleeper")
+
+
+def test_the_life_cycle_from_unconfigured_and_back(sleeper: Client, own_stage: Stage) -> None:
+    assert sleeper.life() == "unconfigured"
+    assert sleeper.change(Transition.TRANSITION_CONFIGURE)
+    assert sleeper.life() == "inactive"
+    until(lambda: sleeper.states, "states come from configuring on")
+    assert not sleeper.send(step(sleeper)).accepted, "nothing moves before it is active"
+    assert sleeper.change(Transition.TRANSITION_ACTIVATE)
+    assert sleeper.life() == "active"
+    succeeds(sleeper, step(sleeper))
+    assert sleeper.change(Transition.TRANSITION_DEACTIVATE)
+    assert sleeper.change(Transition.TRANSITION_CLEANUP)
+    assert sleeper.life() == "unconfigured"
+    with ha.connect(own_stage.target) as arm:
+        assert arm.in_control, "the node has let go of the robot"
+        sleeper.change(Transition.TRANSITION_CONFIGURE)
+        assert sleeper.life() == "unconfigured", "another client controls the robot"
+    assert sleeper.change(Transition.TRANSITION_CONFIGURE)
+    assert sleeper.life() == "inactive"
+
+
+def test_it_waits_for_a_cabinet_and_starts_by_itself(ros: Ros, own_stage: Stage, nodes: Start) -> None:
+    own_stage.kill()
+    node = nodes(own_stage.target, name="early", space="/alone")
+    node.waits_for("not configured")
+    own_stage.restart()
+    client = Client(ros, own_stage, "/alone/early")
+    client.ready()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_told_to_end_in_mid_air_it_leaves_the_arm_at_rest(
+    ros: Ros, own_stage: Stage, nodes: Start, number: int
+) -> None:
+    node = nodes(own_stage.target, name="short", space="/alone")
+    client = Client(ros, own_stage, "/alone/short")
+    client.ready()
+    here = client.place().q
+    assert client.send(step(client, time=4.0, size=4.0)).accepted
+    client.sleep(1.0)
+    assert node.end(number) == 0, node.said
+    with ha.connect(own_stage.target) as arm:
+        assert arm.in_control
+        assert np.abs(arm.state.q - here).max() > 0.01, "it was under way"
+        assert np.abs(arm.state.dq).max() < 0.05
+
+
+# ------------------------------------------------------------------------------------- parameters
+
+
+def test_every_parameter_is_described(client: Client, ros: Ros) -> None:
+    names = list(ros.call(ListParameters, "/heptarm/list_parameters", ListParameters.Request()).result.names)
+    ours = [*parameters.PARAMETERS, *parameters.of_joints([f"A{i}" for i in range(1, 8)])]
+    assert {one.name for one in ours} <= set(names)
+    request = DescribeParameters.Request(names=[one.name for one in ours])
+    told = ros.call(DescribeParameters, "/heptarm/describe_parameters", request).descriptors
+    for one, descriptor in zip(ours, told):
+        assert descriptor.description == one.text
+        if isinstance(one.default, float):
+            assert descriptor.floating_point_range[0].to_value == one.high
+        for choice in one.choices:
+            assert choice in descriptor.additional_constraints
+
+
+def test_parameters_that_count_later_are_refused_while_connected(client: Client) -> None:
+    assert not client.set(prefix="left_")
+    assert not client.set(state_rate=1e9)
+
+
+# ----------------------------------------------------------------------------------------- states
+
+
+def test_joint_states_are_complete_ordered_and_stamped_by_this_machine(client: Client, ros: Ros) -> None:
+    start = len(client.states)
+    until(lambda: len(client.states) > start + 50, "joint states come")
+    found = client.states[start:]
+    for message in found:
+        assert tuple(message.name) == client.joints
+        for values in (message.position, message.velocity, message.effort):
+            assert len(values) == 7 and all(math.isfinite(value) for value in values)
+    stamps = [seconds(message) for message in found]
+    assert all(a < b for a, b in zip(stamps, stamps[1:])), "none twice"  # noqa: RUF007
+    assert abs(client.now() - stamps[-1]) < 2.0
+
+
+def test_states_are_reliable_as_moveit_wants_them(client: Client, ros: Ros) -> None:
+    publishers = ros.node.get_publishers_info_by_topic("/joint_states")
+    assert publishers and all(p.qos_profile.reliability is ReliabilityPolicy.RELIABLE for p in publishers)
+
+
+def test_pose_wrench_torques_and_the_full_state(client: Client, ros: Ros) -> None:
+    poses = ros.collect(PoseStamped, "/heptarm/pose")
+    wrenches = ros.collect(WrenchStamped, "/heptarm/wrench")
+    torques = ros.collect(JointState, "/heptarm/external_torques")
+    full = ros.collect(RobotState, "/heptarm/state")
+    until(lambda: poses and wrenches and torques and full, "all of them come")
+    pose, state = poses[-1], full[-1]
+    assert pose.header.frame_id == wrenches[-1].header.frame_id == "link_0"
+    turn = pose.pose.orientation
+    assert abs(np.linalg.norm([turn.x, turn.y, turn.z, turn.w]) - 1.0) < 1e-6
+    assert 0.2 < pose.pose.position.z < 1.3, "metres"
+    np.testing.assert_allclose(state.position, client.place().q, atol=5e-3)
+    assert len(torques[-1].effort) == 7 and not torques[-1].position
+
+
+def test_diagnostics_say_that_it_is_ready(client: Client, ros: Ros) -> None:
+    found = ros.collect(DiagnosticArray, "/diagnostics")
+    mine = until(
+        lambda: [one for array in found for one in array.status if one.name == "heptarm: arm"], "they come"
+    )
+    assert mine[-1].level == b"\x00" and mine[-1].message == "ready"
+    assert mine[-1].hardware_id
+    assert {value.key for value in mine[-1].values} >= {"connected", "active", "operation mode"}
+
+
+def test_the_status_is_kept_for_late_subscribers(client: Client, ros: Ros) -> None:
+    found = ros.collect(Status, "/heptarm/status", latched=True)
+    until(lambda: found, "it comes without a change")
+    assert found[-1].connected and found[-1].active and found[-1].operation_mode == Status.MODE_AUT
+
+
+# --------------------------------------------------------------------------------------- commands
+
+
+def publish(client: Client, kind: type, name: str, message: object) -> None:
+    publisher = client.ros.node.create_publisher(kind, name, 1)
+    until(publisher.get_subscription_count, f"nobody listens to {name}")
+    publisher.publish(message)
+
+
+def joint_state(client: Client, q: np.ndarray) -> JointState:
+    return JointState(name=list(client.joints), position=[float(value) for value in q])
+
+
+def test_a_joint_command_moves_and_a_stop_stops(client: Client, ros: Ros) -> None:
+    here = client.place().q
+    there = here + 0.2 * np.eye(7)[6] * (-1 if here[6] > 0 else 1)
+    publish(client, JointState, "/heptarm/command/joint", joint_state(client, there))
+    until(lambda: np.abs(client.place().q - there).max() < TOUCH, "it gets there")
+    publish(
+        client, JointState, "/heptarm/command/joint", joint_state(client, here + 1.0 * (there - here) * -4)
+    )
+    until(lambda: np.abs(client.place().q - there).max() > 0.05, "it is under way")
+    answer = ros.call(Trigger, "/heptarm/stop", Trigger.Request())
+    assert answer.success and answer.message
+    rests(client)
+    assert np.abs(client.place().q - there).max() < 0.75
+    publish(client, Empty, "/heptarm/stop", Empty())
+
+
+def test_pose_and_line_commands(client: Client, ros: Ros) -> None:
+    poses = ros.collect(PoseStamped, "/heptarm/pose")
+    start = until(lambda: poses and poses[-1], "poses come")
+    for name, way in (("lin", 0.03), ("pose", -0.03)):
+        rests(client)
+        z = poses[-1].pose.position.z
+        goal = PoseStamped(header=start.header, pose=poses[-1].pose)
+        goal.pose.position.z = z + way
+        publish(client, PoseStamped, f"/heptarm/command/{name}", goal)
+        until(lambda: abs(poses[-1].pose.position.z - z - way) < 2e-3, f"{name} gets there")  # noqa: B023
+    rests(client)
+
+
+def test_a_pose_in_another_frame_is_refused(client: Client, node: NodeProcess) -> None:
+    message = PoseStamped()
+    message.header.frame_id = "moon"
+    message.pose.orientation.w = 1.0
+    publish(client, PoseStamped, "/heptarm/command/pose", message)
+    node.waits_for("the pose is given in 'moon'")
+
+
+def test_servo_topics_and_their_watchdog(client: Client) -> None:
+    here = client.place().q
+    sign = -1.0 if here[6] > 0 else 1.0
+    publisher = client.ros.node.create_publisher(JointState, "/heptarm/servo/velocity", 1)
+    until(publisher.get_subscription_count, "nobody listens")
+    message = JointState(name=[client.joints[6]], velocity=[sign * 0.2])
+    for _ in range(40):
+        publisher.publish(message)
+        client.sleep(0.02)
+    away = client.place().q - here
+    assert abs(away[6]) > 0.03 and np.abs(away[:6]).max() < 5e-3
+    rest = rests(client)  # silence
+    assert abs(rest[6] - here[6]) < 0.6
+    publisher = client.ros.node.create_publisher(JointState, "/heptarm/servo/joint", 1)
+    until(publisher.get_subscription_count, "nobody listens")
+    for _ in range(40):
+        publisher.publish(joint_state(client, here))
+        client.sleep(0.02)
+    until(lambda: np.abs(client.place().q - here).max() < TOUCH, "it is back")
+    rests(client)
+
+
+def test_a_goal_after_a_servo_topic_starts_from_rest(client: Client) -> None:
+    here = client.place().q
+    publisher = client.ros.node.create_publisher(JointState, "/heptarm/servo/joint", 1)
+    until(publisher.get_subscription_count, "nobody listens")
+    for _ in range(10):
+        publisher.publish(joint_state(client, here))
+        client.sleep(0.02)
+    succeeds(client, step(client))
+
+
+# ------------------------------------------------------------------------------------ several of them
+
+
+def test_two_arms_by_namespace_and_prefix(ros: Ros, stages: Callable[..., Stage], nodes: Start) -> None:
+    clients = []
+    for side, model in (("left", "iiwa14"), ("right", "iiwa7")):
+        stage = stages("--model", model)
+        nodes(stage.target, space=f"/{side}", prefix=f"{side}_")
+        clients.append(Client(ros, stage, f"/{side}/heptarm", f"{side}_"))
+    for client in clients:
+        client.ready()
+    places = [client.place().q for client in clients]
+    succeeds(clients[0], step(clients[0]))
+    assert np.abs(clients[0].place().q - places[0]).max() > 0.05
+    assert np.abs(clients[1].place().q - places[1]).max() < 2e-3, "the other arm is another"
