@@ -12,6 +12,7 @@ from heptarm.virtual.fri.standalone import control_of
 from heptarm.virtual.order import Order
 from heptarm.virtual.plant import Plant
 from heptarm.virtual.ring import Ring
+from heptarm.virtual.safety import Demand
 
 _numbers = count(-1, -1)  # of own orders, so that they are nobody else's
 
@@ -40,7 +41,7 @@ class PlantArm:
 
     def reading(self) -> Reading:
         """The state after the last tick."""
-        state = self.plant.snapshot
+        state, safety = self.plant.snapshot, self.plant.safety
         return Reading(
             tuple(state.q.tolist()),
             tuple(state.q_cmd.tolist()),
@@ -49,6 +50,9 @@ class PlantArm:
             tau_cmd=tuple(state.tau_cmd.tolist()),
             tau_ext=tuple(state.tau_ext.tolist()),
             wrench=tuple(state.wrench.tolist()),
+            safety=m.Safety.STOP_1 if safety.halts else m.Safety.NORMAL_OPERATION,  # stops keep the path
+            drives=m.DriveState.OFF if Demand.DRIVE_ERROR in safety.demands else m.DriveState.ACTIVE,
+            operation_mode=m.OperationMode(int(safety.mode)),
             control_mode=self._control,
         )
 
