@@ -14,6 +14,7 @@ import sys
 from bench import (  # noqa: F401  they register themselves
     fri_codec,
     fri_faults,
+    fri_guard,
     fri_hold,
     fri_loop,
     garbage,

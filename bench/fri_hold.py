@@ -172,7 +172,7 @@ def track(arm: ha.Arm, seconds: float, *, period_ms: int = 1) -> Tracking:
     )
 
 
-def balance(arm: ha.Arm, seconds: float, *, period_ms: int = 1) -> Balance:
+def balance(arm: ha.Arm, seconds: float, *, settled: float = SETTLED, period_ms: int = 1) -> Balance:
     """Lead floating joints somewhere by torques alone and hold them there."""
     arm.move(ha.ptp(BENT))
     params = {"start": BENT, "goal": BENT + WAY}
@@ -182,16 +182,16 @@ def balance(arm: ha.Arm, seconds: float, *, period_ms: int = 1) -> Balance:
     ) as session:
         tape = Tape(session)
         tape.record(seconds)
-    held = tape.q[tape.t > SETTLED]
+    held = tape.q[tape.t > settled]
     return Balance(
-        float(tape.t[-1]) - SETTLED,
+        float(tape.t[-1]) - settled,
         float(np.abs(held - BENT - WAY).max()),
         float(((held - BENT) / WAY).min()),
         _report(session),
     )
 
 
-def press(arm: ha.Arm, seconds: float, *, period_ms: int = 1) -> Press:
+def press(arm: ha.Arm, seconds: float, *, settled: float = SETTLED, period_ms: int = 1) -> Press:
     """Push on the table that the arm stands on, free along z, by a wrench alone."""
     arm.move(ha.ptp(BENT))
     height = float(arm.wait_for_rest().pose.xyz[2])
@@ -207,9 +207,9 @@ def press(arm: ha.Arm, seconds: float, *, period_ms: int = 1) -> Press:
         tape.record(seconds, feel)
     arm.move(ha.lin_rel(z=0.1, frame="base"), speed=0.3)
     arm.move(ha.ptp(BENT))
-    held = np.array([force for t, force in forces if t > SETTLED])
+    held = np.array([force for t, force in forces if t > settled])
     return Press(
-        float(tape.t[-1]) - SETTLED,
+        float(tape.t[-1]) - settled,
         float(held.min()),
         float(held.max()),
         float(held.mean()),
