@@ -1,0 +1,247 @@
+"""Tools, workpieces and frames through the whole stack, on the virtual cabinet."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm import Arm, Pose, Tool, Workpiece, deg, hold, lin, lin_rel, ptp
+from heptarm.errors import CommandRejected, ModeConflict
+from heptarm.model import dynamics
+from heptarm.modes import CartesianImpedance, JointImpedance, Position
+from heptarm.values.motion import Lin, LinRel
+from heptarm.values.tool import KnownTool
+from heptarm.wire.codes import Code
+from tests.conftest import RunningCabinet
+
+HOME = deg(0, 30, 0, -90, 0, 60, 0)
+TIP = Pose.xyz_abc(0.03, 0.0, 0.15, *deg(0, 90, 0))
+GRIPPER = Tool("gripper", mass=2.0, com=(0.0, 0.0, 0.08), tcp=TIP, frames={"pad": Pose.at(0.0, 0.04, 0.1)})
+PART = Workpiece("part", mass=1.0, com=(0.0, 0.0, 0.05), frames={"peg": Pose.at(0.0, 0.0, 0.1)})
+
+
+@pytest.fixture
+def bare(arm: Arm) -> Iterator[Arm]:
+    """An arm with nothing on its flange, before and after."""
+    arm.detach_tool()
+    yield arm
+    arm.wait_for_rest()
+    arm.detach_tool()
+
+
+def fresh(arm: Arm) -> ha.State:
+    """A state that was sampled after now, so that everything before counts in it."""
+    now = arm.state.stamp
+    return arm.wait_until(lambda s: s.stamp > now + 30_000_000)
+
+
+def settled(arm: Arm) -> ha.State:
+    """A state after the arm has got used to another load."""
+    arm.move(hold(0.5))
+    return fresh(arm)
+
+
+def test_the_state_names_the_tool_and_its_pose_is_the_tips(bare: Arm) -> None:
+    flange = fresh(bare).pose
+    assert fresh(bare).tool == ""
+    with bare.tool(GRIPPER):
+        state = fresh(bare)
+        assert state.control is not None
+        assert (state.tool, state.control.workpiece, state.control.frame) == ("gripper", "", "tcp")
+        assert state.pose.distance_to(flange @ TIP) < 1e-4
+        assert state.pose.angle_to(flange @ TIP) < 1e-4
+        with bare.attached(PART):
+            control = fresh(bare).control
+            assert control is not None
+            assert (control.tool, control.workpiece) == ("gripper", "part")
+    state = fresh(bare)
+    assert state.tool == ""
+    assert state.pose.distance_to(flange) < 1e-4
+
+
+def test_the_motors_carry_it_and_nothing_is_felt(bare: Arm) -> None:
+    before = fresh(bare)
+    with bare.tool(GRIPPER), bare.attached(PART):
+        bare.move(hold(0.3))
+        state = fresh(bare)
+        expected = dynamics.gravity(bare.robot, state.q, load=GRIPPER.body) - dynamics.gravity(
+            bare.robot, state.q
+        )
+        assert np.abs(state.tau_ext).max() < 0.01
+        assert np.abs(state.wrench.array).max() < 0.02
+        more = state.tau - before.tau
+        assert abs(more[1]) > abs(expected[1]) + 2.0  # the part's weight comes on top
+        assert state.q == pytest.approx(before.q, abs=1e-4)
+
+
+def test_motions_move_the_tip_or_what_they_name(bare: Arm) -> None:
+    with bare.tool(GRIPPER):
+        start = fresh(bare).pose
+        bare.move(lin_rel(z=0.03))  # along the tip's own z, which points along the flange's x
+        end = fresh(bare).pose
+        assert end.distance_to(start @ Pose.at(0, 0, 0.03)) < 2e-4
+        target = start @ Pose.xyz_abc(0, 0, 0, *deg(10, 0, 0))
+        bare.move(lin(target))
+        assert fresh(bare).pose.distance_to(target) < 2e-4
+        assert fresh(bare).pose.angle_to(target) < 1e-3
+        for name, make in (("pad", lin), ("flange", ptp)):
+            target = bare.pose(name) @ Pose.at(0, 0.01, 0.02)
+            bare.move(make(target, moving=name))
+            fresh(bare)
+            assert bare.pose(name).distance_to(target) < 2e-4
+        with bare.attached(PART):
+            bare.move(ptp(HOME))
+            fresh(bare)
+            peg = bare.pose("part/peg")
+            assert peg.distance_to(bare.pose() @ Pose.at(0, 0, 0.1)) < 1e-4
+            bare.move(lin_rel(x=0.02, frame="flange", moving="peg"))
+            fresh(bare)
+            moved = peg.inverse() @ bare.pose("peg")
+            assert bare.pose("peg").distance_to(peg) == pytest.approx(0.02, abs=2e-4)
+            assert moved.z == pytest.approx(0.02, abs=2e-4)  # the flange's x is the peg's z
+    bare.move(ptp(HOME))
+
+
+def test_another_frame_of_the_tool_can_be_the_default(bare: Arm) -> None:
+    bare.attach_tool(GRIPPER, frame="pad")
+    assert fresh(bare).pose.distance_to(bare.pose("pad")) < 1e-4
+    assert bare.pose("tcp", reference="pad").distance_to(GRIPPER.frame("pad").inverse() @ TIP) < 1e-5
+    bare.attach_tool("gripper")  # by its name it is known now
+    control = fresh(bare).control
+    assert control is not None
+    assert control.frame == "tcp"
+    assert bare.tools["gripper"] == KnownTool("gripper", 2.0, GRIPPER.frames)
+
+
+def test_the_wrench_is_told_where_and_as_one_likes(bare: Arm) -> None:
+    """Too light a declaration: the rest of the weight is a force that the arm feels."""
+    heavy = Tool("heavy", mass=3.0, com=(0.0, 0.0, 0.1), tcp=Pose.at(0, 0, 0.2))
+    with ha.connect("sim://iiwa14?payload=3,0,0,0.1") as arm:
+        arm.move(ptp(HOME))
+        state = settled(arm)
+        assert state.wrench.force == pytest.approx((0, 0, -29.43), abs=0.3)
+        assert np.abs(state.tau_ext).max() > 10.0
+        with arm.tool(heavy):
+            assert np.abs(settled(arm).wrench.array).max() < 0.1
+        arm.attach_tool(Tool("light", mass=1.0, com=(0.0, 0.0, 0.1), tcp=Pose.at(0, 0, 0.2)))
+        settled(arm)
+        at_tip, at_flange = arm.wrench(), arm.wrench("flange")
+        assert at_tip.force == pytest.approx((0, 0, -19.62), abs=0.3)
+        com = (arm.pose("flange") @ Pose.at(0, 0, 0.1)).xyz
+        for frame, seen in (("tool", at_tip), ("flange", at_flange)):
+            lever = com - arm.pose(frame).xyz
+            assert seen.torque == pytest.approx(np.cross(lever, seen.force), abs=0.1)
+        turned = arm.wrench("flange", axes="flange")
+        assert turned.force == pytest.approx(arm.pose("flange").rotation.T @ at_flange.force, abs=0.05)
+
+
+def test_a_servo_motion_under_impedance_wants_the_load_to_be_right(bare: Arm) -> None:
+    soft = JointImpedance(500.0)
+    with ha.connect("sim://iiwa14?payload=5,0,0,0.1") as arm:
+        arm.move(ptp(HOME))
+        with pytest.raises(ha.MotionError, match="load data"), arm.servo(mode=soft):
+            pass
+        with arm.tool(Tool("weight", mass=5.0, com=(0, 0, 0.1))):
+            settled(arm)
+            with arm.servo(mode=soft) as sv:
+                assert sv.tick()
+                sv.set(arm.state.q)
+
+
+def test_a_servo_motion_moves_the_chosen_frame(bare: Arm) -> None:
+    with bare.tool(GRIPPER):
+        for moving in ("tool", "pad"):
+            with bare.servo("pose", rate=50, moving=moving) as sv:
+                target = bare.pose(moving) @ Pose.at(0, 0, 0.01)
+                while sv.tick() and sv.t < 1.0:
+                    sv.set(target)
+            assert bare.wait_for_rest()
+            assert bare.pose(moving).distance_to(target) < 5e-4
+    bare.move(ptp(HOME))
+
+
+def test_the_mode_in_force_is_read_back(bare: Arm) -> None:
+    soft = CartesianImpedance(
+        (1500, 1500, 800, 100, 100, 100), damping=0.8, nullspace_stiffness=20.0, frame="base"
+    )
+    assert fresh(bare).mode == Position()
+    handle = bare.start(hold(), mode=soft)
+    assert bare.wait_until(lambda s: s.mode != Position(), timeout=10).mode == soft
+    handle.cancel()
+    handle.wait(timeout=10)
+    with bare.servo(mode=JointImpedance(400.0)) as sv:
+        sv.tick()
+        sv.set(sv.start.q)
+        assert bare.wait_until(lambda s: s.mode == JointImpedance(400.0), timeout=10)
+
+
+def test_nothing_changes_on_the_flange_while_the_arm_moves(bare: Arm) -> None:
+    with bare.tool(GRIPPER):
+        handle = bare.start(hold())
+        with pytest.raises(ModeConflict, match="is running"):
+            bare.attach_tool(GRIPPER)
+        with pytest.raises(ModeConflict, match="is running"):
+            bare.detach_tool()
+        with pytest.raises(ModeConflict, match="is running"):
+            bare.attach_workpiece(PART)
+        handle.cancel()
+        handle.wait(timeout=10)
+        with bare.attached(PART), pytest.raises(ModeConflict, match="part is attached"):
+            bare.attach_workpiece(Workpiece("other"))
+    with pytest.raises(CommandRejected, match="no workpiece part"):
+        bare.detach_workpiece(PART)
+
+
+def test_an_error_in_the_block_takes_the_tool_off_and_comes_through(bare: Arm) -> None:
+    with pytest.raises(ZeroDivisionError), bare.tool(GRIPPER):
+        bare.start(lin_rel(z=0.01))
+        bare.stop()
+        raise ZeroDivisionError
+    assert fresh(bare).tool == ""
+
+
+#: What a client refuses by itself, and the message with which it is bypassed.
+UNKNOWN: dict[str, Callable[[], Lin | LinRel]] = {
+    "moved": lambda: lin_rel(z=0.01, moving="pad"),
+    "axes": lambda: lin_rel(z=0.01, frame="nowhere"),
+    "target": lambda: lin(Pose.at(0.5, 0, 0.5), moving="pad"),
+}
+
+
+@pytest.mark.parametrize("name", UNKNOWN)
+def test_frames_that_nothing_has_are_refused_on_both_sides(
+    bare: Arm, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fresh(bare)
+    with pytest.raises(CommandRejected, match="there are: flange, tool") as here:
+        bare.move(UNKNOWN[name]())
+    monkeypatch.setattr(bare._tooling, "check", lambda _motions, _mode: None)
+    with pytest.raises(CommandRejected) as there:
+        bare.move(UNKNOWN[name]())
+    assert here.value.code == there.value.code == Code.UNKNOWN_NAME
+    assert here.value is not there.value
+
+
+def test_a_mode_with_an_unknown_frame_and_an_unknown_tool_are_refused(bare: Arm) -> None:
+    fresh(bare)
+    with pytest.raises(CommandRejected, match="nowhere") as refused:
+        bare.move(hold(0.1), mode=CartesianImpedance(frame="nowhere"))
+    assert refused.value.code == 42
+    with pytest.raises(CommandRejected, match="no tool hammer"):
+        bare.attach_tool("hammer")
+    with pytest.raises(CommandRejected, match="'tip'"):
+        bare.attach_tool(GRIPPER, frame="tip")
+    with pytest.raises(CommandRejected, match="'tip'"):
+        bare.pose("tip")
+
+
+def test_what_hangs_there_outlives_its_client(cabinet: RunningCabinet, bare: Arm) -> None:
+    bare.attach_tool(GRIPPER)
+    with ha.connect(cabinet.target, control=False) as other:
+        state = other.wait_until(lambda s: s.tool == "gripper")
+        assert state.tool == "gripper"
+        assert other.tools["gripper"].frame_names == ("tcp", "pad")
+        assert other.pose("pad").distance_to(other.pose("flange") @ GRIPPER.frame("pad")) < 1e-6
