@@ -6,11 +6,13 @@ import atexit
 import contextlib
 import logging
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal, TypedDict, overload
 
 from heptarm.arm import fri_settings, program
 from heptarm.arm import servo as servo_module
+from heptarm.arm.conditions import condition_message
 from heptarm.arm.connection import GROUPS, Connection
 from heptarm.arm.equipment import Equipment
 from heptarm.arm.feed import States
@@ -22,6 +24,7 @@ from heptarm.arm.stopping import REST_TIMEOUT, Stopping
 from heptarm.arm.tooling import Tooling
 from heptarm.errors import HeptarmError, ShapeError, StaleState, Timeout
 from heptarm.values.arrays import within
+from heptarm.values.condition import Condition
 from heptarm.values.mode import Mode
 from heptarm.values.motion import TOOL, Motion
 from heptarm.values.result import Result
@@ -52,6 +55,7 @@ class _ServoSettings(TypedDict, total=False):
     min_trajectory_time: float | None
     goal_timeout: float
     moving: str
+    until: Condition | None
 
 
 class Arm(Equipment, Stopping):
@@ -294,6 +298,7 @@ class Arm(Equipment, Stopping):
         *,
         mode: Mode | None = None,
         speed: float | None = None,
+        until: Condition | None = None,
         timeout: float | None = None,
     ) -> Result:
         """Carry out a motion, or several as one batch, and wait until it has ended.
@@ -302,6 +307,8 @@ class Arm(Equipment, Stopping):
             motion: what to do.
             mode: control mode of all of them; None: that of `using`, otherwise position.
             speed: ceiling for this call, (0, 1]; the lower one of this and `arm.speed` counts.
+            until: condition that ends it when it holds, as in `until=force > 10`; what is behind the motion that it
+                ends does not begin. See heptarm.when; the result says which part of it fired, and where.
             timeout: how long to wait [s]; None: three times as long as it can take, and more.
 
         Returns:
@@ -321,7 +328,7 @@ class Arm(Equipment, Stopping):
                 hint="give a timeout, a hold with a duration, or use arm.start()",
             )
         with self._connection.stopping_on_interrupt():
-            handle = self._start(motions, mode=mode, speed=speed, when="queue")
+            handle = self._start(motions, mode=mode, speed=speed, until=until, when="queue")
             try:
                 return handle.wait(timeout=timeout)
             except Timeout:
@@ -334,6 +341,7 @@ class Arm(Equipment, Stopping):
         *,
         mode: Mode | None = None,
         speed: float | None = None,
+        until: Condition | None = None,
         when: Literal["queue", "replace", "reject"] = "queue",
     ) -> MotionHandle:
         """Begin a motion, or several as one batch, and return at once.
@@ -342,6 +350,7 @@ class Arm(Equipment, Stopping):
             motion: what to do.
             mode: control mode of all of them; None: that of `using`, otherwise position.
             speed: ceiling for this call, (0, 1].
+            until: condition that ends it; see `move`.
             when: while another one runs: "queue" behind it, "replace" it, or "reject" this one.
 
         Raises:
@@ -349,7 +358,7 @@ class Arm(Equipment, Stopping):
             ConnectionLost: the connection has ended.
         """
         with self._connection.stopping_on_interrupt():
-            return self._start(program.listed(motion), mode=mode, speed=speed, when=when)
+            return self._start(program.listed(motion), mode=mode, speed=speed, until=until, when=when)
 
     @contextlib.contextmanager
     def using(self, mode: Mode) -> Iterator[None]:
@@ -366,7 +375,13 @@ class Arm(Equipment, Stopping):
             self._mode = outer
 
     def _start(
-        self, motions: tuple[Motion, ...], *, mode: Mode | None, speed: float | None, when: str
+        self,
+        motions: tuple[Motion, ...],
+        *,
+        mode: Mode | None,
+        speed: float | None,
+        until: Condition | None,
+        when: str,
     ) -> MotionHandle:
         if when not in _WHEN:
             raise ShapeError(f"when is {when!r}; allowed are {', '.join(map(repr, _WHEN))}", parameter="when")
@@ -375,8 +390,10 @@ class Arm(Equipment, Stopping):
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
         chosen = mode_message(mode or self._mode)
         self._tooling.check(motions, mode or self._mode)
-        message = wire.Run(items=program.items(motions, self.robot, ceiling, mode=chosen), when=_WHEN[when])
-        return self._connection.run(message, len(motions), self._limit(motions, ceiling))
+        ends, parts = condition_message(until, self._connection.welcome.signals)
+        items = program.items(motions, self.robot, ceiling, mode=chosen, until=ends)
+        message = wire.Run(items=items, when=_WHEN[when])
+        return self._connection.run(message, len(motions), self._limit(motions, ceiling), until=parts)
 
     def _limit(self, motions: tuple[Motion, ...], ceiling: float) -> float:
         """Time after which waiting for them makes no sense [s], with what is before them in the queue."""
@@ -404,6 +421,7 @@ class Arm(Equipment, Stopping):
         min_trajectory_time: float | None = None,
         goal_timeout: float = 300.0,
         moving: str = TOOL,
+        until: Condition | None = None,
     ) -> JointServo | PoseServo:
         """A stream of targets that the arm follows; it begins with the `with` block.
 
@@ -421,6 +439,8 @@ class Arm(Equipment, Stopping):
             goal_timeout: after so long at its target without another one the cabinet's servo motion ends [s]; the
                 next target begins a new one.
             moving: the moved frame: "tool" (the attached tool's, without one the flange), "flange" or a frame's name.
+            until: condition that ends it when it holds; the cabinet's application looks 250 times a second, as far as
+                its robot answers that fast. See `move`.
 
         Raises:
             LimitError: a value outside its range.
@@ -440,8 +460,11 @@ class Arm(Equipment, Stopping):
         )
         self._tooling.check_moved(moving, "moving")
         self._tooling.check_mode(mode or self._mode)
+        ends, parts = condition_message(until, self._connection.welcome.signals)
         stream = PoseServo if kind == "pose" else JointServo
-        return stream(self._connection, message, rate=hertz, watchdog=seconds)
+        return stream(
+            self._connection, replace(message, until=ends), rate=hertz, watchdog=seconds, until=parts
+        )
 
     def fri(
         self,

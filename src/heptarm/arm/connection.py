@@ -16,11 +16,12 @@ from heptarm.arm.feed import Feed, Sample
 from heptarm.arm.handle import MotionHandle
 from heptarm.arm.link import Link
 from heptarm.arm.private_cabinet import PrivateCabinet
-from heptarm.arm.reading import read_result, read_robot, read_state
+from heptarm.arm.reading import read_firing, read_result, read_robot, read_state
 from heptarm.errors import CommandRejected, ConnectionLost, HeptarmError, Timeout
 from heptarm.io.clock import Clock
 from heptarm.io.transport import Transport
 from heptarm.values.arrays import within
+from heptarm.values.condition import Condition
 from heptarm.values.result import Result
 from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
@@ -252,13 +253,18 @@ class Connection:
         self.options = replace(self.options, rate=rate, groups=tuple(groups))
 
     def run(
-        self, message: wire.Run | wire.ServoOpen | wire.FriOpen, count: int, limit: float
+        self,
+        message: wire.Run | wire.ServoOpen | wire.FriOpen,
+        count: int,
+        limit: float,
+        *,
+        until: tuple[Condition, ...] = (),
     ) -> MotionHandle:
         """Send a program of `count` motions, a servo motion or an overlay.
 
-        The handle waits for up to `limit` seconds.
+        The handle waits for up to `limit` seconds. `until` says which part of its break condition each node is.
         """
-        handle = MotionHandle(self, count, limit)
+        handle = MotionHandle(self, count, limit, until=until)
 
         def claim(answer: Message) -> None:
             if isinstance(answer, wire.Accepted):
@@ -369,6 +375,10 @@ class Connection:
         """The state of a sample."""
         return read_state(sample.body, self.link.offset, self.clock.nanos)
 
+    def state_of(self, message: wire.ConditionFired) -> State:
+        """Where the robot was when a condition fired."""
+        return read_firing(message, self.link.offset, self.clock.nanos)
+
     def result_of(self, message: wire.MotionFinished) -> Result:
         """The result that an event tells, with the joint positions measured at its end."""
         state = self.newest()
@@ -379,7 +389,9 @@ class Connection:
     # ---------------------------------------------------------------------------- from the link
 
     def _on_event(self, message: Message) -> None:
-        if isinstance(message, wire.MotionStarted | wire.ItemReached | wire.MotionFinished):
+        if isinstance(
+            message, wire.MotionStarted | wire.ItemReached | wire.ConditionFired | wire.MotionFinished
+        ):
             handle = self._handles.get(message.id)
             if handle is None:
                 self._unclaimed.append(message)  # its Accepted may still be on its way

@@ -8,15 +8,18 @@ import threading
 from collections.abc import Callable, Generator
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout
+from dataclasses import replace
 from math import isnan
 from typing import TYPE_CHECKING, Any
 
 from heptarm import errors
 from heptarm.arm.refusals import error_of
 from heptarm.errors import CommandRejected, ConnectionLost, HeptarmError, MotionAborted, Starved, Timeout
+from heptarm.values.condition import Condition
 from heptarm.values.result import Cause, Result
+from heptarm.values.state import State
 from heptarm.wire.codes import MEANINGS
-from heptarm.wire.messages import ItemReached, Message, MotionFinished, MotionStarted
+from heptarm.wire.messages import ConditionFired, ItemReached, Message, MotionFinished, MotionStarted
 
 if TYPE_CHECKING:
     from heptarm.arm.connection import Connection
@@ -31,10 +34,14 @@ class MotionHandle:
     It can be awaited in asyncio. Its id is the cabinet's.
     """
 
-    def __init__(self, connection: Connection, count: int, limit: float) -> None:
+    def __init__(
+        self, connection: Connection, count: int, limit: float, *, until: tuple[Condition, ...] = ()
+    ) -> None:
         self._connection = connection
         self._count = count
         self._limit = limit
+        self._until = until
+        self._fired: State | None = None
         self._id = 0
         self._item = -1
         self._begun = threading.Event()
@@ -145,6 +152,8 @@ class MotionHandle:
             self._begun.set()
         elif isinstance(message, ItemReached):
             self._item = max(self._item, message.item)
+        elif isinstance(message, ConditionFired):
+            self._fired = self._connection.state_of(message)
         elif isinstance(message, MotionFinished):
             self._finish(message)
 
@@ -160,6 +169,8 @@ class MotionHandle:
 
     def _finish(self, message: MotionFinished) -> None:
         result = self._connection.result_of(message)
+        if 0 <= message.fired < len(self._until):
+            result = replace(result, stopped_by=self._until[message.fired], fired_at=self._fired)
         if result.cause in _GOOD:
             if not self._future.done():
                 self._future.set_result(result)

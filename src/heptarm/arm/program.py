@@ -52,7 +52,12 @@ def listed(motion: Motion | Sequence[Motion]) -> tuple[Motion, ...]:
 
 
 def items(
-    motions: Sequence[Motion], robot: RobotModel, ceiling: float, *, mode: wire.Mode | None = None
+    motions: Sequence[Motion],
+    robot: RobotModel,
+    ceiling: float,
+    *,
+    mode: wire.Mode | None = None,
+    until: wire.Condition | None = None,
 ) -> tuple[wire.Item, ...]:
     """The items of a program.
 
@@ -61,6 +66,7 @@ def items(
         robot: the connected robot.
         ceiling: no axis faster than this fraction of its maximum, (0, 1].
         mode: control mode of all of them; None: position.
+        until: break condition of all of them.
 
     Raises:
         LimitError: a target is outside the robot's limits; the text names motion, axis, value and range.
@@ -68,7 +74,8 @@ def items(
     result = []
     for index, motion in enumerate(motions):
         try:
-            result.append(replace(_item(motion.under(ceiling), robot), mode=mode))
+            item = _item(motion.under(ceiling), robot)
+            result.append(replace(item, mode=mode, until=until or wire.Condition()))
         except HeptarmError as error:
             if len(motions) > 1:  # which of them
                 error.text = f"motions[{index}]: {error.text}"

@@ -63,6 +63,20 @@ def read_state(body: bytes, offset: ClockOffset, clock: Callable[[], int]) -> va
         raise RemoteProtocolError(f"the cabinet pushed a state that is none: {error}") from error
 
 
+def read_firing(
+    told: wire.ConditionFired, offset: ClockOffset, clock: Callable[[], int]
+) -> values.State:
+    """The state of the robot when a condition fired."""
+    return values.State(
+        joints=_joints(told.joints),
+        torques=_torques(told.torques),
+        cartesian=_cartesian(told.pose),
+        external=_wrench(told.wrench),
+        sampled=offset.to_ours(told.joints.stamp),
+        clock=clock,
+    )
+
+
 def read_result(message: wire.MotionFinished, state: values.State | None) -> Result:
     """How a motion ended."""
     return Result(
@@ -70,7 +84,6 @@ def read_result(message: wire.MotionFinished, state: values.State | None) -> Res
         state=state,
         residual=message.residual,
         duration=message.duration,
-        stopped_by=None if message.fired < 0 else message.fired,
         item=message.item,
         code=message.code,
         text=message.text,

@@ -26,6 +26,7 @@ from heptarm.arm.modes import mode_message
 from heptarm.errors import HeptarmError, LimitError, LocalProtocolError, ShapeError, Timeout
 from heptarm.values.arguments import TOOL, check_name
 from heptarm.values.arrays import Array, array, within
+from heptarm.values.condition import Condition
 from heptarm.values.mode import Mode
 from heptarm.values.pose import Pose
 from heptarm.values.result import Result
@@ -99,6 +100,7 @@ class Servo:
         *,
         rate: float,
         watchdog: float,
+        until: tuple[Condition, ...] = (),
     ) -> None:
         self.period = 1.0 / rate
         self.watchdog = watchdog
@@ -106,6 +108,7 @@ class Servo:
         self._link = connection.link
         self._clock = connection.clock
         self._message = message
+        self._until = until
         self._handle: MotionHandle | None = None
         self._start: State | None = None
         self._result: Result | None = None
@@ -125,7 +128,7 @@ class Servo:
         """
         if self._handle is not None:
             raise LocalProtocolError("a servo is used once; make another one with arm.servo(...)")
-        handle = self._handle = self._connection.run(self._message, 1, inf)
+        handle = self._handle = self._connection.run(self._message, 1, inf, until=self._until)
         if not handle.wait_started(_PATIENCE):
             handle.cancel()
             raise Timeout(

@@ -7,6 +7,7 @@ from enum import Enum
 from math import nan
 
 from heptarm.values.arrays import Value
+from heptarm.values.condition import Condition
 from heptarm.values.state import State
 
 
@@ -31,10 +32,12 @@ class Result(Value):
 
     Attributes:
         cause: why it ended.
-        state: the robot at that time; None if nothing is known of it.
+        state: the robot at its end; None if nothing is known of it.
         residual: largest joint distance between measured and commanded position [rad]; NaN if it never moved.
         duration: from its start to its end, on the cabinet's clock [s].
-        stopped_by: the leaf of the break condition that fired; None if none did.
+        stopped_by: the part of the break condition that fired: of those combined by | the one that held; None if none
+            did.
+        fired_at: the robot when it fired, before it braked.
         item: index of the motion of the program that ran last.
         code: number in the protocol's table of codes; 0: none.
         text: what the cabinet says.
@@ -44,7 +47,8 @@ class Result(Value):
     state: State | None = None
     residual: float = nan
     duration: float = 0.0
-    stopped_by: object | None = None
+    stopped_by: Condition | None = None
+    fired_at: State | None = None
     item: int = 0
     code: int = 0
     text: str = ""
