@@ -18,6 +18,18 @@ def test_every_public_name_is_there() -> None:
         _ = heptarm.nothing
 
 
+def test_the_names_of_fri_are_there_without_a_socket() -> None:
+    from heptarm import fri
+
+    for name in fri.__all__:
+        assert getattr(fri, name) is not None
+        assert name in dir(fri)
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = fri.nothing
+    code = "import sys, heptarm.fri.session; assert not {'socket', 'heptarm.rt'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], timeout=60, check=True)
+
+
 def test_importing_costs_nothing_and_connecting_needs_no_simulator() -> None:
     code = (
         "import sys, heptarm\n"
