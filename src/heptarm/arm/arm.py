@@ -19,10 +19,11 @@ from heptarm.arm.feed import States
 from heptarm.arm.fri import Fri
 from heptarm.arm.handle import MotionHandle
 from heptarm.arm.modes import mode_message
+from heptarm.arm.operator import Operator
 from heptarm.arm.servo import JointServo, PoseServo
 from heptarm.arm.stopping import REST_TIMEOUT, Stopping
 from heptarm.arm.tooling import Tooling
-from heptarm.errors import HeptarmError, ShapeError, StaleState, Timeout
+from heptarm.errors import CommandRejected, HeptarmError, ShapeError, StaleState, Timeout
 from heptarm.values.arrays import within
 from heptarm.values.condition import Condition
 from heptarm.values.mode import Mode
@@ -163,6 +164,20 @@ class Arm(Equipment, Stopping):
     def is_virtual(self) -> bool:
         """Whether the robot is simulated."""
         return self._connection.welcome.virtual
+
+    @property
+    def operator(self) -> Operator:
+        """The person beside the robot, to be played by this program; a private simulator only.
+
+        Raises:
+            CommandRejected: this is no private simulator.
+        """
+        if self._connection.cabinet is None:
+            raise CommandRejected(
+                "only a simulator that this program has started lets it play the operator",
+                hint='connect("sim://iiwa14"), or type the words into the terminal of `heptarm sim`',
+            )
+        return Operator(self._connection.cabinet)
 
     @property
     def software(self) -> str:

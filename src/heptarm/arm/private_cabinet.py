@@ -17,13 +17,14 @@ import threading
 from collections import deque
 
 from heptarm.arm.target import Target
-from heptarm.errors import ConnectFailed
+from heptarm.errors import ConnectFailed, ConnectionLost
 
 _log = logging.getLogger("heptarm.sim")
 
 #: A virtual cabinet is ready within a few seconds; a busy machine may need more [s].
 READY_TIMEOUT = 60.0
 _END_TIMEOUT = 5.0
+_REPLY_TIMEOUT = 20.0
 
 
 class PrivateCabinet:
@@ -37,7 +38,15 @@ class PrivateCabinet:
 
     host = "127.0.0.1"
 
-    def __init__(self, process: subprocess.Popen[str], port: int, readers: list[threading.Thread]) -> None:
+    def __init__(
+        self,
+        process: subprocess.Popen[str],
+        port: int,
+        readers: list[threading.Thread],
+        replies: queue.SimpleQueue[str],
+    ) -> None:
+        self._replies = replies
+        self._asking = threading.Lock()
         self.port = port
         self.pid = process.pid
         self._process = process
@@ -66,9 +75,10 @@ class PrivateCabinet:
         )
         words: deque[str] = deque(maxlen=20)
         ready: queue.SimpleQueue[int | None] = queue.SimpleQueue()
+        replies: queue.SimpleQueue[str] = queue.SimpleQueue()
         readers = [
             threading.Thread(
-                target=_listen, args=(process, ready, words), name="heptarm-sim-out", daemon=True
+                target=_listen, args=(process, ready, replies, words), name="heptarm-sim-out", daemon=True
             ),
             threading.Thread(target=_drain, args=(process, words), name="heptarm-sim-log", daemon=True),
         ]
@@ -87,12 +97,27 @@ class PrivateCabinet:
                 f"the virtual cabinet did not start: {' | '.join(words) or 'it said nothing'}",
                 hint="try `python -m heptarm.virtual.cabinet`; it needs pip install 'heptarm[sim]'",
             )
-        return cls(process, port, readers)
+        return cls(process, port, readers, replies)
 
     @property
     def is_running(self) -> bool:
         """Whether the process lives."""
         return self._process.poll() is None
+
+    def operate(self, words: str) -> str:
+        """Let the person beside the robot do something; returns why it was not understood, "" if it was.
+
+        Raises:
+            ConnectionLost: the process has ended, or does not answer.
+        """
+        with self._asking:
+            try:
+                assert self._process.stdin is not None
+                self._process.stdin.write(f"{' '.join(words.split())}\n")
+                self._process.stdin.flush()
+                return self._replies.get(timeout=_REPLY_TIMEOUT)
+            except (OSError, ValueError, queue.Empty):
+                raise ConnectionLost("the virtual cabinet does not answer", hint="connect again") from None
 
     def close(self) -> None:
         """End it; closing twice is legal."""
@@ -100,14 +125,23 @@ class PrivateCabinet:
         _end(self._process, self._readers)
 
 
-def _listen(process: subprocess.Popen[str], ready: queue.SimpleQueue[int | None], words: deque[str]) -> None:
-    """Wait for the READY line, then keep the pipe empty."""
+def _listen(
+    process: subprocess.Popen[str],
+    ready: queue.SimpleQueue[int | None],
+    replies: queue.SimpleQueue[str],
+    words: deque[str],
+) -> None:
+    """Wait for the READY line, then hand on what is answered to the operator."""
     assert process.stdout is not None
     for line in process.stdout:
         try:
             message = json.loads(line)
-            if message["ready"]:
+            if "operator" in message:
+                replies.put(str(message["error"]))
+            elif message["ready"]:
                 ready.put(int(message["port"]))
+            else:
+                words.append(str(message["error"]))
         except (ValueError, KeyError, TypeError):
             words.append(line.rstrip())
     ready.put(None)

@@ -15,7 +15,7 @@ VARIABLE = "HEPTARM_TARGET"
 
 #: Options of a private virtual cabinet besides its speed: a box around the arm; what hangs on the flange whatever the
 #: controller is told; the project's RoboticsAPI.data.xml.
-_OTHERS = ("box", "payload", "project")
+_OTHERS = ("box", "payload", "project", "fault")
 
 _EXAMPLES = (
     'examples: "172.31.1.147" or "172.31.1.147:30001" (a cabinet), "sim://iiwa14" or "sim://iiwa7?speed=5" '

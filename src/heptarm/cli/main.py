@@ -52,6 +52,14 @@ def sim(
     view: Annotated[bool, Parameter(negative="", help="Open a live 3D view in the browser.")] = False,
     view_port: Annotated[int, Parameter(help="Port of the view; 0 takes a free one.")] = 8080,
     key: Annotated[str, Parameter(help="Pre-shared key that clients must know.")] = "",
+    fault: Annotated[
+        tuple[str, ...],
+        Parameter(
+            help="Let something go wrong at a simulated time, as NAME@SECONDS: emergency_stop, operator_safety, "
+            "protective_stop, drive_error, joint_limit, singularity, t1, release, clear ...; may be given again. "
+            "The same words can be typed while it runs."
+        ),
+    ] = (),
     verbose: Annotated[bool, Parameter(negative="", help="Show the cabinet's log.")] = False,
     application: Annotated[
         Path | None,
@@ -118,6 +126,7 @@ def sim(
         view=view,
         view_port=view_port,
         key=key,
+        faults=fault,
         verbose=verbose,
         as_json=json,
     )

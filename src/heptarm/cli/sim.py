@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import subprocess
 import sys
+import threading
+from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,6 +16,7 @@ from typing import Any
 
 from heptarm.cli.output import emit
 from heptarm.errors import ConnectFailed
+from heptarm.virtual.operator import WORDS
 
 
 def run(
@@ -24,10 +28,11 @@ def run(
     view: bool,
     view_port: int,
     key: str,
+    faults: tuple[str, ...],
     verbose: bool,
     as_json: bool,
 ) -> int:
-    """Run until Ctrl-C or SIGTERM; returns the exit code.
+    """Run until Ctrl-C or SIGTERM; lines on standard input are what the operator does. Returns the exit code.
 
     Raises:
         ConnectFailed: the cabinet or the view does not start; the text says why.
@@ -35,6 +40,8 @@ def run(
     command = [sys.executable, "-m", "heptarm.virtual.cabinet", "--parent-pipe", "--model", model]
     command += ["--host", host, "--port", str(port), "--speed", str(speed)]
     command += ["--key", key] if key else []
+    for fault in faults:
+        command += ["--fault", fault]
     command += ["--verbose"] if verbose else []
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ExitStack() as stack:
@@ -62,7 +69,10 @@ def run(
             print(f"A virtual {model} is ready. Connect with {target}; Ctrl-C ends it.")
             if view:
                 print(f"See it at {ready['view']}")
+            if sys.stdin is not None and sys.stdin.isatty():
+                print("You are the operator: type emergency_stop, clear, start, t1, enable ... or help.")
             sys.stdout.flush()
+        _converse(cabinet, as_json)
         try:
             return cabinet.wait()
         except KeyboardInterrupt:
@@ -118,6 +128,58 @@ def _failure(said: str) -> str:
         with suppress(ValueError):
             return str(dict(json.loads(line)).get("error", ""))
     return ""
+
+
+def _type(cabinet: subprocess.Popen[str], as_json: bool) -> None:
+    """Hand on what is typed; the end of standard input ends nothing."""
+    assert cabinet.stdin is not None
+    rest = b""
+    # read raw: a buffered read under way would keep the interpreter from ending
+    while octets := os.read(0, 4096):
+        *lines, rest = (rest + octets).split(b"\n")
+        for line in lines:
+            said = line.decode("utf-8", "replace").strip()
+            if said == "help":
+                for words, meaning in WORDS.items():
+                    about = json.dumps({"say": words, "to": meaning}) if as_json else f"{words:26} {meaning}"
+                    print(about, flush=True)
+                continue
+            cabinet.stdin.write(f"{said}\n")
+            cabinet.stdin.flush()
+
+
+def _converse(cabinet: subprocess.Popen[str], as_json: bool) -> None:
+    """Let whoever sits before the terminal play the operator."""
+    threading.Thread(target=_careful, args=(_answer, cabinet, as_json), daemon=True).start()
+    try:
+        # in the background a terminal must not be read: that would halt the whole process
+        if os.isatty(0) and os.tcgetpgrp(0) != os.getpgrp():
+            return
+    except (OSError, AttributeError):
+        return
+    threading.Thread(target=_careful, args=(_type, cabinet, as_json), daemon=True).start()
+
+
+def _careful(
+    work: Callable[[subprocess.Popen[str], bool], None], cabinet: subprocess.Popen[str], as_json: bool
+) -> None:
+    """Work until a pipe is closed."""
+    with suppress(OSError, ValueError):
+        work(cabinet, as_json)
+
+
+def _answer(cabinet: subprocess.Popen[str], as_json: bool) -> None:
+    """Show what the cabinet answers."""
+    assert cabinet.stdout is not None
+    for line in cabinet.stdout:
+        try:
+            reply = dict(json.loads(line))
+        except ValueError:
+            continue
+        if as_json:
+            print(line.strip(), flush=True)
+        elif reply.get("operator"):
+            print(reply["error"] or f"done: {reply['operator']}", flush=True)
 
 
 class _child(subprocess.Popen[str]):

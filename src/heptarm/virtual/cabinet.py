@@ -24,6 +24,7 @@ from typing import Any
 from heptarm.fri.version import Version
 from heptarm.virtual import processdata, templates
 from heptarm.virtual.fri.sessions import Sessions
+from heptarm.virtual.operator import Operator, timed
 from heptarm.virtual.pacer import Pacer
 from heptarm.virtual.payload import hanging
 from heptarm.virtual.plant import Plant
@@ -74,9 +75,20 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument("--data", action="append", default=[], metavar="NAME=VALUE", help="process data")
     parser.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="NAME@SECONDS",
+        help="let something go wrong at a simulated time, such as emergency_stop@5; may be given again",
+    )
+    parser.add_argument(
         "--stats", type=Path, help="write the loop's statistics here at the end and on SIGUSR1"
     )
-    parser.add_argument("--parent-pipe", action="store_true", help="end when standard input is closed")
+    parser.add_argument(
+        "--parent-pipe",
+        action="store_true",
+        help="end when standard input is closed; its lines are what the operator does",
+    )
     parser.add_argument("--verbose", action="store_true", help="log to standard error")
     return parser.parse_args(argv)
 
@@ -111,6 +123,9 @@ class VirtualCabinet:
         self._options = options
         self.plant = Plant(options.model, boxes=[Box.of(text) for text in options.box])
         self.sessions = Sessions(self.plant, version=Version.of(options.fri_version), speed=options.speed)
+        self.operator = Operator(self.plant)
+        for fault in options.fault:
+            self.operator.schedule(fault)
         self.pacer = Pacer(self.plant.ring, self.tick, speed=options.speed)
         jvm.start(options.classpath)
         import jpype
@@ -128,7 +143,8 @@ class VirtualCabinet:
         self.host = jpype.JClass("heptarm.doubles.Host")(options.application or jvm.APPLICATION)
 
     def tick(self) -> None:
-        """One millisecond of FRI and plant."""
+        """One millisecond of operator, FRI and plant."""
+        self.operator.tick()
         self.sessions.tick()
         self.plant.tick()
 
@@ -181,15 +197,31 @@ def _housekeeping(stop: threading.Event) -> None:
         _promote()
 
 
-def _when_orphaned(end: Callable[[], None]) -> None:
-    """Wait for the end of standard input: the parent is gone or wants us to end."""
+def _when_orphaned(operator: Operator, end: Callable[[], None]) -> None:
+    """Do what standard input says until it ends: then the parent is gone or wants us to end."""
+    rest = b""
     while True:
         try:
-            if not os.read(0, 4096):
-                break
+            octets = os.read(0, 4096)
         except OSError:
             break
+        if not octets:
+            break
+        *lines, rest = (rest + octets).split(b"\n")
+        for line in lines:
+            _obey(operator, line.decode("utf-8", "replace").strip())
     end()
+
+
+def _obey(operator: Operator, words: str) -> None:
+    """Do something in words, and say on standard output whether that was understood."""
+    try:
+        if words:
+            operator.do(words)
+        error = ""
+    except ValueError as refused:
+        error = str(refused)
+    print(json.dumps({"operator": words, "error": error}), flush=True)
 
 
 def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
@@ -225,6 +257,8 @@ def main(argv: list[str] | None = None) -> int:
     logging.basicConfig(level=logging.INFO if options.verbose else logging.WARNING, stream=sys.stderr)
     try:
         data = process_data(options)
+        for fault in options.fault:
+            timed(fault)
         for text in options.box:
             Box.of(text)
         if options.payload is not None:
@@ -247,7 +281,7 @@ def main(argv: list[str] | None = None) -> int:
     if hasattr(signal, "SIGUSR1"):
         signal.signal(signal.SIGUSR1, lambda *_: cabinet.write_stats())
     if options.parent_pipe:
-        threading.Thread(target=_when_orphaned, args=(end,), daemon=True).start()
+        threading.Thread(target=_when_orphaned, args=(cabinet.operator, end), daemon=True).start()
     announcer = threading.Thread(target=_announce, args=(cabinet, stopping, failed), daemon=True)
     cabinet.host.start()
     announcer.start()

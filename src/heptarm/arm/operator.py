@@ -1,0 +1,87 @@
+"""The person beside a simulated robot, played by the program that started the simulator."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy.typing as npt
+
+from heptarm.arm.private_cabinet import PrivateCabinet
+from heptarm.errors import CommandRejected
+from heptarm.values.arrays import array, within
+
+
+class Operator:
+    """Acts on a private simulator as a person beside the robot does; `Arm.operator`.
+
+    What it can do, in words: `heptarm sim` understands the same when they are typed into its terminal.
+    """
+
+    def __init__(self, cabinet: PrivateCabinet) -> None:
+        self._cabinet = cabinet
+
+    def do(self, words: str) -> None:
+        """Do something, in words, such as "push 0 0 -20 1.5".
+
+        Raises:
+            CommandRejected: that is not understood; the text says what is.
+        """
+        reply = self._cabinet.operate(words)
+        if reply:
+            raise CommandRejected(reply, parameter="words", value=words)
+
+    def fault(
+        self,
+        name: Literal[
+            "emergency_stop",
+            "external_emergency_stop",
+            "operator_safety",
+            "protective_stop",
+            "drive_error",
+            "joint_limit",
+            "singularity",
+        ],
+    ) -> None:
+        """Let something go wrong; stops stay until `clear`."""
+        self.do(name)
+
+    def clear(self, name: str = "") -> None:
+        """End a stop and acknowledge it; without a name: all of them. Execution stays paused."""
+        self.do(f"clear {name}")
+
+    def hold(self) -> None:
+        """Hold the enabling switch."""
+        self.do("enable")
+
+    def release(self) -> None:
+        """Let the enabling switch go."""
+        self.do("release")
+
+    def choose(self, mode: Literal["t1", "t2", "aut"]) -> None:
+        """Choose the operation mode."""
+        if mode not in ("t1", "t2", "aut"):
+            raise CommandRejected(
+                f"mode is {mode!r}; there are t1, t2, aut",
+                parameter="mode",
+                value=mode,
+                allowed="t1, t2, aut",
+            )
+        self.do(mode)
+
+    def override(self, factor: float) -> None:
+        """Set the override at the smartPAD, [0, 1], a factor besides the application's."""
+        self.do(f"override {within(factor, 'factor', 0.0, 1.0)!r}")
+
+    def start(self) -> None:
+        """Press Start: execution goes on."""
+        self.do("start")
+
+    def push(self, force: npt.ArrayLike, *, duration: float) -> None:
+        """Push the flange.
+
+        Args:
+            force: base axes, shape (3,) [N].
+            duration: for so long [s].
+        """
+        x, y, z = array(force, 3, "force").tolist()
+        self.do(f"push {x!r} {y!r} {z!r} {within(duration, 'duration', 0.0, 1e6, unit='s')!r}")

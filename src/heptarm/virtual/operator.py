@@ -1,0 +1,170 @@
+"""The person beside the virtual robot, played in words: presses the emergency stop, holds the enabling switch, pushes.
+
+    emergency_stop          until "clear"
+    drive_error 3@2.5       A3's drive trips after 2.5 simulated seconds
+
+Words may come from any thread; those with a time are carried out by the tick.
+"""
+
+from __future__ import annotations
+
+import heapq
+import re
+from collections.abc import Callable
+from itertools import count
+from typing import TYPE_CHECKING
+
+from heptarm.virtual.safety import Demand, Mode
+
+if TYPE_CHECKING:
+    from heptarm.virtual.plant import Plant
+
+#: What can be said, and what it does.
+WORDS = {
+    "emergency_stop": "press the emergency stop of the smartPAD",
+    "external_emergency_stop": "press one beside the robot",
+    "operator_safety": "open the safeguard",
+    "protective_stop": "let a safety function demand a stop",
+    "drive_error [AXIS]": "let a drive trip, 1 to 7",
+    "joint_limit [AXIS]": "let the running motion fail at a joint limit",
+    "singularity": "let it fail at a singularity",
+    "release": "let the enabling switch go",
+    "enable": "hold the enabling switch",
+    "clear [NAME]": "end one stop, or all, and acknowledge it",
+    "t1, t2, aut": "choose the operation mode",
+    "override FACTOR": "set the override at the smartPAD, 0 to 1",
+    "pause": "press Stop: motions pause on their path",
+    "start": "press Start: execution goes on",
+    "push FX FY FZ [SECONDS]": "push the flange, base axes [N]",
+}
+_ALSO = {
+    "estop": "emergency_stop",
+    "e_stop": "emergency_stop",
+    "enabling_switch": "release",
+    "gate": "operator_safety",
+}
+_DEMANDS = tuple(demand.value for demand in Demand)
+#: How many values a word takes.
+_COUNTS = {
+    **dict.fromkeys(
+        (*_DEMANDS, "singularity", "release", "enable", "t1", "t2", "aut", "pause", "start"), (0, 0)
+    ),
+    **dict.fromkeys(("drive_error", "joint_limit", "clear"), (0, 1)),
+    "override": (1, 1),
+    "push": (3, 4),
+}
+_TIMED = re.compile(r"(.+?)\s*@\s*([0-9.]+)\s*s?\s*")
+
+
+def timed(text: str) -> tuple[str, float]:
+    """Split "WORDS@SECONDS".
+
+    Raises:
+        ValueError: it has no time, or the words are not understood.
+    """
+    match = _TIMED.fullmatch(text)
+    if match is None:
+        raise ValueError(f"{text!r} has no time; NAME@SECONDS is expected, as in emergency_stop@5")
+    understood(match[1])
+    return match[1], float(match[2])
+
+
+def understood(words: str) -> tuple[str, list[float | str]]:
+    """The verb of some words, and its values.
+
+    Raises:
+        ValueError: they are not understood.
+    """
+    name, *rest = words.lower().split() or [""]
+    name = _ALSO.get(name.replace("-", "_"), name.replace("-", "_"))
+    if name not in _COUNTS:
+        raise ValueError(f"{words!r} is not understood; say one of: {', '.join(WORDS)}")
+    least, most = _COUNTS[name]
+    if not least <= len(rest) <= most:
+        raise ValueError(f"{words!r}: {name} takes {least} to {most} values, not {len(rest)}")
+    if name == "clear":
+        rest = [_ALSO.get(one.replace("-", "_"), one.replace("-", "_")) for one in rest]
+        if rest and rest[0] not in _DEMANDS:
+            raise ValueError(f"{words!r}: cleared can be {', '.join(_DEMANDS)}")
+        return name, list(rest)
+    try:
+        values = [float(one) for one in rest]
+    except ValueError:
+        raise ValueError(f"{words!r}: numbers are expected behind {name}") from None
+    if name in ("drive_error", "joint_limit") and any(one not in range(1, 8) for one in values):
+        raise ValueError(f"{words!r}: axes are 1 to 7")
+    if name == "override" and not 0.0 <= values[0] <= 1.0:
+        raise ValueError(f"{words!r}: the override is 0 to 1")
+    return name, list(values)
+
+
+class Operator:
+    """Acts on a plant as a person does.
+
+    Args:
+        plant: the plant.
+    """
+
+    def __init__(self, plant: Plant) -> None:
+        self._plant = plant
+        self._due: list[tuple[int, int, str]] = []
+        self._numbers = count()
+        self._verbs: dict[str, Callable[..., None]] = {
+            **{demand.value: self._demanding(demand) for demand in Demand},
+            **{mode.name.lower(): self._choosing(mode) for mode in Mode},
+            "drive_error": self._drive_error,
+            "joint_limit": self._joint_limit,
+            "singularity": lambda: plant.abort(0, "the path leads through a singularity"),
+            "release": plant.safety.release,
+            "enable": plant.safety.enable,
+            "clear": self._clear,
+            "override": self._override,
+            "pause": plant.pause,
+            "start": plant.resume,
+            "push": self._push,
+        }
+
+    def schedule(self, text: str) -> None:
+        """Do something at a time of the plant: "WORDS@SECONDS".
+
+        Raises:
+            ValueError: what it does not understand.
+        """
+        words, seconds = timed(text)
+        heapq.heappush(self._due, (round(seconds * 1000), next(self._numbers), words))
+
+    def tick(self) -> None:
+        """What comes before a tick of the plant."""
+        due = self._due
+        while due and due[0][0] <= self._plant.tick_count:
+            self.do(heapq.heappop(due)[2])
+
+    def do(self, words: str) -> None:
+        """Do something now.
+
+        Raises:
+            ValueError: what it does not understand; nothing has happened.
+        """
+        name, values = understood(words)
+        self._verbs[name](*values)
+
+    def _demanding(self, demand: Demand) -> Callable[[], None]:
+        return lambda: self._plant.safety.demand(demand)
+
+    def _choosing(self, mode: Mode) -> Callable[[], None]:
+        return lambda: self._plant.safety.choose(mode)
+
+    def _drive_error(self, axis: float = 1) -> None:
+        self._plant.trip(f"drive error in A{int(axis)}: the drives are off")
+
+    def _joint_limit(self, axis: float = 1) -> None:
+        self._plant.abort(0, f"Command Position violates limit A{int(axis)}")
+
+    def _clear(self, name: str = "") -> None:
+        self._plant.safety.withdraw(*([Demand(name)] if name else []))
+
+    def _override(self, factor: float) -> None:
+        self._plant.safety.manual = factor
+
+    def _push(self, x: float, y: float, z: float, seconds: float = float("inf")) -> None:
+        self._plant.apply_wrench((x, y, z), duration=seconds)

@@ -1,0 +1,107 @@
+"""The operator of the virtual cabinet: what can be said, when it happens, and what is not understood."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from heptarm.virtual import ring
+from heptarm.virtual.operator import WORDS, Operator, timed, understood
+from heptarm.virtual.order import Order
+from heptarm.virtual.safety import Demand, Mode
+from tests.virtual.driving import Ear, ready
+from tests.virtual.ideal import KINDS, begin
+
+
+@pytest.mark.parametrize("words", sorted(WORDS))
+def test_every_word_of_the_help_is_understood(words: str) -> None:
+    for one in words.split(","):
+        name = one.split()[0]
+        values = {"override": ["0.5"], "push": ["1", "2", "3"]}.get(name, [])
+        assert understood(" ".join([name, *values]))[0] == name
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ("", "say one of"),
+        ("explode", "emergency_stop"),
+        ("override", "1 to 1 values"),
+        ("override 2", "0 to 1"),
+        ("override half", "numbers"),
+        ("drive_error 8", "1 to 7"),
+        ("push 1 2", "3 to 4"),
+        ("clear everything", "emergency_stop"),
+        ("t1 now", "0 to 0 values"),
+    ],
+)
+def test_what_is_not_understood_changes_nothing(words: str, says: str) -> None:
+    plant = ready()
+    with pytest.raises(ValueError, match=says):
+        Operator(plant).do(words)
+    assert not plant.safety.latched and plant.safety.mode is Mode.AUT
+
+
+def test_faults_come_at_their_time_and_go() -> None:
+    plant = begin("hold")
+    operator = Operator(plant)
+    operator.schedule("clear@0.3")
+    operator.schedule("e-stop @ 0.1 s")
+    halted = []
+    for _ in range(400):
+        operator.tick()
+        plant.tick()
+        halted.append(plant.safety.halts)
+    assert halted.index(True) in range(98, 102) and sum(halted) == 200
+    with pytest.raises(ValueError, match="NAME@SECONDS"):
+        timed("emergency_stop")
+    with pytest.raises(ValueError, match="not understood"):
+        operator.schedule("explode@1")
+
+
+def test_two_stops_are_cleared_one_by_one() -> None:
+    plant = ready()
+    operator = Operator(plant)
+    operator.do("gate")
+    operator.do("external_emergency_stop")
+    plant.step()
+    flags = int(plant.ring.ints[1, ring.FLAGS])
+    assert flags & ring.EXTERNAL_STOP and flags & ring.SAFEGUARD_OPEN
+    operator.do("clear gate")
+    assert plant.safety.demands == {Demand.EXTERNAL_EMERGENCY_STOP}
+    operator.do("clear")
+    assert not plant.safety.demands and plant.safety.latched
+    operator.do("start")
+    assert not plant.safety.latched
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [("joint_limit 4", "limit A4"), ("singularity", "singularity"), ("drive_error 3", "drive error in A3")],
+)
+def test_errors_end_what_runs_off_its_path(words: str, text: str) -> None:
+    plant, ear = begin("hold"), Ear()
+    operator = Operator(plant)
+    operator.do(words)  # nothing runs but the hold
+    plant.stop()
+    plant.safety.withdraw()
+    plant.resume()
+    while not plant.idle:
+        plant.tick()
+    plant.submit(Order(2, "ptp", joints=KINDS["ptp"].joints, listener=ear))
+    for _ in range(400):
+        plant.tick()
+    fast = np.abs(plant.speed).max()
+    operator.do(words)
+    while not plant.idle:
+        plant.tick()
+    assert ear.causes == ["started", "error"] and text in ear.heard[-1][1] and fast > 0.5
+
+
+def test_a_push_ends_by_itself() -> None:
+    plant = ready()
+    Operator(plant).do("push 0 20 0 0.1")
+    plant.step(80)
+    assert plant.snapshot.wrench[1] == pytest.approx(20.0, abs=0.5)
+    plant.step(100)
+    assert np.abs(plant.snapshot.wrench).max() < 0.5
