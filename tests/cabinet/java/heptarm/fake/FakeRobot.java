@@ -558,7 +558,8 @@ final class FakeRobot implements Robot, Runnable {
 
     @Override
     public FrameInfo[] frames() {
-        return new FrameInfo[0];
+        Pose there = new Pose(new double[] {0.5, 0.0, 0.0}, new double[] {0.0, 0.0, 0.0, 1.0});
+        return new FrameInfo[] {new FrameInfo("/table", there)};
     }
 
     @Override

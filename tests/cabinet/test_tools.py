@@ -1,0 +1,249 @@
+"""Tools, workpieces and the names of frames in the core."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from heptarm.wire import messages as wire
+from heptarm.wire.codes import Code
+from tests.cabinet.fake import FakeCabinet
+from tests.cabinet.peer import Peer, ptp, run
+
+NAN, INF = math.nan, math.inf
+HERE = wire.Pose(xyz=(0.0, 0.0, 0.12), quat=(0.0, 0.0, 0.0, 1.0))
+BALL = (1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0)
+EMPTY = wire.ToolInfo(name="part", mass=0.5, com=(0.0,) * 3, inertia=(0.0,) * 6, frames=())
+GRIPPER = replace(
+    EMPTY,
+    name="gripper",
+    inertia=BALL,
+    frames=(wire.FrameInfo(name="tcp", pose=HERE), wire.FrameInfo(name="pad", pose=HERE)),
+)
+SPRING = wire.CartesianImpedance(
+    stiffness=(1000.0,) * 3 + (100.0,) * 3,
+    damping=(0.7,) * 6,
+    nullspace_stiffness=0.0,
+    nullspace_damping=0.7,
+    additional_force=(0.0,) * 6,
+    frame="",
+)
+
+
+def frames(*names: str) -> tuple[wire.FrameInfo, ...]:
+    return tuple(wire.FrameInfo(name=name, pose=HERE) for name in names)
+
+
+@pytest.fixture
+def peer(cabinet: FakeCabinet) -> Iterator[Peer]:
+    with Peer(cabinet.port) as peer:
+        peer.ask(wire.TakeControl(watchdog=10.0))
+        peer.ask(wire.AttachTool(name="", frame=""))
+        yield peer
+        peer.ask(wire.Stop())
+        rest(peer)
+        assert isinstance(peer.ask(wire.AttachTool(name="", frame="")), wire.Accepted)
+
+
+def rest(peer: Peer) -> None:
+    """Waits until nothing runs: only then may the load change."""
+    accepted = peer.ask(run(replace(ptp(), motion=wire.Hold(duration=0.01))))
+    peer.wait_for(wire.MotionFinished, lambda event: event.id == accepted.id)
+
+
+def fitted(peer: Peer) -> tuple[str, str, str]:
+    """What the next state says of tool, workpiece and moved frame."""
+    since = len(peer.seen)
+    peer.ask(wire.Subscribe(groups=wire.Groups.MODE, rate=100.0))
+    state = peer.wait(lambda _, message: isinstance(message, wire.State), since=since)
+    peer.ask(wire.Subscribe(groups=wire.Groups.NONE, rate=0.0))
+    return state.mode.tool, state.mode.workpiece, state.mode.frame
+
+
+#: Fields that no tool has: what the client refuses in tests/values/test_tool.py, with the same codes.
+BAD: list[tuple[dict[str, Any], int, str]] = [
+    ({"name": ""}, Code.BAD_LENGTH, "name"),
+    ({"name": "x" * 65}, Code.BAD_LENGTH, "name"),
+    ({"name": "a/b"}, Code.OUT_OF_RANGE, "name"),
+    ({"mass": -0.1}, Code.OUT_OF_RANGE, "mass"),
+    ({"mass": 50.1}, Code.OUT_OF_RANGE, "mass"),
+    ({"mass": NAN}, Code.NOT_FINITE, "mass"),
+    ({"mass": INF}, Code.NOT_FINITE, "mass"),
+    ({"com": (0.0, NAN, 0.0)}, Code.NOT_FINITE, "com[1]"),
+    ({"com": (0.0, 0.0, 2.1)}, Code.OUT_OF_RANGE, "com[2]"),
+    ({"inertia": (NAN, *BALL[1:])}, Code.NOT_FINITE, "inertia[0]"),
+    ({"inertia": (-1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0)}, Code.OUT_OF_RANGE, "inertia"),
+    ({"inertia": (1e-3, 1e-3, 3e-3, 0.0, 0.0, 0.0)}, Code.OUT_OF_RANGE, "inertia"),
+    ({"inertia": (1e-3, 1e-3, 1e-3, 2e-3, 0.0, 0.0)}, Code.OUT_OF_RANGE, "inertia"),
+    ({"frames": frames("")}, Code.BAD_LENGTH, "frames[0].name"),
+    ({"frames": frames("tip", "flange")}, Code.OUT_OF_RANGE, "frames[1].name"),
+    ({"frames": frames("base")}, Code.OUT_OF_RANGE, "frames[0].name"),
+    ({"frames": frames("tool")}, Code.OUT_OF_RANGE, "frames[0].name"),
+    ({"frames": frames("a/b")}, Code.OUT_OF_RANGE, "frames[0].name"),
+    ({"frames": frames("tip", "tip")}, Code.OUT_OF_RANGE, "frames[1].name"),
+    ({"frames": frames(*map(str, range(33)))}, Code.BAD_LENGTH, "frames"),
+    (
+        {"frames": (wire.FrameInfo(name="tip", pose=replace(HERE, quat=(0.0, 0.0, 0.0, 2.0))),)},
+        Code.NOT_NORMALISED,
+        "frames[0].pose.quat",
+    ),
+]
+
+
+@pytest.mark.parametrize("case", range(len(BAD)))
+def test_what_no_tool_has_is_refused_when_the_client_is_bypassed(peer: Peer, case: int) -> None:
+    fields, code, parameter = BAD[case]
+    bad = replace(EMPTY, **fields)
+    refused = peer.ask(wire.DefineTool(tool=bad))
+    assert (refused.code, refused.parameter) == (code, f"tool.{parameter}")
+    refused = peer.ask(wire.AttachLoad(load=bad, attached=True))
+    assert (refused.code, refused.parameter) == (code, f"load.{parameter}")
+    assert fitted(peer) == ("", "", "flange")
+
+
+def test_tools_come_and_go_and_the_state_says_so(peer: Peer) -> None:
+    assert isinstance(peer.ask(wire.DefineTool(tool=GRIPPER)), wire.Accepted)
+    assert fitted(peer) == ("", "", "flange")
+    peer.ask(wire.AttachTool(name="gripper", frame=""))
+    assert fitted(peer) == ("gripper", "", "tcp")
+    peer.ask(wire.AttachLoad(load=EMPTY, attached=True))
+    assert fitted(peer) == ("gripper", "part", "tcp")
+    peer.ask(wire.AttachLoad(load=EMPTY, attached=False))
+    assert fitted(peer) == ("gripper", "", "tcp")
+    peer.ask(wire.AttachLoad(load=EMPTY, attached=True))
+    peer.ask(wire.AttachTool(name="gripper", frame="pad"))
+    assert fitted(peer) == ("gripper", "", "pad")  # the workpiece went with the tool
+    peer.ask(wire.DefineTool(tool=replace(GRIPPER, mass=2.0)))
+    assert fitted(peer) == ("gripper", "", "pad")
+    peer.ask(wire.DefineTool(tool=replace(GRIPPER, frames=frames("tip"))))
+    assert fitted(peer) == ("gripper", "", "tip")
+    peer.ask(wire.AttachTool(name="", frame=""))
+    assert fitted(peer) == ("", "", "flange")
+
+
+def test_templates_of_the_project_are_tools_too(cabinet: FakeCabinet, peer: Peer) -> None:
+    peer.ask(wire.DefineTool(tool=GRIPPER))
+    with Peer(cabinet.port) as other:
+        known = {tool.name: tool for tool in other.welcome.tools}
+    assert known["listed"].frames[0].name == "tip"
+    assert known["gripper"] == GRIPPER
+    assert "hidden" not in known
+    for name in ("listed", "hidden"):
+        peer.ask(wire.AttachTool(name=name, frame="tip"))
+        assert fitted(peer) == (name, "", "tip")
+    refused = peer.ask(wire.DefineTool(tool=replace(GRIPPER, name="hidden")))
+    assert (refused.code, refused.parameter) == (Code.OUT_OF_RANGE, "tool.name")
+
+
+def test_names_of_nothing_are_refused_with_those_there_are(peer: Peer) -> None:
+    peer.ask(wire.DefineTool(tool=GRIPPER))
+    refused = peer.ask(wire.AttachTool(name="hammer", frame=""))
+    assert (refused.code, refused.parameter) == (Code.UNKNOWN_NAME, "name")
+    assert "gripper" in refused.allowed
+    refused = peer.ask(wire.AttachTool(name="gripper", frame="tip"))
+    assert (refused.code, refused.parameter, refused.allowed) == (Code.UNKNOWN_NAME, "frame", "tcp, pad")
+    refused = peer.ask(wire.AttachLoad(load=EMPTY, attached=False))
+    assert (refused.code, refused.parameter) == (Code.UNKNOWN_NAME, "load.name")
+    assert fitted(peer) == ("", "", "flange")
+
+
+def test_a_robot_that_does_not_take_a_tool_keeps_what_it_has(peer: Peer) -> None:
+    peer.ask(wire.DefineTool(tool=GRIPPER))
+    peer.ask(wire.DefineTool(tool=replace(GRIPPER, name="unlucky", mass=13.0)))
+    peer.ask(wire.AttachTool(name="gripper", frame=""))
+    assert peer.ask(wire.AttachTool(name="unlucky", frame="")).code == Code.EXECUTION_FAILED
+    assert (
+        peer.ask(wire.AttachLoad(load=replace(EMPTY, mass=13.0), attached=True)).code == Code.EXECUTION_FAILED
+    )
+    assert fitted(peer) == ("gripper", "", "tcp")
+
+
+def test_nothing_changes_while_something_runs_or_waits(peer: Peer) -> None:
+    peer.ask(wire.DefineTool(tool=GRIPPER))
+    accepted = peer.ask(run(replace(ptp(), motion=wire.Hold(duration=NAN))))
+    for message in (
+        wire.DefineTool(tool=GRIPPER),
+        wire.AttachTool(name="gripper", frame=""),
+        wire.AttachLoad(load=EMPTY, attached=True),
+    ):
+        assert peer.ask(message).code == Code.BUSY
+    peer.ask(wire.Cancel(id=accepted.id))
+    peer.wait_for(wire.MotionFinished, lambda event: event.id == accepted.id)
+    peer.ask(wire.AttachLoad(load=EMPTY, attached=True))
+    refused = peer.ask(wire.AttachLoad(load=replace(EMPTY, name="other"), attached=True))
+    assert refused.code == Code.BUSY
+    assert "part" in refused.text
+
+
+def test_an_observer_changes_nothing(cabinet: FakeCabinet, peer: Peer) -> None:
+    with Peer(cabinet.port) as observer:
+        assert observer.ask(wire.AttachTool(name="", frame="")).code == Code.NOT_IN_CONTROL
+
+
+def under(frame: str) -> dict[str, tuple[Any, str]]:
+    """Requests with the name of a frame, and the parameter that is named."""
+    offset = wire.LinRel(offset=HERE, reference=frame)
+    wave = wire.SineImpedance(
+        base=replace(SPRING, frame=frame),
+        amplitude=(0.0,) * 6,
+        frequency=(1.0,) * 6,
+        phase=(0.0,) * 6,
+        bias=(0.0,) * 6,
+    )
+    return {
+        "moved": (run(ptp(), replace(ptp(), frame=frame)), "items[1].frame"),
+        "axes": (run(wire.Item(motion=offset)), "items[0].motion.reference"),
+        "mode": (run(replace(ptp(), mode=replace(SPRING, frame=frame))), "items[0].mode.frame"),
+        "pattern": (run(replace(ptp(), mode=wave)), "items[0].mode.base.frame"),
+        "servo": (wire.ServoOpen(watchdog=1.0, frame=frame), "frame"),
+        "servo's mode": (wire.ServoOpen(watchdog=1.0, mode=replace(SPRING, frame=frame)), "mode.frame"),
+    }
+
+
+@pytest.mark.parametrize("name", under(""))
+@pytest.mark.parametrize("frame", ["nowhere", "gripper/tip", "/tcp", "part/tcp"])
+def test_frames_that_nothing_has_are_refused_by_name(peer: Peer, name: str, frame: str) -> None:
+    peer.ask(wire.DefineTool(tool=GRIPPER))
+    peer.ask(wire.AttachTool(name="gripper", frame=""))
+    message, parameter = under(frame)[name]
+    refused = peer.ask(message)
+    assert (refused.code, refused.parameter, refused.value) == (Code.UNKNOWN_NAME, parameter, frame)
+    assert refused.allowed.startswith("tool, flange, tcp, pad")
+
+
+@pytest.mark.parametrize(
+    "frame", ["tool", "flange", "tcp", "pad", "gripper/pad", "part/tip", "tip", "base", "/table"]
+)
+def test_every_name_of_a_frame_is_known(peer: Peer, frame: str) -> None:
+    peer.ask(wire.DefineTool(tool=GRIPPER))
+    peer.ask(wire.AttachTool(name="gripper", frame=""))
+    peer.ask(wire.AttachLoad(load=replace(EMPTY, frames=frames("tip")), attached=True))
+    rests = frame in ("base", "/table")
+    answer = peer.ask(under(frame)["moved"][0])
+    assert isinstance(answer, wire.Rejected if rests else wire.Accepted)
+    answer = peer.ask(under(frame)["mode"][0])
+    assert isinstance(answer, wire.Accepted), answer
+
+
+def test_the_mode_in_force_is_told(peer: Peer) -> None:
+    def says(mode: Any) -> bool:
+        wanted = repr(mode)  # NaN is not equal to itself
+        return bool(peer.wait_for(wire.State, lambda s: s.mode is not None and repr(s.mode.mode) == wanted))
+
+    peer.ask(wire.Subscribe(groups=wire.Groups.MODE, rate=100.0))
+    assert says(wire.PositionMode())
+    accepted = peer.ask(run(replace(ptp(), motion=wire.Hold(duration=NAN), mode=SPRING)))
+    assert says(SPRING)
+    peer.ask(wire.Cancel(id=accepted.id))
+    peer.wait_for(wire.MotionFinished, lambda event: event.id == accepted.id)
+    servo = peer.ask(wire.ServoOpen(watchdog=2.0, mode=SPRING)).id
+    peer.wait_for(wire.MotionStarted, lambda event: event.id == servo)
+    softer = replace(SPRING, nullspace_stiffness=7.0)
+    peer.ask(wire.ServoSettings(servo=servo, mode=softer))
+    assert says(softer)
+    peer.ask(wire.ServoClose(servo=servo))
+    peer.wait_for(wire.MotionFinished, lambda event: event.id == servo)
