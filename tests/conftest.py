@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from hypothesis import settings
 
 if TYPE_CHECKING:
     from heptarm import Arm
@@ -18,6 +19,10 @@ if TYPE_CHECKING:
 _LATE = ("slow", "browser")
 _MARK = "TESTS_OF_HEPTARM"
 _left: list[str] = []
+
+# no timing assertions, least of all on a machine that does other things as well
+settings.register_profile("heptarm", deadline=None, max_examples=50)
+settings.load_profile("heptarm")
 
 
 def pytest_configure() -> None:

@@ -100,7 +100,7 @@ def test_template_agrees_with_the_codec(
 
 
 @every_version
-@settings(max_examples=300)
+@settings(max_examples=80)
 @given(data=st.data(), octets=st.binary(max_size=200))
 def test_any_octets_only_raise_malformed(wire: Version, data: st.DataObject, octets: bytes) -> None:
     good = bytearray(codec.encode_monitoring(data.draw(some.monitorings(wire)), wire))

@@ -21,7 +21,7 @@ from . import strategies as some
 from .golden import COMMAND_1X, COMMAND_27, MONITORING_1X
 
 every_version = pytest.mark.parametrize("wire", Version)
-some_examples = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+some_examples = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 REQ, OPT, REP = "required", "optional", "repeated"
 

@@ -40,6 +40,7 @@ class Controller:
         self._sock.setblocking(False)
         self._reflected = 0
         self._stop = False
+        self.longest_pause = 0.0  # between two messages [s]
         self._thread = threading.Thread(target=self._run)
 
     def datagram(self) -> bytes:
@@ -92,9 +93,12 @@ class Controller:
         self.sequence += 1
 
     def _run(self) -> None:
+        before = time.monotonic()
         while not self._stop:
             self.step()
             time.sleep(self.period_ms * 1e-3)
+            now = time.monotonic()
+            self.longest_pause, before = max(self.longest_pause, now - before), now
 
     @contextlib.contextmanager
     def running(self) -> Iterator[Controller]:
@@ -105,6 +109,12 @@ class Controller:
             self._stop = True
             self._thread.join()
             self._sock.close()
+
+    def settle(self) -> None:
+        """Wait for answers to three more messages."""
+        count = len(self.answers)
+        while len(self.answers) < count + 3:
+            time.sleep(self.period_ms * 1e-3)
 
     def walk(self, *states: SessionState, pause: float = 0.05) -> None:
         """Go through states, a while in each."""

@@ -131,9 +131,14 @@ def test_other_versions_and_modes(wire: Version, mode: CommandMode, client: Clie
     with controller.running():
         controller.active()
         client.wait(ACTIVE)
-        for _ in range(100):
+        deadline = time.monotonic() + 20.0
+        while time.monotonic() < deadline:
             client.command(tau=[3.0] * 7, wrench=[0.0, 0.0, 5.0, 0.0, 0.0, 0.0])
             s = client.next()
+            reached = {CommandMode.TORQUE: s.tau_sent[6] == 3.0, CommandMode.WRENCH: s.wrench_sent[2] == 5.0}
+            if reached.get(mode, s.t > 0.1):
+                break
+        controller.settle()
         assert s.mode is mode and s.pose.xyz.tolist() == pytest.approx([0.1, 0.2, 0.3])
         answer = controller.answers[-1]
         assert answer.tau == ((3.0,) * 7 if mode is CommandMode.TORQUE else None)
@@ -229,6 +234,19 @@ def test_another_sender_is_ignored_while_a_session_stands(client: Client) -> Non
 
 def test_the_loop_ends_with_a_killed_user_and_brakes_before() -> None:
     """The user's process dies at once while the arm moves: the loop brings it to a stop and goes."""
+    for _ in range(3):
+        controller, answers = _braked_after_a_kill()
+        # a loop that hears nothing for 5 periods begins anew at rest: then nothing can be said about the way
+        if controller.longest_pause < 4e-3 * controller.period_ms:
+            break
+    sent = np.array([one.q for one in controller.answers if one.q is not None])[-400:]
+    jerk = np.abs(np.diff(sent, 3, axis=0)).max() / controller.period_ms**3 * 1e9
+    assert jerk < 100.0 and np.abs(sent[-1] - sent[-2]).max() < 1e-12, "it came to rest within its limits"
+    assert answers == len(controller.answers), "and nobody answers any more"
+
+
+def _braked_after_a_kill() -> tuple[Controller, int]:
+    """The controller, and how many answers had come some time after its client's user was killed."""
     script = textwrap.dedent(
         """
         import numpy as np, os, sys
@@ -244,20 +262,17 @@ def test_the_loop_ends_with_a_killed_user_and_brakes_before() -> None:
     )
     user = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True, cwd=ROOT)
     assert user.stdout is not None
-    controller = Controller(int(user.stdout.readline()))
+    controller = Controller(int(user.stdout.readline()), period_ms=10)
     with controller.running():
         controller.active()
-        assert user.wait(20) == -9
+        assert user.wait(60) == -9
         count = -1
         deadline = time.monotonic() + 20.0
         while count != len(controller.answers) and time.monotonic() < deadline:
             count = len(controller.answers)
             time.sleep(0.3)
         user.stdout.close()
-    sent = np.array([one.q for one in controller.answers if one.q is not None])[-400:]
-    jerk = np.abs(np.diff(sent, 3, axis=0)).max() / controller.period_ms**3 * 1e9
-    assert jerk < 100.0 and np.abs(sent[-1] - sent[-2]).max() < 1e-12, "it came to rest within its limits"
-    assert count == len(controller.answers), "and nobody answers any more"
+    return controller, count
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setscheduler"), reason="asks Linux")

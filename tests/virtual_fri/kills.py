@@ -6,6 +6,7 @@ import contextlib
 import os
 import queue
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -91,17 +92,21 @@ def _running(text: str, *arguments: int) -> Iterator[Program]:
 
 def controllers(times: int) -> int:
     """Kill the controller in mid-session: the client says so, waits, and the next controller commands it."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        own = probe.getsockname()[1]
     with Client(0, realtime=False, timeout=PATIENCE) as client:
-        own = 0
         for _ in range(times):
             with _running(_CONTROLLER, client.port, own):
                 client.wait("COMMANDING_ACTIVE", timeout=PATIENCE)
+                for _ in range(3):
+                    client.next(timeout=PATIENCE)
             try:
                 while True:
                     client.next(timeout=0.2)
             except Timeout as error:
                 assert "sends no more" in str(error), error
-        assert client.stats.commanded > times
+        assert client.stats.commanded > times and client.stats.restarts >= times - 1
     return times
 
 

@@ -88,7 +88,7 @@ def test_a_session_that_is_torn_off_is_followed_by_another() -> None:
         seed=st.integers(0, 1000),
     ),
 )
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_after_any_faults_the_two_find_each_other_again(version: Version, faults: Faults) -> None:
     pair = Pair(Configuration(version))
     pair.active(MotionOverlay())

@@ -141,7 +141,7 @@ class Session(RuleBasedStateMachine):
 
 def test_any_sequence_stays_within_the_table() -> None:
     run_state_machine_as_test(
-        Session, settings=settings(max_examples=25, stateful_step_count=14, deadline=None)
+        Session, settings=settings(max_examples=15, stateful_step_count=14, deadline=None)
     )
 
 
@@ -149,7 +149,7 @@ def test_any_sequence_stays_within_the_table() -> None:
     st.lists(st.tuples(st.integers(0, 400), st.integers(0, 255)), min_size=1, max_size=3),
     st.sampled_from(Version),
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 def test_damaged_answers_raise_nothing(damage: list[tuple[int, int]], version: Version) -> None:
     rig = Rig(version)
     rig.controller.open()
