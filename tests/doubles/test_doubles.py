@@ -73,9 +73,14 @@ def _command(application: str, classes: Path, *data: str) -> list[str]:
 
 
 def _run(
-    application: str, classes: Path, *data: str, project: Path | None = None, speed: float = 1.0
+    application: str,
+    classes: Path,
+    *data: str,
+    project: Path | None = None,
+    speed: float = 1.0,
+    more: tuple[str, ...] = (),
 ) -> subprocess.CompletedProcess[str]:
-    command = [*_command(application, classes, *data), "--speed", str(speed)]
+    command = [*_command(application, classes, *data), "--speed", str(speed), *more]
     if project is not None:
         command += ["--project", str(project)]
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
