@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     )
     from heptarm.values.motion import arc, circ, hold, lin, lin_rel, ptp
     from heptarm.values.pose import Pose, deg
+    from heptarm.values.recovery import Recovery
     from heptarm.values.redundancy import Redundancy
     from heptarm.values.result import Cause, Result
     from heptarm.values.state import State
@@ -81,6 +82,7 @@ __all__ = [
     "PoseServo",
     "ProtocolError",
     "QualityLost",
+    "Recovery",
     "Redundancy",
     "RemoteProtocolError",
     "Result",
@@ -128,6 +130,7 @@ _HOMES = {
     "ptp": "values.motion",
     "Pose": "values.pose",
     "deg": "values.pose",
+    "Recovery": "values.recovery",
     "Redundancy": "values.redundancy",
     "Cause": "values.result",
     "Result": "values.result",

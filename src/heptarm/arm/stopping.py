@@ -7,9 +7,11 @@ from typing import Literal
 
 import numpy as np
 
+from heptarm.arm import recovery
 from heptarm.arm.connection import Connection
 from heptarm.errors import ShapeError, StaleState
 from heptarm.values.arrays import within
+from heptarm.values.recovery import Recovery
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
 
@@ -32,8 +34,8 @@ class Stopping:
         was lost, a new one is made for it.
 
         Args:
-            kind: "path": brake on the path; "fast": brake as hard as the axes allow; "after_motion": finish what
-                runs and drop the rest.
+            kind: "path": brake on the path; "fast": brake every axis as hard as it may, off the path (a cabinet has one
+                kind of braking only, so there it is the same); "after_motion": finish what runs and drop the rest.
 
         Raises:
             ConnectionLost: the cabinet cannot be reached.
@@ -43,6 +45,26 @@ class Stopping:
                 f"kind is {kind!r}; allowed are {', '.join(map(repr, _STOPS))}", parameter="kind"
             )
         self._connection.stop(_STOPS[kind])
+
+    def recover(self, *, timeout: float = 0.0) -> Recovery:
+        """Make the robot ready again, as far as software may; says what is left to a person.
+
+        It makes a new connection if the old one was lost, takes control if this client has none, acknowledges errors
+        whose cause has gone, and ends a pause: a motion that waits goes on along its path. No stop is lifted by it, and
+        no motion that was ended begins again.
+
+        Args:
+            timeout: while something is left to a person, try again for so long [s].
+
+        Returns:
+            What was done, and the steps that remain.
+
+        Raises:
+            ConnectionLost: the arm was closed.
+        """
+        seconds = within(timeout, "timeout", 0.0, 1e6, unit="s")
+        with self._connection.stopping_on_interrupt():
+            return recovery.recover(self._connection, timeout=seconds)
 
     def pause(self) -> None:
         """Pause on the path."""
