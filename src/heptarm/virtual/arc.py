@@ -29,6 +29,7 @@ class Arc:
         length: [m].
         axis: unit normal, about which the arc turns by the right hand, shape (3,).
         sweep: angle of the arc [rad], in (0, 2 pi).
+        radius: [m].
         angle: by which the orientation turns [rad].
 
     Raises:
@@ -92,3 +93,13 @@ class Arc:
         x, y, z = self.axis.tolist()
         d = sin(half)
         return product((x * d, y * d, z * d, cos(half)), own)
+
+    def direction(self, s: float) -> Array:
+        """Unit direction of the way, shape (3,)."""
+        c, d = cos(s * self.sweep), sin(s * self.sweep)
+        return (c * np.array(self._across) - d * np.array(self._spoke)) / self.radius
+
+    def bend(self, s: float) -> Array:
+        """Second derivative of the place by the length, shape (3,) [1/m]."""
+        c, d = cos(s * self.sweep), sin(s * self.sweep)
+        return -(c * np.array(self._spoke) + d * np.array(self._across)) / self.radius**2

@@ -118,5 +118,11 @@ def product(a: Quat, b: Quat) -> Quat:
 
 
 def left(sigma: float) -> float:
-    """What is left of the first path's zone at a place in a blend, from 1 to 0; its slope is -2 at first, at last 0."""
-    return 1.0 - sigma * (2.0 + sigma * sigma * (sigma - 2.0))
+    """What is left of the first path's zone at a place in a blend, from 1 to 0.
+
+    The slope goes from -2 to 0 with the least jerk: its second derivative is a triangle.
+    """
+    if sigma < 0.5:
+        return 1.0 - 2.0 * sigma * (1.0 - sigma * sigma / 1.5)
+    rest = 1.0 - sigma
+    return rest * rest * rest / 0.75

@@ -9,8 +9,9 @@ from heptarm.virtual import planner
 from heptarm.virtual.batch import plan_batch
 from heptarm.virtual.order import Order, PlanError
 from heptarm.virtual.planner import Plan
+from heptarm.virtual.spline import plan_joint_spline, plan_spline
 
-_KINDS = {"batch": plan_batch}
+_KINDS = {"batch": plan_batch, "spline": plan_spline, "spline_joints": plan_joint_spline}
 
 
 def plan(robot: RobotModel, order: Order, start: Array) -> Plan:

@@ -21,7 +21,9 @@ from heptarm.values.arrays import Array
 from heptarm.virtual.profile import Limits
 
 #: Share of an axis' acceleration that the path's curvature may use, and the path's third derivative of the jerk.
-_CURVE, _TWIST = 0.8, 0.5
+_CURVE, _TWIST = 0.9, 0.9
+#: Share of it that may come at once, where a line meets an arc.
+_JUMP = 0.1
 #: Share of an axis' acceleration that the passes may use.
 _GRIP = 0.97
 #: Time between two entries of a timetable [s], unless it is very long.
@@ -145,13 +147,18 @@ def paced(course: Course) -> Timetable:
     fastest = np.minimum(course.pace, (course.velocity / first).min(axis=1))
     fastest = np.minimum(fastest, np.sqrt((_CURVE * course.acceleration / second).min(axis=1)))
     fastest = np.minimum(fastest, np.cbrt((_TWIST * course.jerk / third).min(axis=1)))
+    jumps = np.flatnonzero(np.diff(course.s) <= 0.0)  # the two samples where pieces meet
+    jump = np.abs(course.second[jumps + 1] - course.second[jumps]) + _TINY
+    bend = np.sqrt((_JUMP * course.acceleration[jumps] / jump).min(axis=1))
+    fastest[jumps], fastest[jumps + 1] = np.minimum(fastest[jumps], bend), np.minimum(fastest[jumps + 1], bend)
     if not (np.isfinite(fastest).all() and fastest.min() > 0.0):
         raise CommandRejected("the path cannot be gone along at any speed")
     window = _window(course)
+    hold = (course.acceleration / first).min(axis=1) * window**2 / 24  # what the average falls behind by
     grip = np.full(len(course.s), _GRIP)
     best: tuple[float, float, Array] | None = None
     for _ in range(_ROUNDS):
-        step, speed = _timed(course, _widened(course.s, fastest, window), grip, window)
+        step, speed = _timed(course, _widened(course.s, fastest, fastest * window / 2 + hold), grip, window)
         speeds, accelerations, jerks = _excess(course, step, speed)
         # as a whole it may be too fast by this
         k = max(1.0, float(speeds.max()), sqrt(float(accelerations.max())), float(np.cbrt(jerks.max())))
@@ -177,12 +184,11 @@ def _window(course: Course) -> float:
     return float(times[np.isfinite(times)].max(initial=_STEP))
 
 
-def _widened(s: Array, fastest: Array, window: float) -> Array:
-    """Every speed also holds so far to both sides as it leads in half the window."""
+def _widened(s: Array, fastest: Array, reaches: Array) -> Array:
+    """Every speed also holds within its reach to both sides."""
     result = fastest.copy()
     for index in np.argsort(-fastest).tolist():  # the narrowest place has the last word
-        reach = fastest[index] * window / 2
-        low, high = np.searchsorted(s, (s[index] - reach, s[index] + reach))
+        low, high = np.searchsorted(s, (s[index] - reaches[index], s[index] + reaches[index]))
         result[low:high] = np.minimum(result[low:high], fastest[index])
     return result
 
