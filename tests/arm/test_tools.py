@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,11 +17,18 @@ from heptarm.values.motion import Lin, LinRel
 from heptarm.values.tool import KnownTool
 from heptarm.wire.codes import Code
 from tests.conftest import RunningCabinet
+from tests.doubles.test_tools import PROJECT as DOUBLES_PROJECT
 
 HOME = deg(0, 30, 0, -90, 0, 60, 0)
 TIP = Pose.xyz_abc(0.03, 0.0, 0.15, *deg(0, 90, 0))
 GRIPPER = Tool("gripper", mass=2.0, com=(0.0, 0.0, 0.08), tcp=TIP, frames={"pad": Pose.at(0.0, 0.04, 0.1)})
 PART = Workpiece("part", mass=1.0, com=(0.0, 0.0, 0.05), frames={"peg": Pose.at(0.0, 0.0, 0.1)})
+
+
+PROJECT = DOUBLES_PROJECT.replace('mass="3.0"', 'mass="1.5"').replace(
+    "</RoboticsAPIData>",
+    '<processData dataType="java.lang.String" id="heptarm.frames" value="/Table/Corner, /Gone"/></RoboticsAPIData>',
+)
 
 
 @pytest.fixture
@@ -116,7 +124,7 @@ def test_another_frame_of_the_tool_can_be_the_default(bare: Arm) -> None:
     assert bare.tools["gripper"] == KnownTool("gripper", 2.0, GRIPPER.frames)
 
 
-def test_the_wrench_is_told_where_and_as_one_likes(bare: Arm) -> None:
+def test_the_wrench_is_told_where_and_as_one_likes() -> None:
     """Too light a declaration: the rest of the weight is a force that the arm feels."""
     heavy = Tool("heavy", mass=3.0, com=(0.0, 0.0, 0.1), tcp=Pose.at(0, 0, 0.2))
     with ha.connect("sim://iiwa14?payload=3,0,0,0.1") as arm:
@@ -138,7 +146,7 @@ def test_the_wrench_is_told_where_and_as_one_likes(bare: Arm) -> None:
         assert turned.force == pytest.approx(arm.pose("flange").rotation.T @ at_flange.force, abs=0.05)
 
 
-def test_a_servo_motion_under_impedance_wants_the_load_to_be_right(bare: Arm) -> None:
+def test_a_servo_motion_under_impedance_wants_the_load_to_be_right() -> None:
     soft = JointImpedance(500.0)
     with ha.connect("sim://iiwa14?payload=5,0,0,0.1") as arm:
         arm.move(ptp(HOME))
@@ -201,6 +209,27 @@ def test_an_error_in_the_block_takes_the_tool_off_and_comes_through(bare: Arm) -
         bare.stop()
         raise ZeroDivisionError
     assert fresh(bare).tool == ""
+
+
+def test_tools_and_places_of_the_project(tmp_path: Path) -> None:
+    file = tmp_path / "RoboticsAPI.data.xml"
+    file.write_text(PROJECT)
+    with ha.connect(f"sim://iiwa14?project={file}") as arm:
+        assert list(arm.tools) == ["Gripper"]
+        assert arm.tools["Gripper"].mass == 1.5
+        assert arm.frames["/Table/Corner"].xyz == pytest.approx((0.51, 0.02, 0.1))
+        arm.move(ptp(HOME))
+        with arm.tool("Gripper"):
+            assert fresh(arm).pose.distance_to(arm.pose("flange") @ Pose.at(0, 0, 0.12)) < 1e-4
+            assert np.abs(settled(arm).tau_ext).max() < 0.05
+            before = arm.pose(reference="/Table/Corner")
+            arm.move(lin_rel(x=-0.02, frame="/Table/Corner"))
+            fresh(arm)
+            assert arm.pose(reference="/Table/Corner").x - before.x == pytest.approx(-0.02, abs=2e-4)
+        with pytest.raises(CommandRejected, match="Gripper"):
+            arm.attach_tool("Cube")  # a workpiece's template
+        with pytest.raises(CommandRejected, match="template"):
+            arm.attach_tool(Tool("Gripper"))
 
 
 #: What a client refuses by itself, and the message with which it is bypassed.
