@@ -48,7 +48,18 @@ if TYPE_CHECKING:
         Unreachable,
         VersionMismatch,
     )
-    from heptarm.values.motion import arc, circ, hold, lin, lin_rel, ptp
+    from heptarm.values.motion import (
+        arc,
+        circ,
+        ellipse,
+        hold,
+        lin,
+        lin_rel,
+        ptp,
+        spl,
+        spline,
+        spline_joints,
+    )
     from heptarm.values.pose import Pose, deg
     from heptarm.values.recovery import Recovery
     from heptarm.values.redundancy import Redundancy
@@ -104,10 +115,14 @@ __all__ = [
     "circ",
     "connect",
     "deg",
+    "ellipse",
     "hold",
     "lin",
     "lin_rel",
     "ptp",
+    "spl",
+    "spline",
+    "spline_joints",
     "target_from_env",
 ]
 
@@ -124,6 +139,10 @@ _HOMES = {
     "target_from_env": "arm.target",
     "arc": "values.motion",
     "circ": "values.motion",
+    "ellipse": "values.motion",
+    "spl": "values.motion",
+    "spline": "values.motion",
+    "spline_joints": "values.motion",
     "hold": "values.motion",
     "lin": "values.motion",
     "lin_rel": "values.motion",

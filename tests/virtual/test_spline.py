@@ -142,7 +142,7 @@ def test_what_makes_no_spline_is_refused_by_name() -> None:
         (replace(good, orientation=Orientation("constant", "path")), "segment 2.*path"),
         (Order(1, "ptp", joints=READY), "kind 'ptp'"),
         (segment("circ", to(start, 0.1, 0.1, 0), via=numbers(to(start, 0.075, 0.075, 0))), "lie on a line"),
-        (segment("spl", to(start, 3.0, 0, 0)), "not reachable"),
+        (segment("spl", to(start, 0, 0.9, 0)), "not reachable"),
     ):
         with pytest.raises(PlanError, match=words):
             plant.submit(Order(1, "spline", parts=(good, part)))

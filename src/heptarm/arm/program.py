@@ -13,13 +13,13 @@ from heptarm.model.inverse import redundancy
 from heptarm.values import motion as values
 from heptarm.values.arrays import Array
 from heptarm.values.limits import Blending, CartesianDynamics, JointDynamics
-from heptarm.values.motion import Circ, Hold, Lin, LinRel, Motion, Ptp, PtpPose
+from heptarm.values.motion import Circ, Hold, JointSpline, Lin, LinRel, Motion, Ptp, PtpPose, Spl, Spline
 from heptarm.values.orientation import Orientation
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 from heptarm.wire import messages as wire
 
-_MOTIONS = (Ptp, PtpPose, Lin, LinRel, Circ, Hold)
+_MOTIONS = (Ptp, PtpPose, Lin, LinRel, Circ, Spline, JointSpline, Hold)
 #: A motion may take this much longer than its slowest plausible estimate, and this much more [s].
 _GENEROUS, _AND_MORE = 3.0, 15.0
 #: The longest straight line and the longest arc inside the workspace of the largest arm [m].
@@ -39,14 +39,14 @@ def listed(motion: Motion | Sequence[Motion]) -> tuple[Motion, ...]:
         raise ShapeError(
             f"{type(motion).__name__} given where a motion or a list of 1 to 1000 motions is wanted",
             parameter="motion",
-            hint="make motions with ptp, lin, lin_rel, circ and hold",
+            hint="make motions with ptp, lin, lin_rel, circ, spline and hold",
         )
     for index, one in enumerate(motions):
         if not isinstance(one, _MOTIONS):
             raise ShapeError(
                 f"motions[{index}] is {one!r}, which is no motion",
                 parameter=f"motions[{index}]",
-                hint="make motions with ptp, lin, lin_rel, circ and hold; joint positions alone are ptp(q)",
+                hint="make motions with ptp, lin, lin_rel, circ, spline and hold; joint positions alone are ptp(q)",
             )
     return tuple(motions)
 
@@ -93,12 +93,23 @@ def longest(motions: Sequence[Motion], robot: RobotModel, ceiling: float) -> flo
 def _slowest(motion: Motion, robot: RobotModel) -> float:
     if isinstance(motion, Hold):
         return motion.duration
+    if isinstance(motion, JointSpline):
+        return sum(_turn(point.joints, robot) for point in motion.points)
     turn = _turn(motion.joints, robot)
+    if isinstance(motion, Spline):
+        return turn * len(motion.segments) + sum(_along(one, motion.path) for one in motion.segments)
     if isinstance(motion, Lin | LinRel | Circ):
         speed = motion.path.velocity
         way = _LONGEST_ARC if isinstance(motion, Circ) else _LONGEST_LINE
         return turn + way / (_SLOW_LINE if isnan(speed) else speed) + 1.0
     return turn
+
+
+def _along(segment: Spl | Lin | Circ, whole: CartesianDynamics) -> float:
+    """Time for the longest segment at its speed [s]."""
+    speeds = (segment.path.velocity, whole.velocity, _SLOW_LINE)
+    speed = next(speed for speed in speeds if not isnan(speed))
+    return (_LONGEST_ARC if isinstance(segment, Circ) else _LONGEST_LINE) / speed
 
 
 def _turn(joints: JointDynamics, robot: RobotModel) -> float:
@@ -168,7 +179,37 @@ def _item(motion: Motion, robot: RobotModel) -> wire.Item:
             ),
             frame=_frame(motion.moving),
         )
+    if isinstance(motion, Spline):
+        return wire.Item(
+            motion=wire.Spline(
+                segments=tuple(_segment(one) for one in motion.segments),
+                dynamics=_path(motion.path),
+                joints=_joints(motion.joints),
+            ),
+            frame=_frame(motion.moving),
+        )
+    if isinstance(motion, JointSpline):
+        for index, point in enumerate(motion.points):
+            robot.check(point.q, f"points[{index}].q")
+        return wire.Item(
+            motion=wire.JointSpline(
+                points=tuple(
+                    wire.JointPoint(q=_tuple(point.q), dynamics=_joints(point.joints)) for point in motion.points
+                ),
+                dynamics=_joints(motion.joints),
+            )
+        )
     return wire.Item(motion=wire.Hold(duration=nan if isinf(motion.duration) else motion.duration))
+
+
+def _segment(one: Spl | Lin | Circ) -> wire.SplineSegment:
+    dynamics, orientation = _path(one.path), _orientation(one.orientation)
+    if isinstance(one, Circ):
+        return wire.CircSegment(
+            via=_pose(one.via), end=_pose(one.end), dynamics=dynamics, orientation=orientation
+        )
+    kind = wire.SplSegment if isinstance(one, Spl) else wire.LinSegment
+    return kind(target=_pose(one.pose), dynamics=dynamics, orientation=orientation)
 
 
 def _frame(name: str) -> str:

@@ -204,7 +204,7 @@ def arc(
     """
     check_pose(start, "start")
     angle = within(angle, "angle", -_LONGEST_ARC, _LONGEST_ARC, unit="rad")
-    middle, axis = array(centre, 3, "centre"), _normal(plane)
+    middle, axis = array(centre, 3, "centre"), normal_of(plane)
     lever = start.xyz - middle
     radius = float(np.linalg.norm(lever - (lever @ axis) * axis))
     if radius < _TOO_NEAR or abs(angle) * radius < _TOO_NEAR:
@@ -237,7 +237,13 @@ def arc(
     )
 
 
-def _normal(plane: str | npt.ArrayLike) -> Array:
+def normal_of(plane: str | npt.ArrayLike) -> Array:
+    """Unit normal of a plane: "xy", "yz" or "xz" of the base, or three numbers.
+
+    Raises:
+        CommandRejected: no such plane.
+        ShapeError: three numbers without a direction.
+    """
     if isinstance(plane, str):
         if plane not in _PLANES:
             raise CommandRejected(
