@@ -21,6 +21,7 @@ sys.path.insert(0, str(ROOT / "src"))
 from heptarm.arm.arm import Arm  # noqa: E402
 from heptarm.bridge.names import PRESETS  # noqa: E402
 from heptarm.bridge.parameters import PARAMETERS, Parameter, of_joints  # noqa: E402
+from heptarm.bridge.services import SERVICES  # noqa: E402
 
 PAGE = ROOT / "docs" / "reference" / "ros.md"
 SOURCES = {
@@ -47,19 +48,37 @@ API = {
     "move": ("~/move_joints", "~/move_pose", "~/command/joint", "~/command/pose", "~/command/lin"),
     "start": ("~/command/joint", "~/command/pose", "~/command/lin"),
     "servo": ("~/servo/joint", "~/servo/velocity", "~/servo/pose", "~/follow_joint_trajectory"),
-    "stop": ("~/stop",),
+    "stop": ("~/stop", "~/stop_as"),
     "set_override": ("~/set_override",),
-    "speed": ("parameter `speed`",),
-    "reconnect": ("by itself", "~/recover"),
-    "take_control": ("~/recover",),
-    "resume": ("~/recover", "~/resume"),
+    "speed": ("parameter `speed`", "~/set_speed"),
+    "reconnect": ("happens by itself", "~/recover"),
+    "take_control": ("~/take_control", "~/recover"),
+    "resume": ("~/resume", "~/recover"),
     "pause": ("~/pause",),
     "connected": ("~/status",),
     "in_control": ("~/status",),
     "cabinet": ("/diagnostics",),
     "open": ("~/change_state",),
     "close": ("~/change_state",),
-    "release_control": ("~/change_state",),
+    "release_control": ("~/release_control", "~/change_state"),
+    "using": (
+        "~/mode/position",
+        "~/mode/joint_impedance",
+        "~/mode/cartesian_impedance",
+        "~/mode/sine_impedance",
+    ),
+    "attach_tool": ("~/attach_tool",),
+    "detach_tool": ("~/detach_tool",),
+    "tool": ("~/attach_tool", "~/detach_tool"),
+    "attach_workpiece": ("~/attach_workpiece",),
+    "detach_workpiece": ("~/detach_workpiece",),
+    "attached": ("~/attach_workpiece", "~/detach_workpiece"),
+    "tools": ("~/tools",),
+    "frames": ("~/frames",),
+    "capabilities": ("~/capabilities",),
+    "wait_for_rest": ("~/state",),
+    "pose": ("~/pose", "~/state"),
+    "wrench": ("~/wrench", "~/state"),
 }
 
 
@@ -92,6 +111,9 @@ def _of(tree: ast.Module) -> Iterator[Declared]:
     types = {}  # of ROS: how they are called here, where they come from
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module:
+            if node.module == "heptarm.bridge.services":
+                for row in SERVICES:
+                    yield Declared(row.name, "service", row.type)
             package, _, kind = node.module.partition(".")
             if kind in ("msg", "srv", "action"):
                 for name in node.names:

@@ -87,7 +87,7 @@ class NodeProcess:
             raise
 
 
-def call(name: str, kind: Any, **request: object) -> Any:
+def call(name: str, kind: Any, /, **request: object) -> Any:
     """Call a service."""
     rospy.wait_for_service(name, PATIENCE)
     return rospy.ServiceProxy(name, kind)(**request)

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from geometry_msgs.msg import PoseStamped
-from heptarm_msgs.srv import SetNumber
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
-from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
 from heptarm.bridge.driver import Answer, Driver
+from heptarm.bridge.services import SERVICES, Names, Service, Services
 from heptarm.errors import HeptarmError, NotReady
 from heptarm_ros2 import convert
 
@@ -49,19 +49,11 @@ class Commands:
                 callback_group=at_once,
             )
         )
+        groups = {True: at_once, False: MutuallyExclusiveCallbackGroup()}
+        self._offered: tuple[Driver, Services] | None = None
         self._services = [
-            node.create_service(
-                Trigger, "~/stop", self._service(lambda d, _: d.stop()), callback_group=at_once
-            ),
-            node.create_service(
-                Trigger, "~/recover", self._service(lambda d, _: d.recover()), callback_group=at_once
-            ),
-            node.create_service(
-                SetNumber,
-                "~/set_override",
-                self._service(lambda d, request: d.set_override(request.value)),
-                callback_group=at_once,
-            ),
+            node.create_service(_type(row), row.name, self._service(row), callback_group=groups[row.at_once])
+            for row in SERVICES
         ]
 
     def destroy(self) -> None:
@@ -85,11 +77,18 @@ class Commands:
 
         return callback
 
-    def _service(self, work: Callable[[Driver, Any], Answer]) -> Callable[[Any, Any], Any]:
+    def _service(self, row: Service) -> Callable[[Any, Any], Any]:
         def callback(request: Any, response: Any) -> Any:
             driver = self._node.driver
-            answer = Answer(False, "the node is not configured") if driver is None else work(driver, request)
+            if driver is None:
+                answer = Answer(False, "the node is not configured")
+            else:
+                if self._offered is None or self._offered[0] is not driver:
+                    self._offered = driver, Services(driver)
+                answer = self._offered[1].answer(row, request)
             response.success, response.message = answer.success, answer.message
+            if isinstance(answer, Names):
+                response.names = list(answer.names)
             return response
 
         return callback
@@ -128,3 +127,8 @@ class Commands:
             self._stopped(driver)
             return
         driver.accept(convert.trajectory_goal(message, now=driver.now, clock=self._node.seconds()))
+
+
+def _type(row: Service) -> Any:
+    package, _, name = row.type.partition("/")
+    return getattr(importlib.import_module(f"{package}.srv"), name)

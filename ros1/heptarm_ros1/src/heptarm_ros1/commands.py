@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
 import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import rospy
 from geometry_msgs.msg import PoseStamped
-from heptarm_msgs.srv import SetNumber
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
-from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory
 
-from heptarm.bridge.driver import Answer, Driver
+from heptarm.bridge.driver import Driver
+from heptarm.bridge.services import SERVICES, Names, Service, Services
 from heptarm.errors import HeptarmError, NotReady
 from heptarm_ros1 import convert
 
@@ -77,12 +77,6 @@ TOPICS: tuple[tuple[type, str, Work], ...] = (
     (JointTrajectory, "~joint_trajectory", joint_trajectory),
     (Empty, "~stop", stop),
 )
-#: Services: type, name, what to do.
-SERVICES: tuple[tuple[type, str, Callable[[Driver, Any], Answer]], ...] = (
-    (Trigger, "~stop", lambda driver, _: driver.stop()),
-    (Trigger, "~recover", lambda driver, _: driver.recover()),
-    (SetNumber, "~set_override", lambda driver, request: driver.set_override(request.value)),
-)
 
 
 def subscriber(
@@ -114,25 +108,29 @@ def subscriber(
 class Commands:
     """Takes commands and services to the driver."""
 
-    def __init__(self, node: HeptarmNode) -> None:
-        self._node = node
+    def __init__(self, node: HeptarmNode, driver: Driver) -> None:
         one_by_one = threading.Lock()
         self._subscribers = [subscriber(node, one_by_one, *topic) for topic in TOPICS]
-        self._services = [
-            rospy.Service(name, kind, self._service(kind, work)) for kind, name, work in SERVICES
-        ]
+        offered = Services(driver)
+        self._services = [_service(offered, row) for row in SERVICES]
 
     def destroy(self) -> None:
         """End them."""
-        for subscriber in self._subscribers:
-            subscriber.unregister()
+        for one in self._subscribers:
+            one.unregister()
         for service in self._services:
             service.shutdown("the node was cleaned up")
 
-    def _service(self, kind: Any, work: Callable[[Driver, Any], Answer]) -> Callable[[Any], Any]:
-        def callback(request: Any) -> Any:
-            driver = self._node.driver
-            answer = Answer(False, "the node is not configured") if driver is None else work(driver, request)
-            return kind._response_class(success=answer.success, message=answer.message)
 
-        return callback
+def _service(offered: Services, row: Service) -> rospy.Service:
+    package, _, name = row.type.partition("/")
+    kind = getattr(importlib.import_module(f"{package}.srv"), name)
+
+    def callback(request: Any) -> Any:
+        answer = offered.answer(row, request)
+        response = kind._response_class(success=answer.success, message=answer.message)
+        if isinstance(answer, Names):
+            response.names = list(answer.names)
+        return response
+
+    return rospy.Service(f"~{row.name[2:]}", kind, callback)
