@@ -58,16 +58,17 @@ def strangers(client: Client) -> str:
     )
 
 
-def cause(stats: Stats, period: float, refused: list[str]) -> str:
+def cause(stats: Stats, period: float, refused: list[str], *, late: float | None = None) -> str:
     """What spoils the quality most, with the remedy; empty if nothing does.
 
     Args:
         stats: of the client.
         period: send period [s].
         refused: what the system has refused the client.
+        late: latency that 99 % of the answers stay below [s]; None: of all answers since the client began.
     """
     expected = stats.received + stats.lost
-    late = stats.latency[1]
+    late = stats.latency[1] if late is None else late
     if stats.malformed > _SHARE * expected:
         return (
             f"{stats.malformed} datagrams were no FRI messages: does something else send to this port, "

@@ -158,7 +158,9 @@ def _course(client: Client, lost: int, missed: int, before: int) -> Course:
     period = messages[-1].period
     late = sum(one.latency > period for one in messages)
     good = messages[-1].quality >= Quality.GOOD and lost + missed + late <= _SHARE * len(messages)
-    return Course(messages, lost, missed, period, cause(stats, period, client.refused), good)
+    usual = float(np.percentile([one.latency for one in messages], 99))
+    why = cause(stats, period, client.refused, late=usual)
+    return Course(messages, lost, missed, period, why, good)
 
 
 def _data(course: Course) -> dict[str, Any]:

@@ -6,6 +6,8 @@ import contextlib
 import time
 from collections.abc import Iterator
 
+import numpy as np
+
 from heptarm.arm.connect import connect
 from heptarm.arm.fri_advice import cause, silence, strangers
 from heptarm.arm.fri_settings import PORTS
@@ -143,20 +145,28 @@ def _quality(client: Client) -> Iterator[Verdict]:
         f"{100 * count / total:.0f} % {name}" for name, count in stats.quality.items() if count
     )
     found = f"{_trend(client)} ({shares}); {stats.missed} answers missed"
-    why = cause(stats, state.period, client.refused)
+    median, late, longest = _latency(client)
+    why = cause(stats, state.period, client.refused, late=late)
     if state.quality < Quality.GOOD:
         yield Verdict("FRI quality", "bad", found, why or "give it time: quality is earned answer by answer")
     elif why:
         yield Verdict("FRI quality", "note", found, why)
     else:
         yield Verdict("FRI quality", "ok", found)
-    median, late, _, longest = (number * 1e3 for number in stats.latency)
-    found = f"{median:.3f} ms median, {late:.3f} ms 99 %, {longest:.3f} ms longest"
-    slow = late > 0.5 * state.period * 1e3
+    found = f"{1e3 * median:.3f} ms median, {1e3 * late:.3f} ms 99 %, {1e3 * longest:.3f} ms longest"
+    slow = late > 0.5 * state.period
     remedy = "; ".join(client.refused) or "look for load on this machine" if slow else ""
     yield Verdict("FRI answers", "note" if slow else "ok", found, remedy)
     if client.refused and not slow:
         yield Verdict("FRI loop", "note", client.refused[0].partition(":")[0], client.refused[0])
+
+
+def _latency(client: Client) -> tuple[float, float, float]:
+    """Median, 99 % and longest latency since the quality was good [s]: the first answers are always slow."""
+    states = client.history()
+    first = next((i for i, one in enumerate(states) if one.quality >= Quality.GOOD), 0)
+    delays = [one.latency for one in states[first:]]
+    return float(np.median(delays)), float(np.percentile(delays, 99)), max(delays)
 
 
 def _trend(client: Client) -> str:
