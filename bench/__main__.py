@@ -24,6 +24,7 @@ from bench import (  # noqa: F401  they register themselves
     motion,
     rl,
     rl_deploy,
+    ros2,
     round_trip,
     servo,
     state_push,

@@ -241,7 +241,10 @@ class Client:
     ) -> None:
         self.ros, self.stage, self.name = ros, stage, name
         self.joints = tuple(f"{prefix}A{i}" for i in range(1, 8))
-        self.states = ros.collect(JointState, f"{name.rpartition('/')[0]}/joint_states")
+        self.states: list[JointState] = []
+        self.subscription = ros.node.create_subscription(
+            JointState, f"{name.rpartition('/')[0]}/joint_states", self.states.append, 100
+        )
         self.status = ros.collect(Status, f"{name}/status", latched=True)
         self._action = ActionClient(ros.node, FollowJointTrajectory, f"{name}/follow_joint_trajectory")
         self._topic = ros.node.create_publisher(JointTrajectory, f"{name}/joint_trajectory", 1)

@@ -91,7 +91,6 @@ class Driver:
             name=_name(),
             watchdog=values["watchdog"],
         )
-        self._arm.speed = values["speed"]
         self._execution = ServoExecution(
             self._arm,
             configuration.joints,
@@ -297,7 +296,7 @@ class Driver:
             motion = ptp(target)
         self._execution.abort("a command took the place of this goal")
         self._stream.close()
-        self._handle = self._arm.start(motion, when="replace")
+        self._handle = self._arm.start(motion, when="replace", speed=self.configuration.values["speed"])
         return self._handle
 
     def follow(self, target: Array | Pose, dq: Array | None = None) -> None:

@@ -12,6 +12,7 @@ from heptarm.arm.arm import Arm
 from heptarm.arm.servo import JointServo
 from heptarm.bridge.goal import End, Goal, GoalRefused
 from heptarm.bridge.runner import Feedback, Measured, Runner, Settings, Step
+from heptarm.bridge.trajectory import Sample
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.io.clock import Clock, RealClock
 from heptarm.values.arrays import within
@@ -51,7 +52,10 @@ class ServoOptions:
     Attributes:
         rate: targets per second [Hz].
         watchdog: within this time after a target the next one has to come, or the arm brakes [s].
-        engine: see `Arm.servo`.
+        engine: who smooths the targets, see `Arm.servo`: "direct" follows a trajectory closely, for it makes no plans
+            of its own; "smart" keeps a limit on the jerk, and lags where the trajectory bends.
+        horizon: the cabinet approaches a target within this time, so a target of "direct" lies so far ahead on the
+            tangent [s]; less follows no closer, but the arm brakes sooner at fast places.
         speed: ceiling, a fraction of each axis' maximum in (0, 1].
         acceleration: likewise.
         linger: how long the servo motion stays open after a goal [s]; the next goal begins at once in it.
@@ -60,7 +64,8 @@ class ServoOptions:
 
     rate: float = 100.0
     watchdog: float = 0.2
-    engine: Literal["smart", "direct"] = "smart"
+    engine: Literal["smart", "direct"] = "direct"
+    horizon: float = 0.1
     speed: float = 1.0
     acceleration: float = 1.0
     linger: float = 0.5
@@ -68,6 +73,7 @@ class ServoOptions:
 
     def __post_init__(self) -> None:
         within(self.linger, "linger", 0.0, 60.0, unit="s")
+        within(self.horizon, "horizon", 0.001, 1.0, unit="s")
 
 
 class Listener(Protocol):
@@ -241,6 +247,7 @@ class ServoExecution:
             speed=options.speed,
             acceleration=options.acceleration,
             mode=options.mode,
+            min_trajectory_time=options.horizon if options.engine == "direct" else None,
         ) as servo:
             self._servo = servo
             quiet = 0.0
@@ -253,7 +260,7 @@ class ServoExecution:
                     step = self._runner.advance(self.now, state)
                     busy = self._runner.busy
                 if step.command is not None:
-                    servo.set(step.command.q, step.command.dq)
+                    self._send(servo, step.command)
                 self._tell_step(step)
                 quiet = 0.0 if busy else quiet + passed
                 if not busy and (self._closing or self._dropped or quiet >= options.linger):
@@ -266,6 +273,13 @@ class ServoExecution:
             ends = self._runner.ends()
             self._changed.notify_all()
         self._tell(None, ends)
+
+    def _send(self, servo: JointServo, command: Sample) -> None:
+        if self._options.engine == "direct":
+            # it approaches a target as a low-pass filter of this time constant does; its inverse leaves no lag
+            servo.set(command.q + self._options.horizon * command.dq)
+        else:
+            servo.set(command.q, command.dq)
 
     def _lose(self, text: str) -> None:
         """The arm follows no more."""

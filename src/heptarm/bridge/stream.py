@@ -27,7 +27,7 @@ class Stream:
     Args:
         arm: in control.
         timeout: within this time after a target the next one has to come [s].
-        options: ceilings and engine.
+        options: ceilings.
     """
 
     def __init__(self, arm: Arm, *, timeout: float, options: ServoOptions) -> None:
@@ -78,7 +78,7 @@ class Stream:
                     "pose",
                     rate=self._rate,
                     watchdog=self._timeout,
-                    engine=options.engine,
+                    engine="smart",
                     speed=options.speed,
                     acceleration=options.acceleration,
                     mode=options.mode,
@@ -104,7 +104,7 @@ class Stream:
                 "joint",
                 rate=self._rate,
                 watchdog=self._timeout,
-                engine=options.engine,
+                engine="smart",
                 speed=options.speed,
                 acceleration=options.acceleration,
                 mode=options.mode,
