@@ -140,6 +140,8 @@ class VirtualCabinet:
             jvm.furnish(self._station, templates.read(options.project))
         if options.payload is not None:
             self.plant.hang(hanging(options.payload))
+        pad = jpype.JClass("heptarm.doubles.Desk")
+        self.operator.press = lambda bar, slot: bool(pad.current().pad.press(bar, slot))
         self.host = jpype.JClass("heptarm.doubles.Host")(options.application or jvm.APPLICATION)
 
     def tick(self) -> None:

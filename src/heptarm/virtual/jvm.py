@@ -333,6 +333,13 @@ def open_station(plant: Plant, sessions: Sessions) -> Any:
             plant.lookout.forget(int(number))
 
         @jpype.JOverride  # type: ignore[untyped-decorator]
+        def signal(self, name: Any, output: bool) -> int:
+            try:
+                return plant.signals.place(str(name), is_output=bool(output))
+            except ValueError as error:
+                raise jpype.JClass("java.lang.IllegalStateException")(str(error)) from error
+
+        @jpype.JOverride  # type: ignore[untyped-decorator]
         def inverse(self, pose: Any, near: Any) -> Any:
             numbers = _numbers(pose)
             try:

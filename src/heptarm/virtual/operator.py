@@ -9,6 +9,7 @@ Words may come from any thread; those with a time are carried out by the tick.
 from __future__ import annotations
 
 import heapq
+import logging
 import re
 from collections.abc import Callable
 from itertools import count
@@ -18,6 +19,8 @@ from heptarm.virtual.safety import Demand, Mode
 
 if TYPE_CHECKING:
     from heptarm.virtual.plant import Plant
+
+log = logging.getLogger("heptarm.virtual")
 
 #: What can be said, and what it does.
 WORDS = {
@@ -36,6 +39,8 @@ WORDS = {
     "pause": "press Stop: motions pause on their path",
     "start": "press Start: execution goes on",
     "push FX FY FZ [SECONDS]": "push the flange, base axes [N]",
+    "set SIGNAL VALUE": "give a signal of the cabinet a value: a number, true or false",
+    "press SLOT [BAR]": "press and release a user key, 0 to 3; of the bar for clients, or another",
 }
 _ALSO = {
     "estop": "emergency_stop",
@@ -52,7 +57,10 @@ _COUNTS = {
     **dict.fromkeys(("drive_error", "joint_limit", "clear"), (0, 1)),
     "override": (1, 1),
     "push": (3, 4),
+    "set": (2, 2),
+    "press": (1, 2),
 }
+_TRUTH = {"true": 1.0, "false": 0.0}
 _TIMED = re.compile(r"(.+?)\s*@\s*([0-9.]+)\s*s?\s*")
 
 
@@ -82,6 +90,8 @@ def understood(words: str) -> tuple[str, list[float | str]]:
     least, most = _COUNTS[name]
     if not least <= len(rest) <= most:
         raise ValueError(f"{words!r}: {name} takes {least} to {most} values, not {len(rest)}")
+    if name in ("set", "press"):
+        return name, _named(words, name)
     if name == "clear":
         rest = [_ALSO.get(one.replace("-", "_"), one.replace("-", "_")) for one in rest]
         if rest and rest[0] not in _DEMANDS:
@@ -96,6 +106,20 @@ def understood(words: str) -> tuple[str, list[float | str]]:
     if name == "override" and not 0.0 <= values[0] <= 1.0:
         raise ValueError(f"{words!r}: the override is 0 to 1")
     return name, list(values)
+
+
+def _named(words: str, name: str) -> list[float | str]:
+    """Values of words that name a signal or a bar of keys, whose case counts."""
+    first, *rest = words.split()[1:]
+    if name == "press":
+        if first not in ("0", "1", "2", "3"):
+            raise ValueError(f"{words!r}: slots are 0 to 3")
+        return [float(first), *rest]
+    value = rest[0].lower()
+    try:
+        return [first, _TRUTH[value] if value in _TRUTH else float(value)]
+    except ValueError:
+        raise ValueError(f"{words!r}: a number, true or false is expected behind the signal") from None
 
 
 class Operator:
@@ -122,7 +146,11 @@ class Operator:
             "pause": plant.pause,
             "start": plant.resume,
             "push": self._push,
+            "set": plant.signals.set,
+            "press": self._press,
         }
+        #: Presses a key of a bar of the smartPAD; says whether there is one.
+        self.press: Callable[[str, int], bool] = lambda bar, slot: False
 
     def schedule(self, text: str) -> None:
         """Do something at a time of the plant: "WORDS@SECONDS".
@@ -137,7 +165,11 @@ class Operator:
         """What comes before a tick of the plant."""
         due = self._due
         while due and due[0][0] <= self._plant.tick_count:
-            self.do(heapq.heappop(due)[2])
+            words = heapq.heappop(due)[2]
+            try:
+                self.do(words)
+            except ValueError as error:  # no such signal or key: the arm goes on
+                log.warning("%s: %s", words, error)
 
     def do(self, words: str) -> None:
         """Do something now.
@@ -165,6 +197,10 @@ class Operator:
 
     def _override(self, factor: float) -> None:
         self._plant.safety.manual = factor
+
+    def _press(self, slot: float, bar: str = "client") -> None:
+        if not self.press(bar, int(slot)):
+            raise ValueError(f"there is no user key {int(slot)} in a bar {bar!r}, or it is disabled")
 
     def _push(self, x: float, y: float, z: float, seconds: float = float("inf")) -> None:
         self._plant.apply_wrench((x, y, z), duration=seconds)

@@ -37,6 +37,7 @@ from heptarm.virtual.profile import Limits, TimeLaw, brake
 from heptarm.virtual.route import plan
 from heptarm.virtual.safety import Demand, Mode, Safety
 from heptarm.virtual.servo import Follower, follower
+from heptarm.virtual.signals import Signals
 from heptarm.virtual.world import Box, compiled
 
 TICK_NS = 1_000_000
@@ -169,6 +170,7 @@ class Plant:
         self._command = [self._q.copy() for _ in range(3)]  # set-points of the last, this and the next tick
         self._control = Control(self.robot, self.model, self.data)
         self.lookout = Lookout(self.robot, self.ring.signals)
+        self.signals = Signals(self.ring.signals)
         self._sensed = Sensed(
             self._q, self._dq, self._mass[:7, :7], self._bias, self._passive, self._q, self._q, self._q
         )

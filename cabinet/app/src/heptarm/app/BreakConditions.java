@@ -1,5 +1,6 @@
 package heptarm.app;
 
+import com.kuka.roboticsAPI.conditionModel.BooleanIOCondition;
 import com.kuka.roboticsAPI.conditionModel.ForceComponentCondition;
 import com.kuka.roboticsAPI.conditionModel.ForceCondition;
 import com.kuka.roboticsAPI.conditionModel.ICallbackAction;
@@ -30,6 +31,7 @@ import heptarm.wire.NormalForceAbove;
 import heptarm.wire.PathReached;
 import heptarm.wire.PathReference;
 import heptarm.wire.ShearForceAbove;
+import heptarm.wire.SignalIs;
 import heptarm.wire.SignalOutside;
 import heptarm.wire.TorqueOutside;
 
@@ -52,11 +54,11 @@ final class BreakConditions {
     }
 
     /** The conditions of a checked one for a motion of a frame; none if Sunrise cannot watch it. */
-    static BreakConditions of(Condition until, AbstractFrame moved, Tools tools) throws Refusal {
+    static BreakConditions of(Condition until, AbstractFrame moved, Tools tools, IoSignals signals) throws Refusal {
         Conditions.Tree[] trees = can(until) ? Conditions.alternatives(until) : new Conditions.Tree[0];
         ICondition[] made = new ICondition[trees.length];
         for (int i = 0; i < trees.length; i++) {
-            made[i] = make(trees[i], moved, tools);
+            made[i] = make(trees[i], moved, tools, signals);
         }
         return new BreakConditions(trees, made);
     }
@@ -84,22 +86,22 @@ final class BreakConditions {
         }
     }
 
-    private static ICondition make(Conditions.Tree tree, AbstractFrame moved, Tools tools) throws Refusal {
+    private static ICondition make(Conditions.Tree tree, AbstractFrame moved, Tools tools, IoSignals signals) throws Refusal {
         if (tree.parts.length == 0) {
-            return leaf(tree.node, moved, tools);
+            return leaf(tree.node, moved, tools, signals);
         }
-        ICondition first = make(tree.parts[0], moved, tools);
+        ICondition first = make(tree.parts[0], moved, tools, signals);
         if (tree.node instanceof Inverted) {
             return first.invert();
         }
         ICondition[] others = new ICondition[tree.parts.length - 1];
         for (int i = 0; i < others.length; i++) {
-            others[i] = make(tree.parts[i + 1], moved, tools);
+            others[i] = make(tree.parts[i + 1], moved, tools, signals);
         }
         return tree.node instanceof AllOf ? first.and(others) : first.or(others);
     }
 
-    private static ICondition leaf(ConditionNode node, AbstractFrame moved, Tools tools) throws Refusal {
+    private static ICondition leaf(ConditionNode node, AbstractFrame moved, Tools tools, IoSignals signals) throws Refusal {
         if (node instanceof ForceAbove) {
             ForceAbove one = (ForceAbove) node;
             AbstractFrame axes = axes(one.frame, moved, tools);
@@ -135,6 +137,10 @@ final class BreakConditions {
         if (node instanceof JointTorqueOutside) {
             JointTorqueOutside one = (JointTorqueOutside) node;
             return new JointTorqueCondition(JointEnum.values()[one.joint], one.low, one.high);
+        }
+        if (node instanceof SignalIs) {
+            SignalIs one = (SignalIs) node;
+            return new BooleanIOCondition(signals.signal(one.signal), one.value);
         }
         PathReached one = (PathReached) node;
         return new MotionPathCondition(one.reference == PathReference.START ? ReferenceType.START : ReferenceType.DEST,

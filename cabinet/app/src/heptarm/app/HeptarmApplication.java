@@ -32,9 +32,12 @@ public class HeptarmApplication extends RoboticsAPIApplication {
         Tools tools = new Tools(lbr, getApplicationData(), text("heptarm.tools", ""), text("heptarm.frames", ""), log);
         SunriseRobot robot = new SunriseRobot(lbr, tools, getApplicationControl(), log);
         robot.heed(getRecovery());
+        CabinetPanel panel = new CabinetPanel(new IoSignals(lbr.getController(), text("heptarm.io", IoSignals.FLANGE), log),
+                getApplicationData());
+        robot.furnish(panel);
         server = new Server(robot, config, Clocks.find(), log);
         try {
-            UserKeys.publish(this, server, log);
+            panel.show(UserKeys.publish(this, server, log));
         } catch (LinkageError e) { // an old cabinet; everything else works without them
             log.warn("this cabinet has no user keys: " + e);
         } catch (RuntimeException e) {

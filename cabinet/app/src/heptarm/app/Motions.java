@@ -50,7 +50,7 @@ import heptarm.wire.Spline;
 /** Turns items of a program into Sunrise motions. What cannot be carried out is refused, never ignored. */
 final class Motions {
     static final String[] CAPABILITIES = {"ptp", "ptp_pose", "lin", "lin_rel", "circ", "spline", "spline_joints", "hold", "blending", "override", "pause",
-        "servo", "servo_direct", "servo_pose", "conditions", "joint_impedance", "cartesian_impedance", "sine_impedance",
+        "servo", "servo_direct", "servo_pose", "conditions", "io", "user_keys", "process_data", "joint_impedance", "cartesian_impedance", "sine_impedance",
         "tools", "workpieces", "frames"};
 
     private static final int JOINTS = 7;

@@ -48,6 +48,7 @@ import heptarm.wire.Redundancy;
 import heptarm.wire.RobotInfo;
 import heptarm.wire.SafetyState;
 import heptarm.wire.ServoOpen;
+import heptarm.wire.SetKey;
 import heptarm.wire.SignalInfo;
 import heptarm.wire.ToolInfo;
 import heptarm.wire.WrenchState;
@@ -62,6 +63,7 @@ final class SunriseRobot implements Robot, IErrorHandler {
     private final Motions motions;
     private final RobotInfo info;
     private final Insight insight;
+    private CabinetPanel panel = new CabinetPanel(null, null);
     private final SunriseSafety safety;
     private final Map<IMotionContainer, SunriseJob> jobs = new IdentityHashMap<IMotionContainer, SunriseJob>();
     private final Map<IMotionContainer, String> orphans = new IdentityHashMap<IMotionContainer, String>();
@@ -84,6 +86,11 @@ final class SunriseRobot implements Robot, IErrorHandler {
     /** From now on the safety state tells whether the application has to be recovered first. */
     void heed(IRecovery recovery) {
         safety.heed(recovery);
+    }
+
+    /** From now on there are signals, keys and process data. */
+    void furnish(CabinetPanel furnished) {
+        panel = furnished;
     }
 
     public RobotInfo info() {
@@ -129,7 +136,7 @@ final class SunriseRobot implements Robot, IErrorHandler {
     }
 
     public SignalInfo[] signals() {
-        return new SignalInfo[0];
+        return panel.signals == null ? new SignalInfo[0] : panel.signals.infos();
     }
 
     public void readJoints(double[] q, double[] commanded) {
@@ -183,7 +190,23 @@ final class SunriseRobot implements Robot, IErrorHandler {
     }
 
     public void readSignals(double[] values, int from, int count) {
-        throw new IllegalStateException("this cabinet has no signals");
+        panel.signals.read(values, from, count);
+    }
+
+    public void writeSignals(int[] places, double[] values) throws Refusal {
+        panel.signals.write(places, values);
+    }
+
+    public void setKey(SetKey key) throws Refusal {
+        panel.setKey(key);
+    }
+
+    public String processData(String name) throws Refusal {
+        return panel.processData(name);
+    }
+
+    public void setProcessData(String name, String value) throws Refusal {
+        panel.setProcessData(name, value);
     }
 
     public boolean watches(Condition condition) {
@@ -212,7 +235,7 @@ final class SunriseRobot implements Robot, IErrorHandler {
         SunriseJob job = new SunriseJob(listener);
         try {
             RobotMotion<?> motion = motions.motion(item, mode);
-            job.guard(motion, BreakConditions.of(item.until, tools.moved(item.frame), tools));
+            job.guard(motion, BreakConditions.of(item.until, tools.moved(item.frame), tools, panel.signals));
             adopt(tools.moved(item.frame).moveAsync(motion, job), job);
         } catch (RuntimeException e) {
             log.warn("a motion was refused by the cabinet: " + e);

@@ -11,15 +11,56 @@ import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyLEDSize;
 
 import heptarm.core.Log;
 import heptarm.core.Server;
+import heptarm.wire.KeyLed;
+import heptarm.wire.SetKey;
 
-/** Keys at the smartPAD for a person beside the robot: stop what moves, take control away from whoever has it. */
+/**
+ * Keys at the smartPAD for a person beside the robot: stop what moves, take control away from whoever has it; and a bar of four
+ * for clients, who say what is on them and hear when they are pressed.
+ */
 final class UserKeys {
     private static final String BAR = "heptarm";
+    private static final String CLIENT_BAR = "client";
+    private static final int SLOTS = 4;
 
-    private UserKeys() {
+    private final IUserKey[] forClients = new IUserKey[SLOTS];
+
+    private UserKeys(RoboticsAPIApplication application, final Server server, final Log log) {
+        IUserKeyBar bar = application.getApplicationUI().createUserKeyBar(CLIENT_BAR);
+        for (int i = 0; i < SLOTS; i++) {
+            final int slot = i;
+            forClients[i] = bar.addUserKey(i, new IUserKeyListener() {
+                public void onKeyEvent(IUserKey pressed, UserKeyEvent event) {
+                    final boolean down = event == UserKeyEvent.KeyDown;
+                    if (down || event == UserKeyEvent.KeyUp) {
+                        server.keyPressed(slot, down);
+                    }
+                }
+            }, true);
+            forClients[i].setEnabled(false);
+        }
+        bar.publish();
     }
 
-    static void publish(RoboticsAPIApplication application, final Server server, final Log log) {
+    /** What a client wants on a key. */
+    void set(SetKey wish) {
+        IUserKey key = forClients[wish.slot];
+        key.setText(UserKeyAlignment.TopMiddle, wish.text);
+        key.setLED(UserKeyAlignment.BottomMiddle, led(wish.led), UserKeyLEDSize.Small);
+        key.setEnabled(wish.enabled);
+    }
+
+    private static UserKeyLED led(KeyLed led) {
+        if (led == KeyLed.GREEN) {
+            return UserKeyLED.Green;
+        }
+        if (led == KeyLed.YELLOW) {
+            return UserKeyLED.Yellow;
+        }
+        return led == KeyLed.RED ? UserKeyLED.Red : UserKeyLED.Grey;
+    }
+
+    static UserKeys publish(RoboticsAPIApplication application, final Server server, final Log log) {
         IUserKeyBar bar = application.getApplicationUI().createUserKeyBar(BAR);
         add(bar, 0, "stop", UserKeyLED.Red, log, new Runnable() {
             public void run() {
@@ -32,6 +73,7 @@ final class UserKeys {
             }
         });
         bar.publish();
+        return new UserKeys(application, server, log);
     }
 
     private static void add(IUserKeyBar bar, int slot, String text, UserKeyLED led, final Log log, final Runnable action) {

@@ -33,7 +33,6 @@ import heptarm.wire.ServoOpen;
 import heptarm.wire.ServoPose;
 import heptarm.wire.ServoSettings;
 import heptarm.wire.SetOverride;
-import heptarm.wire.ShowMessage;
 import heptarm.wire.SineImpedance;
 import heptarm.wire.Stop;
 import heptarm.wire.Subscribe;
@@ -207,9 +206,8 @@ final class Dispatcher {
             Fitting.make(server, message);
         } else if (message instanceof Recover) {
             server.warden.recover();
-        } else if (message instanceof ShowMessage) {
-            ShowMessage note = (ShowMessage) message;
-            server.robot.show(note.severity.value(), note.text);
+        } else if (Panel.concerns(message)) {
+            return Panel.answer(server, message);
         } else {
             throw new Refusal(Code.UNSUPPORTED, "this cabinet application cannot handle message " + message.type() + " yet");
         }

@@ -28,7 +28,7 @@ import heptarm.wire.WireException;
 final class Handshake {
     private static final SecureRandom RANDOM = new SecureRandom();
     private static final int ALL_GROUPS = Groups.JOINTS | Groups.TORQUES | Groups.POSE | Groups.WRENCH | Groups.MOTION
-            | Groups.SAFETY | Groups.MODE;
+            | Groups.SAFETY | Groups.IO | Groups.MODE;
 
     private final Server server;
     private final Client client;

@@ -9,6 +9,7 @@ import heptarm.wire.PoseState;
 import heptarm.wire.RobotInfo;
 import heptarm.wire.SafetyState;
 import heptarm.wire.ServoOpen;
+import heptarm.wire.SetKey;
 import heptarm.wire.SignalInfo;
 import heptarm.wire.ToolInfo;
 import heptarm.wire.WrenchState;
@@ -62,6 +63,18 @@ public interface Robot {
 
     /** Reads some of the signals, into their places. */
     void readSignals(double[] values, int from, int count);
+
+    /** Writes outputs that were checked. */
+    void writeSignals(int[] places, double[] values) throws Refusal;
+
+    /** Text and lamp of a user key for clients. */
+    void setKey(SetKey key) throws Refusal;
+
+    /** A value of the process data as text. */
+    String processData(String name) throws Refusal;
+
+    /** Changes a value of the process data; the text has to be one of its type. */
+    void setProcessData(String name, String value) throws Refusal;
 
     /** Whether the robot itself watches a break condition while a motion runs; otherwise the core does. */
     boolean watches(Condition condition);

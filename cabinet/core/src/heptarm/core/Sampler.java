@@ -4,6 +4,7 @@ import java.util.Map;
 import java.util.concurrent.ConcurrentHashMap;
 
 import heptarm.wire.Groups;
+import heptarm.wire.IoState;
 import heptarm.wire.JointState;
 import heptarm.wire.ModeState;
 import heptarm.wire.MotionState;
@@ -67,12 +68,14 @@ final class Sampler {
     private final Gauge wrenchGauge = new Gauge(Groups.WRENCH, 0.1);
     private final Gauge motionGauge = new Gauge(Groups.MOTION, 0.05);
     private final Gauge safetyGauge = new Gauge(Groups.SAFETY, 0.1);
+    private final Gauge ioGauge = new Gauge(Groups.IO, 0.04);
     private volatile JointState joints;
     private TorqueState torques;
     private PoseState pose;
     private WrenchState wrench;
     private MotionState motion;
     private SafetyState safety;
+    private IoState io;
     private ModeState mode;
 
     private final Server server;
@@ -208,11 +211,15 @@ final class Sampler {
             safety = robot.readSafety(safetyGauge.stamp);
             end(safetyGauge);
         }
+        if (begin(ioGauge, groups, now)) {
+            io = server.signals.read(ioGauge.stamp);
+            end(ioGauge);
+        }
         if ((groups & Groups.MODE) != 0) { // the core knows it by itself
             String[] fitted = server.rack.fitted();
             mode = new ModeState(now, server.executor.mode(), fitted[0], fitted[1], fitted[2]);
         }
-        return choose(new State(joints, torques, pose, wrench, motion, safety, null, mode), groups);
+        return choose(new State(joints, torques, pose, wrench, motion, safety, io, mode), groups);
     }
 
     private boolean begin(Gauge gauge, int groups, long now) {
@@ -279,7 +286,7 @@ final class Sampler {
     private static State choose(State all, int groups) {
         return new State((groups & Groups.JOINTS) != 0 ? all.joints : null, (groups & Groups.TORQUES) != 0 ? all.torques : null,
                 (groups & Groups.POSE) != 0 ? all.pose : null, (groups & Groups.WRENCH) != 0 ? all.wrench : null,
-                (groups & Groups.MOTION) != 0 ? all.motion : null, (groups & Groups.SAFETY) != 0 ? all.safety : null, null,
-                (groups & Groups.MODE) != 0 ? all.mode : null);
+                (groups & Groups.MOTION) != 0 ? all.motion : null, (groups & Groups.SAFETY) != 0 ? all.safety : null,
+                (groups & Groups.IO) != 0 ? all.io : null, (groups & Groups.MODE) != 0 ? all.mode : null);
     }
 }

@@ -12,6 +12,7 @@ import java.util.concurrent.atomic.AtomicInteger;
 import heptarm.wire.Cause;
 import heptarm.wire.Code;
 import heptarm.wire.Encoder;
+import heptarm.wire.KeyPressed;
 import heptarm.wire.Message;
 import heptarm.wire.Protocol;
 
@@ -36,6 +37,7 @@ public final class Server {
     final Warden warden;
     final Rack rack;
     final FriMonitors monitors = new FriMonitors();
+    final Signals signals;
     final Sampler sampler;
     final Dispatcher dispatcher;
 
@@ -52,6 +54,7 @@ public final class Server {
         this.config = config;
         this.clock = clock;
         this.log = log;
+        this.signals = new Signals(robot);
         this.authority = new Authority(this);
         this.executor = new Executor(this);
         this.warden = new Warden(this);
@@ -121,6 +124,11 @@ public final class Server {
     public void stop(String why) {
         executor.endAll(Cause.STOPPED, why);
         robot.stop();
+    }
+
+    /** A person beside the robot has pressed or released a key for clients. */
+    public void keyPressed(int slot, boolean down) {
+        broadcast(new KeyPressed(slot, down));
     }
 
     /** A person beside the robot takes control away from whoever has it; what runs is stopped. */

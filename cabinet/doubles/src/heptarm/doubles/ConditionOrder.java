@@ -3,6 +3,7 @@ package heptarm.doubles;
 import java.util.ArrayList;
 import java.util.List;
 
+import com.kuka.roboticsAPI.conditionModel.BooleanIOCondition;
 import com.kuka.roboticsAPI.conditionModel.ForceComponentCondition;
 import com.kuka.roboticsAPI.conditionModel.ForceCondition;
 import com.kuka.roboticsAPI.conditionModel.ICondition;
@@ -24,6 +25,7 @@ public final class ConditionOrder {
     private static final int FORCE = 2;
     private static final int FORCE_COMPONENT = 5;
     private static final int TORQUE_COMPONENT = 6;
+    private static final int BOOLEAN_SIGNAL = 7;
     private static final int PATH = 9;
     private static final int COMBINED = 32;
 
@@ -69,6 +71,9 @@ public final class ConditionOrder {
             put(TORQUE_COMPONENT);
             frame((Estimated) condition);
             put(((TorqueComponentCondition) condition).numbers());
+        } else if (condition instanceof BooleanIOCondition) {
+            put(BOOLEAN_SIGNAL);
+            put(((BooleanIOCondition) condition).numbers());
         } else if (condition instanceof MotionPathCondition) {
             put(PATH);
             put(((MotionPathCondition) condition).numbers());

@@ -36,10 +36,21 @@ public final class Pad implements IApplicationUI {
 
     /** What stands on a key of a published bar; null if there is none. */
     public String text(String bar, int slot) {
+        Key key = find(bar, slot);
+        return key == null ? null : key.text;
+    }
+
+    /** Colour of a key's lamp; null if it has none, or there is no such key. */
+    public UserKeyLED led(String bar, int slot) {
+        Key key = find(bar, slot);
+        return key == null ? null : key.led;
+    }
+
+    private Key find(String bar, int slot) {
         for (Bar one : bars) {
             for (Key key : one.keys) {
                 if (one.name.equals(bar) && key.slot == slot) {
-                    return key.text;
+                    return key;
                 }
             }
         }
@@ -88,6 +99,7 @@ public final class Pad implements IApplicationUI {
         private final int slot;
         private final IUserKeyListener listener;
         private volatile String text = "";
+        private volatile UserKeyLED led;
         private volatile boolean enabled = true;
 
         Key(int slot, IUserKeyListener listener) {
@@ -101,7 +113,8 @@ public final class Pad implements IApplicationUI {
         }
 
         @Override
-        public void setLED(UserKeyAlignment alignment, UserKeyLED led, UserKeyLEDSize size) {
+        public void setLED(UserKeyAlignment alignment, UserKeyLED value, UserKeyLEDSize size) {
+            led = value;
         }
 
         @Override

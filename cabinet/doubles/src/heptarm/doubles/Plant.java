@@ -39,6 +39,9 @@ public interface Plant {
 
     void unwatch(long number);
 
+    /** Place of a signal in the IO image, see {@link Ring#signal}; made where there is none yet. */
+    int signal(String name, boolean output);
+
     /** Joint positions [rad] that bring the flange to a pose in the base, nearest to others; null if there are none. */
     double[] inverse(double[] pose, double[] near);
 

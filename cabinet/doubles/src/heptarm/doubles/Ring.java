@@ -50,6 +50,7 @@ public final class Ring {
     private static final long TO_JOINTS = 1;
     private static final long TO_JOINTS_WITH_VELOCITY = 2;
 
+    private static final int BOX_WORDS = 32;
     private static final int WORDS = 64;
     private static final int HEADER = 64;
     private static final int NEWEST = 0;
@@ -123,6 +124,15 @@ public final class Ring {
         long newest = newest();
         long view = views.get()[0];
         return view < 0 || newest - view > OLDEST ? newest : view;
+    }
+
+    /** Value of a signal of the IO image. */
+    public double signal(int place) {
+        return Double.longBitsToDouble(word(box + 8 * (BOX_WORDS + place)));
+    }
+
+    public void setSignal(int place, double value) {
+        LONGS.setRelease(memory, box + 8 * (BOX_WORDS + place), Double.doubleToRawLongBits(value));
     }
 
     /** Copies doubles of a state. */

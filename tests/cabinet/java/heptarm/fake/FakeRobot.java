@@ -34,6 +34,7 @@ import heptarm.wire.SafetyBits;
 import heptarm.wire.SafetyState;
 import heptarm.wire.ServoEngine;
 import heptarm.wire.ServoOpen;
+import heptarm.wire.SetKey;
 import heptarm.wire.SignalInfo;
 import heptarm.wire.SignalOutside;
 import heptarm.wire.ToolInfo;
@@ -77,6 +78,8 @@ final class FakeRobot implements Robot, Runnable {
     private final double[] signals = new double[SIGNALS.length];
     private final RobotInfo info;
     private volatile double override = 1.0;
+    private volatile double speed = 0.5;
+    private volatile String keyed = "";
     private volatile boolean paused;
     private volatile int safety;
     private volatile OperationMode operation = OperationMode.AUT;
@@ -389,6 +392,45 @@ final class FakeRobot implements Robot, Runnable {
         pay(count);
         synchronized (signals) {
             System.arraycopy(signals, from, values, from, count);
+        }
+    }
+
+    @Override
+    public void writeSignals(int[] places, double[] values) {
+        synchronized (signals) {
+            for (int i = 0; i < places.length; i++) {
+                signals[places[i]] = values[i];
+            }
+        }
+    }
+
+    /** It has three keys. */
+    @Override
+    public void setKey(SetKey key) throws Refusal {
+        if (key.slot == 3) {
+            throw new Refusal(Code.UNSUPPORTED, "this cabinet has three user keys");
+        }
+        keyed = key.slot + " " + key.text + " " + key.led + " " + key.enabled;
+    }
+
+    @Override
+    public String processData(String name) throws Refusal {
+        if ("keyed".equals(name)) {
+            return keyed;
+        }
+        if (!"speed".equals(name)) {
+            throw new Refusal(Code.UNKNOWN_NAME, "name", name, "", "no process data " + name);
+        }
+        return Double.toString(speed);
+    }
+
+    @Override
+    public void setProcessData(String name, String value) throws Refusal {
+        processData(name);
+        try {
+            speed = Double.parseDouble(value);
+        } catch (NumberFormatException e) {
+            throw new Refusal(Code.OUT_OF_RANGE, "value", value, "a number", value + " is no number");
         }
     }
 

@@ -1,0 +1,98 @@
+package com.kuka.roboticsAPI.ioModel;
+
+import java.util.LinkedHashMap;
+import java.util.Map;
+
+import com.kuka.roboticsAPI.controllerModel.Controller;
+
+import heptarm.doubles.Ring;
+import heptarm.doubles.Station;
+
+/** Inputs and outputs that belong together; a project's classes derive from it. The virtual cabinet has every group that is made. */
+public abstract class AbstractIOGroup {
+    private final String group;
+    private final Map<String, Input> inputs = new LinkedHashMap<>();
+    private final Map<String, Output> outputs = new LinkedHashMap<>();
+
+    public AbstractIOGroup(Controller controller, String groupName) {
+        if (controller == null) {
+            throw new IllegalArgumentException("an IO group belongs to a controller");
+        }
+        group = groupName;
+    }
+
+    public String getIOGroupName() {
+        return group;
+    }
+
+    protected void addInput(String name, IOTypes type, int bits) {
+        inputs.put(name, new Input(group, name, type));
+    }
+
+    protected void addInput(String name, IOTypes type, int bits, double low, double high) {
+        addInput(name, type, bits);
+    }
+
+    protected void addDigitalOutput(String name, IOTypes type, int bits) {
+        double low = type == IOTypes.INTEGER ? -Math.pow(2, bits - 1) : 0;
+        double high = type == IOTypes.INTEGER ? -low - 1 : Math.pow(2, bits) - 1;
+        outputs.put(name, new Output(group, name, type, low, high));
+    }
+
+    protected void addAnalogOutput(String name, IOTypes type, int bits, double low, double high) {
+        outputs.put(name, new Output(group, name, type, low, high));
+    }
+
+    protected boolean getBooleanIOValue(String name, boolean isOutput) {
+        return getIO(name, isOutput).value() != 0.0;
+    }
+
+    protected Number getNumberIOValue(String name, boolean isOutput) {
+        return Long.valueOf(Math.round(getIO(name, isOutput).value()));
+    }
+
+    protected double getAnalogIOValue(String name, boolean isOutput) {
+        return getIO(name, isOutput).value();
+    }
+
+    protected void setDigitalOutput(String name, Object value) {
+        Output output = getOutput(name);
+        boolean truth = output.type() == IOTypes.BOOLEAN;
+        if (truth != value instanceof Boolean || !truth && !(value instanceof Number)) {
+            throw new IllegalArgumentException("output " + name + " of " + group + " is " + output.type() + ", not " + value);
+        }
+        write(output, truth ? (Boolean) value ? 1.0 : 0.0 : ((Number) value).doubleValue());
+    }
+
+    protected void setAnalogOutput(String name, double value) {
+        write(getOutput(name), value);
+    }
+
+    private static void write(Output output, double value) {
+        output.check(value);
+        long flags = Station.current().ring.integer(Ring.FLAGS);
+        if ((flags & Ring.EMERGENCY_STOP) != 0) {
+            throw new IllegalStateException("outputs cannot be written during an emergency stop");
+        }
+        output.setValue(value);
+    }
+
+    public Input getInput(String name) {
+        return known(inputs.get(name), name);
+    }
+
+    public Output getOutput(String name) {
+        return known(outputs.get(name), name);
+    }
+
+    public AbstractIO getIO(String name, boolean isOutput) {
+        return isOutput ? getOutput(name) : getInput(name);
+    }
+
+    private <T> T known(T found, String name) {
+        if (found == null) {
+            throw new IllegalArgumentException("group " + group + " has no " + name);
+        }
+        return found;
+    }
+}

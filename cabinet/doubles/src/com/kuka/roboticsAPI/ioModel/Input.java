@@ -1,0 +1,8 @@
+package com.kuka.roboticsAPI.ioModel;
+
+/** An input of the cabinet. */
+public class Input extends AbstractIO {
+    Input(String group, String name, IOTypes type) {
+        super(group, name, type, false);
+    }
+}

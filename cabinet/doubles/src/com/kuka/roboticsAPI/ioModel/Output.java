@@ -1,0 +1,19 @@
+package com.kuka.roboticsAPI.ioModel;
+
+/** An output of the cabinet. */
+public class Output extends AbstractIO {
+    private final double low;
+    private final double high;
+
+    Output(String group, String name, IOTypes type, double low, double high) {
+        super(group, name, type, true);
+        this.low = low;
+        this.high = high;
+    }
+
+    void check(double value) {
+        if (!(value >= low && value <= high)) {
+            throw new IllegalArgumentException("output " + name() + " is to be " + value + "; it can be " + low + " to " + high);
+        }
+    }
+}

@@ -1,0 +1,10 @@
+package com.kuka.roboticsAPI.ioModel;
+
+/** An output belongs to somebody else. */
+public class OutputReservedException extends RuntimeException {
+    private static final long serialVersionUID = 1L;
+
+    public OutputReservedException(String text) {
+        super(text);
+    }
+}

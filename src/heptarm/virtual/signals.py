@@ -1,0 +1,64 @@
+"""The virtual cabinet's IO image: its inputs and outputs by name, their values in memory that Java shares."""
+
+from __future__ import annotations
+
+import threading
+
+from heptarm.values.arrays import Array
+
+
+class Signals:
+    """Inputs and outputs of the simulated cabinet.
+
+    On a robot the project says which there are; here each is made at its first use.
+
+    Args:
+        values: of the signals by place, shape (n,).
+    """
+
+    def __init__(self, values: Array) -> None:
+        self._values = values
+        self._places: dict[tuple[str, bool], int] = {}
+        self._lock = threading.Lock()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all that are known, "Group.Name"."""
+        return tuple(name for name, _ in self._places)
+
+    def place(self, name: str, *, is_output: bool) -> int:
+        """Place of a signal; made if there is none.
+
+        Raises:
+            ValueError: there is no room for more.
+        """
+        with self._lock:
+            place = self._places.setdefault((name, is_output), len(self._places))
+            if place >= len(self._values):
+                del self._places[name, is_output]
+                raise ValueError(f"the IO image has room for {len(self._values)} signals")
+            return place
+
+    def find(self, name: str) -> int:
+        """Place of a signal by its name, or the part behind the point where that is unique; case does not matter.
+
+        Raises:
+            ValueError: there is none, or more than one.
+        """
+        found = [
+            place
+            for (known, _), place in self._places.items()
+            if name.casefold() in (known.casefold(), known.rpartition(".")[2].casefold())
+        ]
+        exact = [place for (known, _), place in self._places.items() if known == name]
+        if len(exact or found) != 1:
+            raise ValueError(f"no signal {name!r}, or several; there are {', '.join(self.names) or 'none'}")
+        return (exact or found)[0]
+
+    def get(self, name: str) -> float:
+        """Value of a signal. Raises as `find` does."""
+        return float(self._values[self.find(name)])
+
+    def set(self, name: str, value: float) -> None:
+        """Give a signal a value; 0 and 1 of a boolean. Raises as `find` does."""
+        self._values[self.find(name)] = value
