@@ -15,7 +15,7 @@ from heptarm.values.pose import Pose
 from heptarm.values.robot import robot
 from heptarm.virtual.impedance import CartesianSpring, Flange
 from heptarm.virtual.law import Sensed
-from heptarm.virtual.plant import MODELS
+from heptarm.virtual.world import MODELS
 
 #: An arm that is nowhere near a singularity, its axes askew to the base's.
 ASKEW = (0.2, 0.6, -0.3, -1.3, 0.4, 0.9, 0.5)
