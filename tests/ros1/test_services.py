@@ -127,7 +127,7 @@ def test_speed_control_and_lists(client: Client) -> None:
     ask("set_speed", SetNumber, value=0.3)
     answer = call("/heptarm/set_speed", SetNumber, value=3.0)
     assert not answer.success and "3" in answer.message
-    ask("set_speed", SetNumber, value=0.2)
+    ask("set_speed", SetNumber, value=1.0)
     ask("release_control")
     assert "in control" in ask("take_control")
     ask("stop_as", SetText, value="fast")

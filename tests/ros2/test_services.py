@@ -60,7 +60,7 @@ def test_tools_control_and_lists(client: Client, ask) -> None:
     ask("detach_tool")
     assert "broom" in ask("attach_tool", AttachTool, refused=True, name="broom", known=True).message
     ask("set_speed", SetNumber, value=0.3)
-    ask("set_speed", SetNumber, value=0.2)
+    ask("set_speed", SetNumber, value=1.0)
     ask("release_control")
     assert "in control" in ask("take_control").message
     ask("stop_as", SetText, value="fast")

@@ -288,15 +288,28 @@ class Driver:
         Raises:
             HeptarmError: refused; the text says why.
         """
-        self._check_active()
         motion: Motion
         if isinstance(target, Pose):
             motion = lin(target) if straight else ptp(target)
         else:
             motion = ptp(target)
+        return self.start(motion)
+
+    def start(self, motion: Motion, *, speed: float | None = None) -> MotionHandle:
+        """Start any motion; it takes the place of whatever runs.
+
+        Args:
+            motion: what to do.
+            speed: ceiling for this one, (0, 1]; None: that of the parameter `speed`.
+
+        Raises:
+            HeptarmError: refused; the text says why.
+        """
+        self._check_active()
         self._execution.abort("a command took the place of this goal")
         self._stream.close()
-        self._handle = self._arm.start(motion, when="replace", speed=self.configuration.values["speed"])
+        ceiling = self.configuration.values["speed"] if speed is None else speed
+        self._handle = self._arm.start(motion, speed=ceiling, when="replace")
         return self._handle
 
     def follow(self, target: Array | Pose, dq: Array | None = None) -> None:

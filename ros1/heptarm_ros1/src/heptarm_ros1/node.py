@@ -22,6 +22,7 @@ from heptarm.errors import HeptarmError, NotReady
 from heptarm.values.state import State
 from heptarm_ros1 import peers, settings
 from heptarm_ros1.commands import Commands
+from heptarm_ros1.moves import MoveActions
 from heptarm_ros1.peers import Peers
 from heptarm_ros1.publishers import Publishers
 from heptarm_ros1.trajectory import TrajectoryAction
@@ -45,6 +46,7 @@ class HeptarmNode:
         self._wake = threading.Event()
         # actionlib cannot end a server, so they live as long as the node, and reject while it is not configured
         self._goals = TrajectoryAction(self, ("~follow_joint_trajectory", *peers.actions()))
+        self._moves = MoveActions(self)
         steps: tuple[tuple[type, str, Callable[[], str]], ...] = (
             (Trigger, "~configure", self.configure),
             (Trigger, "~activate", self.activate),

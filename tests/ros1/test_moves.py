@@ -1,0 +1,103 @@
+"""Single motions as actions: progress, arrival, cancelling, another one, refusal."""
+
+from __future__ import annotations
+
+import actionlib
+import numpy as np
+import pytest
+import rospy
+from actionlib_msgs.msg import GoalStatus
+from geometry_msgs.msg import PoseStamped
+from heptarm_msgs.msg import MoveJointsAction, MoveJointsGoal, MovePoseAction, MovePoseGoal
+
+from tests.conformance.cases import rests
+from tests.ros1.peer import Client, collect, until
+
+HOME = np.radians([0, 30, 0, -90, 0, 60, 0]).tolist()
+LONG = rospy.Duration(60)
+
+
+@pytest.fixture
+def joints(client: Client):
+    one = actionlib.SimpleActionClient("/heptarm/move_joints", MoveJointsAction)
+    assert one.wait_for_server(LONG)
+    return one
+
+
+@pytest.fixture
+def poses(client: Client):
+    one = actionlib.SimpleActionClient("/heptarm/move_pose", MovePoseAction)
+    assert one.wait_for_server(LONG)
+    return one
+
+
+def test_a_motion_of_joints_tells_how_far_it_is(client: Client, joints) -> None:
+    told: list[float] = []
+    goal = MoveJointsGoal(position=HOME, speed=0.5)
+    joints.send_goal(goal, feedback_cb=lambda feedback: told.append(feedback.progress))
+    assert joints.wait_for_result(LONG)
+    assert joints.get_state() == GoalStatus.SUCCEEDED and joints.get_result().success
+    assert joints.get_result().residual < 1e-3
+    assert told == sorted(told) and told[-1] == 1.0
+    assert np.abs(rests(client) - HOME).max() < 2e-3
+
+
+def test_lines_and_arcs(client: Client, joints, poses) -> None:
+    joints.send_goal_and_wait(MoveJointsGoal(position=HOME, speed=0.5), LONG)
+    rests(client)
+    seen = collect("/heptarm/pose", PoseStamped)
+    until(lambda: seen, "no poses come")
+    start = seen[-1]
+    down, there = MovePoseGoal(path=MovePoseGoal.LIN, pose=start), MovePoseGoal(path=MovePoseGoal.CIRC)
+    down.pose.pose.position.z -= 0.05
+    assert poses.send_goal_and_wait(down, LONG) == GoalStatus.SUCCEEDED, poses.get_result()
+    rests(client)
+    count = len(seen)
+    centre = seen[-1].pose.position.y
+    there.pose, there.via = (PoseStamped(pose=seen[-1].pose) for _ in range(2))
+    for pose, dy, dz in ((there.pose, 0.1, 0.0), (there.via, 0.05, 0.05)):
+        place = seen[count - 1].pose.position
+        pose.pose = type(pose.pose)(
+            type(place)(place.x, place.y + dy, place.z + dz), seen[-1].pose.orientation
+        )
+    assert poses.send_goal_and_wait(there, LONG) == GoalStatus.SUCCEEDED, poses.get_result()
+    rests(client)
+    top = max(one.pose.position.z for one in seen[count:])
+    assert abs(top - there.via.pose.position.z) < 3e-3
+    assert abs(seen[-1].pose.position.y - centre - 0.1) < 2e-3
+
+
+def test_cancelling_brakes_on_the_path(client: Client, joints) -> None:
+    here = rests(client)
+    joints.send_goal(MoveJointsGoal(joint_names=["A1"], position=[here[0] + 2.0]))
+    until(lambda: client.place().dq[0] > 0.1, "the arm does not set out")
+    joints.cancel_goal()
+    assert joints.wait_for_result(LONG)
+    assert joints.get_state() == GoalStatus.PREEMPTED and not joints.get_result().success
+    assert rests(client)[0] < here[0] + 1.9
+
+
+def test_another_motion_takes_the_place_and_a_trajectory_too(client: Client, joints) -> None:
+    here = rests(client)
+    joints.send_goal(MoveJointsGoal(joint_names=["A1"], position=[here[0] - 2.0]))
+    until(lambda: client.place().dq[0] < -0.1, "the arm does not set out")
+    other = actionlib.SimpleActionClient("/heptarm/move_joints", MoveJointsAction)
+    assert other.wait_for_server(LONG)
+    state = other.send_goal_and_wait(MoveJointsGoal(joint_names=["A1"], position=[here[0]]), LONG)
+    assert state == GoalStatus.SUCCEEDED, other.get_result()
+    assert joints.wait_for_result(LONG) and joints.get_state() == GoalStatus.PREEMPTED
+    rests(client)
+
+
+@pytest.mark.parametrize(
+    ("names", "values", "speed", "word"),
+    [
+        (["elbow"], [0.0], 0.0, "elbow"),
+        (["A1"], [9.0], 0.0, "A1"),
+        (["A1"], [0.1], 3.0, "speed"),
+    ],
+)
+def test_a_senseless_motion_is_rejected_in_words(joints, names, values, speed, word) -> None:
+    goal = MoveJointsGoal(joint_names=names, position=values, speed=speed)
+    assert joints.send_goal_and_wait(goal, LONG) == GoalStatus.REJECTED
+    assert not joints.get_result().success and word in joints.get_result().message
