@@ -150,3 +150,32 @@ def test_arcs_and_how_the_orientation_is_led() -> None:
     joint = one(lin(POSE, orientation="joint")).motion
     assert isinstance(joint, wire.Lin) and joint.orientation.type is wire.OrientationType.JOINT
     assert longest([ha.circ(via, end, speed_mps=0.01)], ROBOT, 1.0) > 1800
+
+
+def test_arcs_and_splines_reach_the_wire_whole() -> None:
+    via, end = Pose.at(0.5, 0.15, 0.4), Pose.at(0.5, 0.2, 0.35)
+    arc = one(ha.circ(via, end, orientation="constant", reference="path", blend_m=0.02)).motion
+    assert isinstance(arc, wire.Circ) and arc.via.xyz == (0.5, 0.15, 0.4) and arc.blending.distance == 0.02
+    assert arc.orientation == wire.Orientation(
+        type=wire.OrientationType.CONSTANT, reference=wire.OrientationReference.PATH
+    )
+    curve = ha.spline(
+        [POSE, ha.spl(via, orientation="ignore", speed_mps=0.1), lin(end), ha.circ(via, POSE)],
+        moving="flange",
+        speed_mps=0.2,
+        joint_speed=0.9,
+    )
+    item = one(curve, 0.5)
+    assert isinstance(item.motion, wire.Spline) and item.frame == "flange"
+    kinds = [type(segment) for segment in item.motion.segments]
+    assert kinds == [wire.SplSegment, wire.SplSegment, wire.LinSegment, wire.CircSegment]
+    assert item.motion.segments[1].dynamics.velocity == 0.1
+    assert item.motion.segments[1].orientation.type == wire.OrientationType.IGNORE
+    assert item.motion.dynamics.velocity == 0.2 and item.motion.joints.velocity == (0.5,) * 7
+    joints = one(ha.spline_joints([np.zeros(7), ptp(np.full(7, 0.1), speed=0.2)]), 0.5).motion
+    assert isinstance(joints, wire.JointSpline)
+    assert [point.dynamics.velocity[0] for point in joints.points] == [0.5, 0.2]
+    with pytest.raises(ha.LimitError, match=r"A2"):
+        one(ha.spline_joints([np.zeros(7), deg(0, 121, 0, 0, 0, 0, 0)]))
+    assert 15 < longest([curve], ROBOT, 1.0) < longest([curve], ROBOT, 0.01)
+    assert 15 < longest([ha.spline_joints([np.zeros(7)] * 3)], ROBOT, 1.0) < 200

@@ -128,6 +128,19 @@ def test_joints_blend_with_lines_and_arcs() -> None:
     assert np.abs(plant.snapshot.q - READY).max() <= 1e-4
 
 
+def test_progress_is_that_of_the_motion_under_way() -> None:
+    plant, ear = ready(), PartEar()
+    plant.submit(Order(1, "batch", parts=square(start_of(plant), (0, 0.02, 0)), part_listener=ear))
+    seen: list[tuple[int, float]] = []
+    while not plant.idle:
+        plant.tick()
+        seen.append((len(ear.parts), plant.snapshot.progress))
+    assert sorted(seen[:-1]) == seen[:-1], "it went back"
+    for part in range(4):
+        shares = [share for number, share in seen[:-1] if number == part]
+        assert shares[0] < 0.02 and shares[-1] > 0.98
+
+
 def test_without_blending_every_motion_ends_where_it_should() -> None:
     plant, ear = ready(), PartEar()
     start = start_of(plant)

@@ -66,6 +66,12 @@ class Plan:
             return self.profile.duration
         return _NEVER if isnan(self.order.duration) else self.order.duration
 
+    def progress(self, s: float, part: int) -> float:
+        """How far a part of it has come at s, 0 to 1; a motion by itself is its only part."""
+        marks = (0.0, *self.marks, 1.0)
+        low, high = marks[part], marks[part + 1]
+        return min(1.0, max(0.0, (s - low) / (high - low))) if high > low else 1.0
+
 
 def plan(robot: RobotModel, order: Order, start: Array) -> Plan:
     """Plan an order from rest at `start`, shape (7,) [rad].

@@ -482,7 +482,7 @@ class Plant:
             self._command[2] = planned.end
         else:
             self._lead(run, s)
-        return (nan if run.failure else s), run.profile.duration - run.time
+        return (nan if run.failure else planned.progress(s, run.part)), run.profile.duration - run.time
 
     def _lead(self, run: _Run, s: float) -> None:
         """Set the next set-point; one that no axis could follow ends the motion."""
