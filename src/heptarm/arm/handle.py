@@ -14,7 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 from heptarm import errors
 from heptarm.arm.refusals import error_of
-from heptarm.errors import CommandRejected, ConnectionLost, HeptarmError, MotionAborted, Starved, Timeout
+from heptarm.errors import (
+    CommandRejected,
+    ConnectionLost,
+    HeptarmError,
+    MotionAborted,
+    NotReady,
+    Starved,
+    Timeout,
+)
 from heptarm.values.condition import Condition
 from heptarm.values.result import Cause, Result
 from heptarm.values.state import State
@@ -185,7 +193,9 @@ class MotionHandle:
             error: HeptarmError = ConnectionLost(text, code=message.code, hint=hint)
         elif result.cause is Cause.STARVED:
             error = Starved(text, code=message.code, hint=hint)
-        elif result.cause is Cause.FAILED and issubclass(kind, CommandRejected) and not self.started:
+        elif (
+            result.cause is Cause.FAILED and issubclass(kind, CommandRejected | NotReady) and not self.started
+        ):
             error = error_of(message.code, text)  # found while planning: nothing has moved
         else:
             error = MotionAborted(

@@ -172,6 +172,17 @@ final class Executor {
         end(take(0), cause, code, why);
     }
 
+    /** Ends what was accepted but has not begun to move; what waits behind it is dropped. */
+    void endUnmoved(int code, String why) {
+        Program program;
+        synchronized (this) {
+            program = running != null ? running : queue.peek();
+        }
+        if (program != null && !program.moved) {
+            program.end(Cause.FAILED, code, why);
+        }
+    }
+
     /** Ends what runs if it is led from outside. */
     void endActivity(Cause cause, int code, String why) {
         Program program;

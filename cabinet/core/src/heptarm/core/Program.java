@@ -21,6 +21,7 @@ final class Program {
     int code;
     String text = "";
     long began;
+    volatile boolean moved;
     int fired = -1;
     private int firedItem;
     private boolean isFiringTold;
@@ -75,6 +76,8 @@ final class Program {
             cause = stopped ? Cause.SAFETY : Cause.FAILED;
             code = stopped ? Code.SAFETY_STOP : failureCode;
             text = failure;
+        } else if (cause == Cause.SAFETY) {
+            text = failure; // the robot's own words say more
         }
         notifyAll();
     }
@@ -142,6 +145,7 @@ final class Program {
     Job.Listener listener(final int index) {
         return new Job.Listener() {
             public void started() {
+                moved = true;
                 synchronized (Program.this) {
                     item = index;
                 }

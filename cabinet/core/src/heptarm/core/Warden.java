@@ -18,9 +18,9 @@ final class Warden {
     private static final int STOPS = SafetyBits.EMERGENCY_STOP | SafetyBits.OPERATOR_SAFETY_OPEN | SafetyBits.PROTECTIVE_STOP;
     /** What does not matter to people. */
     private static final int QUIET = SafetyBits.MOVING | SafetyBits.BRAKES_OPEN;
-    /** How long acknowledging and resuming may take. */
-    private static final long PATIENCE_NS = 500000000L;
-    private static final long PAUSE_NS = 5000000L;
+    /** How long acknowledging and resuming may take; short, since the client's other messages wait meanwhile. */
+    private static final long PATIENCE_NS = 100000000L;
+    private static final long PAUSE_MS = 5;
 
     private final Server server;
     private SafetyState seen;
@@ -33,6 +33,9 @@ final class Warden {
     /** Looks at the robot; called now and then by the watchdog. */
     void look() {
         SafetyState now = update();
+        if (isStop(now) || lacksEnabling(now)) { // a program may have been accepted before that was seen
+            server.executor.endUnmoved(Code.NEEDS_OPERATOR, steps(now));
+        }
         if (isStop(now)) {
             server.executor.endAll(Cause.SAFETY, Code.SAFETY_STOP, reason(now));
         } else if (lacksEnabling(now)) {
@@ -90,11 +93,11 @@ final class Warden {
             throw new Refusal(Code.NEEDS_OPERATOR, steps(now));
         }
         server.robot.recover();
-        long patience = server.clock.nanos() + PATIENCE_NS;
+        long patience = System.nanoTime() + PATIENCE_NS;
         try {
             now = update();
-            while (!isReady(now) && server.clock.nanos() < patience) {
-                server.clock.sleepUntil(server.clock.nanos() + PAUSE_NS);
+            while (!isReady(now) && System.nanoTime() < patience) {
+                Thread.sleep(PAUSE_MS); // not by the clock: a simulated robot would be seen as it was when this thread woke
                 now = update();
             }
         } catch (InterruptedException e) {
