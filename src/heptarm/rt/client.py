@@ -127,7 +127,7 @@ class Client:
         history: int = 2048,
         realtime: bool = True,
         cpu: int | None = None,
-        timeout: float = 10.0,
+        timeout: float = 30.0,
     ) -> None:
         self._limits = limits or Limits.of(robot(model) if isinstance(model, str) else model)
         if not 16 <= history <= 1 << 20:
