@@ -18,7 +18,8 @@ import numpy as np
 from heptarm.arm.arm import Arm
 from heptarm.arm.connect import connect
 from heptarm.arm.handle import MotionHandle
-from heptarm.bridge.execution import Listener, ServoExecution
+from heptarm.bridge.execution import Execution, Listener, ServoExecution
+from heptarm.bridge.fri_execution import FriExecution
 from heptarm.bridge.goal import Goal, GoalRefused
 from heptarm.bridge.parameters import Configuration
 from heptarm.bridge.report import Report, report
@@ -91,17 +92,22 @@ class Driver:
             name=_name(),
             watchdog=values["watchdog"],
         )
-        self._execution = ServoExecution(
-            self._arm,
-            configuration.joints,
-            listener,
-            options=configuration.servo,
-            settings=configuration.settings,
-        )
+        self._execution = self._way()
         self._stream = Stream(self._arm, timeout=values["command_timeout"], options=configuration.servo)
         self._pump = threading.Thread(target=self._run, name="heptarm-states")
         self._pump.start()
         listener.on_link("")
+
+    def _way(self) -> Execution:
+        """The way of execution that the parameters choose."""
+        known = self.configuration
+        if known.values["execution"] == "fri":
+            return FriExecution(
+                self._arm, known.joints, self._listener, options=known.fri, settings=known.settings
+            )
+        return ServoExecution(
+            self._arm, known.joints, self._listener, options=known.servo, settings=known.settings
+        )
 
     # ------------------------------------------------------------------------------------ life
 

@@ -1,10 +1,12 @@
-"""Ways to execute a trajectory on an arm: so far `servo`, an interpolated stream of targets, in a thread of its own."""
+"""Ways to execute a trajectory on an arm, in a thread of their own; here `servo`, an interpolated stream of targets."""
 
 from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -23,7 +25,7 @@ _log = logging.getLogger("heptarm.bridge")
 
 #: Ways of execution, and those that are there.
 WAYS = ("servo", "spline", "fri")
-_THERE = ("servo",)
+_THERE = ("servo", "fri")
 #: How long to wait for the thread at the end [s].
 _PATIENCE = 10.0
 
@@ -100,16 +102,33 @@ def measured(state: State) -> Measured:
     return Measured(state.sampled * 1e-9, state.q, state.dq, scaling)
 
 
-class ServoExecution:
-    """Executes goals as a servo motion of joint positions.
+class Follower(Protocol):
+    """A motion that follows commands, tick by tick."""
 
-    The servo motion opens with a goal and closes a moment after the last one; in between the arm is free for others.
+    @property
+    def why(self) -> str:
+        """Why it has ended."""
+        ...
+
+    def tick(self) -> float | None:
+        """Wait for the next tick; the time since the last one [s], None: the motion has ended."""
+        ...
+
+    def follow(self, command: Sample) -> None:
+        """Be there now, passing at its velocity."""
+        ...
+
+
+class Execution(ABC):
+    """Executes goals in a motion that opens with a goal and closes a moment after the last one.
+
+    In between the arm is free for others.
 
     Args:
         arm: in control.
         names: of its joints, seven.
         listener: hears of goals.
-        options: how to stream.
+        linger: how long the motion stays open after a goal [s].
         settings: how to run goals.
         clock: the arm's.
     """
@@ -120,19 +139,19 @@ class ServoExecution:
         names: Sequence[str],
         listener: Listener,
         *,
-        options: ServoOptions | None = None,
+        linger: float = 0.5,
         settings: Settings | None = None,
         clock: Clock | None = None,
     ) -> None:
         self._arm = arm
         self._listener = listener
-        self._options = options or ServoOptions()
+        self._linger = linger
         self._runner = Runner(names, arm.robot, settings)
         self._clock = clock or RealClock()
         self._changed = threading.Condition()
         self._closing = False
         self._dropped = False
-        self._servo: JointServo | None = None
+        self._is_open = False
         self._thread = threading.Thread(target=self._run, name="heptarm-execution")
         self._thread.start()
 
@@ -206,7 +225,7 @@ class ServoExecution:
     def wait_idle(self, timeout: float) -> bool:
         """Wait until nothing runs and the servo motion is closed; False: not within `timeout` [s]."""
         with self._changed:
-            return self._changed.wait_for(lambda: not self._runner.busy and self._servo is None, timeout)
+            return self._changed.wait_for(lambda: not self._runner.busy and not self._is_open, timeout)
 
     def close(self) -> None:
         """End the goal under way and leave the arm at rest."""
@@ -234,58 +253,41 @@ class ServoExecution:
                 self._lose(f"{type(error).__name__}: {error}")
         self._tell(None, ends)
 
+    @abstractmethod
+    def _motion(self) -> AbstractContextManager[Follower]:
+        """A motion that follows commands."""
+
     def _stream(self) -> None:
-        """One servo motion: from the first goal to some time after the last one."""
-        options = self._options
-        arm = self._arm
+        """One motion: from the first goal to some time after the last one."""
         self._dropped = False
-        with arm.servo(
-            "joint",
-            rate=options.rate,
-            watchdog=options.watchdog,
-            engine=options.engine,
-            speed=options.speed,
-            acceleration=options.acceleration,
-            mode=options.mode,
-            min_trajectory_time=options.horizon if options.engine == "direct" else None,
-        ) as servo:
-            self._servo = servo
+        with self._motion() as follower:
+            self._is_open = True
             quiet = 0.0
-            while True:
-                passed = servo.tick()
-                if passed is None:
-                    break
-                state = measured(arm.state)
+            while (passed := follower.tick()) is not None:
+                state = measured(self._arm.state)
                 with self._changed:
                     step = self._runner.advance(self.now, state)
                     busy = self._runner.busy
                 if step.command is not None:
-                    self._send(servo, step.command)
+                    follower.follow(step.command)
                 self._tell_step(step)
                 quiet = 0.0 if busy else quiet + passed
-                if not busy and (self._closing or self._dropped or quiet >= options.linger):
+                if not busy and (self._closing or self._dropped or quiet >= self._linger):
                     break
         with self._changed:
-            if servo.result is not None and passed is None:
-                self._runner.abort(f"the servo motion ended: {servo.result.cause.value} {servo.result.text}")
+            if passed is None:
+                self._runner.abort(f"the motion ended: {follower.why}")
             self._runner.forget()
-            self._servo = None
+            self._is_open = False
             ends = self._runner.ends()
             self._changed.notify_all()
         self._tell(None, ends)
-
-    def _send(self, servo: JointServo, command: Sample) -> None:
-        if self._options.engine == "direct":
-            # it approaches a target as a low-pass filter of this time constant does; its inverse leaves no lag
-            servo.set(command.q + self._options.horizon * command.dq)
-        else:
-            servo.set(command.q, command.dq)
 
     def _lose(self, text: str) -> None:
         """The arm follows no more."""
         with self._changed:
             self._runner.abort(text)
-            self._servo = None
+            self._is_open = False
             ends = self._runner.ends()
             self._changed.notify_all()
         self._tell(None, ends)
@@ -301,3 +303,55 @@ class ServoExecution:
                 self._listener.on_end(end)
         except Exception:
             _log.exception("telling of a goal")
+
+
+class ServoExecution(Execution):
+    """Executes goals as a servo motion of joint positions; `options` say how to stream, else see `Execution`."""
+
+    def __init__(
+        self,
+        arm: Arm,
+        names: Sequence[str],
+        listener: Listener,
+        *,
+        options: ServoOptions | None = None,
+        settings: Settings | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        self._options = options or ServoOptions()
+        super().__init__(arm, names, listener, linger=self._options.linger, settings=settings, clock=clock)
+
+    @contextmanager
+    def _motion(self) -> Iterator[Follower]:
+        options = self._options
+        with self._arm.servo(
+            "joint",
+            rate=options.rate,
+            watchdog=options.watchdog,
+            engine=options.engine,
+            speed=options.speed,
+            acceleration=options.acceleration,
+            mode=options.mode,
+            min_trajectory_time=options.horizon if options.engine == "direct" else None,
+        ) as servo:
+            yield _Servo(servo, options)
+
+
+class _Servo:
+    """A servo motion as a follower."""
+
+    def __init__(self, servo: JointServo, options: ServoOptions) -> None:
+        self._servo, self._options = servo, options
+        self.tick = servo.tick
+
+    @property
+    def why(self) -> str:
+        result = self._servo.result
+        return "" if result is None else f"{result.cause.value} {result.text}"
+
+    def follow(self, command: Sample) -> None:
+        if self._options.engine == "direct":
+            # it approaches a target as a low-pass filter of this time constant does; its inverse leaves no lag
+            self._servo.set(command.q + self._options.horizon * command.dq)
+        else:
+            self._servo.set(command.q, command.dq)

@@ -10,6 +10,7 @@ import numpy as np
 
 from heptarm.bridge.check import Rules
 from heptarm.bridge.execution import ServoOptions, check_way
+from heptarm.bridge.fri_execution import FriOptions
 from heptarm.bridge.runner import Settings
 from heptarm.bridge.tolerance import Bounds, Tolerances
 from heptarm.errors import CommandRejected, ShapeError
@@ -101,6 +102,12 @@ PARAMETERS = (
     Parameter("servo.acceleration", 1.0, "ceiling of the acceleration, likewise", 0.01, 1.0),
     Parameter("servo.linger", 0.5, "how long the servo motion stays open after a goal [s]", 0.0, 60.0),
     Parameter("servo.lookahead", 0.004, "how long a target takes to become motion [s]", 0.0, 0.5),
+    Parameter("fri.period", 5.0, "time between two messages of FRI, whole milliseconds [ms]", 1.0, 10.0),
+    Parameter(
+        "fri.host", "", 'address at which the cabinet reaches this machine; "": as the connection does'
+    ),
+    Parameter("fri.linger", 2.0, "how long the FRI session stays open after a goal [s]", 0.0, 60.0),
+    Parameter("fri.lookahead", 0.01, "how long a command takes to become motion [s]", 0.0, 0.5),
     Parameter(
         "command_timeout",
         0.2,
@@ -203,7 +210,7 @@ class Configuration:
                 Bounds(position=path), Bounds(position=goal, velocity=still), v["constraints.goal_time"]
             ),
             deceleration=frozen(np.full(7, v["max_deceleration_on_cancel"])),
-            lookahead=v["servo.lookahead"],
+            lookahead=v["fri.lookahead" if v["execution"] == "fri" else "servo.lookahead"],
         )
 
     @property
@@ -219,3 +226,9 @@ class Configuration:
             acceleration=v["servo.acceleration"],
             linger=v["servo.linger"],
         )
+
+    @property
+    def fri(self) -> FriOptions:
+        """How trajectories are commanded over FRI."""
+        v = self.values
+        return FriOptions(period=round(v["fri.period"]), host=v["fri.host"], linger=v["fri.linger"])

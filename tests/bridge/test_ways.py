@@ -1,0 +1,128 @@
+"""Ways of execution on a cabinet, driven as a node drives them: arrival, preemption, cancellation, a stop."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from heptarm.bridge.driver import Driver
+from heptarm.bridge.goal import Code, End, Goal, GoalRefused, Outcome, Point
+from heptarm.bridge.parameters import Configuration
+from heptarm.bridge.runner import Feedback
+from heptarm.errors import CommandRejected
+from heptarm.values.state import State
+from tests.conftest import RunningCabinet
+
+HOME = np.radians([0, 30, 0, -90, 0, 60, 0])
+AWAY = np.array([0.3, -0.1, 0.2, 0.2, -0.3, 0.2, 0.5])
+PATIENCE = 60.0
+
+
+class Ears:
+    """Hears what a node would."""
+
+    def __init__(self) -> None:
+        self.told: list[Feedback] = []
+        self.ends: list[End] = []
+        self._changed = threading.Condition()
+
+    def on_state(self, state: State) -> None:
+        pass
+
+    def on_link(self, trouble: str) -> None:
+        pass
+
+    def on_feedback(self, feedback: Feedback) -> None:
+        with self._changed:
+            self.told.append(feedback)
+            self._changed.notify_all()
+
+    def on_end(self, end: End) -> None:
+        with self._changed:
+            self.ends.append(end)
+            self._changed.notify_all()
+
+    def until(self, what: Callable[[], bool]) -> None:
+        with self._changed:
+            assert self._changed.wait_for(what, PATIENCE), self.ends
+
+
+@pytest.fixture(params=["servo", "fri"])
+def way(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def driver(cabinet: RunningCabinet, way: str) -> Iterator[Driver]:
+    values = {"target": cabinet.target, "execution": way, "servo.watchdog": 1.0, "speed": 0.5}
+    driver = Driver(Configuration.of(values), Ears())
+    driver.activate()
+    driver.move(HOME).wait()
+    yield driver
+    driver.close()
+
+
+@pytest.fixture
+def ears(driver: Driver) -> Ears:
+    assert isinstance(driver._listener, Ears)
+    return driver._listener
+
+
+def goal(driver: Driver, away: np.ndarray = AWAY, duration: float = 2.0) -> Goal:
+    """There and no further, in a curve."""
+    now = driver.arm.state.q_cmd
+    shares = 0.5 * (1 - np.cos(np.pi * np.linspace(0, 1, 11)[1:]))
+    times = np.linspace(0, duration, 11)[1:]
+    points = [Point(float(t), tuple(now + s * away)) for t, s in zip(times, shares, strict=True)]
+    return Goal(joints=driver.configuration.joints, points=tuple(points))
+
+
+def test_goals_arrive_one_after_the_other(driver: Driver, ears: Ears) -> None:
+    for away in (AWAY, -AWAY):
+        driver.accept(goal(driver, away))
+        ears.until(lambda: bool(ears.ends))
+        assert (ears.ends[-1].outcome, ears.ends[-1].code) == (Outcome.SUCCEEDED, Code.SUCCESSFUL)
+        ears.ends.clear()
+    assert np.abs(driver.arm.state.q - HOME).max() < 0.01
+    assert max(feedback.time for feedback in ears.told) >= 2.0
+
+
+def test_a_goal_takes_the_place_of_another_and_is_cancelled(driver: Driver, ears: Ears) -> None:
+    first = driver.accept(goal(driver))
+    ears.until(lambda: bool(ears.told) and ears.told[-1].time > 0.5)
+    second = driver.accept(goal(driver))
+    ears.until(lambda: bool(ears.ends))
+    assert (ears.ends[0].number, ears.ends[0].outcome) == (first, Outcome.PREEMPTED)
+    ears.until(lambda: ears.told[-1].number == second and ears.told[-1].time > 0.3)
+    assert driver.cancel(second)
+    ears.until(lambda: len(ears.ends) == 2)
+    assert ears.ends[1].outcome is Outcome.CANCELED
+    assert np.abs(driver.arm.wait_for_rest(timeout=PATIENCE).dq).max() < 0.01
+
+
+def test_a_command_ends_a_goal_and_the_next_goal_works(driver: Driver, ears: Ears) -> None:
+    driver.accept(goal(driver))
+    ears.until(lambda: bool(ears.told) and ears.told[-1].time > 0.3)
+    assert driver.stop().success
+    ears.until(lambda: bool(ears.ends))
+    assert ears.ends[-1].outcome is Outcome.ABORTED
+    assert ears.ends[-1].text
+    ears.ends.clear()
+    deadline = time.monotonic() + PATIENCE
+    while not ears.ends and time.monotonic() < deadline:  # the arm may still be braking
+        try:
+            driver.accept(goal(driver, -AWAY, 3.0))
+            break
+        except GoalRefused:
+            time.sleep(0.1)
+    ears.until(lambda: bool(ears.ends))
+    assert ears.ends[-1].outcome is Outcome.SUCCEEDED, ears.ends
+
+
+def test_a_way_that_is_not_there_is_refused_by_name() -> None:
+    with pytest.raises(CommandRejected, match="spline"):
+        Configuration.of({"execution": "spline"})
