@@ -60,6 +60,17 @@ def sim(
             "The same words can be typed while it runs."
         ),
     ] = (),
+    payload: Annotated[
+        str,
+        Parameter(
+            help="MASS or MASS,X,Y,Z: hangs on the flange whatever the controller is told [kg, m]. "
+            "Default: what it is told."
+        ),
+    ] = "",
+    project: Annotated[
+        Path | None,
+        Parameter(help="RoboticsAPI.data.xml of a Sunrise project: process data, tool templates, frames."),
+    ] = None,
     verbose: Annotated[bool, Parameter(negative="", help="Show the cabinet's log.")] = False,
     application: Annotated[
         Path | None,
@@ -127,6 +138,8 @@ def sim(
         view_port=view_port,
         key=key,
         faults=fault,
+        payload=payload,
+        project=project,
         verbose=verbose,
         as_json=json,
     )

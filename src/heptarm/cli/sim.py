@@ -29,6 +29,8 @@ def run(
     view_port: int,
     key: str,
     faults: tuple[str, ...],
+    payload: str,
+    project: Path | None,
     verbose: bool,
     as_json: bool,
 ) -> int:
@@ -42,6 +44,8 @@ def run(
     command += ["--key", key] if key else []
     for fault in faults:
         command += ["--fault", fault]
+    command += ["--payload", payload] if payload else []
+    command += ["--project", str(project)] if project is not None else []
     command += ["--verbose"] if verbose else []
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ExitStack() as stack:
