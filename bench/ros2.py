@@ -47,11 +47,13 @@ def ros2_trajectory() -> Iterator[Figure]:
     if not _is_there():
         return
     with Cabinet() as cabinet:
-        found = _peer("trajectory", cabinet.target)
-    detail = {"execution": "servo", **{name: round(value, 6) for name, value in found.items()}}
-    yield Figure("ros2_point_moment", "D9", found["moment"] * 1e3, "ms", limit=20.0, detail=detail)
-    yield Figure("ros2_point_distance", "D9", found["distance"] * 1e3, "mrad", limit=2.0)
-    yield Figure("ros2_point_at_its_time", "D9", found["at_its_time"] * 1e3, "mrad")
+        for way, moment, distance in (("servo", 20.0, 2.0), ("fri", 5.0, 0.5)):
+            found = _peer(f"trajectory_{way}", cabinet.target)
+            detail = {name: round(value, 6) for name, value in found.items()}
+            name = f"ros2_{way}_point"
+            yield Figure(f"{name}_moment", "D9", found["moment"] * 1e3, "ms", limit=moment, detail=detail)
+            yield Figure(f"{name}_distance", "D9", found["distance"] * 1e3, "mrad", limit=distance)
+            yield Figure(f"{name}_at_its_time", "D9", found["at_its_time"] * 1e3, "mrad")
 
 
 @benchmark("ros2_states", "D10")

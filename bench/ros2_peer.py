@@ -1,6 +1,6 @@
 """The part of the ROS 2 figures that runs where rclpy is; `bench.ros2` starts it. Prints one JSON object.
 
-build/ros2/bin/python -m bench.ros2_peer trajectory|states|bare TARGET
+build/ros2/bin/python -m bench.ros2_peer trajectory_servo|trajectory_fri|states|bare TARGET
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from tests.ros2.peer import Client, NodeProcess, Ros, stamp, until
 
 #: A trajectory of so many seconds and points.
 SECONDS, POINTS = 10.0, 100
+#: How near each way of execution is to pass a point [rad]; how long its motion may take to open [s].
+NEAR, OPENING = {"servo": 2e-3, "fri": 5e-4}, 4.0
 #: States per second, and for how long.
 RATE, WATCHED = 200.0, 60.0
 #: Every joint swings so far [rad], so often in a trajectory.
@@ -56,16 +58,16 @@ class Watch:
         self.messages.append(message)
 
 
-def trajectory(target: str) -> dict[str, Any]:
+def trajectory(target: str, execution: str) -> dict[str, Any]:
     """How near the arm passes the points of a trajectory, and when."""
     ros = Ros("bench")
-    node = NodeProcess(target, state_rate=500.0)
+    node = NodeProcess(target, state_rate=500.0, execution=execution)
     client = Client(ros, None)
     client.ready()
     share = np.arange(1, POINTS + 1) / POINTS
     q, dq, ddq = wave(share)
     here = client.place().q
-    start = client.now() + 1.0
+    start = client.now() + OPENING
     points = tuple(
         Point(float(s * SECONDS), tuple((here + a).tolist()), tuple(b.tolist()), tuple(c.tolist()))
         for s, a, b, c in zip(share, q, dq, ddq)
@@ -83,7 +85,7 @@ def trajectory(target: str) -> dict[str, Any]:
     for point in points:
         at = np.stack([np.interp(point.time + fine, times, places[:, j]) for j in range(7)], axis=1)
         off = np.abs(at - np.array(point.q)).max(axis=1)
-        near = off <= 2e-3
+        near = off <= NEAR[execution]
         moments.append(float(np.abs(fine[near]).min()) if near.any() else float("inf"))
         distances.append(float(off.min()))
     plain = np.stack([np.interp([p.time for p in points], times, places[:, j]) for j in range(7)], axis=1)
@@ -168,5 +170,8 @@ def publish(target: str) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    work = {"trajectory": trajectory, "states": states, "bare": bare, "publish": publish}[sys.argv[1]]
-    print(json.dumps(work(sys.argv[2])))
+    what, _, way = sys.argv[1].partition("_")
+    if what == "trajectory":
+        print(json.dumps(trajectory(sys.argv[2], way)))
+    else:
+        print(json.dumps({"states": states, "bare": bare, "publish": publish}[what](sys.argv[2])))
