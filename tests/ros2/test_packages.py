@@ -1,0 +1,301 @@
+"""Description, launch files, MoveIt's configuration: they expand, agree with heptarm's numbers and with the node."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import re
+import sys
+import types
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xacro
+import yaml
+
+from heptarm.bridge.parameters import PARAMETERS, Configuration, of_joints
+from heptarm.model.kinematics import forward
+from heptarm.values.robot import ROBOTS
+
+ROOT = Path(__file__).parents[2]
+ROS2 = ROOT / "ros2"
+URDF = ROS2 / "heptarm_description" / "urdf"
+PACKAGES = ("heptarm_bringup", "heptarm_description", "heptarm_moveit_config", "heptarm_msgs", "heptarm_ros2")
+LAUNCHES = sorted(ROS2.glob("*/launch/*.xml"))
+
+
+def expand(path: Path, **mappings: str) -> ET.Element:
+    return ET.fromstring(xacro.process_file(str(path), mappings=mappings).toxml())
+
+
+def numbers(text: str | None) -> np.ndarray:
+    return np.array([float(word) for word in (text or "0 0 0").split()])
+
+
+def turn(axis: np.ndarray, angle: float) -> np.ndarray:
+    x, y, z = axis
+    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * k @ k
+
+
+def tip(arm: ET.Element, q: np.ndarray, last: str) -> np.ndarray:
+    """The pose of a link, shape (4, 4), by following the joints from the root."""
+    into = {
+        joint.find("child").get("link"): joint
+        for joint in arm.iter("joint")
+        if joint.find("child") is not None
+    }  # type: ignore[union-attr]
+    chain = []
+    while last in into:
+        chain.append(into[last])
+        last = into[last].find("parent").get("link")  # type: ignore[union-attr,assignment]
+    pose = np.eye(4)
+    values = iter(q)
+    for joint in reversed(chain):
+        origin = joint.find("origin")
+        step = np.eye(4)
+        step[:3, 3] = numbers(None if origin is None else origin.get("xyz"))
+        if joint.get("type") == "revolute":
+            step[:3, :3] = turn(numbers(joint.find("axis").get("xyz")), next(values))  # type: ignore[union-attr]
+        pose = pose @ step
+    return pose
+
+
+# ------------------------------------------------------------------------------------- description
+
+
+@pytest.mark.parametrize("model", ROBOTS)
+def test_an_arm_expands_with_the_limits_of_its_data_sheet(model: str) -> None:
+    arm = expand(URDF / "heptarm.urdf.xacro", model=model)
+    robot = ROBOTS[model]
+    joints = [joint for joint in arm.findall("joint") if joint.get("type") == "revolute"]
+    assert tuple(joint.get("name") for joint in joints) == Configuration.of({}).joints
+    for values, name in (
+        (robot.q_min, "lower"),
+        (robot.q_max, "upper"),
+        (robot.dq_max, "velocity"),
+        (robot.tau_max, "effort"),
+    ):
+        told = [float(joint.find("limit").get(name)) for joint in joints]  # type: ignore[union-attr,arg-type]
+        np.testing.assert_allclose(told, values, rtol=1e-7)
+    mass = sum(float(m.get("value")) for m in arm.iter("mass"))  # type: ignore[arg-type]
+    assert 20.0 < mass < 35.0
+
+
+@pytest.mark.parametrize("model", ROBOTS)
+def test_its_flange_is_where_heptarm_says(model: str) -> None:
+    arm = expand(URDF / "heptarm.urdf.xacro", model=model)
+    rng = np.random.default_rng(7)
+    for _ in range(5):
+        q = rng.uniform(ROBOTS[model].q_min, ROBOTS[model].q_max)
+        np.testing.assert_allclose(tip(arm, q, "flange"), forward(ROBOTS[model], q), atol=1e-9)
+
+
+def test_prefix_and_origin() -> None:
+    arm = expand(URDF / "heptarm.urdf.xacro", prefix="left_", xyz="1 2 3")
+    names = [e.get("name") for e in (*arm.findall("link"), *arm.findall("joint")) if e.get("name") != "world"]
+    assert len(names) == len(set(names)) and all(name and name.startswith("left_") for name in names)
+    np.testing.assert_allclose(tip(arm, np.zeros(7), "left_link_0")[:3, 3], [1, 2, 3])
+    configuration = Configuration.of({"prefix": "left_"})
+    links = {link.get("name") for link in arm.findall("link")}
+    assert {configuration.frame("base"), configuration.frame("flange")} <= links
+
+
+def test_two_arms_share_a_scene() -> None:
+    arms = expand(URDF / "two_arms.urdf.xacro", left_model="iiwa7")
+    names = [joint.get("name") for joint in arms.findall("joint")]
+    assert len(names) == len(set(names)) == 18
+    there = [tip(arms, np.zeros(7), f"{side}_link_0")[1, 3] for side in ("left", "right")]
+    assert there == [0.5, -0.5]
+
+
+@pytest.mark.parametrize(
+    ("control", "plugin"),
+    [
+        ("topic", "joint_state_topic_hardware_interface/JointStateTopicSystem"),
+        ("mock", "mock_components/GenericSystem"),
+    ],
+)
+def test_ros2_control_over_the_nodes_topics(control: str, plugin: str) -> None:
+    block = expand(URDF / "heptarm.urdf.xacro", control=control, prefix="left_", node="/left/heptarm").find(
+        "ros2_control"
+    )
+    assert block is not None and block.findtext("hardware/plugin") == plugin
+    assert [joint.get("name") for joint in block.findall("joint")] == [f"left_A{i}" for i in range(1, 8)]
+    for joint in block.findall("joint"):
+        assert [e.get("name") for e in joint.findall("command_interface")] == ["position"]
+        assert [e.get("name") for e in joint.findall("state_interface")] == ["position", "velocity"]
+    topics = {param.get("name"): param.text for param in block.findall("hardware/param")}
+    if control == "topic":
+        assert topics["joint_commands_topic"] == "/left/heptarm/servo/joint"
+
+
+def test_the_numbers_are_written_by_their_script() -> None:
+    spec = importlib.util.spec_from_file_location("description", ROOT / "scripts" / "ros2_description.py")
+    assert spec is not None and spec.loader is not None
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    for name, text in script.files().items():
+        assert (ROOT / name).read_text() == text, f"run scripts/ros2_description.py: {name} is old"
+
+
+# ---------------------------------------------------------------------------------------- packages
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_a_package_says_what_it_is_and_installs_what_it_has(name: str) -> None:
+    folder = ROS2 / name
+    manifest = ET.parse(folder / "package.xml").getroot()
+    assert manifest.findtext("name") == name and manifest.findtext("license") == "Apache-2.0"
+    if name == "heptarm_ros2":
+        assert manifest.findtext("export/build_type") == "ament_python"
+        return
+    text = (folder / "CMakeLists.txt").read_text()
+    assert f"project({name})" in text
+    for part in folder.iterdir():
+        if part.is_dir() and name != "heptarm_msgs":
+            assert re.search(rf"DIRECTORY[^)]*\b{part.name}\b", text), f"{part.name} is not installed"
+
+
+def test_all_interfaces_are_built() -> None:
+    folder = ROS2 / "heptarm_msgs"
+    text = (folder / "CMakeLists.txt").read_text()
+    for kind in ("msg", "srv", "action"):
+        for path in folder.glob(f"{kind}/*.{kind}"):
+            assert f'"{kind}/{path.name}"' in text
+
+
+def test_upstreams_interfaces_are_upstreams() -> None:
+    """The hashes of control_msgs, by which two machines find out whether they mean the same."""
+    share = Path(sys.prefix) / "share" / "control_msgs"
+    for name, begin in (
+        ("action/FollowJointTrajectory", "ff29901b2693f5d"),
+        ("msg/JointTolerance", "c254f9cece0f3b7"),
+        ("msg/JointComponentTolerance", "739ea7566931944"),
+        ("srv/QueryTrajectoryState", "4a0935dffef18bc"),
+    ):
+        hashes = yaml.safe_load((share / f"{name}.json").read_text())["type_hashes"]
+        assert hashes[0]["hash_string"] == hashes[0]["hash_string"].replace("RIHS01_", "RIHS01_")
+        assert hashes[0]["hash_string"].startswith(f"RIHS01_{begin}"), name
+
+
+# ------------------------------------------------------------------------------------ launch files
+
+
+@pytest.mark.parametrize("path", LAUNCHES, ids=lambda path: path.name)
+def test_a_launch_file_declares_what_it_uses_and_starts_what_there_is(path: Path) -> None:
+    launch = ET.parse(path).getroot()
+    declared = {arg.get("name") for arg in launch.findall("arg")}
+    assert all(arg.get("description") for arg in launch.findall("arg"))
+    assert set(re.findall(r"\$\(var (\w+)\)", path.read_text())) <= declared
+    known = {one.name for one in (*PARAMETERS, *of_joints([f"A{i}" for i in range(1, 8)]))}
+    for node in launch.iter("node"):
+        if node.get("pkg") == "heptarm_ros2":
+            assert (
+                f"{node.get('exec')} = heptarm_ros2.main:main"
+                in (ROS2 / "heptarm_ros2" / "setup.py").read_text()
+            )
+            assert {param.get("name") for param in node.findall("param") if param.get("name")} <= known
+    for package, rest in re.findall(r"\$\(find-pkg-share (\w+)\)(/[\w/.]+)", path.read_text()):
+        assert (ROS2 / package / rest[1:]).is_file(), rest
+    for include in launch.iter("include"):
+        inner = ET.parse(ROS2 / "heptarm_bringup" / "launch" / Path(include.get("file", "")).name).getroot()
+        given = {arg.get("name") for arg in include.findall("arg")}
+        assert given <= {arg.get("name") for arg in inner.findall("arg")}
+
+
+def flat(values: dict[str, Any], before: str = "") -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for name, value in values.items():
+        found |= flat(value, f"{before}{name}.") if isinstance(value, dict) else {f"{before}{name}": value}
+    return found
+
+
+def test_the_nodes_parameter_file_has_its_defaults() -> None:
+    given = flat(
+        yaml.safe_load((ROS2 / "heptarm_bringup/config/heptarm.yaml").read_text())["/**"]["ros__parameters"]
+    )
+    Configuration.of(given)
+    defaults = {one.name: one.default for one in PARAMETERS}
+    assert given == {name: defaults[name] for name in given}
+
+
+def test_controllers_and_moveit_have_the_nodes_joints_and_action() -> None:
+    joints = list(Configuration.of({}).joints)
+    controllers = yaml.safe_load((ROS2 / "heptarm_bringup/config/controllers.yaml").read_text())
+    assert controllers["joint_trajectory_controller"]["ros__parameters"]["joints"] == joints
+    moveit = yaml.safe_load((ROS2 / "heptarm_moveit_config/config/moveit_controllers.yaml").read_text())
+    ours = moveit["moveit_simple_controller_manager"]
+    assert ours["controller_names"] == ["heptarm"] and ours["heptarm"]["joints"] == joints
+    assert ours["heptarm"]["action_ns"] == "follow_joint_trajectory"
+
+
+def test_moveits_semantic_description_names_what_there_is() -> None:
+    arm = expand(URDF / "heptarm.urdf.xacro")
+    semantic = expand(ROS2 / "heptarm_moveit_config/config/heptarm.srdf.xacro")
+    links = {link.get("name") for link in arm.findall("link")}
+    joints = {joint.get("name") for joint in arm.findall("joint")}
+    chain = semantic.find("group/chain")
+    assert chain is not None and {chain.get("base_link"), chain.get("tip_link")} <= links
+    pairs = semantic.findall("disable_collisions")
+    assert len(pairs) == 13 and all({p.get("link1"), p.get("link2")} <= links for p in pairs)
+    home = {
+        joint.get("name"): float(joint.get("value", "nan")) for joint in semantic.findall("group_state/joint")
+    }
+    assert home.keys() <= joints
+    ROBOTS["iiwa14"].check(np.array(list(home.values())))
+
+
+class Anything:
+    """Stands for whatever a launch file uses of packages that are not here, and keeps what it is given."""
+
+    made: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = []  # noqa: RUF012  one list for all
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __getattr__(self, name: str) -> Anything:
+        return Anything(f"{self._name}.{name}")
+
+    def __call__(self, *given: Any, **named: Any) -> Any:
+        Anything.made.append((self._name, given, named))
+        if self._name == "get_package_share_directory":
+            return str(ROS2 / given[0])
+        if self._name.endswith(".perform"):
+            return "iiwa14"
+        return self
+
+
+def test_moveits_launch_file_uses_files_that_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    path = ROS2 / "heptarm_moveit_config/launch/move_group.launch.py"
+    tree = ast.parse(path.read_text())
+    for one in ast.walk(tree):
+        if isinstance(one, ast.ImportFrom) and one.module:
+            module = types.ModuleType(one.module)
+            for name in one.names:
+                setattr(module, name.name, Anything(name.name))
+            if one.module.split(".")[0] not in ("os",):
+                monkeypatch.setitem(sys.modules, one.module, module)
+    space: dict[str, Any] = {}
+    exec(compile(tree, str(path), "exec"), space)
+    Anything.made.clear()
+    space["generate_launch_description"]()
+    assert len(space["_start"](None)) == 2
+    named = [named["file_path"] for _, _, named in Anything.made if "file_path" in named]
+    assert len(named) == 6
+    for file in named:
+        assert (ROS2 / "heptarm_moveit_config" / file).is_file(), file
+
+
+@pytest.mark.skipif(
+    importlib.util.find_spec("launch_xml") is None, reason="upstream's launch is not installed"
+)
+@pytest.mark.parametrize("path", LAUNCHES, ids=lambda path: path.name)
+def test_upstreams_launch_reads_them(path: Path) -> None:
+    from launch.frontend import Parser
+
+    root, parser = Parser.load(str(path))
+    assert parser.parse_description(root).entities
