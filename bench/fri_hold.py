@@ -44,7 +44,8 @@ class Tape:
     """All messages of a session in which commands were effective, taken from the loop's history now and then.
 
     Attributes:
-        faults: messages that never came to the client, and those that it answered a period late or not at all.
+        lost: messages that never came to the client, or that it did not answer.
+        late: those that it answered more than a period after the kernel had them.
     """
 
     def __init__(self, session: Fri) -> None:
@@ -52,14 +53,15 @@ class Tape:
         self._last = -1
         self._times: list[float] = []
         self._positions: list[Floats] = []
-        self.faults = 0
+        self.lost = self.late = 0
 
     def take(self) -> None:
         """What is new."""
         for s in self._session.history():
             if s.sequence > self._last and s.is_commanding:
-                self.faults += s.sequence - self._last - 1 if self._last >= 0 else 0
-                self.faults += not s.is_answered or s.latency > s.period
+                self.lost += s.sequence - self._last - 1 if self._last >= 0 else 0
+                self.lost += not s.is_answered
+                self.late += s.latency > s.period
                 self._last = s.sequence
                 self._times.append(s.t)
                 self._positions.append(s.q.copy())
@@ -92,7 +94,8 @@ class Tracking:
 
     Attributes:
         messages: in which commands were effective.
-        faults: of these, lost or answered late by the client.
+        lost: messages that the client never had or did not answer.
+        late: messages that it answered more than a period late.
         error: largest distance between plant and law at the same time [rad].
         beyond: messages at which it was more than a milliradian.
         delayed: largest distance between plant and the law `delay` messages before [rad].
@@ -101,7 +104,8 @@ class Tracking:
     """
 
     messages: int
-    faults: int
+    lost: int
+    late: int
     error: float
     beyond: int
     delayed: float
@@ -163,7 +167,8 @@ def track(arm: ha.Arm, seconds: float, *, period_ms: int = 1) -> Tracking:
     best = min(range(4), key=lambda delay: float(np.sum(errors[delay] ** 2)))
     return Tracking(
         len(t),
-        tape.faults,
+        tape.lost,
+        tape.late,
         float(errors[0].max()),
         int((errors[0] > 1e-3).sum()),
         float(errors[best].max()),
@@ -241,7 +246,8 @@ def fri_hold() -> Iterator[Figure]:
         floating = balance(arm, short)
         force = press(arm, short)
     detail = {"seconds": SECONDS, "messages": sine.messages, **sine.report}
-    yield Figure("fri_hold_faults", "C8", float(sine.faults), "count", limit=0.0, detail=detail)
+    yield Figure("fri_hold_lost", "C8", float(sine.lost), "count", limit=0.0, detail=detail)
+    yield Figure("fri_hold_late", "C8", float(sine.late), "count")
     yield Figure(
         "fri_hold_error",
         "C8",
