@@ -18,8 +18,10 @@ from heptarm.arm.equipment import Equipment
 from heptarm.arm.feed import States
 from heptarm.arm.fri import Fri
 from heptarm.arm.handle import MotionHandle
+from heptarm.arm.io import Io
 from heptarm.arm.modes import mode_message
 from heptarm.arm.operator import Operator
+from heptarm.arm.pad import Pad
 from heptarm.arm.servo import JointServo, PoseServo
 from heptarm.arm.stopping import REST_TIMEOUT, Stopping
 from heptarm.arm.tooling import Tooling
@@ -68,6 +70,8 @@ class Arm(Equipment, Stopping):
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self._tooling = Tooling(connection)
+        self._io = Io(connection)
+        self._pad = Pad(connection)
         self._speed = 1.0
         self._mode: Mode | None = None
 
@@ -178,6 +182,16 @@ class Arm(Equipment, Stopping):
                 hint='connect("sim://iiwa14"), or type the words into the terminal of `heptarm sim`',
             )
         return Operator(self._connection.cabinet)
+
+    @property
+    def io(self) -> Io:
+        """The cabinet's signals: the media flange's, and those of IO groups."""
+        return self._io
+
+    @property
+    def pad(self) -> Pad:
+        """The smartPAD: messages, user keys, process data."""
+        return self._pad
 
     @property
     def software(self) -> str:

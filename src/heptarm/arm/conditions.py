@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from math import isnan, nan
 
-from heptarm.errors import CommandRejected
 from heptarm.values import condition as values
 from heptarm.values.arguments import TOOL
 from heptarm.values.condition import Condition, OneOf, check_condition
+from heptarm.values.io import find_name
 from heptarm.wire import messages as wire
 
 _Leaf = (
@@ -30,26 +30,7 @@ def find_signal(name: str, signals: Sequence[wire.SignalInfo]) -> wire.SignalInf
     Raises:
         CommandRejected: there is none of that name, or more than one.
     """
-    for one in signals:
-        if one.name == name:
-            return one
-    wanted = _plain(name)
-    found = [one for one in signals if wanted in (_plain(one.name), _plain(one.name.rpartition(".")[2]))]
-    if len(found) == 1:
-        return found[0]
-    names = ", ".join(one.name for one in found or signals) or "none"
-    raise CommandRejected(
-        f"no signal {name!r}" if not found else f"{name!r} means several signals",
-        code=42,
-        parameter="signal",
-        value=name,
-        allowed=names,
-        hint=f"this cabinet has {names}",
-    )
-
-
-def _plain(name: str) -> str:
-    return name.replace("_", "").casefold()
+    return signals[find_name(name, tuple(one.name for one in signals))]
 
 
 def condition_message(

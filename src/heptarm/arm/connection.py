@@ -16,12 +16,13 @@ from heptarm.arm.feed import Feed, Sample
 from heptarm.arm.handle import MotionHandle
 from heptarm.arm.link import Link
 from heptarm.arm.private_cabinet import PrivateCabinet
-from heptarm.arm.reading import read_firing, read_result, read_robot, read_state
+from heptarm.arm.reading import read_firing, read_result, read_robot, read_signals, read_state
 from heptarm.errors import CommandRejected, ConnectionLost, HeptarmError, Timeout
 from heptarm.io.clock import Clock
 from heptarm.io.transport import Transport
 from heptarm.values.arrays import within
 from heptarm.values.condition import Condition
+from heptarm.values.io import Signal
 from heptarm.values.result import Result
 from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
@@ -93,6 +94,8 @@ class Connection:
         self._servo_status: wire.ServoStatus | None = None
         self._fri_changes: dict[int, wire.FriChanged] = {}
         self._unclaimed: deque[Message] = deque(maxlen=256)
+        self.signals: tuple[Signal, ...] = ()
+        self.key_listeners: list[Callable[[int, bool], None]] = []
         self._lock = threading.RLock()
 
     # ---------------------------------------------------------------------------------- the link
@@ -147,6 +150,7 @@ class Connection:
         self._link = link
         try:
             self._robot = read_robot(self._welcome.robot)
+            self.signals = read_signals(self._welcome.signals)
             self.subscribe(self.options.rate, self.options.groups)
         except BaseException:
             link.close()
@@ -373,7 +377,7 @@ class Connection:
 
     def decode(self, sample: Sample) -> State:
         """The state of a sample."""
-        return read_state(sample.body, self.link.offset, self.clock.nanos)
+        return read_state(sample.body, self.link.offset, self.clock.nanos, self.signals)
 
     def state_of(self, message: wire.ConditionFired) -> State:
         """Where the robot was when a condition fired."""
@@ -399,6 +403,9 @@ class Connection:
                 self._hand_over(handle, message)
         elif isinstance(message, wire.ServoStatus):
             self._servo_status = message
+        elif isinstance(message, wire.KeyPressed):
+            for listener in list(self.key_listeners):
+                listener(message.slot, message.down)
         elif isinstance(message, wire.FriChanged):
             self._note_fri(message)
         elif isinstance(message, wire.ControlChanged):

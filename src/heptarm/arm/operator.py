@@ -76,6 +76,26 @@ class Operator:
         """Press Start: execution goes on."""
         self.do("start")
 
+    def set_signal(self, name: str, value: bool | float) -> None:
+        """Give a signal of the cabinet a value, as the world does to an input.
+
+        Raises:
+            CommandRejected: there is none of that name.
+        """
+        self.do(f"set {name} {str(value).lower() if isinstance(value, bool) else repr(float(value))}")
+
+    def press_key(self, slot: int, *, bar: str = "client") -> None:
+        """Press and release a user key.
+
+        Args:
+            slot: 0 to 3.
+            bar: "client": the keys that programs set; "heptarm": stop (0) and release (1).
+
+        Raises:
+            CommandRejected: there is no such key, or it is disabled.
+        """
+        self.do(f"press {slot} {bar}")
+
     def push(self, force: npt.ArrayLike, *, duration: float) -> None:
         """Push the flange.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from heptarm.arm.modes import read_mode
 from heptarm.errors import ConnectFailed, RemoteProtocolError
 from heptarm.values import state as values
 from heptarm.values.arrays import Array
+from heptarm.values.io import Signal, SignalValues
 from heptarm.values.pose import Pose
 from heptarm.values.redundancy import Redundancy
 from heptarm.values.result import Cause, Result
@@ -24,7 +25,9 @@ _SAFETY = tuple(
 )
 
 
-def read_state(body: bytes, offset: ClockOffset, clock: Callable[[], int]) -> values.State:
+def read_state(
+    body: bytes, offset: ClockOffset, clock: Callable[[], int], signals: Sequence[Signal] = ()
+) -> values.State:
     """The state that a frame's octets say.
 
     Raises:
@@ -43,6 +46,7 @@ def read_state(body: bytes, offset: ClockOffset, clock: Callable[[], int]) -> va
                     told.motion,
                     told.safety,
                     told.mode,
+                    told.io,
                 )
                 if group is not None
             ),
@@ -56,11 +60,26 @@ def read_state(body: bytes, offset: ClockOffset, clock: Callable[[], int]) -> va
             motion=None if told.motion is None else _motion(told.motion),
             status=None if told.safety is None else _safety(told.safety),
             control=None if told.mode is None else _control(told.mode),
+            signals=None if told.io is None else _signals(told.io, signals),
             sampled=offset.to_ours(stamp),
             clock=clock,
         )
     except (DecodeError, ValueError) as error:
         raise RemoteProtocolError(f"the cabinet pushed a state that is none: {error}") from error
+
+
+def read_signals(told: Sequence[wire.SignalInfo]) -> tuple[Signal, ...]:
+    """The cabinet's signals."""
+    return tuple(
+        Signal(one.name, one.direction is wire.IoDirection.OUTPUT, one.type.name.lower(), one.low, one.high)
+        for one in told
+    )
+
+
+def _signals(told: wire.IoState, signals: Sequence[Signal]) -> SignalValues:
+    known = {one.index: one.value for one in told.values}
+    named = {one.name: one.value(known[place]) for place, one in enumerate(signals) if place in known}
+    return SignalValues(told.stamp, named)
 
 
 def read_firing(

@@ -17,6 +17,7 @@ import numpy as np
 
 from heptarm.errors import StaleState
 from heptarm.values.arrays import Array, Value, frozen
+from heptarm.values.io import SignalValues
 from heptarm.values.mode import Mode
 from heptarm.values.pose import Pose
 from heptarm.values.redundancy import Redundancy
@@ -245,6 +246,7 @@ class State(Value):
         motion: what runs.
         status: safety and readiness.
         control: control mode and tool.
+        signals: inputs and outputs of the cabinet.
         sampled: when the newest group was sampled, on this side's clock [ns].
         clock: this side's clock [ns], for the age.
     """
@@ -256,6 +258,7 @@ class State(Value):
     motion: Motion | None = None
     status: Safety | None = None
     control: Control | None = None
+    signals: SignalValues | None = None
     sampled: int = 0
     clock: Callable[[], int] | None = field(default=None, repr=False, compare=False)
 
@@ -270,6 +273,7 @@ class State(Value):
             self.motion,
             self.status,
             self.control,
+            self.signals,
         )
         return max((group.stamp for group in groups if group is not None), default=0)
 
@@ -337,6 +341,11 @@ class State(Value):
     def tool(self) -> str:
         """Name of the attached tool; empty: none."""
         return _of(self.control, "mode").tool
+
+    @property
+    def io(self) -> SignalValues:
+        """Values of the cabinet's signals."""
+        return _of(self.signals, "io")
 
     @property
     def safety(self) -> Safety:

@@ -12,7 +12,7 @@ import heptarm.wire.SignalValue;
 /** Signals of the cabinet's IO groups: found by name, written all or none, read a few at a time. */
 final class Signals {
     /** So many are read before looking at the time: on a cabinet each one takes some 2 ms. */
-    private static final int SLICE = 4;
+    private static final int SLICE = 2;
     private static final long PATIENCE_NS = 300000L;
 
     private final Robot robot;

@@ -1,0 +1,115 @@
+"""Signals of the cabinet: which there are, and what they are at one moment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from heptarm.errors import CommandRejected
+from heptarm.values.arrays import Value
+
+#: What a signal is: boolean or number.
+SignalValue: TypeAlias = bool | float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signal(Value):
+    """A signal of an IO group.
+
+    Attributes:
+        name: "Group.Name".
+        is_output: whether the cabinet can write it.
+        kind: "boolean", "integer", "unsigned" or "analog".
+        low: its least value.
+        high: its largest value.
+    """
+
+    name: str
+    is_output: bool
+    kind: str
+    low: float = 0.0
+    high: float = 1.0
+
+    def value(self, number: float) -> SignalValue:
+        """A number as the value of this signal."""
+        return bool(number) if self.kind == "boolean" else float(number)
+
+
+def find_name(name: str, names: Sequence[str]) -> int:
+    """Place of a name: written in full, or any unique part of it behind a point; case and underscores do not matter.
+
+    Raises:
+        CommandRejected: there is none of that name, or more than one.
+    """
+    if name in names:
+        return names.index(name)
+    wanted = _plain(name)
+    found = [
+        place
+        for place, known in enumerate(names)
+        if wanted in (_plain(known), _plain(known.rpartition(".")[2]))
+    ]
+    if len(found) == 1:
+        return found[0]
+    listed = ", ".join(names[place] for place in found) if found else ", ".join(names)
+    raise CommandRejected(
+        f"{name!r} means several signals" if found else f"no signal {name!r}",
+        code=42,
+        parameter="signal",
+        value=name,
+        allowed=listed,
+        hint=f"this cabinet has {listed or 'none'}",
+    )
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", "").casefold()
+
+
+class SignalValues(Mapping[str, SignalValue]):
+    """Values of all signals: `values["MediaFlange.UserButton"]`, or `values.user_button` where that is unique.
+
+    Args:
+        stamp: cabinet time of the oldest of them [ns].
+        values: by full names, in the cabinet's order.
+    """
+
+    __slots__ = ("_values", "stamp")
+
+    def __init__(self, stamp: int, values: Mapping[str, SignalValue]) -> None:
+        self.stamp = stamp
+        self._values = dict(values)
+
+    def __getitem__(self, name: str) -> SignalValue:
+        """Value of a signal. Raises CommandRejected as `find_name` does."""
+        names = tuple(self._values)
+        return self._values[names[find_name(name, names)]]
+
+    def __getattr__(self, name: str) -> SignalValue:
+        """Value of a signal."""
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return self[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Full names."""
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._values)
+
+    def __eq__(self, other: object) -> bool:
+        """Equal names, values and time."""
+        if not isinstance(other, SignalValues):
+            return NotImplemented
+        return self.stamp == other.stamp and self._values == other._values
+
+    def __hash__(self) -> int:
+        """Equal ones hash alike."""
+        return hash((self.stamp, tuple(self._values.items())))
+
+    def __repr__(self) -> str:
+        """Short form."""
+        return f"SignalValues({self._values})"

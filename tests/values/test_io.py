@@ -1,0 +1,40 @@
+"""Values of signals are found by the names that people use, and are values themselves."""
+
+from __future__ import annotations
+
+import pickle
+
+import pytest
+
+from heptarm.errors import CommandRejected, StaleState
+from heptarm.values.io import Signal, SignalValues
+from heptarm.values.state import State
+
+SEEN = SignalValues(5, {"MediaFlange.UserButton": True, "MediaFlange.InputX3Pin3": False, "Cell.Level": 2.5})
+
+
+def test_by_full_name_by_part_and_as_attribute() -> None:
+    assert SEEN["MediaFlange.UserButton"] is True and SEEN["user_button"] is True and SEEN.user_button is True
+    assert SEEN.input_x3_pin_3 is False and SEEN.level == 2.5
+    assert (
+        list(SEEN) == ["MediaFlange.UserButton", "MediaFlange.InputX3Pin3", "Cell.Level"] and len(SEEN) == 3
+    )
+    with pytest.raises(CommandRejected, match="no signal 'lamp'") as error:
+        _ = SEEN.lamp
+    assert "Cell.Level" in error.value.hint
+
+
+def test_a_value_of_a_state() -> None:
+    state = State(signals=SEEN)
+    assert state.io.user_button and state.stamp == 5
+    assert state == State(signals=SignalValues(5, dict(SEEN))) and hash(state) == hash(
+        pickle.loads(pickle.dumps(state))
+    )
+    assert state != State(signals=SignalValues(6, dict(SEEN)))
+    with pytest.raises(StaleState, match="io"):
+        _ = State().io
+
+
+def test_a_signal_knows_its_kind() -> None:
+    assert Signal("A.B", True, "boolean").value(1.0) is True
+    assert Signal("A.C", True, "unsigned", 0, 255).value(7) == 7.0
