@@ -1,0 +1,31 @@
+"""Stops and errors as a Sunrise programmer meets them: execution pauses, listeners are told, somebody lets it go on."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+from tests.doubles.test_doubles import HERE, _command, _compile
+
+SAID = (
+    "ready = true",
+    "an emergency stop pauses = true",
+    "releasing it does not move the arm = true",
+    "a drive error fails the motion = true",
+    "and switches the drives off = true",
+    "T2 wants the enabling switch = true",
+    "and then moves = true",
+    "listeners = [paused, ready false, ready true, resumed, safety NOSTOP, safety STOP0, safety STOP1]",
+)
+FAULTS = ("emergency_stop@3", "clear@4", "drive_error 2@6.5", "t2@8.5", "enable@9.5")
+
+
+def test_an_application_lives_through_stops(tmp_path: Path) -> None:
+    _compile(HERE / "java" / "Stopping.java", tmp_path)
+    said = tmp_path / "said.txt"
+    command = _command("sample.Stopping", tmp_path, f"sample.file={said}")
+    for fault in FAULTS:
+        command += ["--fault", fault]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert tuple(said.read_text().splitlines()) == SAID
