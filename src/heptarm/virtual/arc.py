@@ -14,7 +14,7 @@ from heptarm.virtual.geometry import Quat, Slerp, Turn, product
 from heptarm.virtual.order import PlanError
 
 #: Sides of the three points' triangle shorter than this [m], or a flatter triangle than this make no circle.
-_SHORT, _FLAT = 1e-6, 1e-6
+_SHORT, _FLAT = 1e-6, 1e-4
 
 
 class Arc:
