@@ -17,6 +17,7 @@ import pytest
 
 import heptarm as ha
 from heptarm.fri import Limits, Missing, Policy, Quality, SessionState
+from heptarm.fri.messages import Safety
 from heptarm.modes import CartesianImpedance, JointImpedance, SineImpedance
 from heptarm.rt import layout as at
 from heptarm.wire import messages as wire
@@ -324,3 +325,24 @@ def test_an_error_of_the_block_is_not_hidden_and_the_arm_rests(arm: ha.Arm) -> N
         rt.command(q=rt.start.q_ipo + 0.1 * A7)
         raise ZeroDivisionError
     arm.wait_for_rest()
+
+
+def test_an_emergency_stop_ends_the_overlay_in_words_and_the_next_session_works() -> None:
+    with ha.connect("sim://iiwa14") as arm:
+        arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=0.6)
+        for _ in range(2):
+            with (
+                arm.fri("monitor", period_ms=LONG) as watching,
+                pytest.raises(ha.MotionAborted, match="emergency stop|safety stop 1") as error,
+                arm.fri("position", period_ms=LONG, law=swing, params={"amplitude": 0.1}) as rt,
+            ):
+                rt.wait(0.5)
+                arm.operator.fault("emergency_stop")
+                assert not rt.wait(30.0)
+                # the session that monitors goes on
+                assert next(s.safety for s in watching if s.safety) is Safety.STOP_1
+            assert error.value.cause is ha.Cause.SAFETY
+            with pytest.raises(ha.NeedsOperator, match="release the emergency stop"), arm.fri("position"):
+                pass
+            arm.operator.clear()
+            assert arm.recover(timeout=10.0).done

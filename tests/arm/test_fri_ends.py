@@ -138,6 +138,18 @@ def test_a_monitor_that_the_cabinet_ends(peer: Peer, quality: str, text: str, ki
         assert rt.next() is None
 
 
+def test_a_monitor_ends_with_the_control(peer: Peer) -> None:
+    with (
+        speaking(peer, number=9, state=SessionState.MONITORING_READY),
+        peer.arm() as arm,
+        pytest.raises(ha.StreamError, match="no longer controls the robot"),
+        arm.fri("monitor", realtime=False, port=0, host="127.0.0.1") as rt,
+    ):
+        peer.tell(wire.ControlChanged(session=0, controller="", text="silent for 500 ms"))
+        peer.tell(changed(9, States.IDLE, wire.FriQuality.GOOD))
+        assert not rt.wait(30.0)
+
+
 def test_a_link_that_breaks_ends_the_session(peer: Peer) -> None:
     with speaking(peer, number=7, state=SessionState.COMMANDING_ACTIVE):
         arm = peer.arm()

@@ -35,7 +35,10 @@ from heptarm.errors import (
     LocalProtocolError,
     ModeConflict,
     MotionAborted,
+    NeedsOperator,
+    NotReady,
     QualityLost,
+    SafetyStop,
     StreamError,
     Timeout,
 )
@@ -153,12 +156,15 @@ class Fri:
         if self._handle is not None:
             try:
                 self._handle.wait(timeout=_PATIENCE)
-            except MotionAborted as error:
+            except (NeedsOperator, SafetyStop):
+                raise
+            except (MotionAborted, NotReady) as error:
+                if isinstance(error, MotionAborted) and error.cause is not Cause.FAILED:
+                    raise  # stopped meanwhile
                 raise ConnectFailed(error.text, code=error.code, hint=hint or error.hint) from error
         elif trouble is not None:
             raise trouble
-        text = self._last_words().text
-        raise ConnectFailed(text or "the FRI session was ended before it stood", hint=hint)
+        raise ConnectFailed(self._last_words().text or self._ended(), hint=hint)
 
     def __exit__(
         self,
@@ -213,14 +219,20 @@ class Fri:
         told = self._last_words()
         text, code = (told.text, told.code) if error is None else (error.text, error.code)
         if told.quality.value < Quality.GOOD and (error is None or error.cause is Cause.FAILED):
-            return QualityLost(text or "the FRI session was ended by the cabinet", code=code, hint=hint)
+            return QualityLost(text or self._ended(), code=code, hint=hint)
         if error is None:
-            return StreamError(text or "the FRI session was ended by the cabinet", code=code, hint=hint)
+            return StreamError(text or self._ended(), code=code, hint=hint)
         limited = self.client.limited
         guard = f"the guard had limited: {'; '.join(limited[:3])}" if limited else ""
         return MotionAborted(
             text, result=error.result, history=error.history, code=code, hint=guard or error.hint
         )
+
+    def _ended(self) -> str:
+        """What is known where the cabinet gives no reason."""
+        if self._connection.controls:
+            return "the FRI session was ended by the cabinet"
+        return "the cabinet ended the FRI session, since this client no longer controls the robot"
 
     def _last_words(self) -> wire.FriChanged:
         """The last that the cabinet told of this session."""

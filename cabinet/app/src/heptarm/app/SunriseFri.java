@@ -55,7 +55,13 @@ final class SunriseFri implements Fri, IFRISessionListener {
 
     static SunriseFri of(FriOpen open, LBR robot, Modes modes, Mover mover, Fri.Listener listener) {
         SunriseFri fri = new SunriseFri(open, robot, modes, mover, listener);
-        fri.tell(fri.session.getFRIChannelInformation()); // what happened before the listener was there
+        FRIChannelInformation now = fri.session.getFRIChannelInformation(); // from before the listener was there
+        FRIChannelInformation told;
+        do {
+            told = now;
+            fri.tell(told);
+            now = fri.session.getFRIChannelInformation(); // the listener may have told newer things meanwhile
+        } while (now.getFRISessionState() != told.getFRISessionState() || now.getQuality() != told.getQuality());
         return fri;
     }
 

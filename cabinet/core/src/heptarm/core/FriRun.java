@@ -139,7 +139,8 @@ final class FriRun implements Activity, Fri.Listener {
 
     public void changed(FriSessionState newState, FriQuality newQuality) {
         synchronized (this) {
-            if (closed || newState == state && newQuality == quality) {
+            // IDLE is told by `finish`; one from before the session began may come late
+            if (closed || newState == FriSessionState.IDLE || newState == state && newQuality == quality) {
                 return;
             }
             if (stood && newState != state && newState == FriSessionState.MONITORING_WAIT) {
