@@ -168,6 +168,8 @@ final class FakeRobot implements Robot, Runnable {
             }
             if (job.cancelled) {
                 ended = Job.Ended.CANCELLED;
+            } else if (!job.started && isStopped()) {
+                return;
             } else {
                 begins = !job.started;
                 job.started = true;
@@ -458,8 +460,7 @@ final class FakeRobot implements Robot, Runnable {
     public SafetyState readSafety(long stamp) {
         pay(6);
         int bits = safety | SafetyBits.MASTERED | (paused ? SafetyBits.PAUSED : 0);
-        boolean stopped = safety != 0 && safety != SafetyBits.ENABLING_SWITCH || operation != OperationMode.AUT && safety == 0;
-        return new SafetyState(stamp, stopped ? bits : bits | SafetyBits.READY_TO_MOVE, operation);
+        return new SafetyState(stamp, isStopped() ? bits : bits | SafetyBits.READY_TO_MOVE, operation);
     }
 
     @Override
@@ -507,6 +508,10 @@ final class FakeRobot implements Robot, Runnable {
     public void recover() {
         safety &= ~SafetyBits.PROTECTIVE_STOP;
         paused = false;
+    }
+
+    private boolean isStopped() {
+        return safety != 0 && safety != SafetyBits.ENABLING_SWITCH || operation != OperationMode.AUT && safety == 0;
     }
 
     /** What happens at the smartPAD; a stop pauses, as on the cabinet. */
