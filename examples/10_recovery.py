@@ -1,0 +1,22 @@
+"""An emergency stop under way: what the program sees, what it may do, and what it leaves to a person."""
+
+import threading
+
+import heptarm as ha
+
+home = ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0), speed=0.5)
+away = ha.ptp(ha.deg(60, 30, 0, -90, 0, 60, 0), speed=0.3)
+
+# a simulator of one's own, since somebody has to press the button
+with ha.connect("sim://iiwa14") as arm:
+    arm.move(home)
+    threading.Timer(1.0, arm.operator.fault, ["emergency_stop"]).start()
+    try:
+        arm.move(away)
+    except ha.MotionAborted as error:
+        print(f"{error.cause.name}: {error.result.text}, {len(error.history)} states before it")
+
+    print(arm.recover())
+    threading.Timer(1.0, arm.operator.clear).start()  # the person needs a moment
+    print(arm.recover(timeout=60))
+    print("at home again:", arm.move(home).arrived)
