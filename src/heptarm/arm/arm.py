@@ -420,6 +420,7 @@ class Arm(Equipment, Stopping):
         chosen = mode_message(mode or self._mode)
         self._tooling.check(motions, mode or self._mode)
         ends, parts = condition_message(until, self._connection.welcome.signals)
+        self._tooling.check_until(parts)
         items = program.items(motions, self.robot, ceiling, mode=chosen, until=ends)
         message = wire.Run(items=items, when=_WHEN[when])
         return self._connection.run(message, len(motions), self._limit(motions, ceiling), until=parts)
@@ -490,6 +491,7 @@ class Arm(Equipment, Stopping):
         self._tooling.check_moved(moving, "moving")
         self._tooling.check_mode(mode or self._mode)
         ends, parts = condition_message(until, self._connection.welcome.signals)
+        self._tooling.check_until(parts)
         stream = PoseServo if kind == "pose" else JointServo
         return stream(
             self._connection, replace(message, until=ends), rate=hertz, watchdog=seconds, until=parts
@@ -523,4 +525,5 @@ class Arm(Equipment, Stopping):
             LimitError: a value outside its range.
         """
         settings["mode"] = settings.get("mode") or (None if kind == "monitor" else self._mode)
+        self._tooling.check_mode(settings["mode"])
         return Fri(self._connection, fri_settings.request(self._connection, kind, **settings))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from heptarm.errors import ShapeError
 from heptarm.model.kinematics import forward
+from heptarm.values.condition import Condition
 from heptarm.values.mode import CartesianImpedance, Mode, SineImpedance
 from heptarm.values.motion import TOOL, Motion
 from heptarm.values.pose import Pose
@@ -176,6 +177,13 @@ class Tooling:
             if axes != TOOL:
                 self.check_reference(axes, f"{at}frame")
         self.check_mode(mode)
+
+    def check_until(self, parts: Sequence[Condition]) -> None:
+        """Refuse conditions whose frames are not known; raises CommandRejected."""
+        for index, part in enumerate(parts):
+            axes = getattr(part, "frame", TOOL)
+            if axes != TOOL:
+                self.check_reference(axes, f"until[{index}].frame")
 
     def check_mode(self, mode: Mode | None) -> None:
         """Refuse a mode whose frame is not known; raises CommandRejected."""

@@ -1,5 +1,6 @@
 package heptarm.doubles;
 
+import com.kuka.roboticsAPI.geometricModel.math.Matrix;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 
 /** Forward kinematics of the robot: Rz(A1) Ry(A2) Rz(A3) Ry(-A4) Rz(A5) Ry(A6) Rz(A7), all offsets along z. */
@@ -15,6 +16,22 @@ public final class Arm {
     public Transformation flange(double[] q) {
         return up(links[0]).compose(z(q[0])).compose(y(q[1])).compose(up(links[1])).compose(z(q[2])).compose(y(-q[3]))
                 .compose(up(links[2])).compose(z(q[4])).compose(y(q[5])).compose(up(links[3])).compose(z(q[6]));
+    }
+
+    /** Origin [m] and direction of each axis in the base, seven rows of six; the directions' signs are left open. */
+    double[][] axes(double[] q) {
+        double[][] found = new double[7][];
+        Transformation here = Transformation.IDENTITY;
+        for (int i = 0; i < 7; i++) {
+            boolean turnsAboutZ = i % 2 == 0;
+            here = turnsAboutZ ? here.compose(up(links[i / 2])) : here;
+            Matrix r = here.getRotationMatrix();
+            int column = turnsAboutZ ? 2 : 1;
+            found[i] = new double[] {here.getX() * 1e-3, here.getY() * 1e-3, here.getZ() * 1e-3, r.get(0, column),
+                r.get(1, column), r.get(2, column)};
+            here = here.compose(turnsAboutZ ? z(q[i]) : y(i == 3 ? -q[i] : q[i]));
+        }
+        return found;
     }
 
     private static Transformation up(double metres) {

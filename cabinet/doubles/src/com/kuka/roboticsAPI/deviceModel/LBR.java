@@ -31,6 +31,7 @@ import heptarm.doubles.Arm;
 import heptarm.doubles.Burden;
 import heptarm.doubles.Container;
 import heptarm.doubles.Desk;
+import heptarm.doubles.Estimate;
 import heptarm.doubles.MotionOrder;
 import heptarm.doubles.Orders;
 import heptarm.doubles.Ring;
@@ -168,9 +169,9 @@ public class LBR extends Robot {
         double[] torque = {wrench[3] + lever[1] * wrench[2] - lever[2] * wrench[1],
             wrench[4] + lever[2] * wrench[0] - lever[0] * wrench[2], wrench[5] + lever[0] * wrench[1] - lever[1] * wrench[0]};
         Matrix axes = (orientationFrame == null ? at : orientationFrame.transformationFromWorld()).getRotationMatrix();
-        Vector none = Vector.of(0, 0, 0);
+        double[] off = Estimate.inaccuracy(arm, numbers(Ring.Q, AXES), at, axes);
         return new ForceSensorData(seenFrom(axes, wrench[0], wrench[1], wrench[2]),
-                seenFrom(axes, torque[0], torque[1], torque[2]), none, none);
+                seenFrom(axes, torque[0], torque[1], torque[2]), Vector.of(off[0], off[1], off[2]), Vector.of(off[3], off[4], off[5]));
     }
 
     private static Vector seenFrom(Matrix axes, double x, double y, double z) {

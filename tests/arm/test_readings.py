@@ -1,0 +1,70 @@
+"""What a state tells besides positions: how sure the estimate of forces is, redundancy, stamps of the groups."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from heptarm import Arm, State, deg, hold, ptp
+from heptarm.model.inverse import redundancy
+from heptarm.model.kinematics import jacobian
+from heptarm.values.arrays import Array
+
+#: Inaccuracy of a simulated torque sensor [Nm].
+SENSOR = 0.5
+
+
+def settled(arm: Arm) -> State:
+    arm.move(hold(0.1))
+    now = arm.state.stamp
+    return arm.wait_until(lambda state: state.stamp > now + 30_000_000)
+
+
+def expected(arm: Arm, q: Array) -> Array:
+    j = jacobian(arm.robot, q)
+    inverse = np.linalg.inv(j @ j.T + 1e-6 * np.eye(6))
+    return SENSOR * np.sqrt(np.diag(inverse))
+
+
+def test_the_estimate_of_forces_says_how_far_it_may_be_off(arm: Arm) -> None:
+    state = settled(arm)
+    told = np.concatenate([state.wrench.force_inaccuracy, state.wrench.torque_inaccuracy])
+    assert told == pytest.approx(expected(arm, state.q), rel=0.01)
+    assert state.wrench.valid(force=5.0, torque=5.0)
+    turned = arm.wrench("flange", axes="flange")
+    assert (turned.force_inaccuracy > 0.0).all()
+
+
+def test_near_a_singularity_it_is_worthless_and_says_so(arm: Arm) -> None:
+    arm.move(ptp(deg(0, 30, 0, -1, 0, 60, 0)))
+    assert not settled(arm).wrench.valid()
+    arm.move(ptp(deg(0, 30, 0, -90, 0, 60, 0)))
+    assert settled(arm).wrench.valid()
+
+
+def test_redundancy_is_that_of_the_joints(arm: Arm) -> None:
+    arm.move(ptp(deg(20, 40, -30, -80, 10, 50, 0)))
+    state = settled(arm)
+    wanted = redundancy(arm.robot, state.q.tolist())
+    assert state.redundancy.e1 == pytest.approx(wanted.e1, abs=1e-4)
+    assert state.redundancy.status == wanted.status
+
+
+def test_each_group_has_its_own_stamp(arm: Arm) -> None:
+    state = settled(arm)
+    groups = (
+        state.joints,
+        state.torques,
+        state.cartesian,
+        state.external,
+        state.motion,
+        state.status,
+        state.control,
+    )
+    stamps = [group.stamp for group in groups if group is not None]
+    assert len(stamps) == len(groups)
+    assert max(stamps) == state.stamp
+    later = settled(arm)
+    assert later.control is not None
+    assert state.control is not None
+    assert later.control.stamp > state.control.stamp
