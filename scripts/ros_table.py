@@ -135,6 +135,8 @@ def _of(tree: ast.Module) -> Iterator[Declared]:
                     yield Declared(_name(str(entry.value)), "action", "control_msgs/FollowJointTrajectory")
             continue
         named = [entry.id for entry in entries if isinstance(entry, ast.Name) and entry.id in types]
+        actions = [name for name in named if types[name][0] == "action" or name.endswith("Action")]
+        named = actions if len(actions) == 1 else named  # beside its feedback and its result
         texts = [
             entry.value
             for entry in entries

@@ -6,16 +6,17 @@ import importlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import Pose, PoseStamped
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 from trajectory_msgs.msg import JointTrajectory
 
 from heptarm.bridge.driver import Answer, Driver
+from heptarm.bridge.names import Meaning
 from heptarm.bridge.services import SERVICES, Names, Service, Services
 from heptarm.errors import HeptarmError, NotReady
-from heptarm_ros2 import convert
+from heptarm_ros2 import convert, peers
 
 if TYPE_CHECKING:
     from heptarm_ros2.node import HeptarmNode
@@ -36,19 +37,23 @@ class Commands:
             (PoseStamped, "~/servo/pose", self._servo_pose),
             (JointTrajectory, "~/joint_trajectory", self._joint_trajectory),
         )
+        theirs: dict[Meaning, tuple[type, Callable[[Driver, Any], None]]] = {
+            Meaning.JOINT: (JointState, peers.joint),
+            Meaning.CARTESIAN: (Pose, peers.cartesian),
+            Meaning.TRAJECTORY: (JointTrajectory, self._joint_trajectory),
+        }
+        topics += tuple(
+            (theirs[entry.meaning][0], entry.name, theirs[entry.meaning][1])
+            for entry in peers.entries(node, *theirs)
+        )
         self._subscriptions = [
             node.create_subscription(kind, name, self._guarded(name, work), 1, callback_group=one_by_one)
             for kind, name, work in topics
         ]
-        self._subscriptions.append(
-            node.create_subscription(
-                Empty,
-                "~/stop",
-                self._guarded("~/stop", lambda driver, _: self._stopped(driver)),
-                1,
-                callback_group=at_once,
-            )
-        )
+        stops = [(Empty, "~/stop"), *((Empty, entry.name) for entry in peers.entries(node, Meaning.STOP))]
+        for kind, name in stops:
+            work = self._guarded(name, lambda driver, _: self._stopped(driver))
+            self._subscriptions.append(node.create_subscription(kind, name, work, 1, callback_group=at_once))
         groups = {True: at_once, False: MutuallyExclusiveCallbackGroup()}
         self._offered: tuple[Driver, Services] | None = None
         self._services = [

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import threading
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
@@ -16,11 +17,15 @@ from rclpy.parameter import Parameter as RosParameter
 from heptarm.bridge import parameters
 from heptarm.bridge.driver import Driver
 from heptarm.bridge.goal import End
+from heptarm.bridge.names import PRESETS, Meaning
 from heptarm.bridge.parameters import Configuration, Parameter
 from heptarm.bridge.runner import Feedback
 from heptarm.errors import HeptarmError
 from heptarm.values.state import State
+from heptarm_ros2 import peers
 from heptarm_ros2.commands import Commands
+from heptarm_ros2.moves import MoveActions
+from heptarm_ros2.peers import Peers
 from heptarm_ros2.publishers import Publishers
 from heptarm_ros2.trajectory import TrajectoryAction
 
@@ -37,9 +42,11 @@ class HeptarmNode(LifecycleNode):
         self._outputs: Publishers | None = None
         self._inputs: Commands | None = None
         self._goals: TrajectoryAction | None = None
+        self._moves: MoveActions | None = None
+        self._peers: Peers | None = None
         self._ending = threading.Event()
-        for one in parameters.PARAMETERS:
-            self._declare(one)
+        for one in sorted(parameters.PARAMETERS, key=lambda one: one.name != "names"):
+            self._declare(one)  # the first says whose names the others have
         for one in parameters.of_joints(self.get_parameter("joint_names").value or []):
             self._declare(one)
         self.configuration = Configuration.of({})
@@ -52,6 +59,9 @@ class HeptarmNode(LifecycleNode):
     # ------------------------------------------------------------------------------- parameters
 
     def _declare(self, one: Parameter) -> None:
+        if self.has_parameter("names"):
+            preset = PRESETS.get(str(self.get_parameter("names").value), PRESETS["heptarm"])
+            one = replace(one, default=preset.defaults.get(one.name, one.default))
         descriptor = ParameterDescriptor(description=one.text)
         if isinstance(one.default, float):
             descriptor.floating_point_range = [FloatingPointRange(from_value=one.low, to_value=one.high)]
@@ -108,13 +118,17 @@ class HeptarmNode(LifecycleNode):
         try:
             self.configuration = Configuration.of(self._values())
             self._outputs = Publishers(self)
+            self._peers = Peers(self)
             self.driver = Driver(self.configuration, self)
         except HeptarmError as error:
             log.error(f"not configured: {error}")
             self._destroy()
             return TransitionCallbackReturn.FAILURE
         arm = self.driver.arm
-        self._goals = TrajectoryAction(self, "~/follow_joint_trajectory", ReentrantCallbackGroup())
+        actions = [entry.name for entry in peers.entries(self, Meaning.FOLLOW)]
+        group = ReentrantCallbackGroup()
+        self._goals = TrajectoryAction(self, ("~/follow_joint_trajectory", *actions), group)
+        self._moves = MoveActions(self, group)
         self._inputs = Commands(self)
         period = 1.0 / self.value("diagnostics_rate")
         self._report_timer = self.create_timer(
@@ -166,17 +180,18 @@ class HeptarmNode(LifecycleNode):
         if driver is not None:
             driver.close()
             self.destroy_timer(self._report_timer)
-        for one in (self._goals, self._inputs, self._outputs):
+        for one in (self._goals, self._moves, self._inputs, self._outputs, self._peers):
             if one is not None:
                 one.destroy()
-        self._goals = self._inputs = self._outputs = None
+        self._goals = self._moves = self._inputs = self._outputs = self._peers = None
 
     # -------------------------------------------------------------------------- from the driver
 
     def on_state(self, state: State) -> None:
         """A state came."""
-        if self._outputs is not None and self._lives:
-            self._outputs.state(state)
+        for outputs in (self._outputs, self._peers):
+            if outputs is not None and self._lives:
+                outputs.state(state)
 
     def on_feedback(self, feedback: Feedback) -> None:
         """A goal went on."""

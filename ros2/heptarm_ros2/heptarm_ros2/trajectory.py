@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from control_msgs.action import FollowJointTrajectory
@@ -24,27 +25,31 @@ _NOTED = 5.0
 class TrajectoryAction:
     """Gives goals to the driver, and their feedback and ends back to their clients."""
 
-    def __init__(self, node: HeptarmNode, name: str, group: Any) -> None:
+    def __init__(self, node: HeptarmNode, names: Sequence[str], group: Any) -> None:
         self._node = node
         self._lock = threading.Lock()
         self._numbers: dict[int, int] = {}  # of a goal message on its way to its handle
         self._ends: dict[int, Future[End]] = {}
         self._handles: dict[int, Any] = {}
         self._told = 0.0
-        self._server = ActionServer(
-            node,
-            FollowJointTrajectory,
-            name,
-            self._execute,
-            callback_group=group,
-            goal_callback=self._on_goal,
-            handle_accepted_callback=self._on_accepted,
-            cancel_callback=self._on_cancel,
-        )
+        self._servers = [
+            ActionServer(
+                node,
+                FollowJointTrajectory,
+                name,
+                self._execute,
+                callback_group=group,
+                goal_callback=self._on_goal,
+                handle_accepted_callback=self._on_accepted,
+                cancel_callback=self._on_cancel,
+            )
+            for name in names
+        ]
 
     def destroy(self) -> None:
         """End it."""
-        self._server.destroy()
+        for server in self._servers:
+            server.destroy()
 
     def _on_goal(self, message: FollowJointTrajectory.Goal) -> GoalResponse:
         driver = self._node.driver

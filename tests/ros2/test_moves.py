@@ -1,0 +1,99 @@
+"""Single motions as actions, and the names of other drivers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from action_msgs.msg import GoalStatus
+from geometry_msgs.msg import Pose, PoseStamped
+from heptarm_msgs.action import MoveJoints, MovePose
+from rclpy.action import ActionClient
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Empty
+
+from tests.conformance.cases import rests
+from tests.conformance.stage import Stage
+from tests.ros2.peer import Client, NodeProcess, Ros, until
+
+HOME = np.radians([0, 30, 0, -90, 0, 60, 0]).tolist()
+
+
+class Moves:
+    """A client of one action."""
+
+    def __init__(self, ros: Ros, kind: Any, name: str) -> None:
+        self.ros, self.kind, self.told = ros, kind, []
+        self._client = ActionClient(ros.node, kind, name)
+        until(self._client.server_is_ready, f"there is no {name}")
+
+    def start(self, **goal: Any) -> Any:
+        future = self._client.send_goal_async(
+            self.kind.Goal(**goal), feedback_callback=lambda one: self.told.append(one.feedback.progress)
+        )
+        handle = self.ros.wait(future, "no answer")
+        assert handle.accepted
+        return handle
+
+    def end(self, handle: Any) -> tuple[int, Any]:
+        answer = self.ros.wait(handle.get_result_async(), "the motion does not end")
+        return answer.status, answer.result
+
+
+@pytest.fixture
+def joints(ros: Ros, client: Client) -> Moves:
+    return Moves(ros, MoveJoints, f"{client.name}/move_joints")
+
+
+def test_a_motion_of_joints_a_line_and_an_arc(ros: Ros, client: Client, joints: Moves) -> None:
+    status, result = joints.end(joints.start(position=HOME, speed=0.5))
+    assert status == GoalStatus.STATUS_SUCCEEDED and result.success and result.residual < 1e-3
+    assert joints.told == sorted(joints.told) and joints.told[-1] == 1.0
+    assert np.abs(rests(client) - HOME).max() < 2e-3
+    seen = ros.collect(PoseStamped, f"{client.name}/pose")
+    until(lambda: seen, "no poses come")
+    poses = Moves(ros, MovePose, f"{client.name}/move_pose")
+    goal, via = seen[-1], PoseStamped(pose=Pose(orientation=seen[-1].pose.orientation))
+    place = goal.pose.position
+    via.pose.position.x, via.pose.position.y, via.pose.position.z = place.x, place.y + 0.05, place.z - 0.05
+    goal.pose.position.y += 0.1
+    status, result = poses.end(poses.start(path=MovePose.Goal.CIRC, pose=goal, via=via))
+    assert status == GoalStatus.STATUS_SUCCEEDED, result.message
+    rests(client)
+    assert abs(seen[-1].pose.position.y - goal.pose.position.y) < 2e-3
+
+
+def test_cancelling_brakes_and_a_senseless_motion_is_aborted_in_words(
+    ros: Ros, client: Client, joints: Moves
+) -> None:
+    here = rests(client)
+    handle = joints.start(joint_names=["A1"], position=[here[0] + 2.0])
+    until(lambda: client.place().dq[0] > 0.1, "the arm does not set out")
+    ros.wait(handle.cancel_goal_async(), "no answer")
+    status, result = joints.end(handle)
+    assert status == GoalStatus.STATUS_CANCELED and not result.success
+    assert rests(client)[0] < here[0] + 1.9
+    status, result = joints.end(joints.start(joint_names=["elbow"], position=[0.0]))
+    assert status == GoalStatus.STATUS_ABORTED and "elbow" in result.message
+
+
+def test_a_program_for_libiiwa(ros: Ros, own_stage: Stage, nodes: Callable[..., NodeProcess]) -> None:
+    nodes(own_stage.target, space="/libiiwa", names="libiiwa")
+    states = ros.collect(JointState, "/libiiwa/iiwa/state/joint_states")
+    poses = ros.collect(Pose, "/libiiwa/iiwa/state/end_effector_pose")
+    until(lambda: states and poses, "no states come")
+    assert states[-1].name == [f"iiwa_joint_{i}" for i in range(1, 8)]
+    command = ros.node.create_publisher(JointState, "/libiiwa/iiwa/command/joint", 1)
+    stop = ros.node.create_publisher(Empty, "/libiiwa/iiwa/command/stop", 1)
+    until(lambda: command.get_subscription_count() and stop.get_subscription_count(), "nobody listens")
+
+    def moved() -> bool:
+        command.publish(JointState(position=[math.nan] * 6 + [0.3]))
+        return abs(states[-1].position[6]) > 0.02
+
+    until(moved, "the arm does not move")  # the node may not be active yet
+    until(lambda: abs(states[-1].position[6] - 0.3) < 2e-3, "the joint does not arrive")
+    stop.publish(Empty())
