@@ -1,20 +1,7 @@
 package heptarm.doubles;
 
-import java.lang.reflect.Field;
-
-import javax.inject.Inject;
-import javax.inject.Named;
-
-import com.kuka.roboticsAPI.applicationModel.IApplicationControl;
-import com.kuka.roboticsAPI.applicationModel.IApplicationData;
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplicationState;
-import com.kuka.roboticsAPI.conditionModel.ObserverManager;
-import com.kuka.roboticsAPI.controllerModel.Controller;
-import com.kuka.roboticsAPI.deviceModel.LBR;
-import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
-import com.kuka.roboticsAPI.uiModel.IApplicationUI;
-import com.kuka.task.ITaskLogger;
 
 /** Runs one application as the cabinet does: inject, initialize, run, and dispose whatever happens. */
 public final class Host {
@@ -31,34 +18,9 @@ public final class Host {
         plant = station.plant;
         desk = new Desk(station, this::terminate);
         application = (RoboticsAPIApplication) Class.forName(className).getDeclaredConstructor().newInstance();
-        inject(station);
+        new Injector(desk, station).fill(application);
         thread = new Thread(this::live, "application");
         thread.setDaemon(true);
-    }
-
-    private void inject(Station station) throws IllegalAccessException {
-        Object[] offers = {station.robot, station.controller, desk, desk.logger, desk.pad, desk.observers};
-        Class<?>[] types = {LBR.class, Controller.class, IApplicationData.class, ITaskLogger.class, IApplicationUI.class,
-            ObserverManager.class};
-        for (Class<?> c = application.getClass(); c != RoboticsAPIApplication.class; c = c.getSuperclass()) {
-            for (Field field : c.getDeclaredFields()) {
-                if (!field.isAnnotationPresent(Inject.class)) {
-                    continue;
-                }
-                field.setAccessible(true);
-                Object found = field.getType() == IApplicationControl.class ? desk : null;
-                if (field.isAnnotationPresent(Named.class) && PhysicalObject.class.isAssignableFrom(field.getType())) {
-                    found = desk.createFromTemplate(field.getAnnotation(Named.class).value());
-                }
-                for (int i = 0; i < types.length && found == null; i++) {
-                    found = field.getType().isAssignableFrom(types[i]) ? offers[i] : null;
-                }
-                if (found == null) {
-                    throw new IllegalArgumentException("nothing to inject into " + field);
-                }
-                field.set(application, found);
-            }
-        }
     }
 
     public void start() {

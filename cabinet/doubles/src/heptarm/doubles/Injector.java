@@ -1,0 +1,96 @@
+package heptarm.doubles;
+
+import java.lang.reflect.Constructor;
+import java.lang.reflect.Field;
+import java.lang.reflect.Modifier;
+import java.util.HashMap;
+import java.util.Map;
+
+import javax.inject.Inject;
+import javax.inject.Named;
+import javax.inject.Singleton;
+
+import com.kuka.roboticsAPI.applicationModel.IApplicationControl;
+import com.kuka.roboticsAPI.applicationModel.IApplicationData;
+import com.kuka.roboticsAPI.conditionModel.ObserverManager;
+import com.kuka.roboticsAPI.controllerModel.Controller;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
+import com.kuka.roboticsAPI.uiModel.IApplicationUI;
+import com.kuka.task.ITaskLogger;
+
+/** Fills the fields that an application wants filled: the cabinet's objects, tools by their templates, classes of the project. */
+final class Injector {
+    private final Desk desk;
+    private final Object[] offers;
+    private final Class<?>[] types = {LBR.class, Controller.class, IApplicationData.class, ITaskLogger.class, IApplicationUI.class,
+        ObserverManager.class, IApplicationControl.class};
+    private final Map<Class<?>, Object> singletons = new HashMap<>();
+
+    Injector(Desk desk, Station station) {
+        this.desk = desk;
+        this.offers = new Object[] {station.robot, station.controller, desk, desk.logger, desk.pad, desk.observers, desk};
+    }
+
+    /** Fills the fields of an object, also those of its super classes up to one of the cabinet's. */
+    void fill(Object target) throws ReflectiveOperationException {
+        for (Class<?> c = target.getClass(); c != null && !isForeign(c); c = c.getSuperclass()) {
+            for (Field field : c.getDeclaredFields()) {
+                if (field.isAnnotationPresent(Inject.class)) {
+                    field.setAccessible(true);
+                    field.set(target, find(field.getType(), field.getAnnotation(Named.class), field.toString()));
+                }
+            }
+        }
+    }
+
+    private Object find(Class<?> type, Named named, String where) throws ReflectiveOperationException {
+        if (named != null && PhysicalObject.class.isAssignableFrom(type)) {
+            return desk.createFromTemplate(named.value());
+        }
+        for (int i = 0; i < types.length; i++) {
+            if (type.isAssignableFrom(types[i])) {
+                return offers[i];
+            }
+        }
+        if (isForeign(type) || type.isInterface() || Modifier.isAbstract(type.getModifiers())) {
+            throw new IllegalArgumentException("nothing to inject into " + where);
+        }
+        Object made = singletons.get(type);
+        if (made == null) {
+            made = make(type, where);
+            if (type.isAnnotationPresent(Singleton.class)) {
+                singletons.put(type, made);
+            }
+        }
+        return made;
+    }
+
+    /** Whether a class is none of the project's. */
+    private static boolean isForeign(Class<?> type) {
+        String name = type.getName();
+        return type.isPrimitive() || name.startsWith("java.")
+                || name.startsWith("com.kuka.") && !name.startsWith("com.kuka.generated.");
+    }
+
+    private Object make(Class<?> type, String where) throws ReflectiveOperationException {
+        Constructor<?> chosen = null;
+        for (Constructor<?> one : type.getDeclaredConstructors()) {
+            if (one.isAnnotationPresent(Inject.class) || chosen == null && one.getParameterCount() == 0) {
+                chosen = one;
+            }
+        }
+        if (chosen == null) {
+            throw new IllegalArgumentException("nothing to inject into " + where + ": " + type.getName()
+                    + " has no constructor for that");
+        }
+        Object[] arguments = new Object[chosen.getParameterCount()];
+        for (int i = 0; i < arguments.length; i++) {
+            arguments[i] = find(chosen.getParameterTypes()[i], null, chosen.toString());
+        }
+        chosen.setAccessible(true);
+        Object made = chosen.newInstance(arguments);
+        fill(made);
+        return made;
+    }
+}
