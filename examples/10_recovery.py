@@ -8,7 +8,7 @@ home = ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0), speed=0.5)
 away = ha.ptp(ha.deg(60, 30, 0, -90, 0, 60, 0), speed=0.3)
 
 # a simulator of one's own, since somebody has to press the button
-with ha.connect("sim://iiwa14") as arm:
+with ha.connect("sim://iiwa14", watchdog=2.0) as arm:
     arm.move(home)
     threading.Timer(1.0, arm.operator.fault, ["emergency_stop"]).start()
     try:
