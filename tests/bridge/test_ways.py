@@ -51,7 +51,7 @@ class Ears:
             assert self._changed.wait_for(what, PATIENCE), self.ends
 
 
-@pytest.fixture(params=["servo", "fri"])
+@pytest.fixture(params=["servo", "spline", "fri"])
 def way(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
@@ -124,5 +124,23 @@ def test_a_command_ends_a_goal_and_the_next_goal_works(driver: Driver, ears: Ear
 
 
 def test_a_way_that_is_not_there_is_refused_by_name() -> None:
-    with pytest.raises(CommandRejected, match="spline"):
-        Configuration.of({"execution": "spline"})
+    with pytest.raises(CommandRejected, match="teleport"):
+        Configuration.of({"execution": "teleport"})
+
+
+def test_a_spline_goes_through_the_points_as_fast_as_the_trajectory(cabinet: RunningCabinet) -> None:
+    values = {"target": cabinet.target, "execution": "spline", "speed": 0.5}
+    ears = Ears()
+    driver = Driver(Configuration.of(values), ears)
+    driver.activate()
+    try:
+        driver.move(HOME).wait()
+        wanted = goal(driver, AWAY, 4.0)
+        driver.accept(wanted)
+        ears.until(lambda: bool(ears.ends))
+        assert ears.ends[-1].outcome is Outcome.SUCCEEDED, ears.ends
+        assert ears.told[-1].elapsed < 1.25 * 4.0
+        off = max(float(np.abs(told.desired.q - told.actual.q).max()) for told in ears.told)
+        assert off < 0.02  # the curve between the points is the cabinet's
+    finally:
+        driver.close()

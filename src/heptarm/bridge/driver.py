@@ -23,6 +23,7 @@ from heptarm.bridge.fri_execution import FriExecution
 from heptarm.bridge.goal import Goal, GoalRefused
 from heptarm.bridge.parameters import Configuration
 from heptarm.bridge.report import Report, report
+from heptarm.bridge.spline_execution import SplineExecution
 from heptarm.bridge.stream import Stream
 from heptarm.errors import HeptarmError, NotReady, ShapeError
 from heptarm.io.clock import RealClock
@@ -98,9 +99,14 @@ class Driver:
         self._pump.start()
         listener.on_link("")
 
-    def _way(self) -> Execution:
+    def _way(self) -> Execution | SplineExecution:
         """The way of execution that the parameters choose."""
         known = self.configuration
+        if known.values["execution"] == "spline":
+            speed = known.values["servo.speed"]
+            return SplineExecution(
+                self._arm, known.joints, self._listener, speed=speed, settings=known.settings
+            )
         if known.values["execution"] == "fri":
             return FriExecution(
                 self._arm, known.joints, self._listener, options=known.fri, settings=known.settings

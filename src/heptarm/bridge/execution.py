@@ -15,7 +15,7 @@ from heptarm.arm.servo import JointServo
 from heptarm.bridge.goal import End, Goal, GoalRefused
 from heptarm.bridge.runner import Feedback, Measured, Runner, Settings, Step
 from heptarm.bridge.trajectory import Sample
-from heptarm.errors import CommandRejected, HeptarmError
+from heptarm.errors import HeptarmError
 from heptarm.io.clock import Clock, RealClock
 from heptarm.values.arrays import within
 from heptarm.values.mode import Mode
@@ -23,28 +23,8 @@ from heptarm.values.state import State
 
 _log = logging.getLogger("heptarm.bridge")
 
-#: Ways of execution, and those that are there.
-WAYS = ("servo", "spline", "fri")
-_THERE = ("servo", "fri")
 #: How long to wait for the thread at the end [s].
 _PATIENCE = 10.0
-
-
-def check_way(way: str) -> None:
-    """Refuse a way of execution that is not there.
-
-    Raises:
-        CommandRejected: the text says which there are.
-    """
-    if way not in _THERE:
-        known = "is not there yet" if way in WAYS else "is unknown"
-        raise CommandRejected(
-            f"the way of execution {way!r} {known}",
-            parameter="execution",
-            value=way,
-            allowed=", ".join(_THERE),
-            hint=f"choose from {', '.join(_THERE)}",
-        )
 
 
 @dataclass(frozen=True, slots=True)

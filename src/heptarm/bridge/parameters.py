@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from heptarm.bridge.check import Rules
-from heptarm.bridge.execution import ServoOptions, check_way
+from heptarm.bridge.execution import ServoOptions
 from heptarm.bridge.fri_execution import FriOptions
 from heptarm.bridge.runner import Settings
 from heptarm.bridge.tolerance import Bounds, Tolerances
@@ -184,7 +184,6 @@ class Configuration:
             if name not in table:
                 raise CommandRejected(f"there is no parameter {name!r}", parameter=name)
         known = {name: one.check(values.get(name, one.default)) for name, one in table.items()}
-        check_way(str(known["execution"]))
         return Configuration(known, tuple(f"{known['prefix']}{name}" for name in names))
 
     def frame(self, which: str) -> str:

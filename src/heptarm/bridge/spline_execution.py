@@ -1,0 +1,301 @@
+"""The way `spline` to execute a trajectory: one joint spline on the cabinet, through the same points.
+
+The cabinet plans it, within its limits on speed, acceleration and jerk, and nothing on the network can make it falter.
+A spline knows no times, only speeds: those of the trajectory are asked for between its points, so it arrives a little
+late where the cabinet's limits are narrower, and it begins and ends at rest.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from heptarm.arm.arm import Arm
+from heptarm.arm.handle import MotionHandle
+from heptarm.bridge.check import read
+from heptarm.bridge.execution import Listener, measured
+from heptarm.bridge.goal import Code, End, Goal, GoalRefused, Outcome
+from heptarm.bridge.runner import Feedback, Measured, Settings
+from heptarm.bridge.tolerance import Tolerances
+from heptarm.bridge.trajectory import Sample, Trajectory
+from heptarm.errors import HeptarmError
+from heptarm.io.clock import Clock, RealClock
+from heptarm.values.motion import JointSpline, ptp, spline_joints
+from heptarm.values.result import Cause
+from heptarm.values.robot import RobotModel
+
+_log = logging.getLogger("heptarm.bridge")
+
+#: Between two looks at the arm [s].
+_LOOK = 0.02
+#: How much faster than the trajectory a spline may be between two points, for it slows down elsewhere.
+_HASTE = 1.1
+#: Slowest speed, a fraction of each axis' maximum.
+_SLOWEST = 0.01
+#: How far ahead on the trajectory the arm is looked for [s], and how finely.
+_WINDOW, _GRID = 0.5, 51
+#: A joint that is slower at the end is at rest [rad/s].
+_STILL = 1e-6
+#: How long the arm may take to come to rest, and the thread to end [s].
+_PATIENCE = 10.0
+
+
+def as_spline(trajectory: Trajectory, robot: RobotModel, ceiling: float) -> JointSpline:
+    """The joint spline through a trajectory's points, as fast between them as the trajectory is.
+
+    Args:
+        trajectory: with at least two points.
+        robot: its limits.
+        ceiling: of the speed, a fraction of each axis' maximum.
+    """
+    points: list[Any] = []
+    for begin, end, q in zip(trajectory.times, trajectory.times[1:], trajectory.points[1:]):
+        fastest = max(
+            float(np.max(np.abs(trajectory.sample(t).dq) / robot.dq_max)) for t in np.linspace(begin, end, 5)
+        )
+        points.append(ptp(q, speed=min(max(_HASTE * fastest, _SLOWEST), ceiling)))
+    return spline_joints(points)
+
+
+@dataclass(slots=True, eq=False)
+class _Running:
+    number: int
+    goal: Goal
+    trajectory: Trajectory
+    tolerances: Tolerances
+    handle: MotionHandle | None = None
+    begin: float = 0.0
+    tau: float = 0.0
+
+
+class SplineExecution:
+    """Executes goals as joint splines of the cabinet, one at a time; a new one waits until the arm is at rest.
+
+    Args:
+        arm: in control.
+        names: of its joints, seven.
+        listener: hears of goals.
+        speed: ceiling, a fraction of each axis' maximum.
+        settings: how to run goals.
+        clock: the arm's.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        names: Sequence[str],
+        listener: Listener,
+        *,
+        speed: float = 1.0,
+        settings: Settings | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        self.settings = settings or Settings()
+        self._arm, self._names, self._listener, self._speed = arm, tuple(names), listener, speed
+        self._clock = clock or RealClock()
+        self._changed = threading.Condition()
+        self._running: _Running | None = None
+        self._ends: list[End] = []
+        self._number = 0
+        self._is_moving = False
+        self._closing = False
+        self._thread = threading.Thread(target=self._run, name="heptarm-execution")
+        self._thread.start()
+
+    @property
+    def busy(self) -> bool:
+        """Whether a goal is under way or the arm brakes after one."""
+        return self._running is not None or self._is_moving
+
+    @property
+    def goal(self) -> int:
+        """Number of the goal under way; 0: none."""
+        running = self._running
+        return 0 if running is None else running.number
+
+    @property
+    def now(self) -> float:
+        """The time on the clock that goals start by [s]."""
+        return self._clock.nanos() * 1e-9
+
+    def accept(self, goal: Goal) -> int:
+        """Take a goal; one under way ends as preempted, and its motion brakes.
+
+        Returns:
+            The goal's number.
+
+        Raises:
+            GoalRefused: it makes no sense, or a spline cannot do it.
+        """
+        try:
+            here = Sample.at_rest(self._arm.state.q_cmd)
+        except HeptarmError as error:
+            raise GoalRefused(f"nothing is known of the arm: {error}") from error
+        trajectory = read(
+            goal, self._names, self._arm.robot, here=here, now=self.now, rules=self.settings.rules
+        )
+        if np.abs(trajectory.end.dq).max() > _STILL:
+            raise GoalRefused("a spline ends at rest", hint="give the last point no velocity")
+        tolerances, warning = self.settings.tolerances.of(goal, self._names)
+        with self._changed:
+            if self._closing:
+                raise GoalRefused("the execution is closed")
+            self._finish(Outcome.PREEMPTED, Code.INVALID_GOAL, "another goal took the place of this one")
+            self._number += 1
+            self._running = _Running(self._number, goal, trajectory, tolerances)
+            if warning:
+                _log.warning("goal %d: all default tolerances count: %s", self._number, warning)
+            self._changed.notify_all()
+            return self._number
+
+    def cancel(self, number: int) -> bool:
+        """End a goal early; the arm brakes. False: it is not under way."""
+        with self._changed:
+            if self.goal != number:
+                return False
+            self._finish(Outcome.CANCELED, Code.SUCCESSFUL, "cancelled; the arm brakes")
+            self._changed.notify_all()
+            return True
+
+    def abort(self, text: str) -> None:
+        """End the goal under way, if there is one, because of something outside; the arm brakes."""
+        with self._changed:
+            self._finish(Outcome.ABORTED, Code.INVALID_GOAL, text)
+            self._changed.notify_all()
+
+    def drop(self, text: str) -> None:
+        """Likewise; a stop of the safety controller holds the arm already."""
+        self.abort(text)
+
+    def wait_idle(self, timeout: float) -> bool:
+        """Wait until nothing runs; False: not within `timeout` [s]."""
+        with self._changed:
+            return self._changed.wait_for(lambda: not self.busy, timeout)
+
+    def close(self) -> None:
+        """End the goal under way and leave the arm at rest."""
+        with self._changed:
+            self._closing = True
+        self.abort("the driver closes")
+        self._thread.join(_PATIENCE)
+
+    def _finish(self, outcome: Outcome, code: Code, text: str) -> None:
+        """Under the lock: the goal under way ends; its motion is cancelled by the thread."""
+        if self._running is not None:
+            self._ends.append(End(self._running.number, outcome, code, text))
+            self._running = None
+
+    # ------------------------------------------------------------------------------------ thread
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closing or self._running is not None or self._ends)
+                run = self._running
+                self._is_moving = run is not None
+            self._tell()
+            if run is None:
+                if self._closing:
+                    return
+                continue
+            try:
+                self._carry_out(run)
+            except HeptarmError as error:
+                self._fail(run, str(error))
+            except Exception as error:
+                _log.exception("executing a goal")
+                self._fail(run, f"{type(error).__name__}: {error}")
+            self._leave(run)
+
+    def _carry_out(self, run: _Running) -> None:
+        if run.goal.start is not None and not self._waited(run, run.goal.start):
+            return
+        motion = as_spline(run.trajectory, self._arm.robot, self._speed)
+        run.handle = handle = self._arm.start(motion, speed=1.0, when="queue")
+        run.begin = self.now
+        while self._running is run and not handle.done:
+            self._look(run, measured(self._arm.state))
+            with self._changed:
+                self._changed.wait_for(lambda: self._running is not run, _LOOK)
+            self._tell()
+        if self._running is run:
+            result = handle.wait(timeout=_PATIENCE)
+            if result.cause is not Cause.FINISHED:
+                self._fail(run, f"the motion ended: {result.cause.value} {result.text}")
+            else:
+                self._arrive(run)
+
+    def _waited(self, run: _Running, start: float) -> bool:
+        """Wait for a goal's start; False: it has ended before."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._running is not run, max(0.0, start - self.now))
+            return self._running is run
+
+    def _look(self, run: _Running, state: Measured) -> None:
+        """Where the arm is on its way, and whether it is too far off."""
+        times = np.linspace(run.tau, run.tau + _WINDOW, _GRID)
+        far = [float(np.abs(run.trajectory.sample(t).q - state.q).max()) for t in times]
+        run.tau = min(float(times[int(np.argmin(far))]), run.trajectory.duration)
+        desired = run.trajectory.sample(run.tau)
+        actual = Sample(state.q, state.dq, np.zeros(7))
+        elapsed = self.now - run.begin
+        with self._changed:
+            if self._running is not run:
+                return
+            broken = run.tolerances.path.worst(self._names, desired, state.q, np.full(7, np.nan))
+            patience = run.tolerances.goal_time
+            if broken:
+                self._finish(Outcome.ABORTED, Code.PATH_TOLERANCE_VIOLATED, f"off the path: {broken}")
+            elif 0.0 < patience < elapsed - run.trajectory.duration:
+                late = elapsed - run.trajectory.duration
+                text = f"not there {late:.3f} s after the end: a spline takes what the cabinet's limits take"
+                self._finish(Outcome.ABORTED, Code.GOAL_TOLERANCE_VIOLATED, text)
+        index = run.trajectory.index(run.tau) - (len(run.trajectory.times) - len(run.goal.points))
+        self._listener.on_feedback(Feedback(run.number, desired, actual, run.tau, elapsed, max(index, 0)))
+
+    def _arrive(self, run: _Running) -> None:
+        """The motion has come to its end: is the arm there?"""
+        deadline = self.now + (run.tolerances.goal_time or _PATIENCE)
+        while True:
+            state = measured(self._arm.state)
+            broken = run.tolerances.goal.worst(self._names, run.trajectory.end, state.q, state.dq)
+            if not broken or self.now > deadline or self._running is not run:
+                break
+            self._clock.sleep(_LOOK)
+        with self._changed:
+            if self._running is not run:
+                return
+            if broken:
+                self._finish(Outcome.ABORTED, Code.GOAL_TOLERANCE_VIOLATED, f"not there: {broken}")
+            else:
+                self._finish(Outcome.SUCCEEDED, Code.SUCCESSFUL, "the arm has arrived")
+
+    def _fail(self, run: _Running, text: str) -> None:
+        with self._changed:
+            if self._running is run:
+                self._finish(Outcome.ABORTED, Code.INVALID_GOAL, text)
+
+    def _leave(self, run: _Running) -> None:
+        """Let the arm come to rest, then tell how the goal ended."""
+        handle = run.handle
+        if handle is not None and not handle.done:
+            try:
+                handle.cancel()
+                handle.wait(timeout=_PATIENCE)
+            except HeptarmError as error:
+                _log.info("ending the motion of goal %d: %s", run.number, error)
+        self._tell()
+        with self._changed:
+            self._is_moving = False
+            self._changed.notify_all()
+
+    def _tell(self) -> None:
+        with self._changed:
+            ends, self._ends = self._ends, []
+        for end in ends:
+            self._listener.on_end(end)
