@@ -226,6 +226,10 @@ def test_tools_and_places_of_the_project(tmp_path: Path) -> None:
             arm.move(lin_rel(x=-0.02, frame="/Table/Corner"))
             fresh(arm)
             assert arm.pose(reference="/Table/Corner").x - before.x == pytest.approx(-0.02, abs=2e-4)
+            arm.move(hold(0.2), mode=CartesianImpedance(frame="/Table/Corner"))
+            arm.move(hold(0.2), mode=CartesianImpedance(frame="Tip"))  # the moved frame's own
+            with pytest.raises(CommandRejected, match="not of flange"):
+                arm.move(hold(0.2), mode=CartesianImpedance(frame="flange"))
         with pytest.raises(CommandRejected, match="Gripper"):
             arm.attach_tool("Cube")  # a workpiece's template
         with pytest.raises(CommandRejected, match="template"):
