@@ -9,7 +9,7 @@ import signal
 import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -22,11 +22,22 @@ from heptarm.modes import CartesianImpedance, JointImpedance, SineImpedance
 from heptarm.rt import layout as at
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
+from tests.conftest import RunningCabinet
 
 A7 = np.array([0, 0, 0, 0, 0, 0, 1.0])
 SOFT = CartesianImpedance(stiffness=(1500, 1500, 1500, 150, 150, 150))
 #: Long enough for a machine that does other things as well.
 LONG = 10
+
+
+@pytest.fixture
+def arm(cabinet: RunningCabinet) -> Iterator[ha.Arm]:
+    """At its home, with a watchdog that a busy machine does not trip."""
+    with ha.connect(cabinet.target, watchdog=5.0) as arm:
+        home = ha.deg(0, 30, 0, -90, 0, 60, 0)
+        if abs(arm.state.q - home).max() > 1e-3:
+            arm.move(ha.ptp(home))
+        yield arm
 
 
 def patient(test: Callable[..., None]) -> Callable[..., None]:
@@ -86,8 +97,7 @@ def test_a_law_moves_the_arm_and_its_parameters_change_while_it_runs(arm: ha.Arm
 
 @patient
 def test_the_simple_form_commands_in_the_loop_and_the_next_session_needs_nothing(arm: ha.Arm) -> None:
-    ports = set()
-    for turn in (0.05, -0.05, 0.0):
+    for turn in (0.05, 0.0):
         with arm.fri("position", period_ms=LONG) as rt:
             goal = rt.start.q_ipo + (turn - rt.start.q_ipo[6]) * A7
             last = -1
@@ -97,9 +107,7 @@ def test_the_simple_form_commands_in_the_loop_and_the_next_session_needs_nothing
                 rt.command(q=goal)
                 if np.abs(s.q - goal).max() < 2e-3:
                     break
-            ports.add(rt.client.port)
         assert rt.next() is None  # and nothing more comes
-    assert len(ports) == 1
     assert rt.limited and "A7" in rt.report  # a jump was asked for; the guard made a motion of it
 
 
@@ -115,8 +123,6 @@ def test_the_guard_makes_a_step_a_motion_and_names_what_it_limited(arm: ha.Arm) 
             fastest = max(fastest, abs(arm.state.dq[6]))
             if abs(s.q[6] - goal[6]) < 2e-3:
                 break
-        rt.command(q=rt.start.q_ipo)
-        rt.wait(1.5)
     assert 0.1 < fastest < 1.1 * 0.2 * arm.robot.dq_max[6]
     assert any("A7: velocity limited" in line for line in rt.limited)
 
@@ -125,7 +131,7 @@ def test_the_guard_makes_a_step_a_motion_and_names_what_it_limited(arm: ha.Arm) 
 def test_torques_bend_the_springs_of_joint_impedance(arm: ha.Arm) -> None:
     with arm.fri("torque", period_ms=5, mode=JointImpedance(100.0), law=push, params={"torque": 2.0}) as rt:
         start = rt.start.q.copy()
-        assert rt.wait(3.0)
+        assert rt.wait(2.0)
         bent = rt.state.q - start
     assert 0.015 < bent[6] < 0.025 and np.abs(bent[:6]).max() < 0.01
 
@@ -135,7 +141,7 @@ def test_a_wrench_bends_those_of_cartesian_impedance(arm: ha.Arm) -> None:
     before = arm.state.pose.xyz
     params = {"force": [0.0, 0.0, 15.0]}
     with arm.using(SOFT), arm.fri("wrench", period_ms=LONG, law=press, params=params) as rt:
-        assert rt.wait(3.0)
+        assert rt.wait(2.0)
         moved = arm.state.pose.xyz - before
     assert 0.007 < moved[2] < 0.013 and np.abs(moved[:2]).max() < 0.003
 
@@ -251,7 +257,7 @@ def test_when_nothing_arrives_the_error_says_where_to_look(arm: ha.Arm, kind: st
         arm.fri(kind, period_ms=LONG, host="192.0.2.7", timeout=0.3),  # type: ignore[arg-type]
     ):
         pass
-    with arm.fri("monitor", period_ms=LONG) as rt:  # and nothing has to be started anew
+    with arm.fri("monitor", period_ms=2) as rt:  # and nothing has to be started anew
         assert rt.next() is not None
 
 
@@ -328,11 +334,11 @@ def test_an_error_of_the_block_is_not_hidden_and_the_arm_rests(arm: ha.Arm) -> N
 
 
 def test_an_emergency_stop_ends_the_overlay_in_words_and_the_next_session_works() -> None:
-    with ha.connect("sim://iiwa14") as arm:
+    with ha.connect("sim://iiwa14", watchdog=5.0) as arm:
         arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=0.6)
         for _ in range(2):
             with (
-                arm.fri("monitor", period_ms=LONG) as watching,
+                arm.fri("monitor", period_ms=2) as watching,
                 pytest.raises(ha.MotionAborted, match="emergency stop|safety stop 1") as error,
                 arm.fri("position", period_ms=LONG, law=swing, params={"amplitude": 0.1}) as rt,
             ):
