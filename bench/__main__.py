@@ -22,6 +22,7 @@ from bench import (  # noqa: F401  they register themselves
     life,
     lost_client,
     motion,
+    paths,
     rl,
     rl_deploy,
     ros2,
