@@ -116,3 +116,19 @@ def test_each_node_knows_which_part_it_is() -> None:
     message, parts = condition_message(first ^ second, SIGNALS)
     assert len(message.nodes) == len(parts) == 8
     assert set(map(str, parts)) == {str(first ^ second)}
+
+
+def test_blended_motions_stay_blended_and_end_together(arm: ha.Arm) -> None:
+    start = arm.wait_for_rest().pose
+    corners = [(0.0, 0.1, 0.0), (-0.1, 0.1, 0.0), (-0.1, 0.0, 0.0), (0.0, 0.0, -0.4)]
+    lines = [
+        ha.lin(ha.Pose.of(start.xyz + corner, start.quat), blend_m=0.03, speed_mps=0.1) for corner in corners
+    ]
+    result = arm.move(lines, until=TOUCH)
+    assert result.cause is ha.Cause.CONDITION and result.item == 3 and result.stopped_by == TOUCH
+    assert result.fired_at is not None
+    assert result.fired_at.pose.xyz[2] < TABLE + 0.02
+    again = arm.move(
+        [ha.lin_rel(z=0.1, frame="base", blend_m=0.02), ha.lin_rel(y=0.05, frame="base")], until=force > 900
+    )
+    assert again.arrived and again.item == 1

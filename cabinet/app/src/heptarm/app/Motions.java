@@ -14,7 +14,6 @@ import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.Frame;
 import com.kuka.roboticsAPI.motionModel.CIRC;
-import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.LIN;
 import com.kuka.roboticsAPI.motionModel.MotionBatch;
 import com.kuka.roboticsAPI.motionModel.OrientationReferenceSystem;
@@ -143,7 +142,7 @@ final class Motions {
     }
 
     /** A batch of them. */
-    IMotion batch(RobotMotion<?>[] motions, Mode mode) throws Refusal {
+    RobotMotion<?> batch(RobotMotion<?>[] motions, Mode mode) throws Refusal {
         MotionBatch batch = new MotionBatch(motions);
         batch.setMode(modes.of(mode));
         return batch;

@@ -248,7 +248,9 @@ final class SunriseRobot implements Robot, IErrorHandler {
         RobotMotion<?>[] members = motions.motions(batch);
         SunriseBatch job = new SunriseBatch(members, listeners);
         try {
-            adopt(tools.moved(batch[0].frame).moveAsync(motions.batch(members, mode), job), job);
+            RobotMotion<?> whole = motions.batch(members, mode);
+            job.guard(whole, BreakConditions.of(batch[0].until, tools.moved(batch[0].frame), tools, panel.signals));
+            adopt(tools.moved(batch[0].frame).moveAsync(whole, job), job);
         } catch (RuntimeException e) {
             log.warn("a batch was refused by the cabinet: " + e);
             job.fail(e.getMessage());

@@ -4,12 +4,14 @@ import java.util.Arrays;
 
 import heptarm.wire.Blending;
 import heptarm.wire.Circ;
+import heptarm.wire.Condition;
 import heptarm.wire.Encoder;
 import heptarm.wire.Item;
 import heptarm.wire.Lin;
 import heptarm.wire.LinRel;
 import heptarm.wire.Mode;
 import heptarm.wire.Motion;
+import heptarm.wire.PathReached;
 import heptarm.wire.PositionMode;
 import heptarm.wire.Ptp;
 import heptarm.wire.PtpPose;
@@ -50,11 +52,19 @@ final class Batches {
         return motion instanceof Circ ? ((Circ) motion).blending : null;
     }
 
-    /** A motion that a condition may end, that moves another frame or in another control mode begins and ends at rest. */
+    /** A motion that another condition may end, that moves another frame or in another control mode begins and ends at rest. */
     private static boolean canBlend(Item one, Item next) {
-        return of(next.motion) != null && one.frame.equals(next.frame) && one.until.nodes.length == 0
-                && next.until.nodes.length == 0 && one.triggers.length == 0 && next.triggers.length == 0
+        return of(next.motion) != null && one.frame.equals(next.frame) && canEndTogether(one.until, next.until) && one.triggers.length == 0 && next.triggers.length == 0
                 && Arrays.equals(octets(one.mode), octets(next.mode));
+    }
+
+    /** A point on the path is one of a single motion. */
+    private static boolean canEndTogether(Condition one, Condition next) {
+        Encoder first = new Encoder();
+        Encoder second = new Encoder();
+        one.write(first);
+        next.write(second);
+        return Arrays.equals(first.toBytes(), second.toBytes()) && !Conditions.contains(one, PathReached.class);
     }
 
     private static byte[] octets(Mode mode) {

@@ -299,6 +299,9 @@ final class Executor {
             if (together > 1) {
                 Batches.start(server, program, i, together);
                 i += together - 1;
+                if (program.run.items[i].until.nodes.length > 0) {
+                    watch(program, i);
+                }
                 continue;
             }
             try {
