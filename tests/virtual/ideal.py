@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from heptarm.model.kinematics import forward
 from heptarm.values.arrays import Array
+from heptarm.values.pose import Pose
+from heptarm.values.robot import robot
 from heptarm.virtual.order import Order
 from heptarm.virtual.plant import FAST_JERK, Plant
 from heptarm.virtual.safety import Demand
@@ -13,10 +16,34 @@ from tests.virtual.driving import READY
 TICK = 1e-3
 LINE = (0.05, 0.25, 0.05, 0.0, 0.0, 0.0, 1.0)
 BASE = (0.0, 0.0, 0.0, 1.0)
+_HERE = Pose.from_matrix(forward(robot("iiwa14"), READY))
+
+
+def _at(x: float, y: float, z: float) -> tuple[float, ...]:
+    return tuple(Pose(_HERE.xyz + (x, y, z), _HERE.quat).array.tolist())
+
+
 #: Every kind of motion, each about a second long at full speed.
 KINDS = {
     "ptp": Order(1, "ptp", joints=(1.2, 0.2, 0.3, -1.0, 0.4, 0.5, -0.8)),
     "lin": Order(1, "lin_rel", offset=LINE, reference=BASE),
+    "circ": Order(1, "circ", via=_at(0.08, 0.12, 0.0), pose=_at(0.0, 0.24, 0.05)),
+    "batch": Order(
+        1,
+        "batch",
+        parts=tuple(
+            Order(1, "lin", pose=_at(*corner), blending=(0.0, 0.03, 0.0))
+            for corner in ((0.0, 0.15, 0.0), (0.1, 0.15, 0.0), (0.1, 0.0, 0.05))
+        ),
+    ),
+    "spline": Order(
+        1,
+        "spline",
+        parts=tuple(
+            Order(1, "spl", pose=_at(*knot))
+            for knot in ((0.05, 0.08, 0.0), (0.0, 0.16, 0.05), (0.08, 0.25, 0.0))
+        ),
+    ),
     "hold": Order(1, "hold"),
     "servo": Order(1, "servo"),
     "direct": Order(1, "direct"),
@@ -71,8 +98,11 @@ class Ideal(Plant):
             return _braking(fastest, steepest, hardest, jerk)
         if run.profile is None:
             return 0.0
-        _, speed, acceleration = run.profile.at(run.time)
-        limits = run.plan.braking
+        place, speed, acceleration = run.profile.at(run.time)
+        limits, halts = run.plan.braking, run.plan.halts
+        if halts is not None:
+            leg = next(i for i, mark in enumerate(halts.marks) if place < mark or mark == halts.marks[-1])
+            limits = halts.courses[leg].brakes(place, speed)
         return _braking(speed, abs(acceleration), limits.acceleration, limits.jerk)
 
 

@@ -101,7 +101,7 @@ def test_a_stop_brakes_closes_the_brakes_and_the_motion_goes_on_afterwards(deman
 
 
 @pytest.mark.parametrize("at", [60, 250, 500, 800])
-@pytest.mark.parametrize("kind", ["ptp", "lin"])
+@pytest.mark.parametrize("kind", ["ptp", "lin", "batch"])
 def test_a_stop_keeps_the_path(kind: str, at: int) -> None:
     way = np.array([plant_q for plant_q in _free_run(kind)])
     plant = begin(kind)
@@ -222,13 +222,13 @@ def test_t1_keeps_the_moved_frame_slow(kind: str) -> None:
         plant.safety.enable()
         plant.resume()
         speeds = []
-        for _ in range(4000):
+        for _ in range(6000):
             plant.tick()
             speeds.append(np.linalg.norm(jacobian(plant.robot, plant.snapshot.q_cmd)[:3] @ plant.speed))
             if plant.idle:
                 break
         fastest[mode], last[mode] = max(speeds), plant.snapshot.q_cmd
-    assert fastest[Mode.T1] <= REDUCED_SPEED < fastest[Mode.T2]
+    assert fastest[Mode.T1] <= 0.25 < fastest[Mode.T2]
     assert fastest[Mode.T1] > 0.8 * REDUCED_SPEED
     assert np.abs(last[Mode.T1] - last[Mode.T2]).max() < 1e-6
 
