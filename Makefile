@@ -2,7 +2,7 @@
 PY := .venv/bin/python
 STAMPS := build/stamps
 
-.PHONY: setup cabinet demo test test-ros2 test-ros1 lint check bench docs wheel clean
+.PHONY: setup cabinet demo test test-ros2 test-ros1 conformance lint check bench docs wheel clean
 
 setup: $(STAMPS)/venv cabinet  ## virtual environment, package, compiled cabinet
 
@@ -56,6 +56,11 @@ test-ros2: setup $(STAMPS)/ros2  ## the ROS 2 node with real rclpy, where there 
 test-ros1: setup $(STAMPS)/ros1  ## the ROS 1 node with a real roscore, where there are packages of it
 	@if [ -x build/ros1/bin/python ]; then build/ros1/bin/python -m pytest tests/ros1; \
 	else echo "no ROS 1 here: the tests of its node are skipped"; fi
+
+conformance: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## every case of conformance against both nodes, with each way of execution
+	@for way in servo fri; do for ros in ros2 ros1; do \
+	if [ -x build/$$ros/bin/python ]; then echo "$$ros, $$way:"; \
+	CONFORMANCE=all EXECUTION=$$way build/$$ros/bin/python -m pytest -q tests/$$ros/test_conformance.py || exit 1; fi; done; done
 
 bench: setup  ## figures as JSON lines; ONLY=name runs one, LIST=1 names them
 	@$(PY) -m bench $(if $(ONLY),--only $(ONLY)) $(if $(LIST),--list)

@@ -91,7 +91,7 @@ def node(stage: Stage) -> Iterator[NodeProcess]:
     """The node of ROS 2 for most tests, active."""
     from tests.ros2.peer import NodeProcess
 
-    running = NodeProcess(stage.target, **PATIENT)
+    running = NodeProcess(stage.target, execution=os.environ.get("EXECUTION", "servo"), **PATIENT)
     yield running
     running.finish()
 

@@ -1,0 +1,68 @@
+#!/usr/bin/env python3
+"""Joint and pose commands by topics, and the states that tell when they are done."""
+
+import math
+
+import rclpy
+from geometry_msgs.msg import PoseStamped
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+
+class Mover(Node):
+    """The newest states, and commands that wait."""
+
+    def __init__(self) -> None:
+        super().__init__("move")
+        self.joints = JointState()
+        self.pose = PoseStamped()
+        self.create_subscription(JointState, "/joint_states", self.on_joints, 1)
+        self.create_subscription(PoseStamped, "/heptarm/pose", self.on_pose, 1)
+        self.to_joints = self.create_publisher(JointState, "/heptarm/command/joint", 1)
+        self.to_pose = self.create_publisher(PoseStamped, "/heptarm/command/lin", 1)
+        self.until(lambda: self.to_joints.get_subscription_count() and self.to_pose.get_subscription_count())
+        self.until(lambda: self.joints.name and self.pose.header.frame_id)
+
+    def on_joints(self, message: JointState) -> None:
+        self.joints = message
+
+    def on_pose(self, message: PoseStamped) -> None:
+        self.pose = message
+
+    def until(self, condition) -> None:
+        while not condition():
+            rclpy.spin_once(self, timeout_sec=0.1)
+
+    def move_joints(self, **target: float) -> None:
+        """To some joints' positions [rad]; the others stay."""
+        self.to_joints.publish(JointState(name=list(target), position=list(target.values())))
+        self.until(lambda: all(abs(self.position(name) - value) < 2e-3 for name, value in target.items()))
+
+    def position(self, name: str) -> float:
+        return self.joints.position[self.joints.name.index(name)]
+
+    def move_straight(self, dx: float = 0.0, dy: float = 0.0, dz: float = 0.0) -> None:
+        """The flange on a line [m]."""
+        target = self.pose
+        place = target.pose.position
+        place.x, place.y, place.z = place.x + dx, place.y + dy, place.z + dz
+        target.header.stamp = self.get_clock().now().to_msg()
+        self.to_pose.publish(target)
+
+        def there() -> bool:
+            now = self.pose.pose.position
+            return math.dist((now.x, now.y, now.z), (place.x, place.y, place.z)) < 1e-3
+
+        self.until(there)
+
+
+rclpy.init()
+arm = Mover()
+arm.move_joints(A1=0.0, A2=0.5, A3=0.0, A4=-1.5, A5=0.0, A6=1.1, A7=0.0)
+print("joints:", [round(value, 3) for value in arm.joints.position])
+for dx, dz in ((0.05, 0.0), (0.0, -0.05), (-0.05, 0.0), (0.0, 0.05)):
+    arm.move_straight(dx=dx, dz=dz)
+    place = arm.pose.pose.position
+    print(f"flange at {place.x:.3f} {place.y:.3f} {place.z:.3f} m")
+arm.destroy_node()
+rclpy.shutdown()

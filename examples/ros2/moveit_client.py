@@ -1,0 +1,117 @@
+#!/usr/bin/env python3
+"""What MoveIt does with a plan, without MoveIt: checks the start, sends, watches the time, cancels, looks again.
+
+A planner's place is taken by a straight way in joint space. Everything else is what MoveIt's execution manager and its
+simple controller manager do with a controller of the type FollowJointTrajectory.
+"""
+
+import sys
+
+import rclpy
+from action_msgs.msg import GoalStatus
+from control_msgs.action import FollowJointTrajectory
+from rclpy.action import ActionClient
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+#: MoveIt's parameters and their defaults.
+ALLOWED_START_TOLERANCE = 0.01  # rad
+ALLOWED_DURATION_SCALING, ALLOWED_DURATION_MARGIN = 1.1, 0.5  # 1, s
+if len(sys.argv) > 1:  # more for a busy machine
+    ALLOWED_DURATION_MARGIN = float(sys.argv[1])
+STATUS = {
+    GoalStatus.STATUS_SUCCEEDED: "SUCCEEDED",
+    GoalStatus.STATUS_ABORTED: "ABORTED",
+    GoalStatus.STATUS_CANCELED: "PREEMPTED",
+}
+
+
+class Execution(Node):
+    """Executes trajectories as MoveIt does."""
+
+    def __init__(self, controller: str, topic: str) -> None:
+        super().__init__("moveit_client")
+        self.state = JointState()
+        self.create_subscription(JointState, topic, self.on_state, 1)
+        self.client = ActionClient(self, FollowJointTrajectory, controller)
+        while not self.client.server_is_ready():
+            rclpy.spin_once(self, timeout_sec=0.1)
+
+    def on_state(self, message: JointState) -> None:
+        self.state = message
+
+    def current(self) -> JointState:
+        """A state that was measured after now."""
+        now = self.get_clock().now()
+        while Time.from_msg(self.state.header.stamp) <= now:
+            rclpy.spin_once(self, timeout_sec=0.1)
+        return self.state
+
+    def execute(self, trajectory: JointTrajectory, *, stop_after: float = 0.0) -> str:
+        """Returns MoveIt's word for the end; `stop_after` [s] is the user's stop button."""
+        state = self.current()
+        place = dict(zip(state.name, state.position))
+        for name, value in zip(trajectory.joint_names, trajectory.points[0].positions):
+            if abs(place[name] - value) > ALLOWED_START_TOLERANCE:
+                raise SystemExit(f"{name} is not where the plan begins")
+        sent = self.client.send_goal_async(FollowJointTrajectory.Goal(trajectory=trajectory))
+        rclpy.spin_until_future_complete(self, sent)
+        handle = sent.result()
+        if not handle.accepted:
+            return "ABORTED"
+        planned = Duration.from_msg(trajectory.points[-1].time_from_start).nanoseconds * 1e-9
+        allowed = planned * ALLOWED_DURATION_SCALING + ALLOWED_DURATION_MARGIN
+        ended = handle.get_result_async()
+        rclpy.spin_until_future_complete(self, ended, timeout_sec=stop_after or allowed)
+        if ended.done():
+            return STATUS[ended.result().status]
+        cancelled = handle.cancel_goal_async()
+        rclpy.spin_until_future_complete(self, cancelled)
+        return "PREEMPTED" if stop_after else "TIMED_OUT"
+
+    def wait_for_rest(self) -> JointState:
+        """Three states in a row that are alike."""
+        before, alike = self.current(), 0
+        while alike < 3:
+            now = self.current()
+            still = max(abs(a - b) for a, b in zip(now.position, before.position)) < 1e-4
+            before, alike = now, alike + 1 if still else 0
+        return before
+
+
+def plan(start: JointState, seconds: float, **target: float) -> JointTrajectory:
+    """From where the arm is, in 20 pieces, at rest at both ends, with all that a planner gives."""
+    goal = [target.get(name, value) for name, value in zip(start.name, start.position)]
+    way = JointTrajectory(joint_names=list(start.name))
+    ways = [b - a for a, b in zip(start.position, goal)]
+    for number in range(21):
+        x = number / 20
+        share = x**3 * (10 - 15 * x + 6 * x**2)
+        speed = 30 * x**2 * (1 - x) ** 2 / seconds
+        change = 60 * x * (1 - x) * (1 - 2 * x) / seconds**2
+        way.points.append(
+            JointTrajectoryPoint(
+                positions=[a + share * d for a, d in zip(start.position, ways)],
+                velocities=[speed * d for d in ways],
+                accelerations=[change * d for d in ways],
+                time_from_start=Duration(seconds=x * seconds).to_msg(),
+            )
+        )
+    return way
+
+
+rclpy.init()
+execution = Execution("/heptarm/follow_joint_trajectory", "/joint_states")
+here = execution.wait_for_rest()
+begin = dict(zip(here.name, here.position))
+
+print("plan and execute:", execution.execute(plan(here, 2.0, A2=begin["A2"] + 0.3, A7=begin["A7"] - 0.4)))
+here = execution.wait_for_rest()
+print("stop in mid-air: ", execution.execute(plan(here, 3.0, A2=begin["A2"], A7=begin["A7"]), stop_after=1.0))
+here = execution.wait_for_rest()
+print("and home again:  ", execution.execute(plan(here, 2.0, **begin)))
+execution.destroy_node()
+rclpy.shutdown()

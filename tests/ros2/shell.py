@@ -1,0 +1,128 @@
+"""A stand-in for the `ros2` command, which is in no wheel: its words, so that documented commands run as written."""
+
+from __future__ import annotations
+
+import importlib
+import shlex
+from typing import Any
+
+import yaml
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import GetParameters, SetParameters
+from rclpy.action import ActionClient
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+from tests.ros2.peer import Ros, until
+
+
+def find(name: str) -> type:
+    """The type of "package/kind/Name"."""
+    package, kind, last = name.split("/")
+    return getattr(importlib.import_module(f"{package}.{kind}"), last)  # type: ignore[no-any-return]
+
+
+def fill(message: Any, values: dict[str, Any]) -> Any:
+    """A message with the values of a YAML mapping."""
+    for name, value in values.items():
+        now = getattr(message, name)
+        if isinstance(value, dict):
+            fill(now, value)
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            kind = message.get_fields_and_field_types()[name].removeprefix("sequence<").split(">")[0]
+            package, last = kind.split("/")
+            setattr(message, name, [fill(find(f"{package}/msg/{last}")(), one) for one in value])
+        else:
+            setattr(
+                message,
+                name,
+                [float(v) if isinstance(v, (int, float)) else v for v in value]
+                if isinstance(value, list)
+                else value,
+            )
+    return message
+
+
+def topic(ros: Ros, verb: str, name: str, *rest: str) -> object:
+    if verb == "pub":
+        publisher = ros.node.create_publisher(find(rest[0]), name, 1)
+        until(publisher.get_subscription_count, f"nobody listens to {name}")
+        publisher.publish(fill(find(rest[0])(), yaml.safe_load(rest[1]) if len(rest) > 1 else {}))
+        return "published"
+    known: list[str] = until(
+        lambda: dict(ros.node.get_topic_names_and_types()).get(name), f"there is no {name}"
+    )
+    latched = any(
+        one.qos_profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
+        for one in ros.node.get_publishers_info_by_topic(name)
+    )
+    found: list[Any] = []
+    durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
+    ros.node.create_subscription(
+        find(known[0]), name, found.append, QoSProfile(depth=1, durability=durability)
+    )
+    until(lambda: found, f"nothing comes on {name}")
+    return found[0]
+
+
+def service(ros: Ros, verb: str, name: str, kind: str, values: str = "{}") -> object:
+    assert verb == "call"
+    answer = ros.call(find(kind), name, fill(find(kind).Request(), yaml.safe_load(values)))  # type: ignore[attr-defined]
+    if not answer.success:
+        raise AssertionError(answer.message)
+    return answer
+
+
+def action(ros: Ros, verb: str, name: str, kind: str, values: str) -> object:
+    assert verb == "send_goal"
+    client = ActionClient(ros.node, find(kind), name)
+    until(client.server_is_ready, f"there is no action {name}")
+    goal = fill(find(kind).Goal(), yaml.safe_load(values))  # type: ignore[attr-defined]
+    handle = ros.wait(client.send_goal_async(goal), "no answer")
+    if not handle.accepted:
+        raise AssertionError("rejected")
+    return ros.wait(handle.get_result_async(), "it does not end").result
+
+
+def param(ros: Ros, verb: str, node: str, name: str, value: str = "") -> object:
+    if verb == "get":
+        request = GetParameters.Request(names=[name])
+        return ros.call(GetParameters, f"{node}/get_parameters", request).values[0]
+    given = yaml.safe_load(value)
+    kinds = {
+        bool: (ParameterType.PARAMETER_BOOL, "bool_value"),
+        float: (ParameterType.PARAMETER_DOUBLE, "double_value"),
+        str: (ParameterType.PARAMETER_STRING, "string_value"),
+    }
+    number, field = kinds[type(given)]
+    parameter = Parameter(name=name, value=ParameterValue(type=number, **{field: given}))
+    answer = ros.call(SetParameters, f"{node}/set_parameters", SetParameters.Request(parameters=[parameter]))
+    if not answer.results[0].successful:
+        raise AssertionError(answer.results[0].reason)
+    return "Set parameter successful"
+
+
+def lifecycle(ros: Ros, verb: str, node: str, name: str) -> object:
+    assert verb == "set"
+    number = getattr(Transition, f"TRANSITION_{name.upper()}")
+    request = ChangeState.Request(transition=Transition(id=number))
+    if not ros.call(ChangeState, f"{node}/change_state", request).success:
+        raise AssertionError("refused")
+    return "Transitioning successful"
+
+
+VERBS = {"topic": topic, "service": service, "action": action, "param": param, "lifecycle": lifecycle}
+
+
+def run(ros: Ros, text: str) -> list[str]:
+    """Run the `ros2` commands of a script, which may go on over lines inside quotes; other lines are left out."""
+    said, command = [], ""
+    for line in text.splitlines():
+        if command or line.startswith("ros2 "):
+            command += line + "\n"
+            if command.count('"') % 2 == 0:
+                words = [word for word in shlex.split(command) if word != "--once"]
+                said.append(str(VERBS[words[1]](ros, *words[2:])))
+                command = ""
+    return said
