@@ -58,7 +58,7 @@ test-ros1: setup $(STAMPS)/ros1  ## the ROS 1 node with a real roscore, where th
 	else echo "no ROS 1 here: the tests of its node are skipped"; fi
 
 conformance: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## every case of conformance against both nodes, with each way of execution
-	@for way in servo fri; do for ros in ros2 ros1; do \
+	@for way in servo spline fri; do for ros in ros2 ros1; do \
 	if [ -x build/$$ros/bin/python ]; then echo "$$ros, $$way:"; \
 	CONFORMANCE=all EXECUTION=$$way build/$$ros/bin/python -m pytest -q tests/$$ros/test_conformance.py || exit 1; fi; done; done
 
