@@ -29,6 +29,7 @@ from bench import (  # noqa: F401  they register themselves
     round_trip,
     servo,
     state_push,
+    stopping,
 )
 from bench.registry import BENCHMARKS
 

@@ -80,30 +80,32 @@ class Ideal(Plant):
         """Press the emergency stop."""
         self.safety.demand(Demand.EMERGENCY_STOP)
 
-    def stopping_time(self, how: str) -> float:
-        """How long a stop may take by its deceleration limit, from this tick on [s].
 
-        A stop on the path brakes with what the path's limits allow, jerk included; a servo motion with its axes'. The
-        others brake at each axis' full deceleration; on a curved path the axis that is fastest may not be the one that
-        sets the pace, so an emergency stop gets half as much again.
-        """
-        run = self._run
-        assert run is not None
-        hardest, jerk = float(self.robot.ddq_max.min()), float(self.robot.dddq_max.min())
-        fastest = float(np.abs(self.speed).max())
-        if how != "path":
-            return 1.5 * fastest / hardest + (hardest / jerk / FAST_JERK if how == "fast" else 0.0)
-        if run.follower is not None:
-            steepest = float(np.abs(self.acceleration).max())
-            return _braking(fastest, steepest, hardest, jerk)
-        if run.profile is None:
-            return 0.0
-        place, speed, acceleration = run.profile.at(run.time)
-        limits, halts = run.plan.braking, run.plan.halts
-        if halts is not None:
-            leg = next(i for i, mark in enumerate(halts.marks) if place < mark or mark == halts.marks[-1])
-            limits = halts.courses[leg].brakes(place, speed)
-        return _braking(speed, abs(acceleration), limits.acceleration, limits.jerk)
+def stopping_time(plant: Plant, how: str) -> float:
+    """How long a stop may take by its deceleration limit, from this tick on [s].
+
+    A stop on the path brakes with what the path's limits allow, jerk included; a servo motion with its axes'. The
+    others brake at each axis' full deceleration; on a curved path the axis that is fastest may not be the one that
+    sets the pace, so an emergency stop gets half as much again.
+    """
+    run = plant._run
+    assert run is not None
+    hardest, jerk = float(plant.robot.ddq_max.min()), float(plant.robot.dddq_max.min())
+    before, now, after = plant._command
+    fastest = float(np.abs(after - now).max()) / TICK
+    if how != "path":
+        return 1.5 * fastest / hardest + (hardest / jerk / FAST_JERK if how == "fast" else 0.0)
+    if run.follower is not None:
+        steepest = float(np.abs(after - 2 * now + before).max()) / TICK**2
+        return _braking(fastest, steepest, hardest, jerk)
+    if run.profile is None:
+        return 0.0
+    place, speed, acceleration = run.profile.at(run.time)
+    limits, halts = run.plan.braking, run.plan.halts
+    if halts is not None:
+        leg = next(i for i, mark in enumerate(halts.marks) if place < mark or mark == halts.marks[-1])
+        limits = halts.courses[leg].brakes(place, speed)
+    return _braking(speed, abs(acceleration), limits.acceleration, limits.jerk)
 
 
 def _braking(speed: float, acceleration: float, most: float, jerk: float) -> float:

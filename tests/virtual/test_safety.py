@@ -13,7 +13,7 @@ from heptarm.virtual.order import Order
 from heptarm.virtual.plant import REDUCED_SPEED, Plant
 from heptarm.virtual.safety import Demand, Mode, Safety
 from tests.virtual.driving import READY, Ear, ready, run
-from tests.virtual.ideal import KINDS, LINE, begin
+from tests.virtual.ideal import KINDS, LINE, begin, stopping_time
 
 STOPS = (Demand.EMERGENCY_STOP, Demand.OPERATOR_SAFETY, Demand.PROTECTIVE_STOP)
 
@@ -276,7 +276,7 @@ def test_a_stop_at_any_instant_ends_in_time(kind: str, how: str) -> None:
         plant = begin(kind, seed=instant)
         for _ in range(instant):
             plant.tick()
-        allowed = plant.stopping_time(how) + 0.02
+        allowed = stopping_time(plant, how) + 0.02
         {"path": plant.stop, "fast": plant.stop_fast, "emergency": plant.press}[how]()
         steepest = ticks = 0.0
         while plant.is_under_way:
