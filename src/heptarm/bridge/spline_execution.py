@@ -34,7 +34,7 @@ _log = logging.getLogger("heptarm.bridge")
 #: Between two looks at the arm [s].
 _LOOK = 0.02
 #: How much faster than the trajectory a spline may be between two points, for it slows down elsewhere.
-_HASTE = 1.1
+_HASTE = 1.4
 #: Slowest speed, a fraction of each axis' maximum.
 _SLOWEST = 0.01
 #: How far ahead on the trajectory the arm is looked for [s], and how finely.
