@@ -149,7 +149,8 @@ class Peer:
                         assert isinstance(event, Received)
                         self._answer(client, event)
                 now = time.monotonic()
-                if client.rate and now >= due and not client.is_mute:
+                is_open = client.session.state is SessionState.OPEN  # it may just have said goodbye
+                if client.rate and now >= due and is_open and not client.is_mute:
                     due = now + 1.0 / client.rate
                     client.say(self.state())
         except ConnectionLost:

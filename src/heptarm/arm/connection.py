@@ -269,6 +269,7 @@ class Connection:
         The handle waits for up to `limit` seconds. `until` says which part of its break condition each node is.
         """
         handle = MotionHandle(self, count, limit, until=until)
+        handle.is_stiff = isinstance(message, wire.Run) and _ends_stiffly(message.items[-1])
 
         def claim(answer: Message) -> None:
             if isinstance(answer, wire.Accepted):
@@ -469,6 +470,12 @@ class Connection:
         while self._handles:
             with contextlib.suppress(KeyError):  # it has just ended by itself
                 self._handles.popitem()[1].lose(error)
+
+
+def _ends_stiffly(item: wire.Item) -> bool:
+    """Whether the arm does not yield at the end of an item, so that it has to be where it was sent."""
+    stiff = item.mode is None or isinstance(item.mode, wire.PositionMode)
+    return stiff and not isinstance(item.motion, wire.HandGuide)
 
 
 _LEVELS = {

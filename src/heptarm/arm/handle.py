@@ -12,9 +12,12 @@ from dataclasses import replace
 from math import isnan
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from heptarm import errors
 from heptarm.arm.refusals import error_of
 from heptarm.errors import (
+    ArrivalError,
     CommandRejected,
     ConnectionLost,
     HeptarmError,
@@ -34,6 +37,8 @@ if TYPE_CHECKING:
 
 #: Ends that are results; all others are errors.
 _GOOD = (Cause.FINISHED, Cause.CANCELLED, Cause.CONDITION, Cause.REPLACED)
+#: A stiff arm that ends farther from its target than this has not arrived [rad].
+ARRIVAL = 0.02
 
 
 class MotionHandle:
@@ -53,6 +58,8 @@ class MotionHandle:
         self._id = 0
         self._item = -1
         self._begun = threading.Event()
+        #: Whether it ends in position control, so that it has to end at its target.
+        self.is_stiff = False
         self._future: Future[Result] = Future()
 
     def __repr__(self) -> str:
@@ -115,6 +122,7 @@ class MotionHandle:
 
         Raises:
             MotionAborted: it was ended under way; carries cause, state and history.
+            ArrivalError: it ended short of its target in position control; likewise.
             CommandRejected: the cabinet found while planning that it cannot be done (mostly a LimitError).
             ConnectionLost: the cabinet was lost; what became of the motion is unknown here, the cabinet stops it.
             Timeout: it has not ended; it goes on.
@@ -179,6 +187,18 @@ class MotionHandle:
         result = self._connection.result_of(message)
         if 0 <= message.fired < len(self._until):
             result = replace(result, stopped_by=self._until[message.fired], fired_at=self._fired)
+        if result.cause is Cause.FINISHED and self.is_stiff and result.residual > ARRIVAL:
+            self._end(
+                ArrivalError(
+                    f"motion {message.id} ended {np.degrees(result.residual):.1f} deg short of its target",
+                    result=result,
+                    history=self._connection.history(),
+                    value=result.residual,
+                    allowed=f"[0, {ARRIVAL}] rad",
+                    hint="something holds the arm, or the load is more than the drives can carry",
+                )
+            )
+            return
         if result.cause in _GOOD:
             if not self._future.done():
                 self._future.set_result(result)
