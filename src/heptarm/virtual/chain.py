@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import inf
 
@@ -24,6 +24,8 @@ LARGEST_STEP = 0.35
 _STENCIL = 7
 #: Of its speed, where it does not matter any more.
 _BARELY = 1e-3
+#: How much more jerk that may take than it needs.
+_SOONER = 1.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,7 +247,10 @@ class Halts:
         s, speed, acceleration = self.law.at(time)
         leg = self._leg(s)
         state = (s, speed * scale, acceleration * scale * scale + speed * rate)
-        stop = brake(state, self.courses[leg].brakes(s, state[1]))
+        limits = self.courses[leg].brakes(s, state[1])
+        if state[1] > 0.0 > state[2]:  # it brakes already: end that early enough not to turn round
+            limits = replace(limits, jerk=max(limits.jerk, _SOONER * state[2] ** 2 / (2 * state[1])))
+        stop = brake(state, limits)
         if stop.at(stop.duration)[0] <= self.marks[leg] or scale < _BARELY:
             return stop
         return Rest(self.law, time, self.law.rest(time), scale)  # it would rest sooner anyway
