@@ -16,6 +16,9 @@ SAID = (
     "an analog input is what the world makes it",
     "and its release is waited for",
     "a key is pressed and released",
+    "ASKED",
+    "a dialog is answered",
+    "a dialog has buttons",
 )
 
 
@@ -43,5 +46,12 @@ def test_signals_and_keys_of_a_sunrise_application(tmp_path: Path) -> None:
             process.stdin.flush()
             assert '"error": ""' in process.stdout.readline()
             _until(said, line)
+        _until(said, "ASKED")
+        for _ in range(200):  # the dialog comes a moment later
+            process.stdin.write("answer 1\n")
+            process.stdin.flush()
+            if '"error": ""' in process.stdout.readline():
+                break
+            time.sleep(0.05)
         assert process.wait(timeout=30) == 0
     assert said.read_text().splitlines() == [f"{one} = true" for one in SAID]

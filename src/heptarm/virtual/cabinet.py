@@ -141,6 +141,7 @@ class VirtualCabinet:
         if options.payload is not None:
             self.plant.hang(hanging(options.payload))
         pad = jpype.JClass("heptarm.doubles.Desk")
+        self.operator.answer = lambda button: bool(pad.current().pad.dialogs.press(button))
         self.operator.press = lambda bar, slot: bool(pad.current().pad.press(bar, slot))
         self.host = jpype.JClass("heptarm.doubles.Host")(options.application or jvm.APPLICATION)
 

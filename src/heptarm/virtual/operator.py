@@ -40,6 +40,7 @@ WORDS = {
     "start": "press Start: execution goes on",
     "push FX FY FZ [SECONDS]": "push the flange, base axes [N]",
     "set SIGNAL VALUE": "give a signal of the cabinet a value: a number, true or false",
+    "answer BUTTON": "press a button of the dialog that is shown, from 0",
     "press SLOT [BAR]": "press and release a user key, 0 to 3; of the bar for clients, or another",
 }
 _ALSO = {
@@ -59,6 +60,7 @@ _COUNTS = {
     "push": (3, 4),
     "set": (2, 2),
     "press": (1, 2),
+    "answer": (1, 1),
 }
 _TRUTH = {"true": 1.0, "false": 0.0}
 _TIMED = re.compile(r"(.+?)\s*@\s*([0-9.]+)\s*s?\s*")
@@ -148,9 +150,12 @@ class Operator:
             "push": self._push,
             "set": plant.signals.set,
             "press": self._press,
+            "answer": self._answer,
         }
         #: Presses a key of a bar of the smartPAD; says whether there is one.
         self.press: Callable[[str, int], bool] = lambda bar, slot: False
+        #: Presses a button of the dialog that is shown; says whether there is one.
+        self.answer: Callable[[int], bool] = lambda button: False
 
     def schedule(self, text: str) -> None:
         """Do something at a time of the plant: "WORDS@SECONDS".
@@ -197,6 +202,10 @@ class Operator:
 
     def _override(self, factor: float) -> None:
         self._plant.safety.manual = factor
+
+    def _answer(self, button: float) -> None:
+        if not self.answer(int(button)):
+            raise ValueError(f"no dialog with a button {int(button)} is shown")
 
     def _press(self, slot: float, bar: str = "client") -> None:
         if not self.press(bar, int(slot)):

@@ -17,6 +17,7 @@ import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.ioModel.AbstractIOGroup;
 import com.kuka.roboticsAPI.ioModel.IOTypes;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
+import com.kuka.roboticsAPI.uiModel.ApplicationDialogType;
 import com.kuka.roboticsAPI.uiModel.userKeys.IUserKey;
 import com.kuka.roboticsAPI.uiModel.userKeys.IUserKeyBar;
 import com.kuka.roboticsAPI.uiModel.userKeys.IUserKeyListener;
@@ -135,6 +136,16 @@ public class Signalling extends RoboticsAPIApplication {
             ThreadUtil.milliSleep(50);
         }
         say("a key is pressed and released", pressed.get() == 101 && key.getSlot() == 1);
+        say("ASKED", true);
+        int answer = getApplicationUI().displayModalDialog(ApplicationDialogType.QUESTION, "Go on?", "no", "yes");
+        say("a dialog is answered", answer == 1);
+        boolean many = false;
+        try {
+            getApplicationUI().displayModalDialog(ApplicationDialogType.INFORMATION, "no buttons");
+        } catch (IllegalArgumentException e) {
+            many = true;
+        }
+        say("a dialog has buttons", many);
     }
 
     private void say(String what, boolean is) {

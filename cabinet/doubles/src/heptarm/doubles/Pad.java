@@ -4,6 +4,7 @@ import java.util.ArrayList;
 import java.util.List;
 import java.util.concurrent.CopyOnWriteArrayList;
 
+import com.kuka.roboticsAPI.uiModel.ApplicationDialogType;
 import com.kuka.roboticsAPI.uiModel.IApplicationUI;
 import com.kuka.roboticsAPI.uiModel.userKeys.IUserKey;
 import com.kuka.roboticsAPI.uiModel.userKeys.IUserKeyBar;
@@ -18,6 +19,13 @@ public final class Pad implements IApplicationUI {
     private static final int SLOTS = 4;
 
     private final List<Bar> bars = new CopyOnWriteArrayList<>();
+
+    public final Dialogs dialogs = new Dialogs();
+
+    @Override
+    public int displayModalDialog(ApplicationDialogType type, String text, String... buttons) {
+        return dialogs.ask(type, text, buttons);
+    }
 
     @Override
     public IUserKeyBar createUserKeyBar(String name) {
@@ -79,6 +87,13 @@ public final class Pad implements IApplicationUI {
         }
 
         @Override
+        public IUserKey addDoubleUserKey(int slot, IUserKeyListener listener, boolean ignoreEvents) {
+            Key key = (Key) addUserKey(slot, listener, ignoreEvents);
+            key.isDouble = true;
+            return key;
+        }
+
+        @Override
         public void publish() {
             bars.add(this);
         }
@@ -86,8 +101,8 @@ public final class Pad implements IApplicationUI {
         boolean press(int slot) {
             for (Key key : keys) {
                 if (key.slot == slot && key.enabled) {
-                    key.listener.onKeyEvent(key, UserKeyEvent.KeyDown);
-                    key.listener.onKeyEvent(key, UserKeyEvent.KeyUp);
+                    key.listener.onKeyEvent(key, key.isDouble ? UserKeyEvent.FirstKeyDown : UserKeyEvent.KeyDown);
+                    key.listener.onKeyEvent(key, key.isDouble ? UserKeyEvent.FirstKeyUp : UserKeyEvent.KeyUp);
                     return true;
                 }
             }
@@ -101,6 +116,7 @@ public final class Pad implements IApplicationUI {
         private volatile String text = "";
         private volatile UserKeyLED led;
         private volatile boolean enabled = true;
+        private volatile boolean isDouble;
 
         Key(int slot, IUserKeyListener listener) {
             this.slot = slot;

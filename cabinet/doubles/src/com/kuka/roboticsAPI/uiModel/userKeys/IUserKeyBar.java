@@ -4,5 +4,8 @@ package com.kuka.roboticsAPI.uiModel.userKeys;
 public interface IUserKeyBar {
     IUserKey addUserKey(int slot, IUserKeyListener listener, boolean ignoreEvents);
 
+    /** A key with an upper and a lower half. */
+    IUserKey addDoubleUserKey(int slot, IUserKeyListener listener, boolean ignoreEvents);
+
     void publish();
 }
