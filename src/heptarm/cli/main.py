@@ -414,6 +414,19 @@ FriListen = Annotated[
 
 
 @app.command
+def recover(
+    *,
+    timeout: Annotated[float, Parameter(help="Wait so long for a person to do what is left [s].")] = 0.0,
+    target: Target = None,
+    json: Json = False,
+) -> int:
+    """Make the robot ready again after a stop, and say what is left to a person; exit code 1 if something is."""
+    from heptarm.cli import move as work
+
+    return work.recover(target=target, timeout=timeout, as_json=json)
+
+
+@app.command
 def doctor(
     *,
     fri: Annotated[bool, Parameter(group=_FRI, negative="", help="Also look at FRI.")] = False,

@@ -69,3 +69,14 @@ def stop(*, target: str | None, as_json: bool) -> int:
         arm.wait_for_rest()
     emit({"stopped": True}) if as_json else print("the arm is at rest")
     return 0
+
+
+def recover(*, target: str | None, timeout: float, as_json: bool) -> int:
+    """Make the robot ready again, or say what is left to a person; returns the exit code."""
+    with connect(target) as arm:
+        recovery = arm.recover(timeout=timeout)
+        if as_json:
+            emit({"done": recovery.done, "did": list(recovery.did), "remaining": list(recovery.remaining)})
+        else:
+            print(recovery)
+    return 0 if recovery.done else 1

@@ -40,6 +40,7 @@ def state_data(state: State) -> dict[str, Any]:
         data |= {"motion": state.motion.id, "progress": state.motion.progress}
     if state.status is not None:
         data |= {"mode": state.safety.mode.value, "ready_to_move": state.safety.ready_to_move}
+        data |= {"stops": list(state.safety.stops)}
     return data
 
 

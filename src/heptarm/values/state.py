@@ -214,6 +214,21 @@ class Safety(Value):
     position_referenced: bool = False
     recovery_required: bool = False
 
+    @property
+    def stops(self) -> tuple[str, ...]:
+        """What keeps the arm from moving, in words; empty: nothing that is known."""
+        lacks = self.mode is not OperationMode.AUT and not self.enabling_switch
+        named = self.emergency_stop or self.operator_safety_open or lacks
+        reasons = {
+            "emergency stop": self.emergency_stop,
+            "safeguard open": self.operator_safety_open,
+            "enabling switch not held": lacks,
+            "safety stop": self.protective_stop and not named,
+            "paused": self.paused,
+            "recovery required": self.recovery_required,
+        }
+        return tuple(reason for reason, holds in reasons.items() if holds)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Control(Value):
