@@ -73,6 +73,7 @@ class Lockstep:
         self._arm = PlantArm(self.plant)
         self._controller = Controller(Configuration(Version.V1_15, 1), self.plant.robot)
         self._answer: bytes | None = None
+        self._held: list[bytes] | None = None
         self._controller.open()
         self._until(State.MONITORING_READY)
         control = control or Position()
@@ -86,6 +87,23 @@ class Lockstep:
         """Let time pass."""
         for _ in range(round(seconds * 1e3)):
             self._tick()
+
+    def lose(self, ticks: int) -> None:
+        """Let messages get lost."""
+        self._held = []
+        self.run(ticks * 1e-3)
+        self._held = None
+
+    def burst(self, ticks: int) -> None:
+        """Hold messages back, then let them arrive together."""
+        self._held = held = []
+        self.run(ticks * 1e-3)
+        self._held, now = None, self.plant.time_ns
+        for datagram in held:
+            answer = self.cycle.turn(datagram, EPOCH + now)
+            self.cycle.finish(EPOCH + now)
+            if answer is not None:
+                self._controller.receive(answer, now)
 
     def command(self, q: npt.ArrayLike) -> None:
         """What a user's process leaves for the loop, shape (7,) [rad]."""
@@ -119,6 +137,8 @@ class Lockstep:
                 self._arm.release()
         plant.tick()
         self.track.append(plant.snapshot)
-        if datagram is not None:
+        if datagram is not None and self._held is not None:
+            self._held.append(datagram)
+        elif datagram is not None:
             self._answer = self.cycle.turn(datagram, EPOCH + now)
             self.cycle.finish(EPOCH + now + TICK_NS // 20)

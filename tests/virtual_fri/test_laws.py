@@ -30,6 +30,20 @@ def test_the_arm_follows_a_sine_within_a_milliradian() -> None:
     assert np.abs(found - wished[:, None]).max() < 1e-3
 
 
+def test_lost_and_late_messages_do_not_jolt_an_arm_in_motion() -> None:
+    """The cabinet goes on with the last speed, and so does the loop: the next setpoint does not lie behind."""
+    both = Lockstep(laws.sine, {"amplitude": 0.15, "frequency": 0.2})
+    both.run(2.3)
+    for ticks in (1, 2, 3, 4):
+        both.lose(ticks)
+        both.run(0.15)
+        both.burst(ticks + 1)
+        both.run(0.15)
+    dq = np.array([state.dq for state in both.track])
+    assert np.abs(dq).max() > 0.15 and both.ends == []
+    assert np.abs(np.diff(dq, axis=0)).max() * 1e3 < 15.0
+
+
 def test_torques_alone_lead_the_floating_arm_and_hold_it_against_a_push() -> None:
     params = {"start": BENT, "goal": BENT + WAY}
     both = Lockstep(

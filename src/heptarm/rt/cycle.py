@@ -26,6 +26,8 @@ Law = Callable[[State, Output, Params], object]
 
 #: After a silence of this many command periods the guard begins anew from the last position, at rest.
 SILENT_PERIODS = 5
+#: A silence is at least as long [ns]: the cabinet goes on with the last speed for a while, and so does the guard.
+SILENT_LEAST = 25_000_000
 #: A command given this long before commanding begins still counts [ns].
 GRACE = 50_000_000
 #: How the event begins that tells of a law which failed.
@@ -83,6 +85,7 @@ class Cycle:
         self._state = State(np.frombuffer(self._slot, dtype=np.float64))
         self.commands_seen = layout.commands.count
         self._restarts = 0
+        self._skipped = 0  # cycles since the last setpoint of which nothing was heard
         self.mirrored: tuple[m.Joints, int] | None = None  # last mirrored position and its sequence
         self.slope: Sequence[float] = _NAN7
         self.ticks = 0
@@ -111,10 +114,13 @@ class Cycle:
         session = self.session
         self._flags, self._answered, before = 0, False, session.received
         self._sent = _NOTHING_SENT
+        last = session.sample
+        heard = last.sequence if last is not None else 0
         self._fresh = sample = session.receive(datagram, received)
         if sample is None:
             return None
-        self._follow(sample, received, before)
+        step = sample.sequence - heard
+        self._follow(sample, received, before, step if 0 < step <= _MOST_LOST else 1)
         if not session.is_due:
             return None
         if session.is_commanding and session.mode in _JOINT_MODES and sample.q_ipo is not None:
@@ -171,11 +177,12 @@ class Cycle:
 
     # ----------------------------------------------------------------------------------------- what is wanted
 
-    def _follow(self, sample: Sample, received: int, before: int) -> None:
+    def _follow(self, sample: Sample, received: int, before: int, step: int) -> None:
         """Keep guard and filler in step with the session's state."""
         session, guard = self.session, self.guard
         again = session.counters.restarts != self._restarts
         self._restarts = session.counters.restarts
+        self._skipped = 0
         if guard.is_started and (again or not session.is_commanding):
             guard.stop()
         if session.is_commanding:
@@ -190,9 +197,12 @@ class Cycle:
                 # a command given just before the start counts, an old one does not
                 self.commands_seen = max(0, self.layout.commands.count - 1)
                 self.started = received
-            elif received - before > SILENT_PERIODS * period * 1e9:
+                step = 1
+            elif received - before > max(SILENT_PERIODS * period * 1e9, SILENT_LEAST):
                 guard.start(guard.q, _ZEROS7, period=period)
-            self.ticks += 1
+            else:
+                self._skipped = (step - 1) // session.multiplier
+            self.ticks += step  # the controller's time goes on while messages are lost
             self.mirrored = None
         elif session.state is m.SessionState.COMMANDING_WAIT and sample.q_ipo is not None:
             last, self.mirrored = self.mirrored, (sample.q_ipo, sample.sequence)
@@ -222,14 +232,28 @@ class Cycle:
         if wish is None:
             self._flags |= at.BRAKING
         reach = ipo if guard.limits.reach < math.inf else None
+        limited = self._catch_up(wish, reach)
         q = tuple(guard.position(wish, reach))
         mode = self.session.mode
-        limited = guard.was_limited
+        limited |= guard.was_limited
         sent_tau = tuple(guard.torque(tau or _ZEROS7)) if mode is m.CommandMode.TORQUE else None
         sent_wrench = tuple(guard.force(wrench or _ZEROS6)) if mode is m.CommandMode.WRENCH else None
         guard.was_limited |= limited
         self._sent = (q, sent_tau or _NAN7, sent_wrench or _NAN6)
         return Setpoint(q=q, tau=sent_tau, wrench=sent_wrench)
+
+    def _catch_up(self, wish: Sequence[float] | None, reach: Sequence[float] | None) -> bool:
+        """Do the cycles that were skipped, evenly towards the wish; says whether one of them was limited.
+
+        The cabinet has gone on meanwhile: without this its next setpoint would lie behind it.
+        """
+        guard, steps, limited = self.guard, min(self._skipped, _MOST_SKIPPED) + 1, False
+        before = tuple(guard.r)
+        for k in range(1, steps):
+            between = wish and [old + (new - old) * k / steps for old, new in zip(before, wish, strict=True)]
+            guard.position(between, reach)
+            limited |= guard.was_limited
+        return limited
 
     def _take(self) -> None:
         """The newest command of the user's process, if there is a new one."""
@@ -405,6 +429,9 @@ class Cycle:
 
 
 _NOTHING = Setpoint()
+_MOST_SKIPPED = 25
+#: A counter that leaps further has been changed, not been lost.
+_MOST_LOST = 1000
 _KINDS = list(Kind)
 _ZEROS7, _ZEROS6 = (0.0,) * 7, (0.0,) * 6
 _JOINT_MODES = (m.CommandMode.POSITION, m.CommandMode.TORQUE, m.CommandMode.WRENCH)

@@ -29,6 +29,7 @@ enum { BUFFER = 2048 };
 #define SHARE 0.8
 #define GRACE 50000000LL
 #define SILENT_PERIODS 5
+#define SILENT_LEAST 25000000.0
 #define LONGEST 1000000000000000LL
 
 struct loop {
@@ -553,7 +554,7 @@ int hf_turn(struct loop *l, const uint8_t *data, int size, word received) {
     if (commanding) {
         word gap = received - l->received;
         if (!l->is_started || *l->outputs != l->outputs_seen) return HANDBACK;
-        if ((double)gap > SILENT_PERIODS * (double)l->period * (double)l->multiplier) return HANDBACK;
+        if ((double)gap > most(SILENT_PERIODS * (double)l->period * (double)l->multiplier, SILENT_LEAST)) return HANDBACK;
     }
     /* from here on nothing is handed back */
     word *counts = l->header + H_COUNTS;
