@@ -90,7 +90,10 @@ def test_what_ended_an_overlay_rises_at_the_end_of_the_block(
     peer: Peer, quality: str, cause: str, code: int, text: str, kind: type[ha.HeptarmError]
 ) -> None:
     say = end_of(peer, wire.FriQuality[quality], wire.Cause[cause], code=int(code), text=text)
-    with speaking(peer, number=7, state=SessionState.COMMANDING_ACTIVE) as heard, peer.arm() as arm:
+    with (
+        speaking(peer, number=7, state=SessionState.COMMANDING_ACTIVE) as heard,
+        peer.arm(timeout=20.0, watchdog=5.0) as arm,
+    ):
         with (
             pytest.raises(kind, match=text) as error,
             arm.fri("position", period_ms=5, realtime=False, port=0, host="127.0.0.1") as rt,
@@ -102,7 +105,10 @@ def test_what_ended_an_overlay_rises_at_the_end_of_the_block(
 
 
 def test_the_guards_share_in_a_bad_end_is_told(peer: Peer) -> None:
-    with speaking(peer, number=7, state=SessionState.COMMANDING_ACTIVE), peer.arm() as arm:
+    with (
+        speaking(peer, number=7, state=SessionState.COMMANDING_ACTIVE),
+        peer.arm(timeout=20.0, watchdog=5.0) as arm,
+    ):
         say = end_of(peer, wire.FriQuality.GOOD, wire.Cause.FAILED, code=0, text="Illegal axis delta")
         with (
             pytest.raises(ha.MotionAborted, match=r"the guard had limited: A1: .* limited in") as error,
@@ -127,7 +133,7 @@ def test_the_guards_share_in_a_bad_end_is_told(peer: Peer) -> None:
 def test_a_monitor_that_the_cabinet_ends(peer: Peer, quality: str, text: str, kind: type[Exception]) -> None:
     with (
         speaking(peer, number=9, state=SessionState.MONITORING_READY),
-        peer.arm() as arm,
+        peer.arm(timeout=20.0, watchdog=5.0) as arm,
         pytest.raises(kind, match=text or "ended by the cabinet"),
         arm.fri("monitor", realtime=False, port=0, host="127.0.0.1") as rt,
     ):
@@ -141,7 +147,7 @@ def test_a_monitor_that_the_cabinet_ends(peer: Peer, quality: str, text: str, ki
 def test_a_monitor_ends_with_the_control(peer: Peer) -> None:
     with (
         speaking(peer, number=9, state=SessionState.MONITORING_READY),
-        peer.arm() as arm,
+        peer.arm(timeout=20.0, watchdog=5.0) as arm,
         pytest.raises(ha.StreamError, match="no longer controls the robot"),
         arm.fri("monitor", realtime=False, port=0, host="127.0.0.1") as rt,
     ):
@@ -152,7 +158,7 @@ def test_a_monitor_ends_with_the_control(peer: Peer) -> None:
 
 def test_a_link_that_breaks_ends_the_session(peer: Peer) -> None:
     with speaking(peer, number=7, state=SessionState.COMMANDING_ACTIVE):
-        arm = peer.arm()
+        arm = peer.arm(timeout=20.0, watchdog=5.0)
         with (
             pytest.raises(ha.ConnectionLost),
             arm.fri("position", period_ms=5, realtime=False, port=0, host="127.0.0.1") as rt,
@@ -164,8 +170,14 @@ def test_a_link_that_breaks_ends_the_session(peer: Peer) -> None:
 
 def test_a_cabinet_without_the_option_says_which(peer: Peer) -> None:
     peer.changes["capabilities"] = ("ptp", "hold")
-    with peer.arm() as arm, pytest.raises(ha.CommandRejected, match="install the option Sunrise.FRI"):
+    with (
+        peer.arm(timeout=20.0, watchdog=5.0) as arm,
+        pytest.raises(ha.CommandRejected, match="install the option Sunrise.FRI"),
+    ):
         arm.fri("monitor")
     peer.changes["capabilities"] = OFFERED
-    with peer.arm() as arm, pytest.raises(ha.CommandRejected, match="no FRI sessions of kind 'torque'"):
+    with (
+        peer.arm(timeout=20.0, watchdog=5.0) as arm,
+        pytest.raises(ha.CommandRejected, match="no FRI sessions of kind 'torque'"),
+    ):
         arm.fri("torque")
