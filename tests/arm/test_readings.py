@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
 
-from heptarm import Arm, State, deg, hold, ptp
+from heptarm import Arm, State, connect, deg, hold, ptp
 from heptarm.model.inverse import redundancy
 from heptarm.model.kinematics import jacobian
 from heptarm.values.arrays import Array
+from tests.conftest import RunningCabinet
 
 #: Inaccuracy of a simulated torque sensor [Nm].
 SENSOR = 0.5
+
+
+@pytest.fixture
+def arm(cabinet: RunningCabinet) -> Iterator[Arm]:
+    """An arm at home; patient, for busy machines."""
+    with connect(cabinet.target, watchdog=5.0) as arm:
+        arm.move(ptp(deg(0, 30, 0, -90, 0, 60, 0)))
+        yield arm
 
 
 def settled(arm: Arm) -> State:
