@@ -82,6 +82,15 @@ def stays(client: Client, before: Array, *, near: float = 2e-3) -> None:
     assert np.abs(client.place().q - before).max() < near
 
 
+def under_way(client: Client, here: Array, far: float = 0.03) -> None:
+    """Wait until the arm has moved so far from a place [rad]; a way of execution may take some time to begin."""
+    for _ in range(1000):
+        if np.abs(client.place().q - here).max() > far:
+            return
+        client.sleep(0.02)
+    raise AssertionError("the arm does not move")
+
+
 def rests(client: Client) -> Array:
     """Wait for rest; returns where it is."""
     for _ in range(200):
@@ -432,7 +441,7 @@ def cancelling_brakes_and_holds(client: Client) -> None:
     here = client.place().q
     path = swing(client)
     sent = client.send(step(client, time=2.0, size=2.0))
-    client.sleep(1.0)
+    under_way(client, here)
     assert client.cancel(sent)
     ended = client.result(sent)
     assert ended.outcome is Outcome.CANCELED and ended.code is Code.SUCCESSFUL, ended
@@ -447,7 +456,7 @@ def cancelling_goes_straight_on_while_it_brakes(client: Client) -> None:
     here = client.place().q
     joint = 6
     sent = client.send(goal(client, point(2.0, here + 0.9 * (np.arange(7) == joint))))
-    client.sleep(1.0)
+    under_way(client, here, 0.3)
     before = client.place()
     client.cancel(sent)
     client.result(sent)
@@ -460,8 +469,9 @@ def cancelling_goes_straight_on_while_it_brakes(client: Client) -> None:
 
 @case
 def a_goal_right_after_a_cancellation_is_accepted(client: Client) -> None:
+    here = client.place().q
     first = client.send(step(client, time=2.0, size=2.0))
-    client.sleep(0.8)
+    under_way(client, here)
     client.cancel(first)
     wanted = step(client, time=0.8, size=-0.5)
     second = client.send(wanted)
@@ -499,7 +509,7 @@ def the_deceleration_is_a_parameter(client: Client) -> None:
         here = client.place().q
         sign = -1.0 if here[6] > 0 else 1.0
         sent = client.send(goal(client, point(2.0, here + sign * 0.8 * (np.arange(7) == 6))))
-        client.sleep(0.7)
+        under_way(client, here, 0.15)
         client.cancel(sent)
         client.result(sent)
         stopped = client.place().q[6]
