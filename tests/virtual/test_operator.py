@@ -17,7 +17,13 @@ from tests.virtual.ideal import KINDS, begin
 def test_every_word_of_the_help_is_understood(words: str) -> None:
     for one in words.split(","):
         name = one.split()[0]
-        values = {"override": ["0.5"], "push": ["1", "2", "3"]}.get(name, [])
+        values = {
+            "override": ["0.5"],
+            "push": ["1", "2", "3"],
+            "set": ["Cell.Door", "true"],
+            "press": ["0"],
+            "answer": ["1"],
+        }.get(name, [])
         assert understood(" ".join([name, *values]))[0] == name
 
 
@@ -33,6 +39,12 @@ def test_every_word_of_the_help_is_understood(words: str) -> None:
         ("push 1 2", "3 to 4"),
         ("clear everything", "emergency_stop"),
         ("t1 now", "0 to 0 values"),
+        ("set Cell.Door", "2 to 2"),
+        ("set Cell.Door ajar", "true or false"),
+        ("set Cell.Door 1", "no signal 'Cell.Door'"),
+        ("press 4", "slots"),
+        ("press 1", "no user key 1"),
+        ("answer 0", "no dialog"),
     ],
 )
 def test_what_is_not_understood_changes_nothing(words: str, says: str) -> None:
@@ -105,3 +117,24 @@ def test_a_push_ends_by_itself() -> None:
     assert plant.snapshot.wrench[1] == pytest.approx(20.0, abs=0.5)
     plant.step(100)
     assert np.abs(plant.snapshot.wrench).max() < 0.5
+
+
+def test_signals_are_set_and_keys_pressed_also_at_a_time() -> None:
+    plant = ready()
+    operator = Operator(plant)
+    place = plant.signals.place("Cell.Door", is_output=False)
+    plant.signals.place("Flange.Door", is_output=False)
+    pressed: list[tuple[str, int]] = []
+    operator.press = lambda bar, slot: not pressed.append((bar, slot))  # type: ignore[func-returns-value]
+    operator.schedule("set cell.door true@0.01")
+    operator.schedule("set Cell.Lid true@0.01")  # there is none: the arm goes on
+    for _ in range(20):
+        operator.tick()
+        plant.tick()
+    assert plant.ring.signals[place] == plant.signals.get("Cell.Door") == 1.0
+    with pytest.raises(ValueError, match="or several"):
+        operator.do("set Door 0")
+    operator.do("press 2")
+    operator.do("press 0 heptarm")
+    assert pressed == [("client", 2), ("heptarm", 0)]
+    assert plant.signals.names == ("Cell.Door", "Flange.Door")
