@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 
 from bench.registry import Figure, benchmark
+from heptarm.errors import HeptarmError
 from tests.virtual_fri import kills, scenarios
 
 #: Fewer are for a first look.
@@ -26,7 +27,7 @@ def fri_faults() -> Iterator[Figure]:
         begin, detail, survived = time.monotonic(), {}, 0
         try:
             survived = run()
-        except AssertionError as error:
+        except (AssertionError, HeptarmError) as error:
             detail["failure"] = str(error)[:500]
         detail["seconds"] = f"{time.monotonic() - begin:.0f}"
         yield Figure(f"fri_fault_{name}", "C11", survived, "times", limit=TIMES, least=True, detail=detail)

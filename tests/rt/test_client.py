@@ -78,8 +78,12 @@ def test_a_user_who_falls_silent_stops_the_arm_by_the_policy() -> None:
                 client.command(q=np.add(IPO, 0.2 * (s.t - begin) * rise**2))
                 if s.t > begin + 0.6:
                     break
-            time.sleep(0.4)  # the user's code is busy elsewhere; answers go on
-            states = client.history(100)
+            deadline = time.monotonic() + 20.0
+            while time.monotonic() < deadline:
+                time.sleep(0.4)  # the user's code is busy elsewhere; answers go on
+                states = client.history(100)
+                if np.ptp([one.q_sent[0] for one in states[-50:]]) == 0.0:
+                    break
     assert all(one.is_answered and one.is_filled for one in states[-50:])
     assert np.ptp([one.q_sent[0] for one in states[-50:]]) == 0.0, "the arm stands"
     assert states[-1].q_sent[0] > IPO[0] + 0.01
@@ -141,9 +145,14 @@ def test_other_versions_and_modes(wire: Version, mode: CommandMode, client: Clie
         controller.settle()
         assert s.mode is mode and s.pose.xyz.tolist() == pytest.approx([0.1, 0.2, 0.3])
         answer = controller.answers[-1]
-        assert answer.tau == ((3.0,) * 7 if mode is CommandMode.TORQUE else None)
-        assert answer.wrench == ((0.0, 0.0, 5.0, 0.0, 0.0, 0.0) if mode is CommandMode.WRENCH else None)
+        assert (answer.tau is not None) == (mode is CommandMode.TORQUE)
+        assert (answer.wrench is not None) == (mode is CommandMode.WRENCH)
         assert (answer.pose is not None) == (mode is CommandMode.CARTESIAN_POSE)
+        # a user who is kept off the processor for a while finds them ramped down by the policy
+        if mode is CommandMode.TORQUE:
+            assert (3.0,) * 7 in [one.tau for one in controller.answers]
+        if mode is CommandMode.WRENCH:
+            assert (0.0, 0.0, 5.0, 0.0, 0.0, 0.0) in [one.wrench for one in controller.answers]
 
 
 def test_loss_duplicates_reordering_and_garbage_end_no_session(client: Client) -> None:
@@ -163,8 +172,8 @@ def test_loss_duplicates_reordering_and_garbage_end_no_session(client: Client) -
     with controller.running():
         controller.active()
         client.wait(ACTIVE)
-        deadline = time.monotonic() + 1.0
-        while time.monotonic() < deadline:
+        deadline = time.monotonic() + 20.0
+        while time.monotonic() < deadline and client.stats.answered < 300:
             client.command(q=IPO)
             client.next()
     stats = client.stats
