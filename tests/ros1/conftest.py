@@ -86,7 +86,7 @@ def node(ros: None, stage: Stage) -> Iterator[NodeProcess]:
     """The node of ROS 1 for most tests, active."""
     from tests.ros1.peer import NodeProcess
 
-    running = NodeProcess(stage.target)
+    running = NodeProcess(stage.target, execution=os.environ.get("EXECUTION", "servo"))
     yield running
     assert running.end() == 0, running.said
 

@@ -31,6 +31,8 @@ from tests.conformance.stage import ROOT, Stage
 
 #: A busy machine may need long for what is quick [s].
 PATIENCE = 60.0
+#: And its watchdogs must not bark at that.
+PATIENT = {"watchdog": 5.0, "servo__watchdog": 1.0}
 PACKAGES = ROOT / "ros1"
 NODE = PACKAGES / "heptarm_ros1" / "scripts" / "heptarm_node"
 
@@ -60,7 +62,7 @@ class NodeProcess:
     def __init__(self, target: str, name: str = "heptarm", *, ns: str = "/", **values: object) -> None:
         self.log = Path(tempfile.mkstemp(prefix="heptarm-node-", suffix=".log")[1])
         command = [sys.executable, str(NODE), f"__name:={name}", f"__ns:={ns}"]
-        for key, value in ({"target": target} | values).items():
+        for key, value in ({"target": target} | PATIENT | values).items():
             command.append(f"_{key.replace('__', '/')}:={value}")
         with self.log.open("w") as log:
             self.process = subprocess.Popen(command, stdout=log, stderr=subprocess.STDOUT)

@@ -11,16 +11,18 @@ import time
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
+from std_srvs.srv import Trigger
 
 from heptarm.bridge.goal import Code, Outcome
 from tests.conformance.cases import rests, step
 from tests.conformance.stage import Stage
-from tests.ros1.peer import Client, NodeProcess, collect, until
+from tests.ros1.peer import Client, NodeProcess, call, collect, until
 
 CLIENT = """
 import actionlib, rospy, sys
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectoryPoint
 rospy.init_node("victim", anonymous=True)
 here = rospy.wait_for_message("/joint_states", JointState)
@@ -70,6 +72,8 @@ def test_an_emergency_stop_ends_the_goal(other: Client) -> None:
     assert not refused.accepted and refused.code is Code.INVALID_GOAL
     other.stage.do("release")
     until(lambda: not other.status[-1].emergency_stop, "the status does not tell")
+    until(lambda: call("/other/heptarm/recover", Trigger).success, "the arm does not recover")
+    until(lambda: other.status[-1].ready_to_move, "the status does not tell")
     rests(other)
     assert other.result(other.send(step(other))).code is Code.SUCCESSFUL
 
