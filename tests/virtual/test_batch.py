@@ -190,7 +190,7 @@ def test_a_stop_in_a_batch_comes_to_rest_on_the_path_within_the_limits() -> None
     start = start_of(ready())
     order = Order(1, "batch", parts=square(start, (0, 0.02, 0)))
     path = points(plant := ready(), run(plant, order).q_cmd)
-    for instant in random.integers(1, 2600, 12).tolist():
+    for instant in random.integers(1, 2400, 7).tolist():
         plant, ear = ready(), Ear()
         plant.submit(replace(order, listener=ear))
         plant.step(instant)

@@ -118,7 +118,7 @@ def test_three_points_on_a_line_make_no_arc() -> None:
 
 def test_a_stop_comes_to_rest_on_the_arc_at_any_instant() -> None:
     random = np.random.default_rng(1)
-    for _ in range(10):
+    for _ in range(6):
         plant, ear = ready(), Ear()
         order, centre = round_trip(plant, 5.0)
         plant.submit(replace(order, listener=ear))

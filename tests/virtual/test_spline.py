@@ -167,7 +167,7 @@ def test_a_stop_in_a_spline_comes_to_rest_on_it(kind: str) -> None:
     order = curve(ready()) if kind == "spline" else Order(1, kind, parts=parts)
     plant = ready()
     path = run(plant, order).q_cmd
-    for instant in (*random.integers(1, 1900, 8).tolist(), 1756):  # the last: while it brakes anyway
+    for instant in (*random.integers(1, 1800, 4).tolist(), 1756):  # the last: while it brakes anyway
         plant, ear = ready(), Ear()
         plant.submit(replace(order, listener=ear))
         plant.step(instant)
