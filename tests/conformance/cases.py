@@ -18,6 +18,27 @@ from tests.conformance.client import Client, Ended, Sent
 Case = Callable[[Client], None]
 CASES: dict[str, Case] = {}
 
+_FAULTS = "the faults act on streams of targets; a spline is the cabinet's own motion"
+#: What a way of execution cannot be asked, and why.
+UNFIT: dict[str, dict[str, str]] = {
+    "spline": {
+        "the_deceleration_is_a_parameter": "the cabinet brakes a motion as it does",
+        "an_end_that_moves_where_it_is_allowed": "a spline ends at rest",
+        "an_impossible_goal_time_fails": _FAULTS,
+        "an_impossible_goal_tolerance_fails": "a spline ends when the arm is there, to the cabinet's own tolerance",
+        "a_frozen_arm_leaves_its_path": _FAULTS,
+        "a_lagging_arm_leaves_a_narrow_path": _FAULTS,
+        "one_joints_path_tolerance": _FAULTS,
+        "a_path_tolerance_counts_from_the_first_sample": _FAULTS,
+        "a_frozen_arm_misses_its_goal": _FAULTS,
+        "one_joints_goal_tolerance": _FAULTS,
+        "tolerances_in_any_order": _FAULTS,
+        "a_goals_tolerances_are_forgotten_after_it": _FAULTS,
+        "default_tolerances_can_change": _FAULTS,
+        "velocity_tolerance_on_the_path": _FAULTS,
+    }
+}
+
 #: A short way for every joint, different for each so that a mix-up shows [rad].
 STEP = np.array([0.05, -0.03, 0.04, 0.06, -0.05, 0.07, 0.1])
 #: Around here the arm moves [rad].

@@ -49,7 +49,7 @@ def as_spline(trajectory: Trajectory, robot: RobotModel, ceiling: float) -> Join
     """The joint spline through a trajectory's points, as fast between them as the trajectory is.
 
     Args:
-        trajectory: with at least two points.
+        trajectory: one of a single point is a way there at the ceiling.
         robot: its limits.
         ceiling: of the speed, a fraction of each axis' maximum.
     """
@@ -59,7 +59,7 @@ def as_spline(trajectory: Trajectory, robot: RobotModel, ceiling: float) -> Join
             float(np.max(np.abs(trajectory.sample(t).dq) / robot.dq_max)) for t in np.linspace(begin, end, 5)
         )
         points.append(ptp(q, speed=min(max(_HASTE * fastest, _SLOWEST), ceiling)))
-    return spline_joints(points)
+    return spline_joints(points or [ptp(trajectory.end.q, speed=ceiling)])
 
 
 @dataclass(slots=True, eq=False)
@@ -255,8 +255,9 @@ class SplineExecution:
                 late = elapsed - run.trajectory.duration
                 text = f"not there {late:.3f} s after the end: a spline takes what the cabinet's limits take"
                 self._finish(Outcome.ABORTED, Code.GOAL_TOLERANCE_VIOLATED, text)
-        index = run.trajectory.index(run.tau) - (len(run.trajectory.times) - len(run.goal.points))
-        self._listener.on_feedback(Feedback(run.number, desired, actual, run.tau, elapsed, max(index, 0)))
+        count = len(run.trajectory.times)
+        index = max(run.trajectory.index(run.tau), min(1, count - 1)) - (count - len(run.goal.points))
+        self._listener.on_feedback(Feedback(run.number, desired, actual, run.tau, elapsed, index))
 
     def _arrive(self, run: _Running) -> None:
         """The motion has come to its end: is the arm there?"""
