@@ -61,7 +61,7 @@ class Watch:
 def trajectory(target: str, execution: str) -> dict[str, Any]:
     """How near the arm passes the points of a trajectory, and when."""
     ros = Ros("bench")
-    node = NodeProcess(target, state_rate=500.0, execution=execution)
+    node = NodeProcess(target, state_rate=200.0, execution=execution)
     client = Client(ros, None)
     client.ready()
     share = np.arange(1, POINTS + 1) / POINTS
