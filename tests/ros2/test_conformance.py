@@ -1,6 +1,6 @@
 """Cases of conformance against the node: messages, executor, driver, cabinet, plant.
 
-Here every other case, as all of them run against the runner alone and against the node of ROS 1; `make conformance`
+Here every other case; the rest run against the node of ROS 1, and all of them against the runner alone. `make conformance`
 runs all of them, with each way of execution.
 """
 
