@@ -1,7 +1,7 @@
 """Cases of conformance against the node: messages, actionlib, driver, cabinet, plant.
 
-Here those that the node of ROS 2 leaves out, as all of them run against the runner alone; `make conformance` runs all of
-them, with each way of execution.
+Here those that the node of ROS 2 leaves out, as all of them run against the runner alone; `make conformance` runs all,
+with each way of execution.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Cases of conformance against the node: messages, executor, driver, cabinet, plant.
 
-Here every other case; the rest run against the node of ROS 1, and all of them against the runner alone. `make conformance`
-runs all of them, with each way of execution.
+Here every other case; the rest run against the node of ROS 1, and all of them against the runner alone.
+`make conformance` runs all of them, with each way of execution.
 """
 
 from __future__ import annotations
