@@ -15,6 +15,8 @@ from tests.virtual.ideal import KINDS, stopping_time
 INSTANTS = 200
 #: Every stop gets this much beyond its deceleration limit's time for the joints to settle behind their set-points [s].
 SETTLING = 0.1
+#: How far a servo motion is sent from its start [rad]; farther, the arm runs into the floor or itself at times, and bounces.
+REACH = 0.4
 #: At rest [rad/s].
 REST = 0.01
 
@@ -44,7 +46,7 @@ def _stop(kind: str, how: str, random: np.random.Generator) -> tuple[float, floa
     plant.submit(order)
     plant.tick()
     if order.is_servo:
-        plant.ring.post(order.id, np.array(READY) + random.uniform(-0.8, 0.8, 7))
+        plant.ring.post(order.id, np.array(READY) + random.uniform(-REACH, REACH, 7))
     plant.step(int(random.integers(1, 700)))
     allowed = stopping_time(plant, how) + SETTLING
     if how == "emergency":
