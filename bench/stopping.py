@@ -15,7 +15,7 @@ from tests.virtual.ideal import KINDS, stopping_time
 INSTANTS = 200
 #: Every stop gets this much beyond its deceleration limit's time for the joints to settle behind their set-points [s].
 SETTLING = 0.1
-#: How far a servo motion is sent from its start [rad]; farther, the arm runs into the floor or itself at times, and bounces.
+#: How far a servo motion is sent from its start [rad]; farther, the arm runs into the floor or itself at times.
 REACH = 0.4
 #: At rest [rad/s].
 REST = 0.01
