@@ -45,7 +45,7 @@ check: $(STAMPS)/venv  ## the generated files agree with the schema
 	$(PY) schema/generate.py --check
 
 test: setup $(STAMPS)/browser lint check  ## everything; fast tests first
-	$(PY) -m pytest
+	$(PY) -m pytest -n 2 --dist loadfile
 	@$(MAKE) --no-print-directory test-ros2
 	@$(MAKE) --no-print-directory test-ros1
 

@@ -8,7 +8,7 @@ import uuid
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from hypothesis import settings
@@ -41,12 +41,27 @@ def _rank(item: pytest.Item) -> int:
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     """Fails the run if a process that a test started is still alive a little later."""
+    output = getattr(session.config, "workeroutput", None)  # of a worker of pytest-xdist
+    if output is not None:
+        output["left"] = _late_ones()
+        return
+    if not session.config.getoption("numprocesses", None):
+        _left.extend(_late_ones())
+    if _left:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any) -> None:
+    """A worker has ended and says what it left behind."""
+    _left.extend(getattr(node, "workeroutput", {}).get("left", []))
+
+
+def _late_ones() -> list[str]:
     patience = time.monotonic() + 2.0
     while (left := _started_here()) and time.monotonic() < patience:
         time.sleep(0.1)
-    if left:
-        _left.extend(left)
-        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+    return left
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
