@@ -49,6 +49,7 @@ from heptarm.rt import Client, Params, Stats
 from heptarm.rt import State as FriState
 from heptarm.rt.cycle import LAW_FAILED
 from heptarm.values.arrays import within
+from heptarm.values.pose import Pose
 from heptarm.values.result import Cause, Result
 from heptarm.wire import messages as wire
 
@@ -62,6 +63,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "position": ("q",),
     "torque": ("q", "tau"),
     "wrench": ("q", "wrench"),
+    "pose": ("pose",),
     "monitor": (),
 }
 #: How long to wait for the end of a session, and for a message of a session that stands [s].
@@ -99,7 +101,7 @@ class Fri:
 
     @property
     def kind(self) -> str:
-        """What is commanded: "position", "torque", "wrench"; or "monitor"."""
+        """What is commanded: "position", "torque", "wrench", "pose"; or "monitor"."""
         return self._request.kind
 
     # ------------------------------------------------------------------------------------ life
@@ -333,6 +335,7 @@ class Fri:
         q: npt.ArrayLike | None = None,
         tau: npt.ArrayLike | None = None,
         wrench: npt.ArrayLike | None = None,
+        pose: Pose | npt.ArrayLike | None = None,
     ) -> None:
         """Give a command; it stands until the next one, or until the policy's patience ends.
 
@@ -343,6 +346,7 @@ class Fri:
             q: joint positions, shape (7,) [rad].
             tau: torques on top of the control mode's, shape (7,) [Nm]; "torque" only.
             wrench: wrench on top of the control mode's, shape (6,) [N, Nm]; "wrench" only.
+            pose: of the flange in the base, or x y z [m] and quaternion x y z w, shape (7,); "pose" only.
 
         Raises:
             ModeConflict: this session commands something else, or a law does it.
@@ -350,7 +354,7 @@ class Fri:
             ConnectionLost: the loop's process has ended.
         """
         allowed = COMMANDS[self.kind]
-        for name, value in (("q", q), ("tau", tau), ("wrench", wrench)):
+        for name, value in (("q", q), ("tau", tau), ("wrench", wrench), ("pose", pose)):
             if value is not None and name not in allowed:
                 other = {"q": "position", "tau": "torque"}.get(name, name)
                 raise ModeConflict(
@@ -364,7 +368,7 @@ class Fri:
                 "the law commands in this session", hint="change rt.params, or open it without a law"
             )
         if self._stands:
-            self.client.command(q=q, tau=tau, wrench=wrench)
+            self.client.command(q=q, tau=tau, wrench=wrench, pose=pose)
 
     @property
     def params(self) -> Params:

@@ -12,6 +12,7 @@ from heptarm.arm.modes import mode_message
 from heptarm.errors import CommandRejected, ConnectFailed, LimitError, ModeConflict, ShapeError
 from heptarm.fri.guard import Limits
 from heptarm.fri.policy import Policy
+from heptarm.fri.pose_guard import PoseLimits
 from heptarm.io.udp import UdpSocket
 from heptarm.rt import Client, Output, Params
 from heptarm.rt import State as FriState
@@ -46,6 +47,7 @@ class FriSettings(TypedDict, total=False):
     params: Mapping[str, npt.ArrayLike] | None
     policy: Policy | None
     limits: Limits | None
+    pose_limits: PoseLimits | None
     version: str | None
     host: str
     port: int | None
@@ -83,6 +85,7 @@ def request(
     params: Mapping[str, npt.ArrayLike] | None = None,
     policy: Policy | None = None,
     limits: Limits | None = None,
+    pose_limits: PoseLimits | None = None,
     version: str | None = None,
     host: str = "",
     port: int | None = None,
@@ -134,6 +137,7 @@ def request(
                 version=version,
                 model=connection.robot,
                 limits=limits,
+                pose_limits=pose_limits,
                 policy=policy,
                 law=law,
                 params=params,

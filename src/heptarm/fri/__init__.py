@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from heptarm.fri.guard import Limits
     from heptarm.fri.messages import CommandMode, Quality, SessionState
     from heptarm.fri.policy import Missing, Policy
+    from heptarm.fri.pose_guard import PoseLimits
     from heptarm.rt import Client, Output, Params, State, Stats
 
 __all__ = [
@@ -31,6 +32,7 @@ __all__ = [
     "Output",
     "Params",
     "Policy",
+    "PoseLimits",
     "Quality",
     "SessionState",
     "State",
@@ -46,6 +48,7 @@ _HOMES = {
     "SessionState": "fri.messages",
     "Missing": "fri.policy",
     "Policy": "fri.policy",
+    "PoseLimits": "fri.pose_guard",
 }
 
 

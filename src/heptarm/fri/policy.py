@@ -7,14 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from heptarm.errors import LimitError
+from heptarm.fri.pose_guard import between, moved
 
 
 class Missing(enum.Enum):
     """What to do without a fresh command.
 
-    HOLD keeps the last one. EXTRAPOLATE lets the position move on with its last speed, from the moment it was
-    commanded, and keeps torques; after `over` seconds it ramps down. RAMP_DOWN brakes the axes to a stop where they are
-    and lets torques and wrenches fall to zero within `over` seconds.
+    HOLD keeps the last one. EXTRAPOLATE lets position or pose move on with its last speed, from the moment it was
+    commanded, and keeps torques; after `over` seconds it ramps down. RAMP_DOWN brakes the axes, or the flange, to a
+    stop where they are and lets torques and wrenches fall to zero within `over` seconds.
     """
 
     HOLD = "hold"
@@ -57,11 +58,13 @@ class Filler:
         slope: its speed, told from the one before [rad/s].
         tau: its torques [Nm].
         wrench: its wrench [N, Nm].
+        pose: its pose [m, x y z w].
+        twist: the pose's speed, told from the one before [m/s, rad/s].
         is_filled: the last wish was made without a fresh command.
         is_braking: the last wish is to brake.
     """
 
-    __slots__ = ("at", "is_braking", "is_filled", "policy", "q", "slope", "tau", "wrench")
+    __slots__ = ("at", "is_braking", "is_filled", "policy", "pose", "q", "slope", "tau", "twist", "wrench")
 
     def __init__(self, policy: Policy) -> None:
         self.policy = policy
@@ -74,6 +77,8 @@ class Filler:
         self.slope: Sequence[float] | None = None
         self.tau: Sequence[float] | None = None
         self.wrench: Sequence[float] | None = None
+        self.pose: Sequence[float] | None = None
+        self.twist: Sequence[float] | None = None
         self.is_filled = self.is_braking = False
 
     def command(
@@ -83,6 +88,7 @@ class Filler:
         q: Sequence[float] | None = None,
         tau: Sequence[float] | None = None,
         wrench: Sequence[float] | None = None,
+        pose: Sequence[float] | None = None,
     ) -> None:
         """Take a command of the user; what is None stays as it was.
 
@@ -91,15 +97,22 @@ class Filler:
             q: joint position [rad].
             tau: superposed torques [Nm].
             wrench: superposed wrench [N, Nm].
+            pose: x y z [m], quaternion x y z w.
         """
+        gap = (at - self.at) * 1e-9
+        # two commands of one stream tell its speed, a pause between them does not
+        is_stream = 0.0 < gap <= self.policy.patience
         if q is not None:
-            gap = (at - self.at) * 1e-9
-            # two commands of one stream tell its speed, a pause between them does not
-            if self.q is not None and 0.0 < gap <= self.policy.patience:
+            if self.q is not None and is_stream:
                 self.slope = [(new - old) / gap for new, old in zip(q, self.q, strict=True)]
             else:
                 self.slope = None
             self.q = q
+        if pose is not None:
+            self.twist = None
+            if self.pose is not None and is_stream:
+                self.twist = [value / gap for value in between(self.pose, pose)]
+            self.pose = pose
         self.tau = tau if tau is not None else self.tau
         self.wrench = wrench if wrench is not None else self.wrench
         self.at = at
@@ -111,9 +124,36 @@ class Filler:
             now: the clock of the commands [ns].
             ipo: interpolator's position, which is mirrored until a position was commanded.
         """
+        age = self._age(now)
+        if self.is_braking:
+            return None
+        if self.q is None:
+            return ipo
+        if self.policy.missing is Missing.EXTRAPOLATE and self.slope is not None:
+            return [value + slope * age for value, slope in zip(self.q, self.slope, strict=True)]
+        return self.q
+
+    def pose_wish(self, now: int, ipo: Sequence[float]) -> Sequence[float] | None:
+        """The pose wanted now, x y z [m] and quaternion x y z w; None to brake.
+
+        Args:
+            now: the clock of the commands [ns].
+            ipo: interpolator's pose, which is mirrored until a pose was commanded.
+        """
+        age = self._age(now)
+        if self.is_braking:
+            return None
+        if self.pose is None:
+            return ipo
+        if self.policy.missing is Missing.EXTRAPOLATE and self.twist is not None:
+            return moved(self.pose, [value * age for value in self.twist])
+        return self.pose
+
+    def _age(self, now: int) -> float:
+        """Age of the last command [s]; says too whether it still counts."""
         self.is_filled = self.is_braking = False
         if not self.at:
-            return ipo
+            return 0.0
         age = (now - self.at) * 1e-9
         late = age - self.policy.patience
         self.is_filled = late > 0.0
@@ -122,12 +162,7 @@ class Filler:
             self.policy.over if missing is Missing.EXTRAPOLATE else 0.0
         ):
             self.is_braking = True
-            return None
-        if self.q is None:
-            return ipo
-        if missing is Missing.EXTRAPOLATE and self.slope is not None:
-            return [value + slope * age for value, slope in zip(self.q, self.slope, strict=True)]
-        return self.q
+        return age
 
     def efforts(self, now: int) -> tuple[Sequence[float] | None, Sequence[float] | None]:
         """Torques and wrench wanted now; None where none was ever commanded."""

@@ -23,6 +23,7 @@ from heptarm.errors import (
 from heptarm.fri.guard import Limits, Report
 from heptarm.fri.messages import Quality, SessionState
 from heptarm.fri.policy import Policy
+from heptarm.fri.pose_guard import PoseLimited, PoseLimits, PoseReport
 from heptarm.fri.session import Event, Kind
 from heptarm.fri.statistics import Counters, Histogram
 from heptarm.fri.version import Version
@@ -32,6 +33,7 @@ from heptarm.rt import layout as at
 from heptarm.rt.cycle import Law
 from heptarm.rt.state import Params, State
 from heptarm.values.arrays import array
+from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel, robot
 
 #: FRI's own port.
@@ -94,6 +96,7 @@ class Client:
         version: FRI release such as "1.15"; None takes it from the first datagram.
         model: robot, for the limits.
         limits: what the guard keeps; None for the robot's, a little inside.
+        pose_limits: what it keeps of commanded poses; None for 0.25 m/s and 1 rad/s.
         policy: what is sent while fresh commands stay away.
         law: `law(state, out, params)`, called in the loop's process in every cycle of COMMANDING_ACTIVE; the guard
             still limits what it wants. None: commands come from `command`.
@@ -121,6 +124,7 @@ class Client:
         version: str | None = None,
         model: str | RobotModel = "iiwa14",
         limits: Limits | None = None,
+        pose_limits: PoseLimits | None = None,
         policy: Policy | None = None,
         law: Law | None = None,
         params: Mapping[str, npt.ArrayLike] | None = None,
@@ -152,6 +156,7 @@ class Client:
                     "remote": remote,
                     "version": wire,
                     "limits": asdict(self._limits),
+                    "pose_limits": asdict(pose_limits or PoseLimits()),
                     "policy": _plain(policy or Policy()),
                     "law": launch.importable(law),
                     "params": schema,
@@ -312,18 +317,22 @@ class Client:
         q: npt.ArrayLike | None = None,
         tau: npt.ArrayLike | None = None,
         wrench: npt.ArrayLike | None = None,
+        pose: Pose | npt.ArrayLike | None = None,
     ) -> None:
         """Give a command; it stands until the next one, or until the policy's patience ends.
 
-        The guard limits it. NaN entries keep the axis' last wish. What is None stays as it was.
+        The guard limits it. NaN entries keep the last wish of their axis or coordinate, or of the rotation. What is
+        None stays as it was.
 
         Args:
             q: joint position, shape (7,) [rad].
             tau: superposed torques, shape (7,) [Nm].
             wrench: superposed wrench, shape (6,) [N, Nm].
+            pose: of the flange in the base, or x y z [m] and unit quaternion x y z w, shape (7,); in sessions that
+                command poses.
 
         Raises:
-            ShapeError: an array has another shape.
+            ShapeError: an array has another shape, or the quaternion's norm is further than 1e-3 from 1.
             ConnectionLost: the client is closed, or its loop has ended.
         """
         given, parts = 0, np.zeros(at.COMMAND_WORDS)
@@ -335,6 +344,9 @@ class Client:
             if value is not None:
                 parts[start : start + size] = array(value, size, name, nan=True)
                 given |= bit
+        if pose is not None:
+            parts[at.C_POSE : at.C_POSE + 7] = _seven(pose)
+            given |= at.GIVEN_POSE
         self._check()
         ints = parts.view(np.int64)
         ints[at.C_AT], ints[at.C_GIVEN] = time.monotonic_ns(), given
@@ -401,7 +413,7 @@ class Client:
 
     @property
     def limited(self) -> list[str]:
-        """What the guard has limited, one line for each axis and quantity, in words."""
+        """What the guard has limited, one line for each axis (or part of a pose) and quantity, in words."""
         report, block = Report(), self._layout.block
         for kind in range(7):
             for name, start, words in (
@@ -410,7 +422,15 @@ class Client:
                 ("allowed", at.LIMITED_ALLOWED, block.floats),
             ):
                 getattr(report, name)[kind] = words[start + 7 * kind : start + 7 * kind + 7].tolist()
-        return report.lines
+        posed = PoseReport()
+        for kind in PoseLimited:
+            for name, start, words in (
+                ("counts", at.POSE_COUNTS, block.ints),
+                ("worst", at.POSE_WORST, block.floats),
+                ("allowed", at.POSE_ALLOWED, block.floats),
+            ):
+                getattr(posed, name)[kind] = words[start + 2 * kind : start + 2 * kind + 2].tolist()
+        return report.lines + posed.lines
 
     def events(self) -> list[Event]:
         """What happened since the last call, oldest first."""
@@ -452,6 +472,16 @@ class Client:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _seven(pose: Pose | npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """The numbers of a pose, shape (7,); only those that are given have to be some."""
+    if isinstance(pose, Pose):
+        return pose.array
+    values = array(pose, 7, "pose", nan=True)
+    if not np.isnan(values[3:]).any():
+        Pose.of((0.0, 0.0, 0.0), values[3:])  # says what is wrong with its norm
+    return values
 
 
 def _plain(policy: Policy) -> dict[str, Any]:

@@ -15,11 +15,13 @@ from heptarm.errors import CommandRejected
 from heptarm.fri import messages as m
 from heptarm.fri.guard import Guard, Limited, Limits
 from heptarm.fri.policy import Filler, Policy
+from heptarm.fri.pose_guard import PoseLimits
 from heptarm.fri.session import Kind, Session, Setpoint
 from heptarm.fri.statistics import Histogram
 from heptarm.fri.template import Sample
 from heptarm.fri.version import Version
 from heptarm.rt import layout as at
+from heptarm.rt.posing import Posing
 from heptarm.rt.state import Output, Params, State
 
 Law = Callable[[State, Output, Params], object]
@@ -36,7 +38,7 @@ LAW_FAILED = "the law failed, the arm brakes: "
 REPEAT_OUTPUTS = 10
 _ROW = struct.Struct(f"=18q{at.STATE_WORDS - 19}d")
 _NAN7, _NAN6 = (math.nan,) * 7, (math.nan,) * 6
-_NOTHING_SENT = (_NAN7, _NAN7, _NAN6)
+_NOTHING_SENT = (_NAN7, _NAN7, _NAN6, _NAN7)
 
 
 class Cycle:
@@ -46,12 +48,13 @@ class Cycle:
         layout: the shared memory.
         version: wire format; None takes it from the first datagram.
         limits: what the guard keeps.
+        pose_limits: what it keeps of commanded poses; None for the usual ones.
         policy: what is sent without fresh commands.
         law: called in every cycle of COMMANDING_ACTIVE; None takes the commands of the user's process.
         params: of the law.
 
     Attributes:
-        layout, session, guard, filler, law: what it is made of.
+        layout, session, guard, posing, filler, law: what it is made of.
         is_ending: it brakes, whatever is commanded.
         mirrored: last mirrored position and the message's counter; None outside COMMANDING_WAIT.
         slope: interpolator's speed then [rad/s].
@@ -68,6 +71,7 @@ class Cycle:
         *,
         version: Version | None,
         limits: Limits,
+        pose_limits: PoseLimits | None = None,
         policy: Policy,
         law: Law | None = None,
         params: Params | None = None,
@@ -75,6 +79,7 @@ class Cycle:
         self.layout = layout
         self.session = Session(version, latency=Histogram(layout.latency), jitter=Histogram(layout.jitter))
         self.guard = Guard(limits)
+        self.posing = Posing(pose_limits or PoseLimits())
         self.filler = Filler(policy)
         self.is_ending = False
         self.law = law
@@ -90,7 +95,7 @@ class Cycle:
         self.slope: Sequence[float] = _NAN7
         self.ticks = 0
         self.started = 0
-        self._sent: tuple[Sequence[float], Sequence[float], Sequence[float]] = _NOTHING_SENT
+        self._sent: tuple[Sequence[float], ...] = _NOTHING_SENT
         self._flags = 0
         self._answered = False
         self._fresh: Sample | None = None
@@ -125,9 +130,10 @@ class Cycle:
             return None
         if session.is_commanding and session.mode in _JOINT_MODES and sample.q_ipo is not None:
             setpoint = self._setpoint(sample, received)
-            self._flags |= at.LIMITED if self.guard.was_limited else 0
-            session.counters.limited += self.guard.was_limited
-            session.counters.filled += bool(self._flags & at.FILLED)
+            self._count(limited=self.guard.was_limited)
+        elif session.is_commanding and session.mode not in _JOINT_MODES and self.posing.guard.is_started:
+            setpoint = self._posed(sample, received)
+            self._count(limited=self.posing.guard.was_limited)
         else:
             setpoint = _NOTHING
         if session.is_commanding:
@@ -140,6 +146,12 @@ class Cycle:
             octets = session.answer(replace(setpoint, io=(), transformations=()))
         self._answered = octets is not None
         return octets
+
+    def _count(self, *, limited: bool) -> None:
+        """Note how a setpoint came about."""
+        self._flags |= at.LIMITED if limited else 0
+        self.session.counters.limited += limited
+        self.session.counters.filled += bool(self._flags & at.FILLED)
 
     def finish(self, now: int) -> None:
         """Publish the turn; called after its answer has left at `now` [ns]."""
@@ -157,6 +169,8 @@ class Cycle:
         session.counters.save(header, at.COUNTS)
         if self.guard.was_limited:
             self._report()
+        if self.posing.guard.was_limited:
+            self.posing.publish(self.layout)
         header[at.BEAT] = now
 
     def idle(self, now: int) -> None:
@@ -173,22 +187,28 @@ class Cycle:
     @property
     def may_end(self) -> bool:
         """Nothing moves by this client."""
-        return not self.guard.is_started or self.guard.is_still
+        return all(one.is_still or not one.is_started for one in (self.guard, self.posing.guard))
 
     # ----------------------------------------------------------------------------------------- what is wanted
 
     def _follow(self, sample: Sample, received: int, before: int, step: int) -> None:
         """Keep guard and filler in step with the session's state."""
-        session, guard = self.session, self.guard
+        session, guard, posing = self.session, self.guard, self.posing
+        by_pose = session.mode is m.CommandMode.CARTESIAN_POSE
+        if by_pose:
+            posing.look(self._message(sample))
         again = session.counters.restarts != self._restarts
         self._restarts = session.counters.restarts
         self._skipped = 0
-        if guard.is_started and (again or not session.is_commanding):
+        if again or not session.is_commanding:
             guard.stop()
+            posing.guard.stop()
         if session.is_commanding:
             period = session.period * session.multiplier * 1e-9 or 1e-3
-            if not guard.is_started:
-                if self.mirrored is not None and not again:
+            if not (posing.guard if by_pose else guard).is_started:
+                if by_pose:
+                    posing.begin(period, again=again)
+                elif self.mirrored is not None and not again:
                     guard.start(self.mirrored[0], self.slope, period=period)
                 elif sample.q_ipo is not None:  # the client was not there when commanding began
                     guard.start(sample.q_ipo, _ZEROS7, period=period)
@@ -199,11 +219,16 @@ class Cycle:
                 self.started = received
                 step = 1
             elif received - before > max(SILENT_PERIODS * period * 1e9, SILENT_LEAST):
-                guard.start(guard.q, _ZEROS7, period=period)
+                if by_pose:
+                    posing.resume(period)
+                else:
+                    guard.start(guard.q, _ZEROS7, period=period)
             else:
                 self._skipped = (step - 1) // session.multiplier
             self.ticks += step  # the controller's time goes on while messages are lost
             self.mirrored = None
+        elif session.state is m.SessionState.COMMANDING_WAIT and by_pose:
+            posing.mirror(sample.sequence, session.period)
         elif session.state is m.SessionState.COMMANDING_WAIT and sample.q_ipo is not None:
             last, self.mirrored = self.mirrored, (sample.q_ipo, sample.sequence)
             self.slope = _ZEROS7
@@ -212,6 +237,7 @@ class Cycle:
                 self.slope = tuple((new - old) / gap for new, old in zip(sample.q_ipo, last[0], strict=True))
         else:
             self.mirrored = None
+            posing.forget()
 
     def _setpoint(self, sample: Sample, now: int) -> Setpoint:
         guard, ipo = self.guard, sample.q_ipo
@@ -223,7 +249,11 @@ class Cycle:
             wish = None
             tau, wrench = _ZEROS7, _ZEROS6
         elif self.law is not None:
-            wish, tau, wrench = self._call(sample, ipo, now)
+            out = self._call(sample, now)
+            if out is None:
+                wish, tau, wrench = None, _ZEROS7, _ZEROS6
+            else:
+                wish, tau, wrench = out.q.tolist(), out.tau.tolist(), out.wrench.tolist()
         else:
             self._take()
             wish = self.filler.wish(now, ipo)
@@ -239,8 +269,24 @@ class Cycle:
         sent_tau = tuple(guard.torque(tau or _ZEROS7)) if mode is m.CommandMode.TORQUE else None
         sent_wrench = tuple(guard.force(wrench or _ZEROS6)) if mode is m.CommandMode.WRENCH else None
         guard.was_limited |= limited
-        self._sent = (q, sent_tau or _NAN7, sent_wrench or _NAN6)
+        self._sent = (q, sent_tau or _NAN7, sent_wrench or _NAN6, _NAN7)
         return Setpoint(q=q, tau=sent_tau, wrench=sent_wrench)
+
+    def _posed(self, sample: Sample, now: int) -> Setpoint:
+        """The setpoint of a session that commands poses; its redundancy stays the interpolator's."""
+        wish: Sequence[float] | None = None
+        if not self.is_ending and self.law is not None:
+            out = self._call(sample, now)
+            wish = None if out is None else out.pose.tolist()
+        elif not self.is_ending:
+            self._take()
+            wish = self.filler.pose_wish(now, self.posing.ipo)
+            self._flags |= at.FILLED if self.filler.is_filled else 0
+        if wish is None:
+            self._flags |= at.BRAKING
+        pose = self.posing.command(wish, min(self._skipped, _MOST_SKIPPED))
+        self._sent = (*_NOTHING_SENT[:3], pose.values)
+        return Setpoint(pose=pose)
 
     def _catch_up(self, wish: Sequence[float] | None, reach: Sequence[float] | None) -> bool:
         """Do the cycles that were skipped, evenly towards the wish; says whether one of them was limited.
@@ -274,19 +320,17 @@ class Cycle:
             q=numbers[at.C_Q : at.C_Q + 7] if given & at.GIVEN_Q else None,
             tau=numbers[at.C_TAU : at.C_TAU + 7] if given & at.GIVEN_TAU else None,
             wrench=numbers[at.C_WRENCH : at.C_WRENCH + 6] if given & at.GIVEN_WRENCH else None,
+            pose=numbers[at.C_POSE : at.C_POSE + 7] if given & at.GIVEN_POSE else None,
         )
 
-    def _call(
-        self, sample: Sample, ipo: m.Joints, now: int
-    ) -> tuple[Sequence[float] | None, Sequence[float], Sequence[float]]:
-        """Let the law decide; if it fails, brake from then on."""
+    def _call(self, sample: Sample, now: int) -> Output | None:
+        """Let the law decide; if it fails, None, and brake from then on."""
         out = self._out
-        out.q[:], out.tau[:], out.wrench[:] = ipo, 0.0, 0.0
+        out.q[:], out.tau[:], out.wrench[:] = sample.q_ipo or _NAN7, 0.0, 0.0
+        out.pose[:] = self.posing.ipo
         _ROW.pack_into(self._slot, 8, *self._row(sample, 0))
         self.ask(self._state, out, now)
-        if self.is_ending:
-            return None, _ZEROS7, _ZEROS6
-        return out.q.tolist(), out.tau.tolist(), out.wrench.tolist()
+        return None if self.is_ending else out
 
     def ask(self, state: State, out: Output, now: int) -> None:
         """Call the law with its newest parameters; if it fails, brake from now on."""
@@ -394,6 +438,8 @@ class Cycle:
             *sent[0],
             *sent[1],
             *sent[2],
+            *(self.posing.on_wire if session.is_commanding else _NAN7),
+            *sent[3],
         )
 
     def _message(self, sample: Sample) -> m.Monitoring:

@@ -17,6 +17,7 @@ from heptarm.errors import ConnectFailed, ConnectionLost
 from heptarm.fri.guard import Limits
 from heptarm.fri.messages import SessionState
 from heptarm.fri.policy import Missing, Policy
+from heptarm.fri.pose_guard import PoseLimits
 from heptarm.fri.version import Version
 from heptarm.io.shared import Block
 from heptarm.io.udp import Address, UdpSocket
@@ -55,6 +56,7 @@ class Loop:
             layout,
             version=None if version is None else Version(version),
             limits=_limits(config["limits"]),
+            pose_limits=PoseLimits(**config["pose_limits"]),
             policy=Policy(
                 Missing(config["policy"]["missing"]), config["policy"]["patience"], config["policy"]["over"]
             ),

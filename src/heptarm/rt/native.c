@@ -23,8 +23,8 @@ enum { ANSWERED = 1, FILLED = 2, LIMITED = 4, BRAKING = 8 };
 /* words of the shared header, a state and a command, as in heptarm.rt.layout */
 enum { H_STATES = 0, H_COMMANDS = 1, H_STOP = 4, H_BEAT = 7, H_COUNTS = 16, H_LIMITED = 32, H_WORST = 81, H_ALLOWED = 130 };
 enum { RECEIVED_ALL = 0, ANSWERED_ALL, MISSED = 6, POOR = 8, COMMANDED = 12, FILLED_ALL, LIMITED_ALL };
-enum { STATE_WORDS = 96, S_TRACKING = 19, S_Q = 20, S_WRENCH = 62, S_POSE = 68, S_E1 = 75, S_SENT_Q = 76 };
-enum { COMMAND_WORDS = 24, COMMAND_SLOTS = 8, C_Q = 3, C_TAU = 10, C_WRENCH = 17 };
+enum { STATE_WORDS = 110, S_TRACKING = 19, S_Q = 20, S_WRENCH = 62, S_POSE = 68, S_E1 = 75, S_SENT_Q = 76, S_POSES = 96 };
+enum { COMMAND_WORDS = 30, COMMAND_SLOTS = 8, C_Q = 3, C_TAU = 10, C_WRENCH = 17 };
 enum { BUFFER = 2048 };
 #define SHARE 0.8
 #define GRACE 50000000LL
@@ -535,6 +535,7 @@ static void fill_state(struct loop *l, word *slot) {
         numbers[S_SENT_Q + 7 + i] = active && l->t_answer && l->mode == TORQUE ? l->tau[i] : NAN;
         if (i < 6) numbers[S_SENT_Q + 14 + i] = active && l->t_answer && l->mode == WRENCH ? l->wrench[i] : NAN;
     }
+    for (int i = S_POSES; i < STATE_WORDS; i++) numbers[i] = NAN; /* sessions that command poses are Python's */
 }
 
 static word *open_slot(struct loop *l) {

@@ -87,7 +87,16 @@ class State:
             raise CommandRejected(
                 "the controller sends no pose", hint="FRI 1.x has none: use heptarm.model.forward(robot, s.q)"
             )
-        return Pose.of(numbers[:3] * 1e-3, numbers[[4, 5, 6, 3]])
+        return _pose(numbers)
+
+    @property
+    def pose_ipo(self) -> Pose:
+        """Interpolator's pose, on which the overlay is laid.
+
+        Raises:
+            CommandRejected: no pose is commanded in this session, or not yet.
+        """
+        return _commanded(self._floats[at.S_POSE_IPO : at.S_POSE_IPO + 7])
 
     @property
     def e1(self) -> float:
@@ -108,6 +117,15 @@ class State:
     def wrench_sent(self) -> Floats:
         """Wrench that was answered, shape (6,) [N, Nm]."""
         return self._floats[at.S_WRENCH_SENT : at.S_WRENCH_SENT + 6]
+
+    @property
+    def pose_sent(self) -> Pose:
+        """Pose that was answered.
+
+        Raises:
+            CommandRejected: no pose is commanded in this session, or not yet.
+        """
+        return _commanded(self._floats[at.S_POSE_SENT : at.S_POSE_SENT + 7])
 
     @property
     def session(self) -> SessionState:
@@ -220,6 +238,21 @@ class State:
         )
 
 
+def _pose(numbers: Floats) -> Pose:
+    """The pose of FRI's numbers: x y z [mm], w x y z."""
+    return Pose.of(numbers[:3] * 1e-3, numbers[[4, 5, 6, 3]])
+
+
+def _commanded(numbers: Floats) -> Pose:
+    """A pose of a session that commands poses."""
+    if numbers[0] != numbers[0]:
+        raise CommandRejected(
+            "no pose is commanded here",
+            hint="poses are commanded in COMMANDING_ACTIVE of a session of kind pose",
+        )
+    return _pose(numbers)
+
+
 class Output:
     """What a law wants; set again before every call.
 
@@ -227,14 +260,26 @@ class Output:
         q: position, shape (7,) [rad]; begins as the interpolator's.
         tau: superposed torques, shape (7,) [Nm]; begin as zero.
         wrench: superposed wrench, shape (6,) [N, Nm]; begins as zero.
+        pose: x y z [m] and quaternion x y z w, shape (7,), or a `Pose` assigned; begins as the interpolator's, NaN
+            where no pose is commanded.
     """
 
-    __slots__ = ("q", "tau", "wrench")
+    __slots__ = ("_pose", "q", "tau", "wrench")
 
     def __init__(self) -> None:
         self.q: Floats = np.zeros(7)
         self.tau: Floats = np.zeros(7)
         self.wrench: Floats = np.zeros(6)
+        self._pose: Floats = np.full(7, np.nan)
+
+    @property
+    def pose(self) -> Floats:
+        """Wanted pose, shape (7,) [m, x y z w]."""
+        return self._pose
+
+    @pose.setter
+    def pose(self, value: Pose | npt.ArrayLike) -> None:
+        self._pose[:] = value.array if isinstance(value, Pose) else value
 
     @classmethod
     def on(cls, q: Any, tau: Any, wrench: Any) -> Output:
