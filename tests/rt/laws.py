@@ -14,6 +14,10 @@ def torque(state: State, out: Output, params: Params) -> None:
     out.tau[:] = params.gain * state.tau_ext
 
 
+def lift(state: State, out: Output, params: Params) -> None:
+    out.pose[2] += params.height
+
+
 def fails_later(state: State, out: Output, params: Params) -> None:
     if state.t > 0.05:
         raise RuntimeError("the law has had enough")

@@ -29,13 +29,20 @@ MS = 1_000_000
 class Bench:
     """A cycle with a controller whose clock is counted."""
 
-    def __init__(self, *, wire: Version = Version.V1_15, law: Law | None = None, **params: object) -> None:
+    def __init__(
+        self,
+        *,
+        wire: Version = Version.V1_15,
+        law: Law | None = None,
+        policy: Policy | None = None,
+        **params: object,
+    ) -> None:
         values, schema = Params.flat(params)  # type: ignore[arg-type]
         block = Block(at.Layout.words(history=256, params=values.size))
         block.unlink()
         self.layout = at.Layout(block, history=256, params=values.size)
         self.layout.params.write(values)
-        policy = Policy(Missing.HOLD, patience=1e6) if law is None else Policy()
+        policy = policy or (Policy(Missing.HOLD, patience=1e6) if law is None else Policy())
         self.cycle = Cycle(
             self.layout,
             version=None,
