@@ -230,6 +230,8 @@ def test_only_one_thing_moves_the_arm_and_only_its_controller(arm: ha.Arm) -> No
             rt.command(q=arm.state.q)
         with pytest.raises(ha.ModeConflict, match=r'arm.fri\("torque"\)'):
             rt.command(tau=np.zeros(7))
+        with pytest.raises(ha.ModeConflict, match=r'arm.fri\("pose"\)'):
+            rt.command(pose=ha.Pose.at(0.5, 0.0, 0.5))
     with pytest.raises(ha.LocalProtocolError, match="used once"), rt:
         pass
     with pytest.raises(ha.LocalProtocolError, match="with block"):

@@ -105,7 +105,7 @@ def test_it_starts_with_the_interpolators_speed_and_brakes_from_it() -> None:
     last = np.array(guard.sent)
     sent = run(guard, [None] * 400)
     assert guard.is_still and np.ptp(sent[-200:], axis=0).max() == 0.0
-    way = between(last, sent[-1])
+    way = between(last.tolist(), sent[-1].tolist())
     assert np.linalg.norm(way[:3]) == pytest.approx(0.02 / 2 / LIMITS.acceleration, rel=0.02)  # v²/2a
     assert np.cross(way[:3], twist[:3]) == pytest.approx(np.zeros(3), abs=1e-12), "straight on"
 

@@ -20,15 +20,15 @@ from heptarm.errors import (
     NotReady,
     Timeout,
 )
-from heptarm.fri.guard import Limits, Report
+from heptarm.fri.guard import Limits
 from heptarm.fri.messages import Quality, SessionState
 from heptarm.fri.policy import Policy
-from heptarm.fri.pose_guard import PoseLimited, PoseLimits, PoseReport
+from heptarm.fri.pose_guard import PoseLimits
 from heptarm.fri.session import Event, Kind
 from heptarm.fri.statistics import Counters, Histogram
 from heptarm.fri.version import Version
 from heptarm.io.shared import Block
-from heptarm.rt import launch
+from heptarm.rt import launch, limited
 from heptarm.rt import layout as at
 from heptarm.rt.cycle import Law
 from heptarm.rt.state import Params, State
@@ -414,23 +414,7 @@ class Client:
     @property
     def limited(self) -> list[str]:
         """What the guard has limited, one line for each axis (or part of a pose) and quantity, in words."""
-        report, block = Report(), self._layout.block
-        for kind in range(7):
-            for name, start, words in (
-                ("counts", at.LIMITED_COUNTS, block.ints),
-                ("worst", at.LIMITED_WORST, block.floats),
-                ("allowed", at.LIMITED_ALLOWED, block.floats),
-            ):
-                getattr(report, name)[kind] = words[start + 7 * kind : start + 7 * kind + 7].tolist()
-        posed = PoseReport()
-        for kind in PoseLimited:
-            for name, start, words in (
-                ("counts", at.POSE_COUNTS, block.ints),
-                ("worst", at.POSE_WORST, block.floats),
-                ("allowed", at.POSE_ALLOWED, block.floats),
-            ):
-                getattr(posed, name)[kind] = words[start + 2 * kind : start + 2 * kind + 2].tolist()
-        return report.lines + posed.lines
+        return limited.lines(self._layout)
 
     def events(self) -> list[Event]:
         """What happened since the last call, oldest first."""

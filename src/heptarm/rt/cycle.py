@@ -13,7 +13,7 @@ import numpy as np
 
 from heptarm.errors import CommandRejected
 from heptarm.fri import messages as m
-from heptarm.fri.guard import Guard, Limited, Limits
+from heptarm.fri.guard import Guard, Limits
 from heptarm.fri.policy import Filler, Policy
 from heptarm.fri.pose_guard import PoseLimits
 from heptarm.fri.session import Kind, Session, Setpoint
@@ -21,8 +21,9 @@ from heptarm.fri.statistics import Histogram
 from heptarm.fri.template import Sample
 from heptarm.fri.version import Version
 from heptarm.rt import layout as at
+from heptarm.rt import limited
 from heptarm.rt.posing import Posing
-from heptarm.rt.state import Output, Params, State
+from heptarm.rt.state import Output, Params, State, information
 
 Law = Callable[[State, Output, Params], object]
 
@@ -168,9 +169,9 @@ class Cycle:
             self._publish(self._fresh, now - session.received if self._answered else 0)
         session.counters.save(header, at.COUNTS)
         if self.guard.was_limited:
-            self._report()
+            limited.publish(self.layout, self.guard.report)
         if self.posing.guard.was_limited:
-            self.posing.publish(self.layout)
+            limited.publish(self.layout, self.posing.guard.report)
         header[at.BEAT] = now
 
     def idle(self, now: int) -> None:
@@ -395,7 +396,7 @@ class Cycle:
         robot, link = sample.robot, sample.connection
         if self.info[0] is not robot or self.info[1] is not link:
             full = self._message(sample)
-            self.info = (robot, link, _information(full))
+            self.info = (robot, link, information(full))
             self._read_inputs(full)
         seconds, nanos = sample.stamp
         wrench, pose, e1 = _NAN6, _NAN7, math.nan
@@ -463,16 +464,6 @@ class Cycle:
         ring.ints[slot, 1:] = self._slot[8:].cast("q")
         ring.end()
 
-    def _report(self) -> None:
-        """Publish what the guard has limited so far."""
-        report, ints, floats = self.guard.report, self.layout.block.ints, self.layout.block.floats
-        size = len(Limited)
-        for kind in range(size):
-            start = 7 * kind
-            ints[at.LIMITED_COUNTS + start : at.LIMITED_COUNTS + start + 7] = report.counts[kind]
-            floats[at.LIMITED_WORST + start : at.LIMITED_WORST + start + 7] = report.worst[kind]
-            floats[at.LIMITED_ALLOWED + start : at.LIMITED_ALLOWED + start + 7] = report.allowed[kind]
-
 
 _NOTHING = Setpoint()
 _MOST_SKIPPED = 25
@@ -487,13 +478,3 @@ def _words(error: Exception) -> str:
     """An error in one line, with where it came up."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     return f"{type(error).__name__}: {error} ({place.filename.rpartition('/')[2]}, line {place.lineno})"
-
-
-def _information(full: m.Monitoring) -> tuple[int, ...]:
-    """What seldom changes: overlay, safety, operation, control, drive, multiplier."""
-    robot, ipo = full.robot or m.RobotInfo(), full.ipo or m.IpoData()
-    drives = set(robot.drives)
-    drive = None if not drives else drives.pop() if len(drives) == 1 else m.DriveState.TRANSITIONING
-    multiplier = full.connection.multiplier if full.connection is not None else None
-    values = (ipo.overlay, robot.safety, robot.operation_mode, robot.control_mode, drive, multiplier)
-    return tuple(at.ABSENT if value is None else int(value) for value in values)

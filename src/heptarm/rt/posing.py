@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from heptarm.fri import messages as m
-from heptarm.fri.pose_guard import PoseGuard, PoseLimited, PoseLimits, between, moved
-from heptarm.rt import layout as at
+from heptarm.fri.pose_guard import PoseGuard, PoseLimits, between, moved
 
 _NAN7 = (math.nan,) * 7
 _REST = (0.0,) * 6
@@ -111,12 +110,3 @@ class Posing:
         guard.was_limited |= limited
         assert self._frame is not None
         return replace(self._frame, values=to_wire(pose))
-
-    def publish(self, layout: at.Layout) -> None:
-        """Leave for the user's process what the guard has limited so far."""
-        report, ints, floats = self.guard.report, layout.block.ints, layout.block.floats
-        for kind in PoseLimited:
-            start = 2 * kind
-            ints[at.POSE_COUNTS + start : at.POSE_COUNTS + start + 2] = report.counts[kind]
-            floats[at.POSE_WORST + start : at.POSE_WORST + start + 2] = report.worst[kind]
-            floats[at.POSE_ALLOWED + start : at.POSE_ALLOWED + start + 2] = report.allowed[kind]

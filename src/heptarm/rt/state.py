@@ -14,9 +14,12 @@ from heptarm.fri.messages import (
     CommandMode,
     ControlMode,
     DriveState,
+    IpoData,
+    Monitoring,
     OperationMode,
     Overlay,
     Quality,
+    RobotInfo,
     Safety,
     SessionState,
 )
@@ -375,3 +378,13 @@ class Params:
             parts.append(given.reshape(-1))
             start += given.size
         return (np.concatenate(parts) if parts else np.zeros(0)), schema
+
+
+def information(full: Monitoring) -> tuple[int, ...]:
+    """What seldom changes: overlay, safety, operation, control, drive, multiplier."""
+    robot, ipo = full.robot or RobotInfo(), full.ipo or IpoData()
+    drives = set(robot.drives)
+    drive = None if not drives else drives.pop() if len(drives) == 1 else DriveState.TRANSITIONING
+    multiplier = full.connection.multiplier if full.connection is not None else None
+    values = (ipo.overlay, robot.safety, robot.operation_mode, robot.control_mode, drive, multiplier)
+    return tuple(at.ABSENT if value is None else int(value) for value in values)
