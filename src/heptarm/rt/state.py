@@ -34,7 +34,7 @@ class State:
     """One monitoring message with what was answered to it. Arrays are NaN where the controller sends nothing.
 
     Args:
-        words: one slot of the ring of states, shape (96,); it is not copied.
+        words: one slot of the ring of states, shape (110,); it is not copied.
     """
 
     __slots__ = ("_floats", "_ints")
