@@ -93,6 +93,7 @@ def test_what_cannot_be_written_is_refused(arm: ha.Arm) -> None:
 def test_during_an_emergency_stop_the_cabinet_writes_nothing(arm: ha.Arm) -> None:
     arm.io["LEDRed"] = False
     arm.operator.fault("emergency_stop")
+    arm.wait_until(lambda state: state.safety.emergency_stop, timeout=10.0)
     with pytest.raises(ha.HeptarmError, match="emergency stop"):
         arm.io["LEDRed"] = True
     arm.operator.clear()

@@ -129,6 +129,7 @@ def test_start_at_the_smartpad_lets_a_paused_motion_go_on(safe: Arm) -> None:
 def test_t1_is_slow(safe: Arm) -> None:
     safe.operator.choose("t1")
     safe.operator.hold()
+    safe.wait_until(lambda s: s.safety.mode is OperationMode.T1 and s.safety.enabling_switch, timeout=10.0)
     assert safe.recover(timeout=5.0).done
     fastest = 0.0
     handle = safe.start(ptp(AWAY))

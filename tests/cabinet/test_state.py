@@ -95,6 +95,8 @@ def test_velocity_follows_the_motion(connect: Connect) -> None:
     peer = connect()
     peer.ask(wire.TakeControl(watchdog=10.0))
     peer.ask(wire.Subscribe(groups=G.JOINTS | G.MOTION, rate=200.0))
+    begin = peer.ask(run(ptp(0.0)))  # wherever other tests left it
+    peer.wait_for(wire.MotionFinished, lambda e: e.id == begin.id)
     accepted = peer.ask(run(ptp(0.3)))
     peer.wait_for(wire.MotionFinished, lambda e: e.id == accepted.id)
     peer.read_for(0.2)

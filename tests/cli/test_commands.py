@@ -61,7 +61,7 @@ def test_servo_swings_an_axis_and_tells_how_the_stream_went(target: str) -> None
     assert told["received"] == told["sent"] > 50
     assert told["refused"] == told["late"] == 0 and told["largest_lag_rad"] < 0.1
     done = run("servo", "--duration", "1", "--target", target)
-    assert "targets at 100" in done.stdout and "when applied" in done.stdout
+    assert " targets at " in done.stdout and "when applied" in done.stdout
     assert run("servo", "--axis", "8", "--target", target).returncode == 1
 
 
