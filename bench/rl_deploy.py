@@ -18,7 +18,7 @@ from heptarm.rl.report import Report
 
 EPISODES, SPEED, SOON, LATER = 200, 4.0, 1.5, 1.8
 #: Episodes of the oracle, on the first of the same targets.
-ORACLE = 100
+ORACLE = 20
 PLAIN = Settings(homing=0.6)
 HARD = Settings(homing=0.6, mode=JointImpedance(300.0), latency=0.06)
 
