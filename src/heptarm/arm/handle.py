@@ -56,6 +56,7 @@ class MotionHandle:
         self._until = until
         self._fired: State | None = None
         self._id = 0
+        self._furthest = 0.0
         self._item = -1
         self._begun = threading.Event()
         #: Whether it ends in position control, so that it has to end at its target.
@@ -97,19 +98,19 @@ class MotionHandle:
 
     @property
     def progress(self) -> float:
-        """How much of it is done, [0, 1]; each motion counts the same."""
-        if self.done:
-            return (
-                1.0 if self.result is not None and self.result.cause is Cause.FINISHED else self._share(0.0)
-            )
-        state = self._connection.newest()
-        seen = None if state is None else state.motion
-        if seen is None or seen.id != self._id or seen.item != max(self._item, 0) or isnan(seen.progress):
-            return self._share(0.0)
-        return self._share(seen.progress)
+        """How much of it is done, [0, 1]; each motion counts the same. It never goes back."""
+        if self.done and self.result is not None and self.result.cause is Cause.FINISHED:
+            return 1.0
+        # a state at the change from one motion to the next may already tell the progress of the next
+        self._furthest = max(self._furthest, self._share())
+        return self._furthest
 
-    def _share(self, of_item: float) -> float:
-        return (max(self._item, 0) + of_item) / self._count
+    def _share(self) -> float:
+        item = max(self._item, 0)
+        state = None if self.done else self._connection.newest()
+        seen = None if state is None else state.motion
+        told = seen is not None and seen.id == self._id and seen.item == item and not isnan(seen.progress)
+        return (item + (seen.progress if told and seen is not None else 0.0)) / self._count
 
     def wait(self, *, timeout: float | None = None) -> Result:
         """Wait until it has ended.
