@@ -95,7 +95,7 @@ def test_something_else_arrives() -> None:
 
 
 def test_bench_measures_a_session_of_its_own(cabinet: RunningCabinet) -> None:
-    arguments = ("--target", cabinet.target, "--fri-period", "10", "--duration", "1")
+    arguments = ("--target", cabinet.target, "--fri-port", "0", "--fri-period", "10", "--duration", "1")
     done = run("bench", "--fri", *arguments, "--fri-command", "position")
     assert done.returncode in (0, 1), done.stderr
     assert "every 10 ms" in done.stdout and "us median" in done.stdout and "verdict" in done.stdout
