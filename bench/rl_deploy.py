@@ -17,8 +17,6 @@ from heptarm.rl.policy import shipped
 from heptarm.rl.report import Report
 
 EPISODES, SPEED, SOON, LATER = 200, 4.0, 1.5, 1.8
-#: Episodes of the oracle, on the first of the same targets.
-ORACLE = 20
 PLAIN = Settings(homing=0.6)
 HARD = Settings(homing=0.6, mode=JointImpedance(300.0), latency=0.06)
 
@@ -32,7 +30,7 @@ def rl_deploy() -> Iterator[Figure]:
         oracle = Oracle(task)
         fewest = np.array([oracle.solve(target)[1] for target in targets]) / task.rate
         for name, settings in (("", PLAIN), ("_soft_late", HARD)):
-            best = deploy(arm, oracle, targets[:ORACLE], settings=settings)
+            best = deploy(arm, oracle, targets, settings=settings)
             yield Figure(
                 f"rl_oracle{name}_within_1.5_s",
                 "E9",

@@ -1,4 +1,7 @@
-"""What no policy can beat: the joints that reach a target in the fewest full-speed steps, and an arm driven there."""
+"""A yardstick: the joints that reach a target in the fewest full-speed steps, and an arm driven straight there.
+
+The fewest steps bound every policy. The arm that is driven there does not: it lags, and knows nothing of it.
+"""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ _MARK = "TESTS_OF_HEPTARM"
 _left: list[str] = []
 
 # no timing assertions, least of all on a machine that does other things as well
-settings.register_profile("heptarm", deadline=None, max_examples=50)
+settings.register_profile("heptarm", deadline=None)
 settings.load_profile("heptarm")
 
 

@@ -243,7 +243,7 @@ def test_the_mode_in_force_is_told(peer: Peer) -> None:
     servo = peer.ask(wire.ServoOpen(watchdog=2.0, mode=SPRING)).id
     peer.wait_for(wire.MotionStarted, lambda event: event.id == servo)
     softer = replace(SPRING, nullspace_stiffness=7.0)
-    peer.ask(wire.ServoSettings(servo=servo, mode=softer))
+    assert isinstance(peer.ask(wire.ServoSettings(servo=servo, mode=softer)), wire.Accepted)
     assert says(softer)
     peer.ask(wire.ServoClose(servo=servo))
     peer.wait_for(wire.MotionFinished, lambda event: event.id == servo)

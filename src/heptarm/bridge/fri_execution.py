@@ -21,13 +21,11 @@ class FriOptions:
 
     Attributes:
         period: of the session [ms], 1 to 10.
-        port: own UDP port; 0: the first free one of FRI's.
         host: under which address the cabinet reaches this machine; empty: as the connection does.
         linger: how long the session stays open after a goal [s]; the next goal begins at once in it.
     """
 
     period: int = 5
-    port: int = 0
     host: str = ""
     linger: float = 2.0
 
@@ -55,9 +53,7 @@ class FriExecution(Execution):
     @contextmanager
     def _motion(self) -> Iterator[Follower]:
         options = self._options
-        with self._arm.fri(
-            "position", period_ms=options.period, port=options.port or None, host=options.host
-        ) as session:
+        with self._arm.fri("position", period_ms=options.period, host=options.host) as session:
             yield _Overlay(session)
 
 

@@ -213,15 +213,7 @@ def _target(target: npt.ArrayLike | Target, guard: Guard) -> Target:
     else:
         point = array(target, 3, "target")
         moving = lambda _: point  # noqa: E731
-    if not guard.contains(point):
-        raise LimitError(
-            f"the target {np.round(point, 3).tolist()} m is outside the guard's box",
-            code=2,
-            parameter="target",
-            value=point.tolist(),
-            allowed=f"{list(guard.low)} to {list(guard.high)} m",
-            hint="choose another target, or a guard with a larger box",
-        )
+    guard.check(point)
     return moving
 
 

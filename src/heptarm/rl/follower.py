@@ -8,7 +8,7 @@ from math import nan
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import LimitError, ShapeError
+from heptarm.errors import ShapeError
 from heptarm.rl.guard import Guard
 from heptarm.rl.pilot import Decides, Pilot
 from heptarm.values.arrays import Array, array
@@ -79,15 +79,7 @@ class Follower:
         if target is None:
             self._target, self._under_way = None, False
             return
-        point = array(target, 3, "target")
-        if not self.guard.contains(point):
-            raise LimitError(
-                f"the target {np.round(point, 3).tolist()} m is outside the guard's box",
-                parameter="target",
-                value=point.tolist(),
-                allowed=f"{list(self.guard.low)} to {list(self.guard.high)} m",
-            )
-        self._target = point
+        self._target = self.guard.check(array(target, 3, "target"))
 
     def command(self, now: float) -> Array | None:
         """The next commanded joints, shape (7,) [rad]; to be asked for `task.rate` times a second.

@@ -42,9 +42,22 @@ class Guard:
             if not getattr(self, name) > 0:
                 raise LimitError(f"{name} is {getattr(self, name)}; it is positive", code=2, parameter=name)
 
-    def contains(self, point: Array) -> bool:
-        """Whether a point [m] is inside the box."""
-        return bool((point >= self.low).all() and (point <= self.high).all())
+    def check(self, target: Array) -> Array:
+        """A target, base frame, shape (3,) [m], if it is inside the box.
+
+        Raises:
+            LimitError: it is outside.
+        """
+        if (target >= self.low).all() and (target <= self.high).all():
+            return target
+        raise LimitError(
+            f"the target {np.round(target, 3).tolist()} m is outside the guard's box",
+            code=2,
+            parameter="target",
+            value=target.tolist(),
+            allowed=f"{list(self.low)} to {list(self.high)} m",
+            hint="choose another target, or a guard with a larger box",
+        )
 
 
 class Watch:

@@ -149,10 +149,10 @@ final class Program {
                 synchronized (Program.this) {
                     item = index;
                 }
-                server.broadcast(new MotionStarted(id, index));
                 if (activity != null) {
-                    activity.begun();
+                    activity.begun(); // before anybody hears of it: what a client orders then finds it running
                 }
+                server.broadcast(new MotionStarted(id, index));
             }
 
             public void fired(int node) {
