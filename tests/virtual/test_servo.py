@@ -11,6 +11,7 @@ from heptarm.values.arrays import Array
 from heptarm.values.mode import JointImpedance
 from heptarm.virtual.order import Order
 from heptarm.virtual.plant import Plant
+from heptarm.virtual.safety import Demand
 from tests.virtual.driving import READY, Ear, ready
 
 KINDS = ("servo", "direct")
@@ -213,3 +214,23 @@ def test_a_motion_planned_behind_an_impedance_motion_starts_where_the_arm_is() -
     assert ear.causes == ["started", "done"]
     assert fastest < 0.8  # no jump back
     assert np.abs(plant.snapshot.q - HERE).max() < 1e-3
+
+
+@pytest.mark.parametrize("fast", [False, True], ids=["path", "fast"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_whoever_cancels_a_motion_that_a_stop_halts_turns_nothing_back(kind: str, fast: bool) -> None:
+    for lag in (*range(0, 16, 3), 17, 18, 19, 25, 60):
+        plant, ear = serving(kind, joint_velocity=(0.2,) * 7, joint_acceleration=(0.2,) * 7)
+        plant.ring.post(7, HERE + 0.5)
+        plant.step(600)
+        path = [plant.snapshot.q_cmd]
+        plant.safety.demand(Demand.OPERATOR_SAFETY)
+        for tick in range(300):
+            if tick == lag:
+                plant.stop_fast() if fast else plant.cancel()
+            plant.tick()
+            path.append(plant.snapshot.q_cmd)
+        speed = np.diff(np.array(path), axis=0) * 1e3
+        assert (speed > -1e-6).all() and (speed <= 0.2 * plant.robot.dq_max * 1.001).all()
+        to_rest(plant)
+        assert ear.causes[-1] == "cancelled"

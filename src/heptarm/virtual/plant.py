@@ -453,6 +453,11 @@ class Plant:
 
     def _follow(self, run: _Run) -> tuple[float, float]:
         planned = run.plan
+        if run.cancelled and not (run.ended or run.braking or self._overlaid):
+            if self._pace.rests:
+                run.ended = True
+            elif not self.safety.latched:  # the stop is over before it was one
+                self._brake_on_path(run)
         if run.ended:
             return self._settle(run)
         if run.follower is not None:
@@ -590,6 +595,10 @@ class Plant:
         if run.cancelled or run.failure:
             return
         run.cancelled = True
+        if not self.safety.latched:  # else the stop in force brings it to rest, sooner
+            self._brake_on_path(run)
+
+    def _brake_on_path(self, run: _Run) -> None:
         rate = self._pace.rate
         if run.follower is not None:
             run.follower.brake(scale=self._pace.scale, rate=rate)

@@ -137,7 +137,8 @@ class SmartFollower:
         q, dq, ddq = self._state()
         if speed is not None:
             dq = speed
-        self._halt((q, dq * scale, ddq * scale * scale + dq * rate))
+        limit = self._terms.acceleration  # beyond it, braking would end in a swing backwards
+        self._halt((q, dq * scale, np.clip(ddq * scale * scale + dq * rate, -limit, limit)))
         self._stopping = True
 
     @property
