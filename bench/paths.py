@@ -36,7 +36,8 @@ def _orders(start: Pose) -> dict[str, Order]:
 
     def sides(*, zone: float) -> tuple[Order, ...]:
         return tuple(
-            Order(1, "lin", pose=_at(start, *c), cart_velocity=SPEED, blending=(0.0, zone, 0.0)) for c in corners
+            Order(1, "lin", pose=_at(start, *c), cart_velocity=SPEED, blending=(0.0, zone, 0.0))
+            for c in corners
         )
 
     curved = tuple(Order(1, "spl", pose=_at(start, *knot), cart_velocity=SPEED) for knot in knots)
