@@ -8,8 +8,9 @@ from heptarm.model.kinematics import forward
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import robot
+from heptarm.virtual.interpolator import FAST_JERK
 from heptarm.virtual.order import Order
-from heptarm.virtual.plant import FAST_JERK, Plant
+from heptarm.virtual.plant import Plant
 from heptarm.virtual.safety import Demand
 from tests.virtual.driving import READY
 
@@ -55,8 +56,9 @@ class Ideal(Plant):
 
     def tick(self) -> None:
         self._advance()
-        self._q[:] = self._command[2]
-        self._dq[:] = (self._command[2] - self._command[1]) / TICK
+        _, now, after = self.interpolator.command
+        self._q[:] = after
+        self._dq[:] = (after - now) / TICK
         self.tick_count += 1
 
     @property
@@ -67,13 +69,14 @@ class Ideal(Plant):
     @property
     def acceleration(self) -> Array:
         """Of the set-points, shape (7,) [rad/s²]."""
-        before, now, after = self._command
+        before, now, after = self.interpolator.command
         return (after - 2 * now + before) / TICK**2
 
     @property
     def is_under_way(self) -> bool:
         """Whether the set-points move, or a motion brakes that has not come to its end."""
-        braking = self._run is not None and self._run.cancelled and not self._run.ended
+        run = self.interpolator.run
+        braking = run is not None and run.cancelled and not run.ended
         return braking or bool(self._dq.any())
 
     def press(self) -> None:
@@ -88,10 +91,10 @@ def stopping_time(plant: Plant, how: str) -> float:
     others brake at each axis' full deceleration; on a curved path the axis that is fastest may not be the one that
     sets the pace, so an emergency stop gets half as much again.
     """
-    run = plant._run
+    run = plant.interpolator.run
     assert run is not None
     hardest, jerk = float(plant.robot.ddq_max.min()), float(plant.robot.dddq_max.min())
-    before, now, after = plant._command
+    before, now, after = plant.interpolator.command
     fastest = float(np.abs(after - now).max()) / TICK
     if how != "path":
         return 1.5 * fastest / hardest + (hardest / jerk / FAST_JERK if how == "fast" else 0.0)

@@ -12,7 +12,7 @@ import pytest
 from heptarm.errors import Unreachable
 from heptarm.model.kinematics import jacobian
 from heptarm.values.arrays import Array
-from heptarm.virtual import plant as plant_module
+from heptarm.virtual import queue as queue_module
 from heptarm.virtual.order import Order, PlanError
 from heptarm.virtual.path import CartesianPath
 from heptarm.virtual.planner import Plan, plan
@@ -148,7 +148,7 @@ def test_the_tick_does_not_wait_for_a_plan(monkeypatch: pytest.MonkeyPatch) -> N
         assert go_on.wait(10)
         return plan(*arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(plant_module, "plan", slow)
+    monkeypatch.setattr(queue_module, "plan", slow)
     other = threading.Thread(target=plant.submit, args=(Order(2, "ptp", joints=READY),))
     other.start()
     assert planning.wait(10)

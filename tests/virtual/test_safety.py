@@ -9,8 +9,9 @@ from heptarm.model.kinematics import forward, jacobian
 from heptarm.values.arrays import Array
 from heptarm.values.mode import JointImpedance
 from heptarm.virtual import ring
+from heptarm.virtual.interpolator import REDUCED_SPEED
 from heptarm.virtual.order import Order
-from heptarm.virtual.plant import REDUCED_SPEED, Plant
+from heptarm.virtual.plant import Plant
 from heptarm.virtual.safety import Demand, Mode, Safety
 from tests.virtual.driving import READY, Ear, ready, run
 from tests.virtual.ideal import KINDS, LINE, begin, stopping_time

@@ -14,7 +14,8 @@ from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import Array
 from heptarm.values.mode import JointImpedance
 from heptarm.virtual.order import Order
-from heptarm.virtual.plant import TICK, Plant
+from heptarm.virtual.pace import TICK
+from heptarm.virtual.plant import Plant
 
 _SERVO = 1
 

@@ -1,0 +1,397 @@
+"""The interpolator of a simulated controller: turns orders into set-points, one a tick.
+
+It takes orders from its queue, runs their time at the pace that overrides, pauses and stops allow, leads the set-points
+along their paths or after servo targets, and brakes on the path or off it where something ends a motion early.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from math import nan
+
+import numpy as np
+
+from heptarm.errors import Unreachable
+from heptarm.values.arrays import Array
+from heptarm.values.mode import Mode as ControlMode
+from heptarm.values.robot import RobotModel
+from heptarm.virtual import ring
+from heptarm.virtual.condition import Lookout, Watching
+from heptarm.virtual.control import Control
+from heptarm.virtual.fri.overlay import Superposition
+from heptarm.virtual.law import Sensed
+from heptarm.virtual.load import Load
+from heptarm.virtual.pace import TICK, Pace
+from heptarm.virtual.path import JointLine, JointPath
+from heptarm.virtual.planner import Plan
+from heptarm.virtual.profile import Limits, TimeLaw, brake
+from heptarm.virtual.queue import Cancellation, Queue
+from heptarm.virtual.safety import Mode, Safety
+from heptarm.virtual.servo import Follower, follower
+
+#: A motion is done when every measured joint is this near to its command [rad] and this slow [rad/s] ...
+SETTLED = 5e-5
+SETTLED_SPEED = 1e-3
+#: ... or after this many ticks.
+SETTLE_TICKS = 500
+
+#: Highest speed of the moved frame in T1 [m/s], a trifle less than the standard's 250 mm/s.
+REDUCED_SPEED = 0.249
+#: A fast stop may jerk so many times more than a motion.
+FAST_JERK = 20.0
+
+#: Set-points this far behind a limit are rounding errors [rad].
+ON_LIMIT = 1e-9
+#: A set-point that asks for more than this many times an axis' speed is not followed.
+OVERSPEED = 1.2
+
+
+class Run:
+    """An order under way.
+
+    Args:
+        planned: its plan.
+        serial: its number among all accepted orders.
+        watches: its conditions.
+    """
+
+    __slots__ = (
+        "braking",
+        "broken",
+        "cancelled",
+        "ended",
+        "failure",
+        "follower",
+        "part",
+        "path",
+        "plan",
+        "profile",
+        "serial",
+        "settling",
+        "started",
+        "time",
+        "watches",
+    )
+
+    def __init__(self, planned: Plan, serial: int, watches: tuple[Watching, ...]) -> None:
+        self.plan = planned
+        self.serial = serial
+        self.watches = watches
+        self.path: JointPath | None = planned.path
+        self.profile: TimeLaw | None = planned.profile
+        self.failure = ""
+        self.part = 0
+        self.time = 0.0
+        self.braking = False
+        self.cancelled = False
+        self.ended = False
+        self.settling = 0
+        self.started = False
+        self.follower: Follower | None = None
+        self.broken = False
+
+
+class Interpolator:
+    """Leads the set-points of a plant.
+
+    Args:
+        robot: the robot.
+        shared: ring with the override, the servo targets and the signals.
+        sensed: what the plant measures; the arrays of its positions and speeds stay the same.
+        load: external load of the arm.
+        control: the control law in force.
+        safety: what safety demands.
+
+    Attributes:
+        queue: orders that wait.
+        lookout: looks at the conditions.
+        command: set-points of the last, this and the next tick, shape (7,) each [rad].
+        run: the order under way; None: nothing runs.
+        is_paused: come to rest on the path, keeping all orders.
+        action: what an FRI overlay wants of the next tick.
+        is_overlaid: whether the last set-point was an overlay's.
+    """
+
+    def __init__(
+        self, robot: RobotModel, shared: ring.Ring, sensed: Sensed, load: Load, control: Control, safety: Safety
+    ) -> None:
+        self._robot, self._ring, self._load = robot, shared, load
+        self._control, self._safety = control, safety
+        self._q, self._dq = sensed.q, sensed.dq
+        self._leap = OVERSPEED * robot.dq_max * TICK
+        self._lowest, self._highest = robot.q_min - ON_LIMIT, robot.q_max + ON_LIMIT
+        self.command = [self._q.copy() for _ in range(3)]
+        self.queue = Queue(robot, self._rest)
+        self.lookout = Lookout(robot, shared.signals)
+        self._pace = Pace(robot)
+        self._changes: deque[tuple[int, ControlMode]] = deque()  # of the control mode of an order
+        # orders that somebody else ends by an error; 0: whichever runs
+        self._aborts: deque[tuple[int, str]] = deque()
+        self.run: Run | None = None
+        self.is_paused = False
+        self.action: Superposition | None = None
+        self.is_overlaid = False
+
+    @property
+    def order(self) -> int:
+        """Id of the running order, 0 if none."""
+        return 0 if self.run is None else self.run.plan.order.id
+
+    @property
+    def interpolated(self) -> Array:
+        """Set-point of the next tick without an overlay, shape (7,) [rad]: where a held arm was when the hold began."""
+        return self.run.plan.end if self.is_overlaid and self.run is not None else self.command[2]
+
+    @property
+    def rests(self) -> bool:
+        """Whether the set-points rest."""
+        return bool((self.command[2] == self.command[1]).all())
+
+    def _rest(self) -> Array:
+        return self.command[2].copy()
+
+    def change_mode(self, order_id: int, mode: ControlMode) -> None:
+        """Change the parameters of a running order's control mode, from any thread; see `Plant.change_mode`."""
+        self._changes.append((order_id, mode))
+
+    def abort(self, order_id: int, text: str) -> None:
+        """End a running order (0: whichever runs) by an error, from any thread."""
+        self._aborts.append((order_id, text))
+
+    # ------------------------------------------------------------------------------ the tick
+
+    def advance(self) -> tuple[float, float]:
+        """Shift the set-points and compute the next one; returns progress and remaining time."""
+        command = self.command
+        while (wish := self.queue.cancelled()) is not None:
+            self._cancel(wish)
+        while self._aborts:
+            order_id, text = self._aborts.popleft()
+            if self.run is not None and order_id in (0, self.order) and not self.run.failure:
+                self.run.failure = text
+                if not self.is_overlaid and not self.run.braking:
+                    self._fail(self.run, text)
+        while self._changes:
+            order_id, mode = self._changes.popleft()
+            if order_id == self.order:
+                self._control.retune(mode)
+        self._keep_pace()
+        if self.lookout.is_busy or (self.run is not None and self.run.watches):
+            self._look()
+        run = self.run
+        if run is None:
+            run = None if self._safety.latched else self._next()
+            if run is None and self._control.stiffen():
+                self._stay()
+            command = self.command
+        command[0], command[1] = command[1], command[2]
+        if run is None:
+            return 0.0, nan
+        if not run.started:
+            run.started = True
+            if run.plan.order.listener is not None:
+                run.plan.order.listener.started()
+        if self._control.violation:
+            self._catch(run, self._control.violation)
+        return self._follow(run)
+
+    def _next(self) -> Run | None:
+        while (accepted := self.queue.take()) is not None:
+            order = accepted.order
+            if self._control.take(order):
+                self._stay()
+            planned = self.queue.planned(accepted, self.command[2])
+            if planned is None:
+                continue
+            self.run = run = Run(planned, accepted.serial, self.lookout.begin(planned))
+            if order.is_servo:
+                run.follower = follower(self._robot, order, self.command[2])
+            return run
+        return None
+
+    def _look(self) -> None:
+        """Look at the conditions; one that breaks the running motion brakes it on its path."""
+        run = self.run
+        watches = () if run is None or run.braking or run.ended else run.watches
+        elapsed = 0.0 if run is None else run.time
+        breaks = self.lookout.look(
+            self._q, self._load.torque, self._load.wrench, watches=watches, elapsed=elapsed
+        )
+        if breaks and run is not None and not run.cancelled and not run.failure:
+            run.broken = True
+            self.queue.diverge()
+            self._brake(run)
+
+    def _keep_pace(self) -> None:
+        """How fast time runs in this tick, by overrides, pauses, stops and the operation mode."""
+        safety = self._safety
+        held = self.is_paused or safety.latched
+        goal = 0.0 if held else safety.manual * min(1.0, max(0.0, float(self._ring.reals[ring.OVERRIDE])))
+        if safety.mode is Mode.T1 and self.run is not None:
+            tcp = self.run.plan.order.tcp[:3]
+            self._pace.advance(goal, self.command, halts=safety.latched, ceiling=REDUCED_SPEED, tcp=tcp)
+        else:
+            self._pace.advance(goal, self.command, halts=safety.latched)
+
+    def _follow(self, run: Run) -> tuple[float, float]:
+        planned = run.plan
+        if run.cancelled and not (run.ended or run.braking or self.is_overlaid):
+            if self._pace.rests:
+                run.ended = True
+            elif not self._safety.latched:  # the stop is over before it was one
+                self._brake_on_path(run)
+        if run.ended:
+            return self._settle(run)
+        if run.follower is not None:
+            return self._serve(run, run.follower)
+        if self.action is not None and planned.order.kind == "hold" and not (run.cancelled or run.failure):
+            self.is_overlaid = True
+            self.command[2] = self.action.q
+            return 0.0, nan
+        if self.is_overlaid:
+            self.is_overlaid = False
+            self._halt(run)
+        run.time += TICK if run.braking else TICK * self._pace.factor
+        if run.path is None or run.profile is None:
+            if run.cancelled or run.time >= planned.duration or planned.order.kind != "hold":
+                run.ended = True
+            return min(1.0, run.time / planned.duration), planned.duration - run.time
+        s = run.profile.at(run.time)[0]
+        if run.time >= run.profile.duration:
+            run.ended = True
+        s = min(max(s, 0.0), 1.0)
+        while run.part < len(planned.marks) and s >= planned.marks[run.part]:
+            run.part += 1
+            if planned.order.part_listener is not None:
+                planned.order.part_listener.reached(run.part)
+        # at the very end take the planned joints: the path's samples may end a rounding error beside them
+        if s == 1.0 and run.path is planned.path:
+            self.command[2] = planned.end
+        else:
+            self._lead(run, s)
+        return (nan if run.failure else planned.progress(s, run.part)), run.profile.duration - run.time
+
+    def _lead(self, run: Run, s: float) -> None:
+        """Set the next set-point; one that no axis could follow ends the motion."""
+        assert run.path is not None
+        here = self.command[2]
+        try:
+            there = run.path.at(s, here)
+        except Unreachable as error:
+            self._fail(run, f"the path is not reachable: {error.text}")
+            return
+        self._go(run, there)
+
+    def _go(self, run: Run, there: Array) -> None:
+        """Take a set-point unless an axis could not follow it."""
+        leap = np.abs(there - self.command[2]) > self._leap
+        if leap.any() and not run.failure:
+            self._fail(run, f"Command Velocity violates limit A{int(leap.argmax()) + 1} (singularity)")
+            return
+        self.command[2] = there
+
+    def _settle(self, run: Run) -> tuple[float, float]:
+        if self._control.stays and not run.cancelled and not run.failure:
+            return 1.0, 0.0
+        run.settling += 1
+        at_rest = not self._control.is_stiff or float(np.abs(self._q - self.command[2]).max()) <= SETTLED
+        at_rest = at_rest and float(np.abs(self._dq).max()) <= SETTLED_SPEED
+        if at_rest or run.settling >= SETTLE_TICKS:
+            cause = "condition" if run.broken else "cancelled" if run.cancelled else "done"
+            self.run = None
+            self.queue.close(run.plan.order, "error" if run.failure else cause, run.failure)
+        return (nan if run.cancelled or run.failure else 1.0), 0.0
+
+    # ------------------------------------------------------------------------------ braking
+
+    def _fail(self, run: Run, text: str) -> None:
+        """Brake every axis by itself, off the path: straight on from where the last set-points led."""
+        run.failure = text
+        self._halt(run)
+
+    def _halt(self, run: Run, *, jerk: float = 1.0) -> None:
+        """Brake every axis by itself, straight on from where the last set-points led."""
+        run.braking, run.ended, run.follower = True, False, None
+        before, now, here = self.command
+        step = here - (before if now is here else now)  # whether or not the set-points were shifted in this tick
+        speed = np.clip(step / TICK, -self._robot.dq_max, self._robot.dq_max)
+        run.path = JointLine(here.copy(), here + speed)
+        full = float(np.abs(speed).max())
+        if full < 1e-9:
+            run.path, run.ended = None, True
+            return
+        limits = Limits(
+            2.0, float(self._robot.ddq_max.min()) / full, jerk * float(self._robot.dddq_max.min()) / full
+        )
+        run.profile, run.time = brake((0.0, 1.0, 0.0), limits), 0.0
+
+    def _cancel(self, wish: Cancellation) -> None:
+        """Carry out a cancellation."""
+        run = self.run
+        if run is not None and wish.concerns(run.serial, run.plan.order):
+            (self._brake_fast if wish.fast else self._brake)(run)
+        self.queue.drop(wish)
+
+    def _brake(self, run: Run) -> None:
+        if run.cancelled or run.failure:
+            return
+        run.cancelled = True
+        if not self._safety.latched:  # else the stop in force brings it to rest, sooner
+            self._brake_on_path(run)
+
+    def _brake_on_path(self, run: Run) -> None:
+        rate = self._pace.rate
+        if run.follower is not None:
+            run.follower.brake(scale=self._pace.scale, rate=rate)
+            run.braking = True
+            return
+        if self.is_overlaid:
+            return  # the next tick brakes from the overlay's speed
+        if run.ended or run.profile is None or run.path is None:
+            run.ended = run.ended or run.path is None
+            return
+        scale, halts = self._pace.scale, run.plan.halts
+        if halts is not None:
+            run.profile = halts.brake(run.time, scale, rate)
+        else:
+            s, velocity, acceleration = run.profile.at(run.time)
+            state = (s, velocity * scale, acceleration * scale * scale + velocity * rate)
+            run.profile = brake(state, run.plan.braking)
+        run.time, run.braking = 0.0, True
+
+    def _brake_fast(self, run: Run) -> None:
+        if run.failure or run.ended:
+            self._brake(run)
+            return
+        run.cancelled = True
+        if not self.is_overlaid:  # else the next tick brakes from the overlay's speed
+            self._halt(run, jerk=FAST_JERK)
+
+    # ------------------------------------------------------------------------------ servo motions and yielding
+
+    def _serve(self, run: Run, follower: Follower) -> tuple[float, float]:
+        """Lead the set-point to the newest target."""
+        target = self._ring.target()
+        order = run.plan.order
+        if target is not None and target.order == order.id and not run.cancelled:
+            follower.aim(target.q, target.dq)
+        there = follower.advance(TICK if run.braking else TICK * self._pace.factor)
+        run.ended = follower.is_still if run.braking else follower.resting > order.goal_timeout
+        beyond = (there > self._highest) | (there < self._lowest)
+        if beyond.any():
+            self._fail(run, f"Command Position violates limit A{int(beyond.argmax()) + 1}")
+        else:
+            self._go(run, there)
+        return nan, follower.remaining
+
+    def _stay(self) -> None:
+        """The set-points of an arm that has yielded become what it has yielded to."""
+        self.command = [self._q.copy() for _ in range(3)]
+
+    def _catch(self, run: Run, text: str) -> None:
+        """A limit of the control mode is exceeded: become stiff and brake from the measured speed."""
+        self._control.stiffen()
+        way = self._dq * TICK
+        self.command = [self._q - way, self._q.copy(), self._q.copy()]
+        run.settling = 0
+        self._fail(run, text)
