@@ -80,7 +80,7 @@ def trajectory(target: str, execution: str) -> dict[str, Any]:
     assert ended.outcome is Outcome.SUCCEEDED, ended
     times = np.array([stamp(message) for message in watch.messages]) - start
     places = np.array([message.position for message in watch.messages])
-    fine = np.arange(-0.02, 0.0201, 0.0005)
+    fine = np.arange(-0.02, 0.02005, 0.0001)
     distances, moments = [], []
     for point in points:
         at = np.stack([np.interp(point.time + fine, times, places[:, j]) for j in range(7)], axis=1)

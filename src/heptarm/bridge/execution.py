@@ -14,7 +14,6 @@ from heptarm.arm.arm import Arm
 from heptarm.arm.servo import JointServo
 from heptarm.bridge.goal import End, Goal, GoalRefused
 from heptarm.bridge.runner import Feedback, Measured, Runner, Settings, Step
-from heptarm.bridge.trajectory import Sample
 from heptarm.errors import HeptarmError
 from heptarm.io.clock import Clock, RealClock
 from heptarm.values.arrays import within
@@ -91,11 +90,11 @@ class Follower(Protocol):
         ...
 
     def tick(self) -> float | None:
-        """Wait for the next tick; the time since the last one [s], None: the motion has ended."""
+        """Wait for the next tick; the time for which to command now [s], None: the motion has ended."""
         ...
 
-    def follow(self, command: Sample) -> None:
-        """Be there now, passing at its velocity."""
+    def follow(self, step: Step) -> None:
+        """Do what the runner wants."""
         ...
 
 
@@ -242,20 +241,19 @@ class Execution(ABC):
         self._dropped = False
         with self._motion() as follower:
             self._is_open = True
-            quiet = 0.0
-            while (passed := follower.tick()) is not None:
+            last = None
+            while (now := follower.tick()) is not None:
                 state = measured(self._arm.state)
                 with self._changed:
-                    step = self._runner.advance(self.now, state)
+                    step = self._runner.advance(now, state)
                     busy = self._runner.busy
-                if step.command is not None:
-                    follower.follow(step.command)
-                self._tell_step(step)
-                quiet = 0.0 if busy else quiet + passed
-                if not busy and (self._closing or self._dropped or quiet >= self._linger):
+                follower.follow(step)
+                self._tell(step.feedback, step.ends)
+                last = now if busy or last is None else last
+                if not busy and (self._closing or self._dropped or now - last >= self._linger):
                     break
         with self._changed:
-            if passed is None:
+            if now is None:
                 self._runner.abort(f"the motion ended: {follower.why}")
             self._runner.forget()
             self._is_open = False
@@ -271,9 +269,6 @@ class Execution(ABC):
             ends = self._runner.ends()
             self._changed.notify_all()
         self._tell(None, ends)
-
-    def _tell_step(self, step: Step) -> None:
-        self._tell(step.feedback, step.ends)
 
     def _tell(self, feedback: Feedback | None, ends: Sequence[End]) -> None:
         try:
@@ -314,22 +309,25 @@ class ServoExecution(Execution):
             mode=options.mode,
             min_trajectory_time=options.horizon if options.engine == "direct" else None,
         ) as servo:
-            yield _Servo(servo, options)
+            yield _Servo(servo, options, self._clock)
 
 
 class _Servo:
     """A servo motion as a follower."""
 
-    def __init__(self, servo: JointServo, options: ServoOptions) -> None:
-        self._servo, self._options = servo, options
-        self.tick = servo.tick
+    def __init__(self, servo: JointServo, options: ServoOptions, clock: Clock) -> None:
+        self._servo, self._options, self._clock = servo, options, clock
 
     @property
     def why(self) -> str:
         result = self._servo.result
         return "" if result is None else f"{result.cause.value} {result.text}"
 
-    def follow(self, command: Sample) -> None:
+    def tick(self) -> float | None:
+        return None if self._servo.tick() is None else self._clock.nanos() * 1e-9
+
+    def follow(self, step: Step) -> None:
+        command = step.command
         if self._options.engine == "direct":
             # it approaches a target as a low-pass filter of this time constant does; its inverse leaves no lag
             self._servo.set(command.q + self._options.horizon * command.dq)

@@ -107,7 +107,7 @@ PARAMETERS = (
         "fri.host", "", 'address at which the cabinet reaches this machine; "": as the connection does'
     ),
     Parameter("fri.linger", 2.0, "how long the FRI session stays open after a goal [s]", 0.0, 60.0),
-    Parameter("fri.lookahead", 0.01, "how long a command takes to become motion [s]", 0.0, 0.5),
+    Parameter("fri.lookahead", 0.0, "how long a command takes to become motion, beyond a period [s]", 0.0, 0.5),
     Parameter(
         "command_timeout",
         0.2,

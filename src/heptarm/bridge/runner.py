@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from heptarm.bridge.check import Rules, read
+from heptarm.bridge.course import Course, Leg
 from heptarm.bridge.goal import Code, End, Goal, Outcome
 from heptarm.bridge.tolerance import Bounds, Tolerances
 from heptarm.bridge.trajectory import Brake, Sample, Trajectory
@@ -92,12 +93,14 @@ class Step:
     """What comes of one step.
 
     Attributes:
-        command: where to go, now; None: nothing to do.
+        command: where to go, now.
+        course: where to go from now on.
         feedback: of the goal under way; None: there is none.
         ends: goals that ended since the last step.
     """
 
-    command: Sample | None
+    command: Sample
+    course: Course
     feedback: Feedback | None
     ends: tuple[End, ...]
 
@@ -136,6 +139,7 @@ class Runner:
         self._brake: tuple[float, Brake] | None = None
         self._command: Sample | None = None
         self._now: float | None = None
+        self._scaling = 1.0
         self._ends: list[End] = []
         self._number = 0
         self.warning = ""
@@ -159,6 +163,7 @@ class Runner:
         Raises:
             GoalRefused: it makes no sense; whatever ran goes on.
         """
+        now = self._instant(now)
         later = goal.start is not None and goal.start > now
         brake = self._braking(now) if later and self.busy else self._brake
         here = self._here(now, state)
@@ -169,7 +174,7 @@ class Runner:
         self._end(Outcome.PREEMPTED, Code.INVALID_GOAL, "another goal took the place of this one")
         self._brake = brake if later else None
         self._number += 1
-        begin = goal.start if later else None
+        begin = goal.start if later else None if self._now is None else now
         offset = len(trajectory.times) - len(goal.points)
         late = 0.0 if goal.start is None or later else now - goal.start
         self._running = _Running(self._number, goal, trajectory, tolerances, begin, offset=offset, late=late)
@@ -179,8 +184,8 @@ class Runner:
         """End a goal early; the arm brakes. False: it is not under way."""
         if self._running is None or self._running.number != number:
             return False
-        self._end(Outcome.CANCELED, Code.SUCCESSFUL, "cancelled; the arm brakes")
         self._brake = self._braking(now)
+        self._end(Outcome.CANCELED, Code.SUCCESSFUL, "cancelled; the arm brakes")
         return True
 
     def abort(self, text: str, *, now: float | None = None) -> None:
@@ -190,8 +195,8 @@ class Runner:
             text: why.
             now: brake from here; None: the arm follows no more, so there is nothing to command.
         """
-        self._end(Outcome.ABORTED, Code.INVALID_GOAL, text)
         self._brake = None if now is None else self._braking(now)
+        self._end(Outcome.ABORTED, Code.INVALID_GOAL, text)
         if now is None:
             self.forget()
 
@@ -218,6 +223,7 @@ class Runner:
             raise LimitError(f"scaling is {state.scaling}; 0 or more is wanted", parameter="scaling")
         passed = 0.0 if self._now is None else max(0.0, now - self._now)
         self._now = now
+        self._scaling = state.scaling
         feedback = None
         if self._running is not None:
             feedback = self._follow(self._running, now, passed, state)
@@ -227,12 +233,30 @@ class Runner:
                 self._brake = None
         if self._command is None:
             self._command = Sample.at_rest(state.q)
-        return Step(self._command, feedback, self.ends())
+        return Step(self._command, self._course(now, self._command), feedback, self.ends())
 
     # ------------------------------------------------------------------------------------ inside
 
     def _waits(self, now: float) -> bool:
         return self._running is not None and self._running.begin is not None and now < self._running.begin
+
+    def _course(self, now: float, command: Sample) -> Course:
+        """Where the arm is led from this step on."""
+        run, brake, pace = self._running, self._brake, self._scaling
+        legs: list[Leg] = []
+        waits = self._waits(now)
+        if run is None or waits:
+            path = brake[1] if brake is not None else self._brake_from(Sample.at_rest(command.q))
+            legs.append(Leg(now if brake is None else brake[0], path))
+        if run is not None:
+            begin = run.begin if waits and run.begin is not None else now
+            legs.append(Leg(begin, run.trajectory, run.tau + pace * self.settings.lookahead, pace))
+        key = (0.0 if run is None else run.number, waits, 0.0 if brake is None else brake[0], pace)
+        return Course(key, tuple(legs))
+
+    def _instant(self, now: float) -> float:
+        """When something that comes now changes the course: from the last step on, for all before is commanded."""
+        return now if self._now is None else self._now
 
     def _follow(self, run: _Running, now: float, passed: float, state: Measured) -> Feedback | None:
         """One step of the goal under way."""
@@ -294,14 +318,16 @@ class Runner:
         return Sample.at_rest(state.q)
 
     def _braking(self, now: float) -> tuple[float, Brake] | None:
-        """A way to rest from what was commanded last."""
+        """A way to rest from what is commanded now."""
         if self._brake is not None:
             return self._brake
         if self._command is None:
             return None
-        begin = replace(self._command, ddq=np.zeros(7))
-        low, high = self._robot.q_min, self._robot.q_max
-        return now, Brake(begin, self.settings.deceleration, low, high)
+        begin = replace(self._command, dq=self._scaling * self._command.dq, ddq=np.zeros(7))
+        return self._instant(now), self._brake_from(begin)
+
+    def _brake_from(self, begin: Sample) -> Brake:
+        return Brake(begin, self.settings.deceleration, self._robot.q_min, self._robot.q_max)
 
     def _end(self, outcome: Outcome, code: Code, text: str) -> None:
         if self._running is not None:

@@ -74,6 +74,16 @@ class Trajectory:
         ddq = 2 * c[2] + x * (6 * c[3] + x * (12 * c[4] + x * 20 * c[5]))
         return Sample(q, dq, ddq)
 
+    def positions(self, times: Array) -> Array:
+        """Where it is at many times, shape (n,) [s]; shape (n, 7) [rad]."""
+        if len(self._pieces) == 0:
+            return np.tile(self._last.q, (len(times), 1))
+        t = np.clip(times, self.times[0], self.times[-1])
+        piece = np.clip(np.searchsorted(self.times, t, side="right") - 1, 0, len(self._pieces) - 1)
+        x, c = (t - self.times[piece])[:, None], self._pieces[piece]
+        q = c[:, 0] + x * (c[:, 1] + x * (c[:, 2] + x * (c[:, 3] + x * (c[:, 4] + x * c[:, 5]))))
+        return np.asarray(np.where((t >= self.times[-1])[:, None], self._last.q, q))
+
     def index(self, t: float) -> int:
         """How many way-points are before a time [s]: the one being approached."""
         return int(np.searchsorted(self.times, t, side="left"))
@@ -140,3 +150,11 @@ class Brake:
         held = np.minimum(np.maximum(q, self._low), self._high)
         slowing = -self._begin.dq / self.duration if x < self.duration else np.zeros(7)
         return Sample(held, np.where(held == q, dq, 0.0), np.where(held == q, slowing, 0.0))
+
+    def positions(self, times: Array) -> Array:
+        """Where it is at many times, shape (n,) [s]; shape (n, 7) [rad]."""
+        if self.duration <= 0.0:
+            return np.tile(self._begin.q, (len(times), 1))
+        x = np.clip(times, 0.0, self.duration)[:, None]
+        q = self._begin.q + x * self._begin.dq * (1.0 - x / (2.0 * self.duration))
+        return np.asarray(np.clip(q, self._low, self._high))

@@ -1,0 +1,224 @@
+"""What a runner will command is known ahead, and over FRI the loop's process has it: courses, the law, its table."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from heptarm.bridge.fri_execution import _Overlay
+from heptarm.bridge.fri_law import follow
+from heptarm.bridge.goal import Goal, Point
+from heptarm.bridge.runner import Measured, Runner, Settings
+from heptarm.rt import Output, Params
+from heptarm.values.robot import robot
+
+NAMES = tuple(f"A{i}" for i in range(1, 8))
+HOME = np.array([0.0, 0.0, 0.0, -1.5, 0.0, 1.5, 0.0])
+PERIOD = 0.005
+
+
+def goal(*, start: float | None = None) -> Goal:
+    """A curve of a second; every joint another way."""
+    times = np.linspace(0.0, 1.0, 11)[1:]
+    away = np.linspace(0.1, 0.4, 7)
+    way = [HOME + away * (10 * t**3 - 15 * t**4 + 6 * t**5) for t in times]
+    speed = [away * 30 * t**2 * (1 - t) ** 2 for t in times]
+    points = tuple(Point(float(t), tuple(q), tuple(v)) for t, q, v in zip(times, way, speed, strict=True))
+    return Goal(NAMES, points, start)
+
+
+class Stage:
+    """A runner and an arm that is where it is told to be."""
+
+    def __init__(self) -> None:
+        self.runner = Runner(NAMES, robot("iiwa14"), Settings())
+        self.now, self.q, self.scaling = 10.0, HOME, 1.0
+        self.numbers: list[int] = []
+        self.step()
+
+    def step(self):
+        """One step; the arm is there at once."""
+        self.now += PERIOD
+        step = self.runner.advance(self.now, Measured(self.now, self.q, np.zeros(7), self.scaling))
+        self.q = step.command.q
+        return step
+
+    def accept(self, wanted: Goal) -> int:
+        number = self.runner.accept(
+            wanted, now=self.now, state=Measured(self.now, self.q, np.zeros(7), self.scaling)
+        )
+        self.numbers.append(number)
+        return number
+
+    def foretold(self, count: int) -> float:
+        """How far the next commands are from what their course said before [rad]."""
+        course = self.step().course
+        times = self.now + PERIOD * np.arange(1.0, count + 1.0)
+        told = course.positions(times)
+        done = np.array([self.step().command.q for _ in range(count)])
+        return float(np.abs(told - done).max())
+
+
+@pytest.fixture
+def stage() -> Stage:
+    return Stage()
+
+
+def test_a_course_tells_what_will_be_commanded(stage: Stage) -> None:
+    stage.accept(goal())
+    assert stage.foretold(100) < 1e-12
+    assert stage.foretold(150) < 1e-12, "beyond its end, too"
+
+
+def test_a_course_tells_of_a_start_to_come(stage: Stage) -> None:
+    stage.accept(goal(start=stage.now + 0.2))
+    assert stage.foretold(200) < 1e-12
+
+
+def test_a_course_goes_at_the_pace_of_the_override(stage: Stage) -> None:
+    stage.accept(goal())
+    stage.step()
+    stage.scaling = 0.3
+    assert stage.foretold(100) < 1e-12
+
+
+def test_a_course_tells_how_a_cancelled_goal_brakes(stage: Stage) -> None:
+    number = stage.accept(goal())
+    for _ in range(100):
+        before = stage.step()
+    assert stage.runner.cancel(number, stage.now + 1.0)
+    after = stage.step()
+    assert after.course.key != before.course.key
+    assert np.abs(after.command.q - before.command.q - PERIOD * before.command.dq).max() < 1e-4, "no jump"
+    assert stage.foretold(100) < 1e-12
+    assert not stage.runner.busy
+
+
+@pytest.mark.parametrize("scaling", [1.0, 0.25])
+def test_a_cancelled_goal_brakes_from_the_speed_that_it_has(stage: Stage, scaling: float) -> None:
+    stage.scaling = scaling
+    number = stage.accept(goal())
+    for _ in range(round(100 / scaling)):
+        stage.step()
+    before = [stage.q, stage.step().command.q]
+    stage.runner.cancel(number, stage.now)
+    speeds = np.diff(np.array([*before, *(stage.step().command.q for _ in range(400))]), axis=0) / PERIOD
+    slowing = np.abs(np.diff(speeds, axis=0)) / PERIOD
+    assert np.abs(speeds[0]).max() > 0.5 * scaling
+    assert slowing.max() < 2.6, "no faster than the parameter says, but for one step"
+    assert (np.abs(speeds[-1]) < 1e-9).all()
+
+
+def test_a_goal_that_takes_a_place_goes_on_without_a_jump(stage: Stage) -> None:
+    stage.accept(goal())
+    for _ in range(100):
+        before = stage.step()
+    back = Goal(NAMES, (Point(1.0, tuple(HOME), (0.0,) * 7),))
+    stage.accept(back)
+    after = stage.step()
+    assert np.abs(after.command.q - before.command.q - PERIOD * before.command.dq).max() < 2e-4
+    assert stage.foretold(150) < 1e-12
+
+
+# ------------------------------------------------------------------------------------------ FRI
+
+
+class Message:
+    """A message of the controller at its time."""
+
+    def __init__(self, t: float) -> None:
+        self.t, self.period = t, PERIOD
+        self.sequence, self.received = round(t / PERIOD), round((100.0 + t) * 1e9)
+
+
+class Session:
+    """An FRI session without a cabinet: messages when they are asked for."""
+
+    def __init__(self, rows: int) -> None:
+        values, schema = Params.flat({"begin": -1.0, "q": np.zeros((rows, 7)), "deceleration": 2.0})
+        self.params = Params(values, schema, changed=lambda: None)
+        self.t = 0.0
+        self.start = Message(0.0)
+
+    @property
+    def state(self) -> Message:
+        return Message(self.t)
+
+    def next(self) -> Message | None:
+        return self.state
+
+    def history(self, size: int) -> list[Message]:
+        return [Message(self.t)]
+
+    def commanded(self) -> np.ndarray:
+        """What the law answers now."""
+        out = Output()
+        out.q[:] = HOME
+        follow(self.state, out, self.params)  # type: ignore[arg-type]
+        return out.q
+
+
+@pytest.fixture
+def session() -> Session:
+    return Session(100)
+
+
+def test_the_law_mirrors_before_there_are_set_points_and_brakes_after_the_last(session: Session) -> None:
+    assert (session.commanded() == HOME).all()
+    speed = np.linspace(-0.3, 0.4, 7)
+    rows = HOME + PERIOD * np.arange(100.0)[:, None] * speed
+    session.params.set(begin=0.0, q=rows)
+    done = []
+    for k in range(200):
+        session.t = k * PERIOD
+        done.append(session.commanded())
+    way = np.array(done)
+    np.testing.assert_allclose(way[:100], rows)
+    braking = np.diff(way[98:], n=2, axis=0) / PERIOD**2
+    assert np.abs(braking).max() < 2.0 + 1e-6
+    np.testing.assert_allclose(way[-1], rows[-1] + speed * 0.4 / 2.0 / 2.0, atol=1e-3)
+    assert (way[-1] == way[-2]).all(), "at rest"
+
+
+def test_over_fri_a_goal_is_commanded_at_its_times_however_late_this_process_is(session: Session) -> None:
+    """Here it looks every 0.2 s only, and messages come late: what is commanded is the trajectory all the same."""
+    runner = Runner(NAMES, robot("iiwa14"), Settings())
+    still = Measured(100.0, HOME, np.zeros(7))
+    start = 100.3
+    runner.accept(goal(start=start), now=100.0, state=still)
+    overlay = _Overlay(session, PERIOD)  # type: ignore[arg-type]
+    reference = Stage()
+    reference.accept(goal())
+    begin = reference.now
+    wanted = reference.step().course
+    done, times = [], []
+    for k in range(300):
+        session.t = k * PERIOD
+        if k % 40 == 0:
+            now = overlay.tick()
+            assert now is not None and now > 100.0 + session.t
+            overlay.follow(runner.advance(now, Measured(now, HOME, np.zeros(7))))
+        done.append(session.commanded())
+        times.append(100.0 + session.t + PERIOD - start)  # it is there a period later
+    told = wanted.positions(begin + np.maximum(times, 0.0))
+    assert np.abs(np.array(done) - told).max() < 1e-9
+
+
+def test_over_fri_a_cancellation_takes_effect_ahead_of_what_is_commanded(session: Session) -> None:
+    runner = Runner(NAMES, robot("iiwa14"), Settings())
+    number = runner.accept(goal(), now=100.0, state=Measured(100.0, HOME, np.zeros(7)))
+    overlay = _Overlay(session, PERIOD)  # type: ignore[arg-type]
+    done = []
+    for k in range(250):
+        session.t = k * PERIOD
+        now = overlay.tick()
+        assert now is not None
+        if k == 100:
+            assert runner.cancel(number, 100.0 + session.t)
+        overlay.follow(runner.advance(now, Measured(now, HOME, np.zeros(7))))
+        done.append(session.commanded())
+    speeds = np.diff(np.array(done), axis=0) / PERIOD
+    slowing = np.diff(speeds[99:], axis=0) / PERIOD
+    assert np.abs(speeds[99]).max() > 0.4, "it was under way"
+    assert np.abs(slowing).max() < 2.7, "straight from the trajectory into the brake"
+    assert np.abs(speeds[-1]).max() < 1e-9
