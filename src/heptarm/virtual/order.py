@@ -65,7 +65,7 @@ class Order:
     Attributes:
         id: chosen by the caller, unique.
         kind: "ptp", "lin", "lin_rel", "circ", "hold", or of several parts: "batch",
-            "spline" and "spline_joints"; or a servo motion: "servo" or "direct". Of a spline only: "spl".
+            "spline" and "spline_joints"; or a servo motion: "servo", "direct" or "straight". Of a spline only: "spl".
         joints: target of a ptp [rad]; None: `pose` is the target.
         pose: target of the moved frame in the base: x y z [m], quaternion x y z w.
         via: of a circ: the auxiliary point, as `pose`.
@@ -73,7 +73,8 @@ class Order:
         redundancy: E1 [rad] (NaN: keep), Status and Turn (-1: keep).
         tcp: flange to moved frame, x y z [m], quaternion.
         offset: of a lin_rel: translation and rotation in the axes of the reference.
-        reference: axes of a lin_rel's offset as a quaternion in the base; None: the moved frame's own.
+        reference: axes of a lin_rel's offset as a quaternion in the base; None: the moved frame's own. Of a straight
+            servo motion: those of its limits; None: the base's.
         joint_velocity: fractions of each axis' maximum, as the next two.
         cart_velocity: [m/s]; then [m/s²], [m/s³]; orientation [rad/s], [rad/s²], [rad/s³].
         blending: where it may turn into the next part of its batch: fraction of the path, distance from its end
@@ -85,6 +86,7 @@ class Order:
         minimum_time: no trajectory to a servo target is shorter [s].
         goal_timeout: a servo motion ends so long after its target was reached and no other came [s].
         speed_timeout: how long a servo target's velocity is kept after it was passed [s].
+        straight: of a straight servo motion: largest velocity x y z, about x y z, then acceleration; NaN: the usual.
         listener: hears of start and end.
         part_listener: hears of a batch's parts.
         watches: break conditions and triggers.
@@ -117,6 +119,7 @@ class Order:
     minimum_time: float = 0.02
     goal_timeout: float = 30.0
     speed_timeout: float = 0.1
+    straight: Seven | None = None
     listener: Listener | None = field(default=None, compare=False)
     part_listener: PartListener | None = field(default=None, compare=False)
     watches: tuple[Watch, ...] = field(default=(), compare=False)
@@ -124,4 +127,4 @@ class Order:
     @property
     def is_servo(self) -> bool:
         """Whether it follows targets that come while it runs."""
-        return self.kind in ("servo", "direct")
+        return self.kind in ("servo", "direct", "straight")

@@ -41,6 +41,46 @@ class JointLine:
         return self.start + s * self.way
 
 
+class Tip:
+    """Joint positions that bring the moved frame somewhere, in the Status in which the arm begins.
+
+    Args:
+        robot: the robot.
+        start: joint positions at the beginning, shape (7,) [rad].
+        tcp: flange to moved frame.
+
+    Attributes:
+        status: of the arm at the beginning.
+        e1: its arm angle [rad].
+    """
+
+    __slots__ = ("_offset", "_robot", "_turned", "e1", "status")
+
+    def __init__(self, robot: RobotModel, start: Array, tcp: Pose) -> None:
+        self._robot = robot
+        to_flange = tcp.inverse()
+        self._offset: Vec = tuple(to_flange.xyz.tolist())
+        self._turned: Quat | None = tuple(to_flange.quat.tolist()) if to_flange.quat[3] < 1.0 else None
+        self.status = inverse.status_of(robot, start.tolist())
+        self.e1 = inverse.arm_angle(robot, start.tolist(), bool(self.status & 1))
+
+    def joints(self, point: Vec, quat: Quat, e1: float, near: Array) -> Array:
+        """Joint positions next to `near`, shape (7,) [rad]; plain floats inside, since the tick waits for it.
+
+        Raises:
+            Unreachable: out of reach.
+        """
+        r, (x, y, z), (u, v, w) = _rows(quat), point, self._offset
+        p = (
+            x + r[0][0] * u + r[0][1] * v + r[0][2] * w,
+            y + r[1][0] * u + r[1][1] * v + r[1][2] * w,
+            z + r[2][0] * u + r[2][1] * v + r[2][2] * w,
+        )
+        if self._turned is not None:
+            r = _rows(product(quat, self._turned))
+        return np.array(inverse.raw(self._robot, r, p, e1, self.status, near.tolist(), continuous=True))
+
+
 class CartesianPath:
     """Path of the moved frame in space, the arm angle linear with s.
 
@@ -60,15 +100,12 @@ class CartesianPath:
     def __init__(
         self, robot: RobotModel, start: Array, geometry: Geometry, tcp: Pose, e1: float | None
     ) -> None:
-        self._robot = robot
         self.start = start
         self.geometry = geometry
         self.length, self.angle = geometry.length, geometry.angle
-        to_flange = tcp.inverse()
-        self._offset: Vec = tuple(to_flange.xyz.tolist())
-        self._turned: Quat | None = tuple(to_flange.quat.tolist()) if to_flange.quat[3] < 1.0 else None
-        self.status = inverse.status_of(robot, start.tolist())
-        self._e1 = inverse.arm_angle(robot, start.tolist(), bool(self.status & 1))
+        self._tip = Tip(robot, start, tcp)
+        self.status = self._tip.status
+        self._e1 = self._tip.e1
         self._turn = 0.0 if e1 is None else (e1 - self._e1 + pi) % (2 * pi) - pi
         self._arm = self._linear
 
@@ -88,22 +125,12 @@ class CartesianPath:
         return result
 
     def at(self, s: float, near: Array) -> Array:
-        """Joint positions next to `near`, shape (7,) [rad]; plain floats inside, since the tick waits for it.
+        """Joint positions next to `near`, shape (7,) [rad].
 
         Raises:
             Unreachable: the path leaves the workspace.
         """
-        quat = self.geometry.quat(s)
-        r, (x, y, z), (u, v, w) = _rows(quat), self.geometry.point(s), self._offset
-        p = (
-            x + r[0][0] * u + r[0][1] * v + r[0][2] * w,
-            y + r[1][0] * u + r[1][1] * v + r[1][2] * w,
-            z + r[2][0] * u + r[2][1] * v + r[2][2] * w,
-        )
-        if self._turned is not None:
-            r = _rows(product(quat, self._turned))
-        e1 = self._arm(s)
-        return np.array(inverse.raw(self._robot, r, p, e1, self.status, near.tolist(), continuous=True))
+        return self._tip.joints(self.geometry.point(s), self.geometry.quat(s), self._arm(s), near)
 
 
 def _rows(quat: Quat) -> inverse.Rows:

@@ -27,7 +27,7 @@ FLAGS, MODE, ORDER, PROGRESS, REMAINING, E1, REDUNDANCY = 57, 58, 59, 60, 61, 62
 
 # words of the box behind the slots, in which Java leaves the newest servo target; kinds of targets
 BOX_SEQ, BOX_ORDER, BOX_KIND, BOX_Q, BOX_DQ = 0, 1, 2, 3, 10
-TO_JOINTS, TO_JOINTS_WITH_VELOCITY = 1, 2
+TO_JOINTS, TO_JOINTS_WITH_VELOCITY = 1, 2  # a straight servo motion takes a pose in the place of joints
 
 # bits of the flags word
 READY, PAUSED, BRAKES_OPEN, MOVING, MASTERED, EMERGENCY_STOP, ENABLED = (1 << i for i in range(7))
@@ -41,7 +41,7 @@ class Target(NamedTuple):
 
     Attributes:
         order: id of the servo motion that it is for.
-        q: joint positions, shape (7,) [rad].
+        q: joint positions, shape (7,) [rad]; of a straight servo motion x y z [m] and quaternion of the moved frame.
         dq: velocity to pass them at, shape (7,) [rad/s], or None.
     """
 

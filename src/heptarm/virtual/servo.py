@@ -1,8 +1,9 @@
 """Leads the set-points of a servo motion: the newest target wins, and every limit holds.
 
 `SmartFollower` plans a limited trajectory to each target anew, as SmartServo does; `DirectFollower` goes straight
-for it, as DirectServo does, which suits targets that are close and smooth. Time runs through `advance`, so the
-override and pausing slow a servo motion as they slow every other.
+for it, as DirectServo does, which suits targets that are close and smooth; `heptarm.virtual.straight` has the one
+that leads along lines in space. Time runs through `advance`, so the override and pausing slow a servo motion as they
+slow every other.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 from heptarm.virtual.order import Order
+from heptarm.virtual.straight import StraightFollower
 
 #: The last approach of a direct follower is an exponential one with this time constant [s].
 APPROACH = 0.01
@@ -228,11 +230,13 @@ class DirectFollower:
         return self._brake is not None and self._brake.is_still
 
 
-Follower = SmartFollower | DirectFollower
+Follower = SmartFollower | DirectFollower | StraightFollower
 
 
 def follower(robot: RobotModel, order: Order, here: Array) -> Follower:
     """What follows the targets of a servo motion that begins at rest, at a set-point of shape (7,) [rad]."""
+    if order.kind == "straight":
+        return StraightFollower(robot, order, here)
     terms = ServoTerms.of(
         robot,
         velocity=order.joint_velocity,
