@@ -208,7 +208,6 @@ def test_a_bad_item_is_refused_by_name_and_nothing_moves(
 
 def test_an_empty_program_and_what_is_not_there_are_refused(peer: Peer) -> None:
     assert peer.ask(run()).code == Code.BAD_LENGTH
-    assert peer.ask(wire.ServoOpen(engine=wire.ServoEngine.LIN)).code == Code.UNSUPPORTED
     assert peer.ask(wire.GetProcessData(name="x")).code == Code.UNKNOWN_NAME
     assert isinstance(peer.ask(wire.Recover()), wire.Accepted)  # nothing is to be done
 

@@ -6,6 +6,8 @@ import time
 from math import nan
 from typing import Any
 
+import pytest
+
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.cabinet.fake import FakeCabinet
@@ -167,3 +169,46 @@ def test_settings_keep_the_kind_of_the_mode(cabinet: FakeCabinet) -> None:
         finish(peer, servo)
         gone = peer.ask(wire.ServoSettings(servo=servo, mode=soft))
         assert isinstance(gone, wire.Rejected) and gone.code == Code.UNKNOWN_MOTION
+
+
+LINE = {"engine": wire.ServoEngine.LIN, "velocity": 1.0, "acceleration": 1.0}
+
+
+def test_the_straight_engine_follows_poses_and_no_joints(cabinet: FakeCabinet) -> None:
+    with controller(cabinet.port) as peer:
+        servo = opened(peer, linear=wire.CartesianDynamics(velocity=0.1, orientation_acceleration=2.0), **LINE)
+        peer.send(wire.ServoPose(servo=servo, watchdog=1.0, xyz=(0.3, 0.0, 0.5), quat=(0.0, 0.0, 0.0, 1.0)))
+        peer.send(target(servo, 0.7))
+        peer.ask(wire.Subscribe(groups=wire.Groups.JOINTS, rate=100.0))
+        peer.wait_for(wire.State, lambda state: state.joints is not None and state.joints.q[6] == 0.3)
+        peer.ask(wire.ServoClose(servo=servo))
+        assert finish(peer, servo).q[6] == 0.3
+        seen = status(peer, servo)
+        assert (seen.applied, seen.refused, seen.code) == (1, 1, Code.UNSUPPORTED)
+        assert "poses" in seen.text
+
+
+@pytest.mark.parametrize(
+    ("fields", "parameter"),
+    [
+        (LINE | {"velocity": 0.5}, "velocity"),
+        (LINE | {"acceleration": 0.5}, "acceleration"),
+        (LINE | {"linear": wire.CartesianDynamics(jerk=10.0)}, "linear.jerk"),
+        (LINE | {"linear": wire.CartesianDynamics(orientation_jerk=10.0)}, "linear.orientation_jerk"),
+        ({"linear": wire.CartesianDynamics(velocity=0.1)}, "linear"),
+    ],
+)
+def test_limits_that_an_engine_does_not_heed_are_refused(cabinet: FakeCabinet, fields: Any, parameter: str) -> None:
+    with controller(cabinet.port) as peer:
+        refused = peer.ask(wire.ServoOpen(**fields))
+        assert isinstance(refused, wire.Rejected)
+        assert (refused.code, refused.parameter) == (Code.UNSUPPORTED, parameter)
+
+
+def test_the_direct_engine_refuses_a_velocity_that_it_would_not_heed(cabinet: FakeCabinet) -> None:
+    with controller(cabinet.port) as peer:
+        servo = opened(peer, engine=wire.ServoEngine.DIRECT)
+        peer.send(wire.ServoJointsVelocity(servo=servo, watchdog=1.0, q=(0.0,) * 7, dq=(0.1,) * 7))
+        peer.ask(wire.ServoClose(servo=servo))
+        seen = status(peer, servo)
+        assert (seen.refused, seen.applied, seen.code) == (1, 0, Code.UNSUPPORTED)

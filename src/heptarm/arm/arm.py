@@ -10,8 +10,7 @@ from dataclasses import replace
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal, TypedDict, overload
 
-from heptarm.arm import fri_settings, program
-from heptarm.arm import servo as servo_module
+from heptarm.arm import fri_settings, program, servo_settings
 from heptarm.arm.conditions import condition_message
 from heptarm.arm.connection import GROUPS, Connection
 from heptarm.arm.equipment import Equipment
@@ -53,8 +52,12 @@ class _ServoSettings(TypedDict, total=False):
     watchdog: float | None
     engine: Literal["smart", "direct"]
     mode: Mode | None
-    speed: float
-    acceleration: float
+    speed: float | None
+    acceleration: float | None
+    speed_mps: float | None
+    acceleration_mps2: float | None
+    speed_radps: float | None
+    acceleration_radps2: float | None
     min_trajectory_time: float | None
     goal_timeout: float
     moving: str
@@ -437,17 +440,21 @@ class Arm(Equipment, Stopping):
     @overload
     def servo(self, kind: Literal["joint"] = "joint", **settings: Unpack[_ServoSettings]) -> JointServo: ...
     @overload
-    def servo(self, kind: Literal["pose"], **settings: Unpack[_ServoSettings]) -> PoseServo: ...
+    def servo(self, kind: Literal["pose", "lin"], **settings: Unpack[_ServoSettings]) -> PoseServo: ...
     def servo(
         self,
-        kind: Literal["joint", "pose"] = "joint",
+        kind: Literal["joint", "pose", "lin"] = "joint",
         *,
         rate: float = 100.0,
         watchdog: float | None = None,
         engine: Literal["smart", "direct"] = "smart",
         mode: Mode | None = None,
-        speed: float = 0.2,
-        acceleration: float = 0.2,
+        speed: float | None = None,
+        acceleration: float | None = None,
+        speed_mps: float | None = None,
+        acceleration_mps2: float | None = None,
+        speed_radps: float | None = None,
+        acceleration_radps2: float | None = None,
         min_trajectory_time: float | None = None,
         goal_timeout: float = 300.0,
         moving: str = TOOL,
@@ -456,15 +463,22 @@ class Arm(Equipment, Stopping):
         """A stream of targets that the arm follows; it begins with the `with` block.
 
         Args:
-            kind: what the targets are: "joint" positions or "pose" of the moved frame.
+            kind: what the targets are: "joint" positions; "pose" of the moved frame, to be reached by the joints; or
+                "lin": the same, to be reached on straight lines.
             rate: ticks per second of the loop [Hz].
             watchdog: within this time after a target the next one has to come, or the arm stops [s], 0.005 to 2;
                 None: five periods, and at least 0.05 s.
-            engine: "smart" plans a limited trajectory to each target; "direct" goes straight for it, for targets
-                that are close and smooth.
+            engine: of joints and poses: "smart" plans a limited trajectory to each target; "direct" goes straight for
+                it, for targets that are close and smooth.
             mode: control mode; None: position. It may change its parameters while the arm follows.
-            speed: ceiling, a fraction of each axis' maximum in (0, 1]; the lower one of this and `arm.speed` counts.
+            speed: of joints and poses: ceiling, a fraction of each axis' maximum in (0, 1]; None: 0.2. The lower one of
+                this and `arm.speed` counts.
             acceleration: likewise, of the acceleration and the jerk.
+            speed_mps: of "lin": largest speed along each axis of the base [m/s], up to 10; None: 0.25. `arm.speed`
+                scales it, since the joints' own limits are not heeded.
+            acceleration_mps2: likewise [m/s²], up to 100; None: 1. Not scaled.
+            speed_radps: largest speed of the rotation about each axis of the base [rad/s], up to 20; None: 0.5. Scaled.
+            acceleration_radps2: likewise [rad/s²], up to 200; None: 2. Not scaled.
             min_trajectory_time: no trajectory to a target is shorter [s]; None: a period and 5 ms.
             goal_timeout: after so long at its target without another one the cabinet's servo motion ends [s]; the
                 next target begins a new one.
@@ -474,25 +488,28 @@ class Arm(Equipment, Stopping):
 
         Raises:
             LimitError: a value outside its range.
+            CommandRejected: a limit that this kind of stream would not heed.
             ModeConflict: another motion runs (when the block begins).
         """
-        message, hertz, seconds = servo_module.open_message(
+        message, hertz, seconds = servo_settings.open_message(
             kind,
             rate=rate,
             watchdog=watchdog,
             engine=engine,
             mode=mode or self._mode,
-            speed=min(self._speed, within(speed, "speed", 0.0, 1.0, above=True)),
+            speed=speed,
             acceleration=acceleration,
             min_trajectory_time=min_trajectory_time,
             goal_timeout=goal_timeout,
             moving=moving,
+            line=servo_settings.Line(speed_mps, acceleration_mps2, speed_radps, acceleration_radps2),
+            ceiling=self._speed,
         )
         self._tooling.check_moved(moving, "moving")
         self._tooling.check_mode(mode or self._mode)
         ends, parts = condition_message(until, self._connection.welcome.signals)
         self._tooling.check_until(parts)
-        stream = PoseServo if kind == "pose" else JointServo
+        stream = JointServo if kind == "joint" else PoseServo
         return stream(
             self._connection, replace(message, until=ends), rate=hertz, watchdog=seconds, until=parts
         )

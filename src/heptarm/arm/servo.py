@@ -23,9 +23,8 @@ import numpy.typing as npt
 
 from heptarm.arm.handle import MotionHandle
 from heptarm.arm.modes import mode_message
-from heptarm.errors import HeptarmError, LimitError, LocalProtocolError, ShapeError, Timeout
-from heptarm.values.arguments import TOOL, check_name
-from heptarm.values.arrays import Array, array, within
+from heptarm.errors import CommandRejected, HeptarmError, LocalProtocolError, ShapeError, Timeout
+from heptarm.values.arrays import Array, array
 from heptarm.values.condition import Condition
 from heptarm.values.mode import Mode
 from heptarm.values.pose import Pose
@@ -38,12 +37,6 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger("heptarm.servo")
 
-ENGINES = {"smart": wire.ServoEngine.SMART, "direct": wire.ServoEngine.DIRECT}
-#: Without a word of the user the watchdog is so many periods long, but no shorter than this [s].
-_PERIODS, _SHORTEST = 5.0, 0.05
-_LONGEST = 2.0
-#: How long the cabinet may take until the first target counts [s].
-_FIRST = 2.0
 #: How long to wait for the start, and for rest at the end [s].
 _PATIENCE = 5.0
 #: Calls of `set` whose cost is remembered.
@@ -279,7 +272,7 @@ class JointServo(Servo):
 
         Args:
             q: joint positions, shape (7,) [rad]; beyond a joint's limits they are brought back to them.
-            dq: velocity to pass them at, shape (7,) [rad/s]; None: come to rest there.
+            dq: velocity to pass them at, shape (7,) [rad/s]; None: come to rest there. With the engine "smart" only.
 
         Returns:
             What was sent, shape (7,) [rad].
@@ -287,7 +280,14 @@ class JointServo(Servo):
         Raises:
             ShapeError: not seven numbers.
             LimitError: one is not finite.
+            CommandRejected: a velocity for the engine "direct", which would not heed it.
         """
+        if dq is not None and self._message.engine is wire.ServoEngine.DIRECT:
+            raise CommandRejected(
+                'the engine "direct" passes its targets at the speed that the next ones make; it takes no velocity',
+                parameter="dq",
+                hint='leave dq out, or use engine="smart"',
+            )
         robot = self._connection.robot
         wanted = _joints(q, "q")
         sent = np.minimum(np.maximum(wanted, robot.q_min), robot.q_max)
@@ -304,7 +304,7 @@ class JointServo(Servo):
 
 
 class PoseServo(Servo):
-    """A stream of poses of the moved frame in the base."""
+    """A stream of poses of the moved frame in the base: followed by the joints or, as "lin", on straight lines."""
 
     def __enter__(self) -> PoseServo:
         """Begin; see `Servo`."""
@@ -314,8 +314,8 @@ class PoseServo(Servo):
     def set(self, pose: Pose) -> Pose:
         """Send a target; the newest wins. After the motion has ended it does nothing.
 
-        The cabinet chooses the joints that reach it nearest to the last target; a pose that none reach is refused
-        there, and `stats` tells of it.
+        The cabinet chooses the joints that reach it nearest to the last target, on straight lines those that keep the
+        arm angle; a pose that none reach is refused there, and `stats` tells of it.
 
         Returns:
             What was sent.
@@ -348,55 +348,3 @@ def _joints(value: npt.ArrayLike, name: str) -> Array:
     ):
         return value
     return array(value, 7, name)
-
-
-def open_message(
-    kind: str,
-    *,
-    rate: float,
-    watchdog: float | None,
-    engine: str,
-    mode: Mode | None,
-    speed: float,
-    acceleration: float,
-    min_trajectory_time: float | None,
-    goal_timeout: float,
-    moving: str = TOOL,
-) -> tuple[wire.ServoOpen, float, float]:
-    """The message that opens a servo motion, its rate [Hz] and its watchdog [s], all checked; see `Arm.servo`."""
-    if engine not in ENGINES:
-        raise ShapeError(
-            f"engine is {engine!r}; allowed are {', '.join(map(repr, ENGINES))}", parameter="engine"
-        )
-    check_name(moving, "moving")
-    if kind not in ("joint", "pose"):
-        raise ShapeError(f"kind is {kind!r}; allowed are 'joint', 'pose'", parameter="kind")
-    hertz = within(rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
-    period = 1.0 / hertz
-    seconds = min(max(_PERIODS * period, _SHORTEST), _LONGEST)
-    if watchdog is not None:
-        seconds = within(watchdog, "watchdog", 0.005, _LONGEST, unit="s")
-    if seconds < period:
-        raise LimitError(
-            f"the watchdog of {seconds:g} s is shorter than the period of {period:g} s",
-            code=2,
-            parameter="watchdog",
-            value=seconds,
-            allowed=f"[{period:g}, {_LONGEST:g}] s",
-            hint="give a longer watchdog or a higher rate",
-        )
-    shortest = min(max(period + 0.005, 0.001), 1.0) if min_trajectory_time is None else min_trajectory_time
-    return (
-        wire.ServoOpen(
-            engine=ENGINES[engine],
-            frame="" if moving == TOOL else moving,
-            mode=mode_message(mode),
-            velocity=within(speed, "speed", 0.0, 1.0, above=True),
-            acceleration=within(acceleration, "acceleration", 0.0, 1.0, above=True),
-            min_trajectory_time=within(shortest, "min_trajectory_time", 0.001, 1.0, unit="s"),
-            goal_timeout=within(goal_timeout, "goal_timeout", 0.1, 3600.0, unit="s"),
-            watchdog=_FIRST,
-        ),
-        hertz,
-        seconds,
-    )

@@ -237,6 +237,7 @@ def _order(java: Any) -> Order:
         minimum_time=minimum_time,
         goal_timeout=goal_timeout,
         speed_timeout=speed_timeout,
+        straight=_numbers_if(java.straight),
         listener=listener,
         watches=_watches(java),
         part_listener=listener,

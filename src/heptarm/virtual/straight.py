@@ -197,11 +197,9 @@ class StraightFollower:
             return speed + 0.5 * np.cross(turn, speed)
         # left Jacobian of the rotation group, e.g. Sola et al., "A micro Lie theory", 2018, (145)
         once = np.cross(turn, speed)
-        return (
-            speed
-            + (1.0 - cos(angle)) / angle**2 * once
-            + (angle - sin(angle)) / angle**3 * np.cross(turn, once)
-        )
+        twice = np.cross(turn, once)
+        spin: Array = speed + (1.0 - cos(angle)) / angle**2 * once + (angle - sin(angle)) / angle**3 * twice
+        return spin
 
     def _replan(self, place: Array, speed: Array, change: Array) -> bool:
         """Plan from a state, rotations counted from here; False: it cannot be planned (the last plan goes on)."""

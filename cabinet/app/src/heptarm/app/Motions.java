@@ -42,7 +42,6 @@ import heptarm.wire.Pose;
 import heptarm.wire.Ptp;
 import heptarm.wire.PtpPose;
 import heptarm.wire.Redundancy;
-import heptarm.wire.ServoEngine;
 import heptarm.wire.ServoOpen;
 import heptarm.wire.Spline;
 
@@ -94,9 +93,6 @@ final class Motions {
     /** Refuses a servo motion that this cabinet cannot carry out. */
     void check(ServoOpen open) throws Refusal {
         modes.check(open.mode, tools.moved(open.frame), "mode.");
-        if (open.engine == ServoEngine.LIN) {
-            throw unsupported("engine", "the servo engine \"lin\"");
-        }
     }
 
     private static Refusal unsupported(String parameter, String what) {

@@ -108,9 +108,14 @@ final class SunriseRobot implements Robot, IErrorHandler {
     public String[] capabilities() {
         List<String> all = new ArrayList<String>(Arrays.asList(Motions.CAPABILITIES));
         try {
+            all.add(SunriseLin.capability());
+        } catch (LinkageError e) {
+            log.info("this cabinet has no straight servo motions: " + e);
+        }
+        try {
             all.addAll(Arrays.asList(SunriseFri.capabilities()));
-        } catch (LinkageError e) { // the option is not installed
-            return Motions.CAPABILITIES;
+        } catch (LinkageError e) {
+            log.info("this cabinet has no FRI: " + e);
         }
         return all.toArray(new String[0]);
     }

@@ -28,21 +28,21 @@ final class SunriseServo implements Servo {
     private final ObjectFrame moved;
     private final SunriseJob job;
     private final ServoMotion<?> motion;
+    private final boolean isStraight;
+    private boolean passes;
 
-    private SunriseServo(LBR robot, Tools tools, ObjectFrame moved, SunriseJob job, ServoMotion<?> motion) {
+    private SunriseServo(LBR robot, Tools tools, ObjectFrame moved, SunriseJob job, ServoMotion<?> motion, boolean isStraight) {
         this.robot = robot;
         this.tools = tools;
         this.moved = moved;
         this.job = job;
         this.motion = motion;
+        this.isStraight = isStraight;
     }
 
     /** A servo motion at the present position. */
     static SunriseServo of(ServoOpen open, LBR robot, Tools tools, SunriseJob job) throws Refusal {
-        JointPosition here = robot.getCurrentJointPosition();
-        ServoMotion<?> motion = open.engine == ServoEngine.DIRECT ? new DirectServo(here) : new SmartServo(here);
-        motion.setJointVelocityRel(open.velocity);
-        motion.setJointAccelerationRel(open.acceleration);
+        ServoMotion<?> motion = open.engine == ServoEngine.LIN ? SunriseLin.of(open, robot, tools) : joints(open, robot);
         motion.setMinimumTrajectoryExecutionTime(open.min_trajectory_time);
         motion.setTimeoutAfterGoalReach(open.goal_timeout);
         if (open.mode != null && !(open.mode instanceof PositionMode)) {
@@ -52,7 +52,15 @@ final class SunriseServo implements Servo {
             }
             motion.setMode(new Modes(tools).of(open.mode));
         }
-        return new SunriseServo(robot, tools, tools.moved(open.frame), job, motion);
+        return new SunriseServo(robot, tools, tools.moved(open.frame), job, motion, open.engine == ServoEngine.LIN);
+    }
+
+    private static ServoMotion<?> joints(ServoOpen open, LBR robot) {
+        JointPosition here = robot.getCurrentJointPosition();
+        ServoMotion<?> motion = open.engine == ServoEngine.DIRECT ? new DirectServo(here) : new SmartServo(here);
+        motion.setJointVelocityRel(open.velocity);
+        motion.setJointAccelerationRel(open.acceleration);
+        return motion;
     }
 
     /** Begins it. */
@@ -67,12 +75,17 @@ final class SunriseServo implements Servo {
     public void follow(double[] q, double[] velocity) throws Refusal {
         try {
             IServoRuntime runtime = motion.getRuntime();
-            if (runtime instanceof IDirectServoRuntime && motion instanceof DirectServo) {
+            if (motion instanceof DirectServo) {
                 ((IDirectServoRuntime) runtime).setDestination(new JointPosition(q));
             } else if (velocity == null) {
                 ((ISmartServoRuntime) runtime).setDestination(new JointPosition(q));
             } else {
-                ((ISmartServoRuntime) runtime).setDestination(new JointPosition(q), new JointPosition(velocity));
+                ISmartServoRuntime smart = (ISmartServoRuntime) runtime;
+                if (!passes) { // once, with the first target that has a velocity
+                    smart.activateVelocityPlanning(true);
+                    passes = true;
+                }
+                smart.setDestination(new JointPosition(q), new JointPosition(velocity));
             }
         } catch (RuntimeException e) {
             throw refusal(e);
@@ -82,11 +95,12 @@ final class SunriseServo implements Servo {
     public void followPose(double[] xyz, double[] quat) throws Refusal {
         try {
             Frame target = new Frame(robot.getRootFrame(), Convert.transformation(new Pose(xyz, quat)));
-            IServoRuntime runtime = motion.getRuntime();
-            if (motion instanceof DirectServo) {
-                ((IDirectServoRuntime) runtime).setDestination(target);
+            if (isStraight) {
+                SunriseLin.follow(motion, target);
+            } else if (motion instanceof DirectServo) {
+                ((IDirectServoRuntime) motion.getRuntime()).setDestination(target);
             } else {
-                ((ISmartServoRuntime) runtime).setDestination(target);
+                ((ISmartServoRuntime) motion.getRuntime()).setDestination(target);
             }
         } catch (RuntimeException e) {
             throw refusal(e);

@@ -142,6 +142,7 @@ final class Dispatcher {
             if (joints != null) {
                 checkJoints(joints, server.robot.info(), "q");
             }
+            ServoRules.check(stream.open.engine, target);
             stream.offer(target);
         } catch (Violation e) {
             stream.refuse(new Refusal(e.code, e.parameter, e.value, e.allowed, e.getMessage()));
@@ -169,6 +170,7 @@ final class Dispatcher {
             server.rack.checkMoved(((ServoOpen) message).frame, "frame");
             checkMode(((ServoOpen) message).mode, "mode.");
             checkUntil((ServoOpen) message);
+            ServoRules.check((ServoOpen) message);
             server.robot.check((ServoOpen) message);
             server.warden.check();
             id = server.executor.open(new Stream(server, (ServoOpen) message));

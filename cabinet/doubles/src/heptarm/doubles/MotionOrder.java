@@ -27,7 +27,7 @@ public final class MotionOrder {
     public double[] tcp = {0, 0, 0, 0, 0, 0, 1};
     /** Of a relative motion: translation and rotation in the axes of the reference. */
     public double[] offset;
-    /** Quaternion of the reference's axes in the base; null: the moved frame's own. */
+    /** Quaternion of the reference's axes in the base; null: the moved frame's own, of a straight servo motion the base's. */
     public double[] reference;
     /** Fractions of each axis' maximum: velocity, acceleration, jerk; seven each. */
     public double[] relative = missing(21);
@@ -45,6 +45,8 @@ public final class MotionOrder {
     public double[] mode;
     /** Of a servo motion: shortest trajectory, time-out after the goal, time-out of its speed [s]. */
     public double[] timing = {0.02, 30.0, 0.1};
+    /** Of a straight servo motion: largest velocity x y z, about x y z, then acceleration; NaN: the usual. */
+    public double[] straight;
     /** FRI session whose client overlays the motion; 0: none. */
     public long friSession;
     /** What that client commands, as FRI numbers it. */

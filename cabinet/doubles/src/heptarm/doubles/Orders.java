@@ -6,6 +6,7 @@ import com.kuka.connectivity.fastRobotInterface.FRIJointOverlay;
 import com.kuka.connectivity.motionModel.directServo.DirectServo;
 import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
 import com.kuka.connectivity.motionModel.smartServo.SmartServo;
+import com.kuka.connectivity.motionModel.smartServoLIN.SmartServoLIN;
 import com.kuka.roboticsAPI.conditionModel.ICondition;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
@@ -149,20 +150,31 @@ public final class Orders {
             RelativeLIN relative = (RelativeLIN) motion;
             order = new MotionOrder(id, "lin_rel");
             order.offset = pose(relative.getOffset());
-            if (relative.getReference() != null) {
-                double[] axes = pose(World.Current.getRootFrame().transformationTo(relative.getReference()));
-                order.reference = new double[] {axes[3], axes[4], axes[5], axes[6]};
-            }
+            order.reference = axes(relative.getReference());
         } else if (motion instanceof PositionHold) {
             order = new MotionOrder(id, "hold");
             order.duration = ((PositionHold) motion).seconds();
         } else if (motion instanceof SmartServo || motion instanceof DirectServo) {
             order = new MotionOrder(id, motion instanceof SmartServo ? "servo" : "direct");
             order.timing = ((ServoMotion<?>) motion).timing();
+        } else if (motion instanceof SmartServoLIN) {
+            order = new MotionOrder(id, "straight");
+            order.timing = ((SmartServoLIN) motion).timing();
+            order.straight = ((SmartServoLIN) motion).limits();
+            order.reference = axes(((SmartServoLIN) motion).reference());
         } else {
             throw new IllegalArgumentException("the virtual cabinet cannot carry out a " + motion.getClass().getName());
         }
         return order;
+    }
+
+    /** Quaternion of a frame's axes in the base; null: of none. */
+    private static double[] axes(AbstractFrame frame) {
+        if (frame == null) {
+            return null;
+        }
+        double[] placed = pose(World.Current.getRootFrame().transformationTo(frame));
+        return new double[] {placed[3], placed[4], placed[5], placed[6]};
     }
 
     private static void overlay(MotionOrder order, IMotionOverlay overlay) {

@@ -101,7 +101,7 @@ public final class Ring {
         LONGS.setRelease(memory, OVERRIDE, Double.doubleToRawLongBits(value));
     }
 
-    /** Leaves a servo target for the plant's next tick; the newest counts. */
+    /** Leaves a servo target for the plant's next tick; the newest counts. On straight lines q is a pose. */
     public synchronized void post(long order, double[] q, double[] velocity) {
         long seq = memory.getLong(box + BOX_SEQ);
         LONGS.setRelease(memory, box + BOX_SEQ, seq + 1);

@@ -5,6 +5,7 @@ import java.util.concurrent.CountDownLatch;
 import com.kuka.connectivity.motionModel.directServo.IDirectServoRuntime;
 import com.kuka.connectivity.motionModel.smartServo.IServoOnGoalReachedEvent;
 import com.kuka.connectivity.motionModel.smartServo.ISmartServoRuntime;
+import com.kuka.connectivity.motionModel.smartServoLIN.ISmartServoLINRuntime;
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.executionModel.CommandInvalidException;
@@ -18,7 +19,7 @@ import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
  * A servo motion under way. Destinations go into the ring's box, where the plant takes the newest at its next tick;
  * only Cartesian ones ask Python for the joints.
  */
-public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRuntime {
+public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRuntime, ISmartServoLINRuntime {
     /** Remaining time when none is known. */
     private static final double UNKNOWN = -999.0;
 
@@ -27,18 +28,21 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
     private final Container container;
     private final ObjectFrame moved;
     private final IMotionControlMode mode;
+    private final boolean isStraight;
     private final CountDownLatch activated = new CountDownLatch(1);
     private JointPosition destination;
     private IServoOnGoalReachedEvent handler;
     private int targets;
     private int told;
 
-    public ServoRuntime(Station station, LBR robot, Container container, ObjectFrame moved, IMotionControlMode mode) {
+    public ServoRuntime(Station station, LBR robot, Container container, ObjectFrame moved, IMotionControlMode mode,
+            boolean isStraight) {
         this.station = station;
         this.robot = robot;
         this.container = container;
         this.moved = moved;
         this.mode = mode;
+        this.isStraight = isStraight;
         this.destination = robot.getCommandedJointPosition();
     }
 
@@ -78,7 +82,8 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
         if (joints == null) {
             throw new CommandInvalidException("Can not plan motion: the destination of the servo motion is not reachable");
         }
-        return post(new JointPosition(joints), null);
+        JointPosition reached = new JointPosition(joints);
+        return isStraight ? post(reached, Orders.pose(wanted.transformationFromWorld()), null) : post(reached, null);
     }
 
     @Override
@@ -87,6 +92,11 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
     }
 
     private long post(JointPosition wanted, double[] velocity) {
+        return post(wanted, wanted.get(), velocity);
+    }
+
+    /** What the plant is told: the joints; on straight lines the pose of the moved frame. */
+    private long post(JointPosition wanted, double[] told, double[] velocity) {
         if (container.isFinished()) {
             throw new CommandInvalidException("the servo motion has ended; command a new one");
         }
@@ -95,7 +105,7 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
             destination = new JointPosition(wanted);
             targets++;
         }
-        station.ring.post(container.id, wanted.get(), velocity);
+        station.ring.post(container.id, told, velocity);
         return System.currentTimeMillis();
     }
 

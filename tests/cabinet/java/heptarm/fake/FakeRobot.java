@@ -46,7 +46,7 @@ import heptarm.wire.WrenchState;
  * <p>Errors to order: a PTP whose A7 is 1.25 rad fails when it is planned, one with 1.5 rad fails on the way, and one with
  * 1.0 rad is planned for half a second. One with 0.75 rad needs an option that
  * the cabinet lacks. A servo motion goes straight to its targets; one to more than 2 rad of A7 is refused by the robot,
- * and after 0.3 s without a target it ends by itself. After the message "blind" readings fail for a while, after "jammed" cancelling does.
+ * and after 0.3 s without a target it ends by itself. Of poses it follows those of the engine lin only, and turns A7 by their x. After the message "blind" readings fail for a while, after "jammed" cancelling does.
  */
 final class FakeRobot implements Robot, Runnable {
     static final double SPEED = 1.0;
@@ -103,6 +103,7 @@ final class FakeRobot implements Robot, Runnable {
         final Job.Listener listener;
         Conditions.Tree[] until = new Conditions.Tree[0];
         boolean follows;
+        boolean straight;
         boolean started;
         boolean cancelled;
         double left;
@@ -127,7 +128,10 @@ final class FakeRobot implements Robot, Runnable {
 
         @Override
         public void followPose(double[] xyz, double[] quat) throws Refusal {
-            throw new Refusal(Code.UNREACHABLE, "not reachable");
+            if (!straight) {
+                throw new Refusal(Code.UNREACHABLE, "not reachable");
+            }
+            follow(new double[] {0, 0, 0, 0, 0, 0, xyz[0]}, null);
         }
 
         @Override
@@ -333,15 +337,13 @@ final class FakeRobot implements Robot, Runnable {
 
     @Override
     public void check(ServoOpen open) throws Refusal {
-        if (open.engine == ServoEngine.LIN) {
-            throw new Refusal(Code.UNSUPPORTED, "engine", "lin", "smart, direct", "not here");
-        }
     }
 
     @Override
     public Servo servo(ServoOpen open, Job.Listener listener) {
         FakeJob job = new FakeJob(null, SERVO_TIMEOUT, listener);
         job.follows = true;
+        job.straight = open.engine == ServoEngine.LIN;
         synchronized (jobs) {
             jobs.add(job);
         }

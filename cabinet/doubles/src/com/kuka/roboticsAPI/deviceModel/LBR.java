@@ -9,6 +9,7 @@ import java.util.concurrent.atomic.AtomicLong;
 
 import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
 import com.kuka.connectivity.motionModel.smartServo.SmartServo;
+import com.kuka.connectivity.motionModel.smartServoLIN.SmartServoLIN;
 import com.kuka.connectivity.motionModel.directServo.DirectServo;
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.controllerModel.sunrise.ISafetyState;
@@ -265,10 +266,12 @@ public class LBR extends Robot {
     }
 
     private void serve(ServoMotion<?> motion, Container container, ObjectFrame moved) {
-        JointPosition start = motion instanceof SmartServo ? ((SmartServo) motion).getStart()
-                : ((DirectServo) motion).getStart();
-        checkLimits(start);
-        ServoRuntime runtime = new ServoRuntime(station, this, container, moved, motion.getMode());
+        if (motion instanceof SmartServo) {
+            checkLimits(((SmartServo) motion).getStart());
+        } else if (motion instanceof DirectServo) {
+            checkLimits(((DirectServo) motion).getStart());
+        }
+        ServoRuntime runtime = new ServoRuntime(station, this, container, moved, motion.getMode(), motion instanceof SmartServoLIN);
         container.serve(runtime);
         motion.accepted(runtime);
     }

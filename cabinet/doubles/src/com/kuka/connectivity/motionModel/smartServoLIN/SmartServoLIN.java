@@ -1,0 +1,95 @@
+package com.kuka.connectivity.motionModel.smartServoLIN;
+
+import java.util.Arrays;
+
+import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
+import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+
+/** Follows destinations on straight lines; begins at a frame that has to be where the moved frame is. */
+public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
+    private static final int AXES = 3;
+    private static final double MM = 1e-3;
+
+    private final AbstractFrame start;
+    private final double[] limits = new double[4 * AXES];
+    private AbstractFrame reference;
+
+    public SmartServoLIN(AbstractFrame start) {
+        this.start = start;
+        Arrays.fill(limits, Double.NaN);
+    }
+
+    /** Along whose axes the limits hold; without it the world's. */
+    public SmartServoLIN setReferenceFrame(AbstractFrame frame) {
+        reference = frame;
+        return this;
+    }
+
+    /** Along x, y, z [mm/s]. */
+    public SmartServoLIN setMaxTranslationVelocity(double[] millimetresPerSecond) {
+        return limit("maxTranslationVelocity", millimetresPerSecond, 0, MM);
+    }
+
+    /** Along x, y, z [mm/s²]. */
+    public SmartServoLIN setMaxTranslationAcceleration(double[] millimetresPerSecondSquared) {
+        return limit("maxTranslationAcceleration", millimetresPerSecondSquared, 2 * AXES, MM);
+    }
+
+    /** About x, y, z [rad/s]. */
+    public SmartServoLIN setMaxOrientationVelocity(double[] radiansPerSecond) {
+        return limit("maxOrientationVelocity", radiansPerSecond, AXES, 1.0);
+    }
+
+    /** About x, y, z [rad/s²]. */
+    public SmartServoLIN setMaxOrientationAcceleration(double[] radiansPerSecondSquared) {
+        return limit("maxOrientationAcceleration", radiansPerSecondSquared, 3 * AXES, 1.0);
+    }
+
+    /** The simulated arm keeps its arm angle, so that nothing moves in the null space. */
+    public SmartServoLIN setMaxNullSpaceVelocity(double velocity) {
+        positive("maxNullSpaceVelocity", velocity);
+        return this;
+    }
+
+    /** See {@link #setMaxNullSpaceVelocity}. */
+    public SmartServoLIN setMaxNullSpaceAcceleration(double acceleration) {
+        positive("maxNullSpaceAcceleration", acceleration);
+        return this;
+    }
+
+    private SmartServoLIN limit(String name, double[] values, int at, double unit) {
+        if (values.length != AXES) {
+            throw new IllegalArgumentException(name + " takes " + AXES + " values, not " + values.length);
+        }
+        double[] checked = new double[AXES];
+        for (int i = 0; i < AXES; i++) {
+            checked[i] = positive(name, values[i]) * unit;
+        }
+        System.arraycopy(checked, 0, limits, at, AXES);
+        return this;
+    }
+
+    @Override
+    public ISmartServoLINRuntime getRuntime() {
+        return running(true);
+    }
+
+    @Override
+    public ISmartServoLINRuntime getRuntime(boolean waitForActivation) {
+        return running(waitForActivation);
+    }
+
+    public AbstractFrame getStart() {
+        return start;
+    }
+
+    /** Velocity x y z, about x y z, then acceleration, in SI; NaN where nothing was said; for the simulation. */
+    public double[] limits() {
+        return limits.clone();
+    }
+
+    /** For the simulation; null: the world. */
+    public AbstractFrame reference() {
+        return reference;
+    }
+}
