@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.modes import CartesianImpedance, JointImpedance, Position
+from heptarm.modes import JointImpedance, Position
 from tests.conftest import RunningCabinet
 
 A7 = np.array([0, 0, 0, 0, 0, 0, 1.0])
@@ -208,60 +208,3 @@ def test_a_killed_program_leaves_an_arm_at_rest(cabinet: RunningCabinet) -> None
     child.stdout.close()
     with ha.connect(cabinet.target, control=False) as watching:
         watching.wait_for_rest(timeout=5.0)
-
-
-def test_poses_are_followed_on_straight_lines(arm: ha.Arm) -> None:
-    assert "servo_lin" in arm.capabilities
-    places = []
-    with arm.servo("lin", rate=50, speed_mps=0.1, acceleration_mps2=0.5, watchdog=0.5) as sv:
-        start = sv.start.pose
-        goal = ha.Pose.of(start.xyz + [0.0, 0.08, -0.06], start.quat) @ ha.Pose.xyz_abc(0, 0, 0, 0.2, 0, 0)
-        while sv.tick() and sv.t < 2.5:
-            sv.set(goal)
-            places.append(arm.state.pose.xyz)
-        assert arm.state.pose.distance_to(goal) < 1e-3 and arm.state.pose.angle_to(goal) < 1e-3
-        sv.set(ha.Pose.of([3.0, 0, 0], start.quat))
-        sv.tick()
-        sv.set(goal)
-    assert (sv.stats.refused, "not reachable" in sv.stats.text) == (1, True)
-    way = (goal.xyz - start.xyz) / np.linalg.norm(goal.xyz - start.xyz)
-    off = np.array(places) - start.xyz
-    assert np.linalg.norm(off - np.outer(off @ way, way), axis=1).max() < 2e-3
-
-
-def test_a_straight_servo_is_soft_and_renewed_after_its_time_out(arm: ha.Arm) -> None:
-    soft = CartesianImpedance(1500.0, damping=0.7)
-    with arm.servo("lin", watchdog=2.0, goal_timeout=0.1, mode=soft, speed_mps=0.2) as sv:
-        start = sv.start.pose
-        sv.set(start)
-        time.sleep(0.6)  # reached, and timed out
-        goal = ha.Pose.of(start.xyz + [0.0, 0.03, 0.0], start.quat)
-        sv.set(goal)
-        arm.wait_until(lambda state: state.pose.distance_to(goal) < 5e-3, timeout=5.0)
-        sv.change(CartesianImpedance(800.0, damping=0.9))
-    assert sv.stats.refused == 0
-
-
-@pytest.mark.parametrize(
-    ("kind", "settings", "word"),
-    [
-        ("lin", {"speed": 0.5}, "speed is a fraction"),
-        ("lin", {"acceleration": 0.5}, "acceleration is a fraction"),
-        ("lin", {"engine": "direct"}, "engine"),
-        ("lin", {"speed_mps": 11.0}, "speed_mps"),
-        ("lin", {"speed_radps": 0.0}, "speed_radps"),
-        ("lin", {"acceleration_mps2": float("nan")}, "acceleration_mps2"),
-        ("pose", {"speed_mps": 0.1}, "speed_mps belongs"),
-        ("joint", {"acceleration_radps2": 1.0}, "acceleration_radps2 belongs"),
-    ],
-)
-def test_limits_that_a_kind_does_not_heed_are_refused(arm: ha.Arm, kind: str, settings: dict, word: str) -> None:
-    with pytest.raises(ha.CommandRejected, match=word):
-        arm.servo(kind, **settings)  # type: ignore[call-overload]
-
-
-def test_the_direct_engine_takes_no_velocity(arm: ha.Arm) -> None:
-    with arm.servo("joint", engine="direct", watchdog=1.0) as sv:
-        with pytest.raises(ha.CommandRejected, match="takes no velocity"):
-            sv.set(sv.start.q, np.zeros(7))
-        sv.set(sv.start.q)

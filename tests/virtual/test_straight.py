@@ -134,6 +134,19 @@ def test_the_override_and_a_pause_slow_it_down() -> None:
     assert np.abs(places(plant, 2500)[0][-1] - goal).max() < 1e-6
 
 
+def test_a_line_that_slowly_ends_at_the_reach_of_the_arm_is_an_error_too() -> None:
+    plant, ear = Plant("iiwa14", q=(0.0, 0.5, 0.0, -0.02, 0.0, 0.9, 0.0)), Ear()
+    start = Pose.from_matrix(forward(plant.robot, plant.snapshot.q_cmd))
+    plant.submit(Order(7, "straight", straight=(1e-4,) * 6 + (1.0,) * 6, listener=ear))
+    plant.step(2)
+    outward = start.xyz - (0.0, 0.0, plant.robot.d_bs)
+    plant.ring.post(7, Pose.of(start.xyz + 0.01 * outward, start.quat).array)
+    while not plant.idle:
+        plant.tick()
+        assert plant.tick_count < 10_000
+    assert ear.causes == ["started", "error"]
+
+
 @pytest.mark.parametrize("goal", [(2.0, 0.0, 0.5), (0.0, 0.0, 0.35)])
 def test_a_line_that_leaves_the_workspace_ends_the_motion_in_a_controlled_stop(goal: tuple[float, ...]) -> None:
     plant, ear, start = serving()

@@ -375,7 +375,11 @@ class Interpolator:
         order = run.plan.order
         if target is not None and target.order == order.id and not run.cancelled:
             follower.aim(target.q, target.dq)
-        there = follower.advance(TICK if run.braking else TICK * self._pace.factor)
+        try:
+            there = follower.advance(TICK if run.braking else TICK * self._pace.factor)
+        except Unreachable as error:
+            self._fail(run, f"the path is not reachable: {error.text}")
+            return nan, nan
         run.ended = follower.is_still if run.braking else follower.resting > order.goal_timeout
         beyond = (there > self._highest) | (there < self._lowest)
         if beyond.any():

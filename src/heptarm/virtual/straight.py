@@ -11,7 +11,7 @@ accelerations of the coordinates are those of the rotation where the count begin
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, sin, sqrt
+from math import atan2, cos, sin, sqrt
 
 import numpy as np
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
@@ -194,7 +194,8 @@ class StraightFollower:
         turn, speed = np.array(x[3:]), np.array(v[3:])
         angle = sqrt(float(turn @ turn))
         if angle < 1e-6:
-            return speed + 0.5 * np.cross(turn, speed)
+            almost: Array = speed + 0.5 * np.cross(turn, speed)
+            return almost
         # left Jacobian of the rotation group, e.g. Sola et al., "A micro Lie theory", 2018, (145)
         once = np.cross(turn, speed)
         twice = np.cross(turn, once)
@@ -223,7 +224,7 @@ def _between(start: Array, end: Array) -> Array:
     length = sqrt(x * x + y * y + z * z)
     if length < _TINY:
         return np.zeros(3)
-    angle = 2.0 * np.arctan2(length, abs(w)) * (1.0 if w >= 0.0 else -1.0)
+    angle = 2.0 * atan2(length, abs(w)) * (1.0 if w >= 0.0 else -1.0)
     return np.array([x, y, z]) * (angle / length)
 
 

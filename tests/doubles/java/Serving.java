@@ -15,6 +15,8 @@ import com.kuka.connectivity.motionModel.smartServo.IServoRuntime;
 import com.kuka.connectivity.motionModel.smartServo.ISmartServoRuntime;
 import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
 import com.kuka.connectivity.motionModel.smartServo.SmartServo;
+import com.kuka.connectivity.motionModel.smartServoLIN.ISmartServoLINRuntime;
+import com.kuka.connectivity.motionModel.smartServoLIN.SmartServoLIN;
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
 import com.kuka.roboticsAPI.deviceModel.LBR;
@@ -46,6 +48,7 @@ public class Serving extends RoboticsAPIApplication implements IServoOnGoalReach
         lbr.move(ptp(0, 0.5, 0, -1.3, 0, 0.9, 0));
         smart();
         direct();
+        straight();
         timeout();
         impedance();
     }
@@ -131,6 +134,57 @@ public class Serving extends RoboticsAPIApplication implements IServoOnGoalReach
         say("DirectServo arrives", isAt(beside(here, 0.2)));
         runtime.stopMotion();
         ThreadUtil.milliSleep(300);
+    }
+
+    private void straight() {
+        lbr.move(ptp(0, 0.5, 0, -1.3, 0, 0.9, 0));
+        Frame start = lbr.getCurrentCartesianPosition(lbr.getFlange());
+        SmartServoLIN motion = new SmartServoLIN(start);
+        say("limits that are none are refused", refuses(motion, new double[] {100, 100}) && refuses(motion, new double[] {100, 0, 100}));
+        motion.setMaxTranslationVelocity(new double[] {100, 100, 100}).setMaxTranslationAcceleration(new double[] {1000, 1000, 1000});
+        motion.setMaxOrientationVelocity(new double[] {0.5, 0.5, 0.5}).setMaxOrientationAcceleration(new double[] {2, 2, 2});
+        motion.setReferenceFrame(lbr.getRootFrame()).setMaxNullSpaceVelocity(0.5).setMaxNullSpaceAcceleration(1.0);
+        motion.setTimeoutAfterGoalReach(60.0);
+        lbr.moveAsync(motion);
+        ISmartServoLINRuntime runtime = motion.getRuntime(true);
+        runtime.setGoalReachedEventHandler(this);
+        reached = 0;
+        Frame there = new Frame(start.getX() - 20, start.getY() + 60, start.getZ() - 40, start.getAlphaRad() + 0.2, start.getBetaRad(),
+                start.getGammaRad());
+        runtime.setDestination(there);
+        double aside = 0;
+        for (int i = 0; i < 150; i++) {
+            ThreadUtil.milliSleep(10);
+            Frame here = lbr.getCurrentCartesianPosition(lbr.getFlange());
+            double share = (here.getY() - start.getY()) / 60;
+            aside = Math.max(aside, Math.abs(here.getX() - start.getX() + 20 * share));
+            aside = Math.max(aside, Math.abs(here.getZ() - start.getZ() + 40 * share));
+        }
+        runtime.updateWithRealtimeSystem();
+        ThreadUtil.milliSleep(50);
+        Frame here = lbr.getCurrentCartesianPosition(lbr.getFlange());
+        say("SmartServoLIN arrives", here.distanceTo(there) < 0.5 && Math.abs(here.getAlphaRad() - there.getAlphaRad()) < 1e-3);
+        say("on a straight line", aside < 1.0);
+        say("its goal is told of, too", runtime.isDestinationReached() && reached == 1);
+        say("and can be read back", runtime.getCurrentCartesianDestination(lbr.getFlange()).distanceTo(there) < 1e-3);
+        boolean refused = false;
+        try {
+            runtime.setDestination(new Frame(5000, 0, 0));
+        } catch (CommandInvalidException e) {
+            refused = true;
+        }
+        say("out of its reach", refused);
+        say("it stops", runtime.stopMotion());
+        ThreadUtil.milliSleep(300);
+    }
+
+    private boolean refuses(SmartServoLIN motion, double[] limits) {
+        try {
+            motion.setMaxTranslationVelocity(limits);
+            return false;
+        } catch (IllegalArgumentException e) {
+            return true;
+        }
     }
 
     private void timeout() {

@@ -250,7 +250,9 @@ final class Stream implements Activity {
             }
         } catch (Refusal e) {
             synchronized (this) {
-                note(e);
+                if (!closed && ended == null) { // one that came too late was not refused
+                    note(e);
+                }
             }
         }
     }

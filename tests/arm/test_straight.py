@@ -1,0 +1,77 @@
+"""Straight servo motions through everything, and limits that a kind of stream does not heed."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm.modes import CartesianImpedance
+from tests.conftest import RunningCabinet
+
+
+@pytest.fixture
+def arm(cabinet: RunningCabinet) -> Iterator[ha.Arm]:
+    """An arm at home; patient, for busy machines."""
+    with ha.connect(cabinet.target, watchdog=5.0) as arm:
+        arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)))
+        yield arm
+
+
+def test_poses_are_followed_on_straight_lines(arm: ha.Arm) -> None:
+    assert "servo_lin" in arm.capabilities
+    places = []
+    with arm.servo("lin", rate=50, speed_mps=0.1, acceleration_mps2=0.5, watchdog=2.0) as sv:
+        start = sv.start.pose
+        goal = ha.Pose.of(start.xyz + [0.0, 0.08, -0.06], start.quat) @ ha.Pose.xyz_abc(0, 0, 0, 0.2, 0, 0)
+        while sv.tick() and sv.t < 2.5:
+            sv.set(goal)
+            places.append(arm.state.pose.xyz)
+        assert arm.state.pose.distance_to(goal) < 1e-3 and arm.state.pose.angle_to(goal) < 1e-3
+        while sv.tick() and sv.stats.refused == 0 and sv.t < 20.0:
+            sv.set(ha.Pose.of([3.0, 0, 0], start.quat))
+    assert "not reachable" in sv.stats.text
+    way = (goal.xyz - start.xyz) / np.linalg.norm(goal.xyz - start.xyz)
+    off = np.array(places) - start.xyz
+    assert np.linalg.norm(off - np.outer(off @ way, way), axis=1).max() < 2e-3
+
+
+def test_a_straight_servo_is_soft_and_renewed_after_its_time_out(arm: ha.Arm) -> None:
+    soft = CartesianImpedance((1500.0,) * 3 + (150.0,) * 3, damping=0.7)
+    with arm.servo("lin", watchdog=2.0, goal_timeout=0.1, mode=soft, speed_mps=0.2) as sv:
+        start = sv.start.pose
+        sv.set(start)
+        time.sleep(0.6)  # reached, and timed out
+        goal = ha.Pose.of(start.xyz + [0.0, 0.03, 0.0], start.quat)
+        sv.set(goal)
+        arm.wait_until(lambda state: state.pose.distance_to(goal) < 5e-3, timeout=5.0)
+        sv.change(CartesianImpedance((800.0,) * 3 + (100.0,) * 3, damping=0.9))
+    assert sv.stats.refused == 0
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings", "word"),
+    [
+        ("lin", {"speed": 0.5}, "speed is a fraction"),
+        ("lin", {"acceleration": 0.5}, "acceleration is a fraction"),
+        ("lin", {"engine": "direct"}, "engine"),
+        ("lin", {"speed_mps": 11.0}, "speed_mps"),
+        ("lin", {"speed_radps": 0.0}, "speed_radps"),
+        ("lin", {"acceleration_mps2": float("nan")}, "acceleration_mps2"),
+        ("pose", {"speed_mps": 0.1}, "speed_mps belongs"),
+        ("joint", {"acceleration_radps2": 1.0}, "acceleration_radps2 belongs"),
+    ],
+)
+def test_limits_that_a_kind_does_not_heed_are_refused(arm: ha.Arm, kind: str, settings: dict, word: str) -> None:
+    with pytest.raises(ha.CommandRejected, match=word):
+        arm.servo(kind, **settings)  # type: ignore[call-overload]
+
+
+def test_the_direct_engine_takes_no_velocity(arm: ha.Arm) -> None:
+    with arm.servo("joint", engine="direct", watchdog=1.0) as sv:
+        with pytest.raises(ha.CommandRejected, match="takes no velocity"):
+            sv.set(sv.start.q, np.zeros(7))
+        sv.set(sv.start.q)
