@@ -12,8 +12,10 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from heptarm.errors import CommandRejected
 from heptarm.fri import codec
 from heptarm.fri import messages as m
+from heptarm.fri.event import Kind
 from heptarm.fri.messages import CommandMode, Quality, SessionState
-from heptarm.fri.session import Kind, Session, Setpoint
+from heptarm.fri.session import Session
+from heptarm.fri.setpoint import Setpoint
 from heptarm.fri.version import Version
 
 from . import strategies as some

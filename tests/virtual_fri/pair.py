@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from heptarm.fri import messages as m
-from heptarm.fri.session import Session, Setpoint
+from heptarm.fri.session import Session
+from heptarm.fri.setpoint import Setpoint
 from heptarm.virtual.fri.configuration import Configuration
 from heptarm.virtual.fri.controller import TICK_NS, Controller
 from heptarm.virtual.fri.events import Event, OverlayEnded

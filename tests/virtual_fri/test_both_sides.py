@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from heptarm.fri import messages as m
-from heptarm.fri.session import Kind, Setpoint
+from heptarm.fri.event import Kind
+from heptarm.fri.setpoint import Setpoint
 from heptarm.fri.version import Version
 from heptarm.virtual.fri.configuration import Configuration
 from heptarm.virtual.fri.faults import Faults, Line

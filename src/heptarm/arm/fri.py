@@ -42,8 +42,8 @@ from heptarm.errors import (
     StreamError,
     Timeout,
 )
+from heptarm.fri.event import Event, Kind
 from heptarm.fri.messages import Quality, SessionState
-from heptarm.fri.session import Event, Kind
 from heptarm.io.udp import own_address
 from heptarm.rt import Client, Params, Stats
 from heptarm.rt import State as FriState

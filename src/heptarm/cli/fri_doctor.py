@@ -13,8 +13,8 @@ from heptarm.arm.fri_advice import cause, silence, strangers
 from heptarm.arm.fri_settings import PORTS
 from heptarm.cli.doctor import Look, Verdict
 from heptarm.errors import CommandRejected, ConnectFailed, HeptarmError, Timeout
+from heptarm.fri.event import Event, Kind
 from heptarm.fri.messages import CommandMode, Quality, SessionState
-from heptarm.fri.session import Event, Kind
 from heptarm.io.udp import UdpSocket
 from heptarm.rt import Client
 

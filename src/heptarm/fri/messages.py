@@ -11,6 +11,12 @@ from dataclasses import dataclass
 
 Joints = tuple[float, ...]
 
+JOINTS = 7
+MAX_IO = 10
+MAX_TRANSFORMATIONS = 5
+#: Characters of a name.
+MAX_NAME = 63
+
 
 class SessionState(enum.IntEnum):
     """State of an FRI session."""

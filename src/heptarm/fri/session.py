@@ -3,21 +3,21 @@
 The controller leads: it names the session state in every message and the client answers every multiplier-th one.
 `receive` takes a datagram; if it says that an answer is due, `answer` makes it: nothing in IDLE, a bare header (1.x:
 the commanded position too) while monitoring, a mirror of the interpolator in COMMANDING_WAIT, and the given setpoint,
-with all that the client command mode needs, in COMMANDING_ACTIVE. A session may end and another begin at any time.
+with all that the client command mode needs, in COMMANDING_ACTIVE. Outputs and transformations go with any of them. A
+session may end and another begin at any time.
 """
 
 from __future__ import annotations
 
-import enum
 import math
-from dataclasses import dataclass
 
-from heptarm.errors import CommandRejected
-from heptarm.fri import codec
 from heptarm.fri import messages as m
+from heptarm.fri.answers import Answers
+from heptarm.fri.event import Event, Kind
 from heptarm.fri.protobuf import MalformedMessage, read_varint
+from heptarm.fri.setpoint import NOTHING, Setpoint
 from heptarm.fri.statistics import Counters, Histogram
-from heptarm.fri.template import CommandTemplate, MonitoringReader, Sample
+from heptarm.fri.template import MonitoringReader, Sample
 from heptarm.fri.version import Version, recognise
 
 #: A counter that goes back by no more than this is a message overtaken on its way, else the controller began anew.
@@ -27,68 +27,8 @@ SILENCE = 500_000_000
 #: Events kept until somebody takes them.
 MAX_EVENTS = 256
 
-_ZEROS7, _ZEROS6 = (0.0,) * 7, (0.0,) * 6
 _WRAP = 1 << 32
 _QUALITIES = ("poor", "fair", "good", "excellent")
-
-
-class Kind(enum.Enum):
-    """What an event is about."""
-
-    STATE = "state"
-    QUALITY = "quality"
-    VERSION = "version"
-    WRONG_VERSION = "wrong version"
-    MALFORMED = "malformed"
-    LOST = "lost"
-    DUPLICATED = "duplicated"
-    REORDERED = "reordered"
-    RESTARTED = "restarted"
-    COMMAND_MODE = "command mode"
-    SAFETY = "safety"
-    NO_IPO = "no interpolator position"
-    CLIENT = "client"
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """Something that happened in a session.
-
-    Attributes:
-        kind: what it is about.
-        text: in words.
-        at: the client's clock [ns].
-    """
-
-    kind: Kind
-    text: str
-    at: int
-
-
-@dataclass(slots=True)
-class Setpoint:
-    """What the user wants in COMMANDING_ACTIVE; what is None is filled with what does nothing.
-
-    Attributes:
-        q: joint position [rad]; None mirrors the interpolator.
-        tau: superposed joint torques [Nm]; None is zero. TORQUE only.
-        wrench: superposed wrench [N, Nm]; None is zero. WRENCH only.
-        pose: Cartesian pose [mm, quaternion]; None mirrors the interpolator. CARTESIAN_POSE only.
-        redundancy: of the pose; None mirrors the interpolator.
-        io: outputs to set.
-        transformations: values of the requested transformations.
-    """
-
-    q: m.Joints | None = None
-    tau: m.Joints | None = None
-    wrench: tuple[float, ...] | None = None
-    pose: m.Transformation | None = None
-    redundancy: m.Redundancy | None = None
-    io: tuple[m.IoValue, ...] = ()
-    transformations: tuple[m.Transformation, ...] = ()
-
-
-_NOTHING = Setpoint()
 
 
 class Session:
@@ -142,7 +82,7 @@ class Session:
         self.reflected = -1  # our counter, as the controller knows it
         self._safety: m.Safety | None = None
         self._reader: MonitoringReader | None = None
-        self._templates: dict[m.CommandMode, CommandTemplate] = {}
+        self._answers: Answers | None = None
 
     @property
     def multiplier(self) -> int:
@@ -204,18 +144,22 @@ class Session:
             self.waiting = 0
         return sample
 
-    def answer(self, setpoint: Setpoint = _NOTHING) -> bytes | None:
+    def answer(self, setpoint: Setpoint = NOTHING) -> bytes | None:
         """The answer to the last message; None if none is due.
 
         Raises:
             CommandRejected: the setpoint names outputs or transformations that the controller does not offer.
         """
         sample = self.sample
-        if not self.is_due or sample is None or self.version is None:
+        if not self.is_due or sample is None or self._answers is None:
             return None
-        if self.is_commanding and (setpoint.io or setpoint.transformations):
-            self._check(setpoint, sample)
-        octets = self._content(sample, setpoint, self.version)
+        if not setpoint.is_plain:
+            setpoint.check(sample.message)
+        octets = self._answers.make(
+            sample, setpoint, m.Header(self.sent, sample.sequence), state=self.state, mode=self.mode
+        )
+        if self._answers.lack:
+            self._tell(Kind.NO_IPO, self._answers.lack, self.received)
         self.sent = (self.sent + 1) % _WRAP
         self.waiting, self.is_due = 0, False
         self.counters.answered += 1
@@ -264,8 +208,7 @@ class Session:
             )
         if version is not self.version:
             self._tell(Kind.VERSION, f"the controller speaks FRI {version.value}", now)
-        self.version, self._reader = version, reader
-        self._templates.clear()
+        self.version, self._reader, self._answers = version, reader, Answers(version)
         return sample
 
     def _count(self, sample: Sample, now: int) -> bool:
@@ -329,102 +272,6 @@ class Session:
     def _tell(self, kind: Kind, text: str, now: int) -> None:
         if len(self._events) < MAX_EVENTS:
             self._events.append(Event(kind, text, now))
-
-    # ------------------------------------------------------------------------------------------- answering
-
-    def _content(self, sample: Sample, setpoint: Setpoint, version: Version) -> bytes:
-        header = m.Header(self.sent, sample.sequence)
-        state, mode = self.state, self.mode
-        if state in (m.SessionState.MONITORING_WAIT, m.SessionState.MONITORING_READY):
-            echo = None if version.traits.quaternions else sample.q_cmd
-            if echo is None:
-                return codec.encode_command(m.Command(header), version)
-            return self._joints(m.CommandMode.POSITION, echo, None, None, header)
-        if mode is m.CommandMode.NO_COMMAND:
-            return codec.encode_command(m.Command(header), version)
-        active = setpoint if state is m.SessionState.COMMANDING_ACTIVE else _NOTHING
-        if mode is m.CommandMode.CARTESIAN_POSE:
-            return self._pose(sample, active, version, header)
-        q = active.q if active.q is not None else sample.q_ipo
-        if q is None:
-            self._tell(Kind.NO_IPO, "the controller sends no interpolator position to mirror", self.received)
-            return codec.encode_command(m.Command(header), version)
-        if not (active.io or active.transformations):
-            return self._joints(mode, q, active.tau, active.wrench, header)
-        tau, wrench = active.tau or _ZEROS7, active.wrench or _ZEROS6
-        command = m.Command(
-            header,
-            q=q,
-            tau=tau if mode is m.CommandMode.TORQUE else None,
-            wrench=wrench if mode is m.CommandMode.WRENCH else None,
-            io=active.io,
-            transformations=active.transformations,
-        )
-        return codec.encode_command(command, version)
-
-    def _joints(
-        self,
-        mode: m.CommandMode,
-        q: m.Joints,
-        tau: m.Joints | None,
-        wrench: tuple[float, ...] | None,
-        header: m.Header,
-    ) -> bytes:
-        template = self._templates.get(mode)
-        if template is None:
-            assert self.version is not None
-            template = self._templates[mode] = CommandTemplate(
-                self.version, torque=mode is m.CommandMode.TORQUE, wrench=mode is m.CommandMode.WRENCH
-            )
-        template.q[:] = q
-        if template.tau is not None:
-            template.tau[:] = tau or _ZEROS7
-        if template.wrench is not None:
-            template.wrench[:] = wrench or _ZEROS6
-        return template.encode(header.sequence, header.reflected)
-
-    def _pose(self, sample: Sample, active: Setpoint, version: Version, header: m.Header) -> bytes:
-        ipo = sample.message.ipo or m.IpoData()
-        pose = active.pose or ipo.pose
-        if pose is None:
-            self._tell(Kind.NO_IPO, "the controller sends no interpolator pose to mirror", self.received)
-            return codec.encode_command(m.Command(header), version)
-        command = m.Command(
-            header,
-            pose=pose,
-            redundancy=active.redundancy or ipo.redundancy,
-            io=active.io,
-            transformations=active.transformations,
-        )
-        return codec.encode_command(command, version)
-
-    @staticmethod
-    def _check(setpoint: Setpoint, sample: Sample) -> None:
-        full = sample.message
-        signals = {one.name: one for one in (full.monitor.io if full.monitor is not None else ())}
-        for value in setpoint.io:
-            offered = signals.get(value.name)
-            if offered is None or offered.direction is not m.IoDirection.OUTPUT:
-                outputs = [name for name, one in signals.items() if one.direction is m.IoDirection.OUTPUT]
-                raise CommandRejected(
-                    f"{value.name!r} is no output of this FRI session",
-                    parameter=value.name,
-                    allowed=", ".join(outputs) or "none",
-                    hint="register the signal in the cabinet's FRI configuration",
-                )
-            if offered.type is not value.type:
-                raise CommandRejected(
-                    f"{value.name!r} is {offered.type.name}, not {value.type.name}", parameter=value.name
-                )
-        wanted = [one.name for one in full.requested]
-        for one in setpoint.transformations:
-            if one.name not in wanted:
-                raise CommandRejected(
-                    f"the controller asks for no transformation {one.name!r}",
-                    parameter=one.name,
-                    allowed=", ".join(wanted) or "none",
-                )
-
 
 def reflected_in(datagram: bytes, *, framed: bool) -> int:
     """The reflected counter of a legal monitoring datagram; -1 if it is in no usual place."""

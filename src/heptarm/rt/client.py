@@ -20,11 +20,11 @@ from heptarm.errors import (
     NotReady,
     Timeout,
 )
+from heptarm.fri.event import Event, Kind
 from heptarm.fri.guard import Limits
 from heptarm.fri.messages import Quality, SessionState
 from heptarm.fri.policy import Policy
 from heptarm.fri.pose_guard import PoseLimits
-from heptarm.fri.session import Event, Kind
 from heptarm.fri.statistics import Counters, Histogram
 from heptarm.fri.version import Version
 from heptarm.io.shared import Block

@@ -13,10 +13,12 @@ import numpy as np
 
 from heptarm.errors import CommandRejected
 from heptarm.fri import messages as m
+from heptarm.fri.event import Kind
 from heptarm.fri.guard import Guard, Limits
 from heptarm.fri.policy import Filler, Policy
 from heptarm.fri.pose_guard import PoseLimits
-from heptarm.fri.session import Kind, Session, Setpoint
+from heptarm.fri.session import Session
+from heptarm.fri.setpoint import Setpoint
 from heptarm.fri.statistics import Histogram
 from heptarm.fri.template import Sample
 from heptarm.fri.version import Version

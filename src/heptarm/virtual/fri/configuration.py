@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from heptarm.errors import CommandRejected, LimitError
-from heptarm.fri.codec import MAX_IO, MAX_NAME, MAX_TRANSFORMATIONS
-from heptarm.fri.messages import IoValue
+from heptarm.fri.messages import MAX_IO, MAX_NAME, MAX_TRANSFORMATIONS, IoValue
 from heptarm.fri.version import Version
 
 #: Legal periods [ms], of sending and of receiving.
