@@ -31,6 +31,7 @@ class Controller:
     ipo: tuple[float, ...] = IPO
     io: tuple[m.IoValue, ...] = ()
     requested: tuple[m.Transformation, ...] = ()
+    redundancy: m.Redundancy | None = None
     mangle: Callable[[bytes], bytes | None] = bytes
     answers: list[m.Command] = field(default_factory=list)
 
@@ -59,14 +60,21 @@ class Controller:
             m.MonitorData(
                 q=self.position(),
                 tau=(1.0,) * 7,
-                q_cmd=None if quaternions else self.ipo,
+                q_cmd=None if quaternions else self.position(),
                 tau_ext=(0.5,) * 7,
                 io=self.io,
                 pose=pose,
                 stamp=m.TimeStamp(1_700_000_000, self.sequence),
             ),
             m.ConnectionInfo(self.state, self.quality, self.period_ms, 1),
-            m.IpoData(q=self.ipo, pose=pose, command_mode=self.mode, overlay=m.Overlay.JOINT, tracking=1.0)
+            m.IpoData(
+                q=self.ipo,
+                pose=pose,
+                redundancy=self.redundancy,
+                command_mode=self.mode,
+                overlay=m.Overlay.JOINT,
+                tracking=1.0,
+            )
             if commanding
             else None,
             self.requested,

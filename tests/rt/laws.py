@@ -14,6 +14,10 @@ def torque(state: State, out: Output, params: Params) -> None:
     out.tau[:] = params.gain * state.tau_ext
 
 
+def lights(state: State, out: Output, params: Params) -> None:
+    out.io["lamp"] = state.io["button"]
+
+
 def lift(state: State, out: Output, params: Params) -> None:
     out.pose[2] += params.height
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 import os
 import random
 import socket
@@ -24,6 +25,7 @@ from heptarm.fri.version import Version
 from heptarm.rt import Client, Output, Params, State
 from heptarm.rt.launch import importable
 from heptarm.rt.layout import PID
+from heptarm.values.pose import Pose
 
 from .controller import IPO, Controller
 
@@ -195,19 +197,51 @@ def test_signals_are_read_and_written(client: Client) -> None:
     controller.io = (
         m.IoValue("FRI.In", m.IoType.ANALOG, m.IoDirection.INPUT, 2.5),
         m.IoValue("FRI.Out", m.IoType.BOOLEAN, m.IoDirection.OUTPUT, 0),
+        m.IoValue("FRI.Code", m.IoType.DIGITAL, m.IoDirection.OUTPUT, 7),
     )
-    with controller.running():
-        controller.active()
-        client.wait(ACTIVE)
-        assert client.inputs == {"FRI.In": 2.5, "FRI.Out": 0}
+    with pytest.raises(CommandRejected, match="no signal 'FRI.Out' in this FRI session"):
         client.output("FRI.Out", True)
-        client.output("FRI.In", 1.0)
-        deadline = time.monotonic() + 5.0
-        texts: list[str] = []
-        while not any("'FRI.In' is no output" in text for text in texts) and time.monotonic() < deadline:
-            time.sleep(0.01)
-            texts += [event.text for event in client.events()]
-        assert any("'FRI.In' is no output of this FRI session" in text for text in texts)
+    with controller.running():
+        controller.walk(SessionState.MONITORING_READY)
+        state = client.wait("MONITORING_READY")
+        assert client.inputs == {"FRI.In": 2.5} and client.outputs == {"FRI.Out": False, "FRI.Code": 7.0}
+        assert state.io["in"] == 2.5 and state.io.out is False and len(state.io) == 3
+        client.output("out", True)
+        client.output("FRI.Code", 2**40)
+        deadline = time.monotonic() + 20.0
+        written: set[tuple[str, float]] = set()
+        while len(written) < 2 and time.monotonic() < deadline:
+            controller.settle()
+            written = {(one.name, one.value) for answer in controller.answers for one in answer.io}
+        assert written == {("FRI.Out", 1), ("FRI.Code", 2**40)}
+        for name, value, words in (
+            ("FRI.In", 1.0, "is an input of the cabinet"),
+            ("FRI.Door", 1.0, "no signal 'FRI.Door' in this FRI session"),
+            ("FRI.Out", 2, "is boolean; it cannot be 2"),
+            ("FRI.Code", -1, "is unsigned; it cannot be -1"),
+            ("FRI.Code", 1.5, "it cannot be 1.5"),
+            ("FRI.Code", math.nan, "it cannot be nan"),
+        ):
+            with pytest.raises(CommandRejected, match=words):
+                client.output(name, value)
+
+
+def test_a_frame_that_is_asked_for_is_told(client: Client) -> None:
+    controller = Controller(client.port, wire=Version.V2_7)
+    controller.requested = (m.Transformation("PBase", ()),)
+    with controller.running():
+        client.wait("MONITORING_WAIT")
+        assert client.wanted_frames == ("PBase",)
+        with pytest.raises(CommandRejected, match="asks for no frame 'Part'"):
+            client.frame("Part", Pose.at(0.0, 0.0, 0.3))
+        with pytest.raises(ShapeError):
+            client.frame("PBase", np.eye(4))
+        client.frame("PBase", Pose.at(0.0, 0.0, 0.3))
+        deadline = time.monotonic() + 20.0
+        while not controller.answers[-1].transformations and time.monotonic() < deadline:
+            controller.settle()
+        (frame,) = controller.answers[-1].transformations
+        assert frame.name == "PBase" and frame.values == (0.0, 0.0, 300.0, 1.0, 0.0, 0.0, 0.0)
 
 
 def test_a_taken_port_and_bad_arguments_are_refused_in_words(client: Client) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -17,11 +19,13 @@ from heptarm.fri.version import Version
 from heptarm.io.shared import Block
 from heptarm.rt import layout as at
 from heptarm.rt.cycle import Cycle, Law
-from heptarm.rt.state import Params, State
+from heptarm.rt.exchange import REPEATS
+from heptarm.rt.params import Params
+from heptarm.rt.state import State
 from heptarm.values.robot import robot
 
 from .controller import IPO, Controller
-from .laws import fails_later, offset, torque
+from .laws import fails_later, lights, offset, torque
 
 MS = 1_000_000
 
@@ -81,7 +85,8 @@ class Bench:
     @property
     def states(self) -> list[State]:
         ring = self.layout.states
-        return [State(words) for tick in range(ring.count) if (words := ring.read(tick)) is not None]
+        known = self.cycle.exchange.signals
+        return [State(words, known) for tick in range(ring.count) if (words := ring.read(tick)) is not None]
 
     def track(self) -> np.ndarray:
         """Every position that was sent while commanding or mirroring."""
@@ -152,7 +157,7 @@ def test_the_interpolators_speed_is_taken_over() -> None:
     assert not bench.cycle.guard.report.lines
 
 
-def test_a_long_silence_while_commanding_begins_anew_at_rest() -> None:
+def test_after_a_long_silence_an_arm_that_stands_is_left_at_rest() -> None:
     bench = Bench()
     bench.activate()
     bench.command(tuple(value + 0.5 for value in IPO))
@@ -160,9 +165,27 @@ def test_a_long_silence_while_commanding_begins_anew_at_rest() -> None:
     last = bench.sent[-1].q
     assert last is not None
     bench.now += 200 * MS
-    bench.controller.sequence += 200
+    bench.controller.sequence += 200  # the controller has stopped at once, and shows it
     bench.run(2)
     assert np.abs(np.subtract(bench.sent[-2].q, last)).max() < 1e-6, "no jump after the gap"
+
+
+@pytest.mark.parametrize("wire", [Version.V1_15, Version.V2_5])
+def test_after_a_long_silence_an_arm_that_went_on_is_not_halted(wire: Version) -> None:
+    bench = Bench(wire=wire)
+    bench.activate()
+    bench.command(tuple(value + 1.5 for value in IPO))
+    bench.run(400)
+    speed = np.subtract(bench.sent[-1].q, bench.sent[-2].q)
+    assert speed[0] > 1e-3
+    ahead = m.Command(m.Header(0, 0), q=tuple(np.add(bench.sent[-1].q, 60 * speed).tolist()))
+    bench.sent.append(ahead)  # where the arm then is
+    bench.now += 60 * MS
+    bench.controller.sequence += 60
+    bench.run(2)
+    after = np.subtract(bench.sent[-1].q, bench.sent[-2].q)
+    first = np.subtract(bench.sent[-2].q, ahead.q)
+    assert after == pytest.approx(speed, rel=0.1) and np.abs(first).max() < 3 * speed.max()
 
 
 def test_a_law_sees_the_state_and_its_parameters() -> None:
@@ -199,20 +222,83 @@ def _events(bench: Bench) -> list[np.ndarray]:
     return [words for tick in range(ring.count) if (words := ring.read(tick)) is not None]
 
 
-def test_outputs_are_written_and_unknown_ones_refused_in_words() -> None:
+def want(bench: Bench, **outputs: tuple[int, float]) -> None:
+    """What the user's process leaves: for each output a count and a value."""
+    io = {f"FRI.{name}": one for name, one in outputs.items()}
+    bench.layout.outputs.write(json.dumps({"io": io, "frames": {}}))
+
+
+def test_outputs_are_written_until_the_cabinet_shows_them() -> None:
     bench = Bench()
     signal = m.IoValue("FRI.Out", m.IoType.BOOLEAN, m.IoDirection.OUTPUT, 0)
     bench.controller.io = (signal,)
+    bench.run(3, SessionState.MONITORING_READY)
+    want(bench, Out=(1, 1))
+    bench.run(5)
+    assert [one.io[0].value for one in bench.sent if one.io] == [1] * 5, "in every state of a session"
+    bench.controller.io = (replace(signal, value=1),)
     bench.activate()
-    bench.layout.outputs.write('{"io": {"FRI.Out": 1}, "transformations": {}}')
-    bench.run(20)
-    written = [one.io[0].value for one in bench.sent if one.io]
-    assert written == [1] * 10, "a few times, since an answer may be lost"
-    assert bench.layout.inputs.read() == '{"FRI.Out": 0}'
-    bench.layout.outputs.write('{"io": {"FRI.Nowhere": 1}, "transformations": {}}')
-    bench.run(3)
-    assert bench.sent[-1].q == IPO, "the cycle is answered all the same"
-    assert any(b"no output of this FRI session" in words.tobytes() for words in _events(bench))
+    bench.run(5)
+    assert not any(one.io for one in bench.sent[-5:])
+    want(bench, Out=(2, 0))
+    bench.run(80)
+    assert sum(bool(one.io) for one in bench.sent[-80:]) == REPEATS
+    assert any(b"does not take FRI.Out = 0: it shows 1" in words.tobytes() for words in _events(bench))
+    assert bench.states[-1].io["out"] is True and bench.sent[-1].q == IPO
+
+
+def test_signals_that_come_and_go() -> None:
+    bench = Bench(wire=Version.V2_7)
+    analog = m.IoValue("FRI.Level", m.IoType.ANALOG, m.IoDirection.INPUT, 2.5)
+    bench.activate()
+    bench.run(2)
+    assert not bench.states[-1].io
+    bench.controller.io = (analog,)
+    bench.run(2)
+    assert bench.layout.offered.read() == json.dumps(
+        {"signals": json.dumps([("FRI.Level", "analog", False)]), "frames": []}
+    )
+    bench.controller.io = ()
+    bench.run(2)
+    assert json.loads(bench.layout.offered.read() or "")["signals"] == "[]"
+    want(bench, Out=(1, 1))
+    bench.run(2)
+    assert any(b"'FRI.Out' is no output of this FRI session" in words.tobytes() for words in _events(bench))
+
+
+def test_a_law_reads_inputs_and_writes_outputs() -> None:
+    bench = Bench(law=lights)
+    button = m.IoValue("FRI.Button", m.IoType.BOOLEAN, m.IoDirection.INPUT, 0)
+    lamp = m.IoValue("FRI.Lamp", m.IoType.BOOLEAN, m.IoDirection.OUTPUT, 0)
+    bench.controller.io = (button, lamp)
+    bench.activate()
+    bench.run(5)
+    assert not any(one.io for one in bench.sent), "the lamp is off already"
+    bench.controller.io = (replace(button, value=1), lamp)
+    bench.run(5)
+    assert [one.io[0].value for one in bench.sent if one.io] == [1] * 5
+    bench.controller.io = ()
+    bench.run(200)
+    assert bench.cycle.may_end and any(b"no signal" in words.tobytes() for words in _events(bench))
+
+
+@pytest.mark.parametrize("wire", Version)
+def test_frames_are_told_as_each_version_has_them(wire: Version) -> None:
+    bench = Bench(wire=wire)
+    bench.controller.requested = (m.Transformation("PBase", (), m.TimeStamp(1, 2)),)
+    half = math.sqrt(0.5)
+    pose = [0.1, 0.2, 0.3, 0.0, 0.0, half, half]  # turned by 90 degrees about z
+    bench.layout.outputs.write(json.dumps({"io": {}, "frames": {"PBase": pose, "Other": pose}}))
+    bench.run(3, SessionState.MONITORING_WAIT)
+    assert [one.name for one in bench.sent[-1].transformations] == ["PBase"]
+    values = bench.sent[-1].transformations[0].values
+    if wire.traits.quaternions:
+        assert values == pytest.approx((100.0, 200.0, 300.0, half, 0.0, 0.0, half))
+    else:
+        assert values == pytest.approx((0, -1, 0, 100, 1, 0, 0, 200, 0, 0, 1, 300), abs=1e-12)
+    bench.controller.requested = ()
+    bench.run(2)
+    assert not bench.sent[-1].transformations
 
 
 def test_parameters_have_names_and_shapes() -> None:

@@ -16,7 +16,8 @@ from heptarm.fri.protobuf import put_bytes, put_varint
 from heptarm.fri.version import MONITORING_ID, Version
 from heptarm.rt import layout as at
 from heptarm.rt.native import HANDBACK, LAW, Native, Unavailable, library
-from heptarm.rt.state import Output, State
+from heptarm.rt.output import Output
+from heptarm.rt.state import State
 
 from .controller import IPO
 from .laws import offset, torque

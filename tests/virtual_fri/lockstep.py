@@ -14,7 +14,7 @@ from heptarm.fri.version import Version
 from heptarm.io.shared import Block
 from heptarm.rt import layout as at
 from heptarm.rt.cycle import Cycle, Law
-from heptarm.rt.state import Params
+from heptarm.rt.params import Params
 from heptarm.values.arrays import Array
 from heptarm.values.mode import Mode, Position
 from heptarm.virtual.fri.configuration import Configuration

@@ -19,7 +19,7 @@ from heptarm.model.kinematics import forward
 from heptarm.rt import Output, State
 from heptarm.rt import layout as at
 from heptarm.rt.cycle import Cycle, Law
-from heptarm.rt.state import Params
+from heptarm.rt.params import Params
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from heptarm.virtual.fri.configuration import Configuration

@@ -49,6 +49,7 @@ from heptarm.rt import Client, Params, Stats
 from heptarm.rt import State as FriState
 from heptarm.rt.cycle import LAW_FAILED
 from heptarm.values.arrays import within
+from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
 from heptarm.values.result import Cause, Result
 from heptarm.wire import messages as wire
@@ -376,8 +377,8 @@ class Fri:
         return self.client.params
 
     @property
-    def inputs(self) -> dict[str, float]:
-        """The signals that the cabinet sends in this session, by name."""
+    def inputs(self) -> dict[str, SignalValue]:
+        """The cabinet's inputs that the session carries, as they are now, by name."""
         return self.client.inputs
 
     def output(self, name: str, value: float) -> None:

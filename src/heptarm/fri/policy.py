@@ -14,8 +14,8 @@ class Missing(enum.Enum):
     """What to do without a fresh command.
 
     HOLD keeps the last one. EXTRAPOLATE lets position or pose move on with its last speed, from the moment it was
-    commanded, and keeps torques; after `over` seconds it ramps down. RAMP_DOWN brakes the axes, or the flange, to a
-    stop where they are and lets torques and wrenches fall to zero within `over` seconds.
+    commanded, and keeps torques and elbow; after `over` seconds it ramps down. RAMP_DOWN brakes the axes, or flange and
+    elbow, to a stop where they are and lets torques and wrenches fall to zero within `over` seconds.
     """
 
     HOLD = "hold"
@@ -60,11 +60,24 @@ class Filler:
         wrench: its wrench [N, Nm].
         pose: its pose [m, x y z w].
         twist: the pose's speed, told from the one before [m/s, rad/s].
+        e1: its redundancy angle [rad].
         is_filled: the last wish was made without a fresh command.
         is_braking: the last wish is to brake.
     """
 
-    __slots__ = ("at", "is_braking", "is_filled", "policy", "pose", "q", "slope", "tau", "twist", "wrench")
+    __slots__ = (
+        "at",
+        "e1",
+        "is_braking",
+        "is_filled",
+        "policy",
+        "pose",
+        "q",
+        "slope",
+        "tau",
+        "twist",
+        "wrench",
+    )
 
     def __init__(self, policy: Policy) -> None:
         self.policy = policy
@@ -79,6 +92,7 @@ class Filler:
         self.wrench: Sequence[float] | None = None
         self.pose: Sequence[float] | None = None
         self.twist: Sequence[float] | None = None
+        self.e1: float | None = None
         self.is_filled = self.is_braking = False
 
     def command(
@@ -89,6 +103,7 @@ class Filler:
         tau: Sequence[float] | None = None,
         wrench: Sequence[float] | None = None,
         pose: Sequence[float] | None = None,
+        e1: float | None = None,
     ) -> None:
         """Take a command of the user; what is None stays as it was.
 
@@ -98,6 +113,7 @@ class Filler:
             tau: superposed torques [Nm].
             wrench: superposed wrench [N, Nm].
             pose: x y z [m], quaternion x y z w.
+            e1: redundancy angle of the pose [rad].
         """
         gap = (at - self.at) * 1e-9
         # two commands of one stream tell its speed, a pause between them does not
@@ -115,6 +131,7 @@ class Filler:
             self.pose = pose
         self.tau = tau if tau is not None else self.tau
         self.wrench = wrench if wrench is not None else self.wrench
+        self.e1 = e1 if e1 is not None else self.e1
         self.at = at
 
     def wish(self, now: int, ipo: Sequence[float]) -> Sequence[float] | None:
@@ -148,6 +165,16 @@ class Filler:
         if self.policy.missing is Missing.EXTRAPOLATE and self.twist is not None:
             return moved(self.pose, [value * age for value in self.twist])
         return self.pose
+
+    def elbow_wish(self, now: int, ipo: float) -> float | None:
+        """The redundancy angle wanted now [rad]; None to brake.
+
+        Args:
+            now: the clock of the commands [ns].
+            ipo: interpolator's, which is mirrored until one was commanded.
+        """
+        self._age(now)
+        return None if self.is_braking else ipo if self.e1 is None else self.e1
 
     def _age(self, now: int) -> float:
         """Age of the last command [s]; says too whether it still counts."""

@@ -23,7 +23,7 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 #: What is limited each for itself, as the report names it.
-PARTS = ("flange", "rotation")
+PARTS = ("flange", "rotation", "elbow")
 #: A quaternion that is shorter tells no rotation.
 SHORTEST = 1e-3
 #: No wish is further from the base along an axis [m].
@@ -41,7 +41,8 @@ class PoseLimited(enum.IntEnum):
     ACCELERATION = 3
 
 
-_UNITS = (("", "m", "m/s", "m/s²"), ("", "rad", "rad/s", "rad/s²"))
+_ANGLES = ("", "rad", "rad/s", "rad/s²")
+_UNITS = (("", "m", "m/s", "m/s²"), _ANGLES, _ANGLES)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,6 +54,8 @@ class PoseLimits:
         acceleration: of the flange [m/s²].
         angular_velocity: of its rotation [rad/s].
         angular_acceleration: of its rotation [rad/s²].
+        elbow_velocity: of the redundancy angle [rad/s].
+        elbow_acceleration: of the redundancy angle [rad/s²].
         reach: how far a wish may be from the interpolator [m].
 
     Raises:
@@ -63,6 +66,8 @@ class PoseLimits:
     acceleration: float = 1.0
     angular_velocity: float = 1.0
     angular_acceleration: float = 4.0
+    elbow_velocity: float = 0.5
+    elbow_acceleration: float = 2.0
     reach: float = math.inf
 
     def __post_init__(self) -> None:
@@ -78,7 +83,7 @@ class PoseReport:
     """What the guard limited, since it was made.
 
     Attributes:
-        counts: cycles, by `PoseLimited` and part, shape [4][2].
+        counts: cycles, by `PoseLimited` and part, shape [4][3].
         worst: largest magnitude asked, by `PoseLimited` and part.
         allowed: largest magnitude allowed then.
     """
@@ -128,6 +133,8 @@ class PoseGuard:
         quat: rotation that was sent last.
         v: last difference of the translations [m per step].
         w: last difference of the rotations [rad per step].
+        e1: redundancy angle that was sent last [rad]; NaN where the interpolator has none.
+        u: its last difference [rad per step].
         goal: the last wish, within the reach.
         is_started: between `start` and `stop`.
         was_limited: the last cycle changed something.
@@ -139,6 +146,7 @@ class PoseGuard:
         self.xyz, self.v, self.w = _ZERO, _ZERO, _ZERO
         self.quat: Quaternion = (0.0, 0.0, 0.0, 1.0)
         self.goal: tuple[Vector, Quaternion] = (self.xyz, self.quat)
+        self.e1, self.u, self._e1_goal = math.nan, 0.0, math.nan
         self.is_started = self.was_limited = False
         self._scale(1e-3)
 
@@ -146,19 +154,28 @@ class PoseGuard:
         """Limits in steps of the command period [s]."""
         limits, more = self.limits, 1.0 + ROUNDING
         self.period = period
-        self._tops = (limits.velocity * period * more, limits.angular_velocity * period * more)
-        self._mosts = (
-            limits.acceleration * period**2 * more,
-            limits.angular_acceleration * period**2 * more,
-        )
+        self._rates = (limits.velocity, limits.angular_velocity, limits.elbow_velocity)
+        self._changes = (limits.acceleration, limits.angular_acceleration, limits.elbow_acceleration)
+        self._tops = tuple(rate * period * more for rate in self._rates)
+        self._mosts = tuple(change * period**2 * more for change in self._changes)
 
-    def start(self, pose: Sequence[float], twist: Sequence[float] = _REST, *, period: float) -> None:
+    def start(
+        self,
+        pose: Sequence[float],
+        twist: Sequence[float] = _REST,
+        *,
+        period: float,
+        e1: float = math.nan,
+        e1_speed: float = 0.0,
+    ) -> None:
         """Begin where the interpolator is, with its speed.
 
         Args:
             pose: interpolator's pose, shape (7,).
             twist: its velocity and angular velocity, base axes, shape (6,) [m/s, rad/s].
             period: distance of two commands [s].
+            e1: interpolator's redundancy angle [rad]; NaN: it has none.
+            e1_speed: its speed [rad/s].
         """
         self._scale(period)
         x, y, z = pose[:3]
@@ -166,6 +183,8 @@ class PoseGuard:
         self.goal = (self.xyz, self.quat)
         self.v = _within(_times(period, twist[:3]), self._tops[0])
         self.w = _within(_times(period, twist[3:]), self._tops[1])
+        self.e1 = self._e1_goal = e1
+        self.u = _within((e1_speed * period, 0.0, 0.0), self._tops[2])[0]
         self.is_started, self.was_limited = True, False
 
     def stop(self) -> None:
@@ -179,8 +198,8 @@ class PoseGuard:
 
     @property
     def is_still(self) -> bool:
-        """Neither part moves."""
-        return not any(self.v) and not any(self.w)
+        """No part moves."""
+        return not any(self.v) and not any(self.w) and not self.u
 
     def pose(self, wish: Sequence[float] | None, ipo: Sequence[float] | None = None) -> tuple[float, ...]:
         """The pose to send.
@@ -214,6 +233,26 @@ class PoseGuard:
             self.quat = _turned(self.quat, self.w)
         return self.sent
 
+    def elbow(self, wish: float | None) -> float:
+        """The redundancy angle to send [rad]; to be asked after `pose`.
+
+        Args:
+            wish: an angle; None brakes to a stop, NaN keeps the last wish.
+        """
+        if wish is None:
+            self.u = _slower((self.u, 0.0, 0.0), self._mosts[2])[0]
+            self.e1 = self._e1_goal = self.e1 + self.u
+            return self.e1
+        before = self._e1_goal
+        if not math.isfinite(wish):
+            self._limited(PoseLimited.NOT_FINITE, 2, 0.0, 0.0)
+            wish = before
+        self._e1_goal = wish
+        ahead = wish - self.e1
+        self.u = self._step(2, (ahead, 0.0, 0.0), (wish - before, 0.0, 0.0), (self.u, 0.0, 0.0))[0]
+        self.e1 = wish if self.u == ahead else self.e1 + self.u
+        return self.e1
+
     # ---------------------------------------------------------------------------------------------- one part
 
     def _bounded(
@@ -243,7 +282,7 @@ class PoseGuard:
         """The velocity of this step.
 
         Args:
-            part: 0 translation, 1 rotation.
+            part: 0 translation, 1 rotation, 2 redundancy angle.
             ahead: from here to the wish.
             pace: from the last wish to this one.
             v: the velocity of the last step.
@@ -255,13 +294,11 @@ class PoseGuard:
         # on the wish's track, or near enough to be so with the next step
         if speed <= top and bend <= most and far <= most:
             return ahead
-        period, limits = self.period, self.limits
+        period = self.period
         if speed > top:
-            allowed = limits.angular_velocity if part else limits.velocity
-            self._limited(PoseLimited.VELOCITY, part, speed / period, allowed)
+            self._limited(PoseLimited.VELOCITY, part, speed / period, self._rates[part])
         else:
-            allowed = limits.angular_acceleration if part else limits.acceleration
-            self._limited(PoseLimited.ACCELERATION, part, max(bend, far) / period**2, allowed)
+            self._limited(PoseLimited.ACCELERATION, part, max(bend, far) / period**2, self._changes[part])
         soft, wanted = SHARE * most, pace
         if far > 0.0:  # as fast as still stops at the moving goal, in steps of `soft`
             rate = min(far, soft * (math.sqrt(0.25 + 2.0 * far / soft) - 0.5))

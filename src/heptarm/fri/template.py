@@ -92,6 +92,7 @@ class Sample:
 
     __slots__ = (
         "_datagram",
+        "_full",
         "_version",
         "connection",
         "q",
@@ -118,19 +119,27 @@ class Sample:
     stamp: tuple[int, int]
     tracking: float
     _datagram: bytes
+    _full: m.Monitoring | None
     _version: Version
+
+    @property
+    def is_full(self) -> bool:
+        """The full value is there already; else it has no signals, no poses of its own and no requests."""
+        return self._full is not None
 
     @property
     def message(self) -> m.Monitoring:
         """The full value, decoded on demand."""
-        return codec.decode_monitoring(self._datagram, self._version)
+        if self._full is None:
+            self._full = codec.decode_monitoring(self._datagram, self._version)
+        return self._full
 
 
 def _sample(datagram: bytes, version: Version, full: m.Monitoring) -> Sample:
     """The sample of a fully decoded message."""
     sample = Sample()
     monitor, ipo = full.monitor or m.MonitorData(), full.ipo or m.IpoData()
-    sample._datagram, sample._version = datagram, version
+    sample._datagram, sample._version, sample._full = datagram, version, full
     sample.sequence, sample.robot, sample.connection = full.header.sequence, full.robot, full.connection
     sample.q, sample.tau, sample.q_cmd = monitor.q, monitor.tau, monitor.q_cmd
     sample.tau_cmd, sample.tau_ext, sample.q_ipo = monitor.tau_cmd, monitor.tau_ext, ipo.q
@@ -166,6 +175,8 @@ class _Layout:
         names = [name for _, name in self._ARRAYS]
         present = [tag for tag, name in self._ARRAYS if getattr(monitor, name) is not None]
         arrays = b"".join(put_bytes(tag, put_unpacked(1, _ZERO)) for tag in present)
+        if monitor.io or monitor.wrench or monitor.pose or monitor.redundancy:  # nothing stays where it was
+            raise MalformedMessage("no fixed layout")
         tracked = ipo is not None and ipo.tracking is not None
         ipo_array = put_bytes(1, put_unpacked(1, _ZERO)) if ipo is not None and ipo.q is not None else b""
         enums = sections[5][len(ipo_array) : len(sections[5]) - 9 * tracked] if 5 in sections else b""
@@ -218,7 +229,7 @@ class _Layout:
             return None
         values, tail = front[1::2], back[1::2]
         sample = Sample()
-        sample._datagram, sample._version = datagram, self._version
+        sample._datagram, sample._version, sample._full = datagram, self._version, None
         sample.sequence, sample.robot, sample.connection = sequence, self._robot, self._connection
         for name, at in self._slots:
             setattr(sample, name, values[at : at + 7])

@@ -9,7 +9,10 @@
             client.command(q=s.q_ipo + 0.01 * np.sin(s.t))
 """
 
-from heptarm.rt.client import Client, Stats
-from heptarm.rt.state import Output, Params, State
+from heptarm.rt.client import Client
+from heptarm.rt.output import Output
+from heptarm.rt.params import Params
+from heptarm.rt.state import State
+from heptarm.rt.stats import Stats
 
 __all__ = ["Client", "Output", "Params", "State", "Stats"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict
 from types import TracebackType
 from typing import Any
 
@@ -17,74 +17,27 @@ from heptarm.errors import (
     CommandRejected,
     ConnectFailed,
     ConnectionLost,
-    NotReady,
-    Timeout,
 )
-from heptarm.fri.event import Event, Kind
 from heptarm.fri.guard import Limits
-from heptarm.fri.messages import Quality, SessionState
 from heptarm.fri.policy import Policy
 from heptarm.fri.pose_guard import PoseLimits
-from heptarm.fri.statistics import Counters, Histogram
 from heptarm.fri.version import Version
 from heptarm.io.shared import Block
-from heptarm.rt import launch, limited
+from heptarm.rt import launch
 from heptarm.rt import layout as at
 from heptarm.rt.cycle import Law
-from heptarm.rt.state import Params, State
-from heptarm.values.arrays import array
+from heptarm.rt.params import Params
+from heptarm.rt.reader import Reader
+from heptarm.values.arrays import array, scalar
+from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel, robot
 
 #: FRI's own port.
 PORT = 30200
-#: A state is looked for this often once it is due [s].
-_LOOK = 1e-4
-_KINDS = list(Kind)
-_NOBODY = (
-    "is the FRI application running on the cabinet, does it send to this machine's address and this port, are both in "
-    "one network (address and netmask), and does a firewall let UDP through?"
-)
 
 
-@dataclass(frozen=True, slots=True)
-class Stats:
-    """How well it goes; counts are over all sessions of the client.
-
-    Attributes:
-        received: messages of the controller.
-        answered: answers sent.
-        lost: messages that never came.
-        missed: answers that the controller did not take in time.
-        duplicated: messages that came twice.
-        reordered: messages overtaken by later ones.
-        malformed: datagrams that were no message.
-        restarts: sessions that began anew.
-        commanded: answers whose commands were effective.
-        filled: of those, made by the policy without a fresh command.
-        limited: of those, changed by the guard.
-        quality: messages by the quality that they named.
-        latency: receipt to answer, [s]: median, 99 %, 99.9 %, longest.
-        jitter: deviation from the send period, [s]: median, 99 %, 99.9 %, longest.
-    """
-
-    received: int
-    answered: int
-    lost: int
-    missed: int
-    duplicated: int
-    reordered: int
-    malformed: int
-    restarts: int
-    commanded: int
-    filled: int
-    limited: int
-    quality: dict[str, int]
-    latency: tuple[float, ...]
-    jitter: tuple[float, ...]
-
-
-class Client:
+class Client(Reader):
     """A client that answers a controller from a process of its own; close it, or use it in a `with` block.
 
     It stays through any number of sessions: the cabinet's application may end and begin again.
@@ -145,8 +98,7 @@ class Client:
             raise CommandRejected(str(error), parameter="version", value=version) from None
         self._values = values
         block = Block(at.Layout.words(history=history, params=values.size))
-        self._layout = at.Layout(block, history=history, params=values.size)
-        self._header = self._layout.header
+        super().__init__(at.Layout(block, history=history, params=values.size))
         self._header[at.HISTORY], self._header[at.SIZE] = history, values.size
         self._layout.config.write(
             json.dumps(
@@ -170,8 +122,7 @@ class Client:
         )
         self.params = Params(values, schema, changed=self._send_params)
         self._send_params()
-        self._seen = self._events_seen = 0
-        self._outputs: dict[str, float] = {}
+        self._outputs: dict[str, tuple[int, int | float]] = {}
         self._frames: dict[str, list[float]] = {}
         self._closed = False
         try:
@@ -192,122 +143,10 @@ class Client:
             self._worker.join(1.0)
             raise ConnectFailed(self._layout.trouble.read() or "the loop's process did not start")
 
-    # ------------------------------------------------------------------------------------------------ states
-
-    @property
-    def state(self) -> State:
-        """The newest message.
-
-        Raises:
-            NotReady: none has come yet; the text says what may be the cause.
-        """
-        words = self._layout.states.newest()
-        if words is None:
-            raise NotReady(self.trouble, hint=_NOBODY)
-        return State(words)
-
-    @property
-    def session(self) -> SessionState:
-        """State of the session; IDLE before the first message."""
-        words = self._layout.states.newest()
-        return SessionState.IDLE if words is None else State(words).session
-
-    @property
-    def quality(self) -> Quality:
-        """Quality of the connection; POOR before the first message."""
-        words = self._layout.states.newest()
-        return Quality.POOR if words is None else State(words).quality
-
-    @property
-    def trouble(self) -> str:
-        """Why no session stands, in words; empty if one does."""
-        return self._layout.trouble.read() or ""
-
-    @property
-    def refused(self) -> list[str]:
-        """What the system refused the loop, in words with the remedy."""
-        return (self._layout.refused.read() or "").splitlines()
-
-    @property
-    def is_native(self) -> bool:
-        """The loop's frequent turns are done by the native part."""
-        return bool(self._header[at.NATIVE])
-
     @property
     def is_running(self) -> bool:
         """The loop's process runs, or the client was closed in order."""
         return self._closed or self._worker.is_alive()
-
-    def history(self, size: int | None = None) -> list[State]:
-        """The last states, oldest first; the very oldest may be overwritten meanwhile and are left out."""
-        ring = self._layout.states
-        count = ring.count
-        first = max(0, count - (len(ring.ints) - 1 if size is None else size))
-        found = (ring.read(tick) for tick in range(first, count))
-        return [State(words) for words in found if words is not None]
-
-    def next(self, *, timeout: float = 5.0) -> State:
-        """The newest state that was not returned before; waits for one.
-
-        Raises:
-            Timeout: none came; the text says what may be the cause.
-            ConnectionLost: the client is closed, or its loop has ended.
-        """
-        header, deadline = self._header, time.monotonic() + timeout
-        while header[at.STATES] <= self._seen:
-            self._check()
-            now = time.monotonic()
-            if now > deadline:
-                known = self._layout.states.newest()
-                text = self.trouble or (
-                    "the controller sends no more" if known is not None else "nothing has arrived"
-                )
-                raise Timeout(f"no FRI message within {timeout:g} s: {text}", hint=_NOBODY)
-            time.sleep(min(self._until_due(), deadline - now + _LOOK))
-        self._seen = header[at.STATES]
-        return self.state
-
-    def _until_due(self) -> float:
-        """Time until the next state is likely to be there [s]."""
-        words = self._layout.states.newest()
-        if words is None:
-            return 1e-3
-        newest = State(words)
-        return min(max(newest.period - newest.age, _LOOK), 0.05)
-
-    def __iter__(self) -> Iterator[State]:
-        """Every newest state, never one twice, as long as messages come."""
-        while True:
-            yield self.next()
-
-    def wait(self, session: SessionState | str, *, timeout: float = 10.0) -> State:
-        """Wait for a state of the session.
-
-        Args:
-            session: the state, or its name such as "COMMANDING_ACTIVE".
-            timeout: how long [s].
-
-        Raises:
-            Timeout: it did not come; the text says what stands in the way.
-        """
-        wanted = SessionState[session] if isinstance(session, str) else session
-        deadline = time.monotonic() + timeout
-        while (rest := deadline - time.monotonic()) > 0.0:
-            state = self.next(timeout=rest)
-            if state.session is wanted:
-                return state
-        state = self.state
-        hint = ""
-        if wanted > state.session:
-            if state.session is SessionState.MONITORING_WAIT:
-                hint = "the controller wants quality GOOD first; see `stats` for latency and lost messages"
-            elif state.session is SessionState.MONITORING_READY:
-                hint = "the cabinet's application has started no overlay"
-        raise Timeout(
-            f"the session is {state.session.name} with quality {state.quality.name} after {timeout:g} s, "
-            f"not {wanted.name}",
-            hint=hint,
-        )
 
     # ---------------------------------------------------------------------------------------------- commands
 
@@ -318,6 +157,7 @@ class Client:
         tau: npt.ArrayLike | None = None,
         wrench: npt.ArrayLike | None = None,
         pose: Pose | npt.ArrayLike | None = None,
+        e1: float | None = None,
     ) -> None:
         """Give a command; it stands until the next one, or until the policy's patience ends.
 
@@ -330,6 +170,8 @@ class Client:
             wrench: superposed wrench, shape (6,) [N, Nm].
             pose: of the flange in the base, or x y z [m] and unit quaternion x y z w, shape (7,); in sessions that
                 command poses.
+            e1: redundancy angle of the pose [rad], that of A3; in sessions that command poses. None: the last one,
+                at first the interpolator's.
 
         Raises:
             ShapeError: an array has another shape, or the quaternion's norm is further than 1e-3 from 1.
@@ -347,6 +189,9 @@ class Client:
         if pose is not None:
             parts[at.C_POSE : at.C_POSE + 7] = _seven(pose)
             given |= at.GIVEN_POSE
+        if e1 is not None:
+            parts[at.C_E1] = scalar(e1, "e1")
+            given |= at.GIVEN_E1
         self._check()
         ints = parts.view(np.int64)
         ints[at.C_AT], ints[at.C_GIVEN] = time.monotonic_ns(), given
@@ -355,89 +200,62 @@ class Client:
     def _send_params(self) -> None:
         self._layout.params.write(self._values)
 
-    @property
-    def inputs(self) -> dict[str, float]:
-        """The signals that the controller sends, by name."""
-        return dict(json.loads(self._layout.inputs.read() or "{}"))
-
-    def output(self, name: str, value: float) -> None:
-        """Set an output of the controller, in COMMANDING_ACTIVE.
+    def output(self, name: str, value: SignalValue) -> None:
+        """Write an output of the cabinet; it is sent until the cabinet shows it, in every state of a session.
 
         Args:
-            name: "Group.Signal".
-            value: 0 or 1, an integer, or a number, as the signal is.
+            name: "Group.Signal", or the part behind the point where only one signal has it.
+            value: True or False, or a number.
+
+        Raises:
+            CommandRejected: the session carries no such output.
+            LimitError: it cannot have the value.
+            ConnectionLost: the client is closed, or its loop has ended.
         """
-        self._outputs[name] = value
+        full, number = self._signals.output(name, value)
+        count = 1 + max((one[0] for one in self._outputs.values()), default=0)
+        self._outputs[full] = (count, number)  # counted, since the loop may see several at once
         self._send_outputs()
 
-    def transformation(self, name: str, values: npt.ArrayLike) -> None:
-        """Answer the controller's request for a transformation from now on.
+    def frame(self, name: str, pose: Pose | npt.ArrayLike) -> None:
+        """Tell the controller where a frame is that it asks for; from now on, until the next word.
 
         Args:
-            name: of the requested frame.
-            values: 12 numbers (3x4, mm) for FRI 1.x; 7 (x y z [mm], qw qx qy qz) for 2.x.
+            name: of the frame, one of `wanted_frames`.
+            pose: of the frame, or x y z [m] and unit quaternion x y z w, shape (7,).
+
+        Raises:
+            CommandRejected: the controller asks for no such frame.
+            ShapeError: seven numbers are wanted, or the quaternion's norm is further than 1e-3 from 1.
+            ConnectionLost: the client is closed, or its loop has ended.
         """
-        numbers = np.asarray(values, dtype=np.float64).reshape(-1)
-        self._frames[name] = array(numbers, 12 if numbers.size == 12 else 7, name).tolist()
+        wanted = self.wanted_frames
+        if name not in wanted:
+            raise CommandRejected(
+                f"the controller asks for no frame {name!r}",
+                parameter="name",
+                value=name,
+                allowed=", ".join(wanted) or "none",
+                hint="its application registers it with registerTransformationProvider",
+            )
+        given = pose if isinstance(pose, Pose) else array(pose, 7, "pose")
+        self._frames[name] = (
+            given if isinstance(given, Pose) else Pose.of(given[:3], given[3:])
+        ).array.tolist()
         self._send_outputs()
 
     def _send_outputs(self) -> None:
         self._check()
-        self._layout.outputs.write(json.dumps({"io": self._outputs, "transformations": self._frames}))
-
-    # ------------------------------------------------------------------------------------------------ report
-
-    @property
-    def stats(self) -> Stats:
-        """Counts, latency and jitter so far."""
-        counts = Counters()
-        counts.load(self._header, at.COUNTS)
-        latency, jitter = Histogram(self._layout.latency), Histogram(self._layout.jitter)
-        shares = (0.5, 0.99, 0.999)
-        return Stats(
-            received=counts.received,
-            answered=counts.answered,
-            lost=counts.lost,
-            missed=counts.missed,
-            duplicated=counts.duplicated,
-            reordered=counts.reordered,
-            malformed=counts.malformed,
-            restarts=counts.restarts,
-            commanded=counts.commanded,
-            filled=counts.filled,
-            limited=counts.limited,
-            quality={name: getattr(counts, name) for name in ("poor", "fair", "good", "excellent")},
-            latency=(*latency.percentiles(*shares), latency.longest),
-            jitter=(*jitter.percentiles(*shares), jitter.longest),
-        )
-
-    @property
-    def limited(self) -> list[str]:
-        """What the guard has limited, one line for each axis (or part of a pose) and quantity, in words."""
-        return limited.lines(self._layout)
-
-    def events(self) -> list[Event]:
-        """What happened since the last call, oldest first."""
-        ring, found = self._layout.events, []
-        count = ring.count
-        for tick in range(max(self._events_seen, count - len(ring.ints)), count):
-            words = ring.read(tick)
-            if words is not None:
-                ints = words.view(np.int64)
-                text = words[3:].tobytes().rstrip(b"\0").decode(errors="replace")
-                found.append(Event(_KINDS[int(ints[2])], text, int(ints[1])))
-        self._events_seen = count
-        return found
+        self._layout.outputs.write(json.dumps({"io": self._outputs, "frames": self._frames}))
 
     # --------------------------------------------------------------------------------------------------- end
 
     def _check(self) -> None:
         if self._closed:
             raise ConnectionLost("the FRI client is closed")
-        if self._header[at.STATUS] in (at.Status.ENDED, at.Status.FAILED) or not self._worker.is_alive():
-            raise ConnectionLost(
-                f"the FRI loop has ended: {self._layout.trouble.read() or 'its process is gone'}"
-            )
+        super()._check()
+        if not self._worker.is_alive():
+            raise ConnectionLost("the FRI loop has ended: its process is gone")
 
     def close(self, *, timeout: float = 5.0) -> None:
         """Brake the arm to a stop and end the loop. Closing twice is legal."""

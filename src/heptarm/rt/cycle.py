@@ -2,46 +2,41 @@
 
 from __future__ import annotations
 
-import json
 import math
-import struct
 import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from heptarm.errors import CommandRejected
 from heptarm.fri import messages as m
-from heptarm.fri.event import Kind
 from heptarm.fri.guard import Guard, Limits
 from heptarm.fri.policy import Filler, Policy
 from heptarm.fri.pose_guard import PoseLimits
 from heptarm.fri.session import Session
-from heptarm.fri.setpoint import Setpoint
+from heptarm.fri.setpoint import NOTHING, Setpoint
+from heptarm.fri.silence import carried_on
 from heptarm.fri.statistics import Histogram
 from heptarm.fri.template import Sample
 from heptarm.fri.version import Version
 from heptarm.rt import layout as at
 from heptarm.rt import limited
+from heptarm.rt.exchange import Exchange
+from heptarm.rt.output import Output
+from heptarm.rt.params import Params
 from heptarm.rt.posing import Posing
-from heptarm.rt.state import Output, Params, State, information
+from heptarm.rt.record import NAN6, NAN7, NOTHING_SENT, Record, Sent
+from heptarm.rt.state import State
 
 Law = Callable[[State, Output, Params], object]
 
-#: After a silence of this many command periods the guard begins anew from the last position, at rest.
+#: After a silence of this many command periods commanding goes on from where the arm has come to.
 SILENT_PERIODS = 5
-#: A silence is at least as long [ns]: the cabinet goes on with the last speed for a while, and so does the guard.
+#: A silence is at least as long [ns]: up to then what was skipped is done evenly towards the wish.
 SILENT_LEAST = 25_000_000
 #: A command given this long before commanding begins still counts [ns].
 GRACE = 50_000_000
 #: How the event begins that tells of a law which failed.
 LAW_FAILED = "the law failed, the arm brakes: "
-#: An output is written this often, since an answer may be lost.
-REPEAT_OUTPUTS = 10
-_ROW = struct.Struct(f"=18q{at.STATE_WORDS - 19}d")
-_NAN7, _NAN6 = (math.nan,) * 7, (math.nan,) * 6
-_NOTHING_SENT = (_NAN7, _NAN7, _NAN6, _NAN7)
 
 
 class Cycle:
@@ -57,15 +52,12 @@ class Cycle:
         params: of the law.
 
     Attributes:
-        layout, session, guard, posing, filler, law: what it is made of.
+        layout, session, guard, posing, filler, exchange, record, law: what it is made of.
         is_ending: it brakes, whatever is commanded.
         mirrored: last mirrored position and the message's counter; None outside COMMANDING_WAIT.
         slope: interpolator's speed then [rad/s].
-        ticks: messages since commands became effective.
-        started: when they did [ns].
+        started: when commands became effective [ns].
         commands_seen: commands of the user's process that were taken.
-        outputs_seen: tick of the outputs that were taken.
-        info: robot and connection of the last message, and what seldom changes.
     """
 
     def __init__(
@@ -88,27 +80,17 @@ class Cycle:
         self.law = law
         self._params = params
         self._param_tick = -1
-        self._out = Output()
-        self._slot = memoryview(bytearray(8 * at.STATE_WORDS))
-        self._state = State(np.frombuffer(self._slot, dtype=np.float64))
+        self.exchange = Exchange(layout)
+        self.record = Record(layout, self.session)
+        self._out = Output(self.exchange.outputs)
         self.commands_seen = layout.commands.count
         self._restarts = 0
         self._skipped = 0  # cycles since the last setpoint of which nothing was heard
         self.mirrored: tuple[m.Joints, int] | None = None  # last mirrored position and its sequence
-        self.slope: Sequence[float] = _NAN7
-        self.ticks = 0
+        self.slope: Sequence[float] = NAN7
         self.started = 0
-        self._sent: tuple[Sequence[float], ...] = _NOTHING_SENT
-        self._flags = 0
         self._answered = False
         self._fresh: Sample | None = None
-        self.info: tuple[object, object, tuple[int, ...]] = (None, None, ())
-        self._full: tuple[Sample | None, m.Monitoring] = (None, m.Monitoring(m.Header(0, 0)))
-        self.outputs_seen = layout.outputs.tick
-        self._outputs: tuple[int, dict[str, float], dict[str, list[float]]] = (0, {}, {})
-        self._inputs: tuple[m.IoValue, ...] = ()
-        self._trouble = self.session.trouble
-        layout.trouble.write(self._trouble)
 
     # --------------------------------------------------------------------------------------------- a message
 
@@ -119,18 +101,20 @@ class Cycle:
             datagram: its octets.
             received: monotonic clock at its receipt [ns].
         """
-        session = self.session
-        self._flags, self._answered, before = 0, False, session.received
-        self._sent = _NOTHING_SENT
+        session, record, exchange = self.session, self.record, self.exchange
+        record.flags, record.sent, self._answered, before = 0, NOTHING_SENT, False, session.received
         last = session.sample
         heard = last.sequence if last is not None else 0
         self._fresh = sample = session.receive(datagram, received)
         if sample is None:
             return None
-        step = sample.sequence - heard
-        self._follow(sample, received, before, step if 0 < step <= _MOST_LOST else 1)
-        if not session.is_due:
+        exchange.look(sample)
+        record.signals, record.state.signals = exchange.numbers, exchange.signals
+        self._follow(sample, received, before, sample.sequence - heard)
+        record.ipo, record.ipo_e1 = self.posing.on_wire, self.posing.ipo_e1
+        if not session.is_due or session.version is None:
             return None
+        exchange.take()
         if session.is_commanding and session.mode in _JOINT_MODES and sample.q_ipo is not None:
             setpoint = self._setpoint(sample, received)
             self._count(limited=self.guard.was_limited)
@@ -138,37 +122,34 @@ class Cycle:
             setpoint = self._posed(sample, received)
             self._count(limited=self.posing.guard.was_limited)
         else:
-            setpoint = _NOTHING
-        if session.is_commanding:
-            setpoint = self._with_io(sample, setpoint)
+            setpoint = NOTHING
+        if not exchange.is_idle:
+            exchange.write()
+            setpoint = exchange.add(setpoint, session.version, lambda text: record.tell(received, text))
         try:
             octets = session.answer(setpoint)
         except CommandRejected as refusal:
-            self._outputs = (0, {}, {})
-            self.tell(received, str(refusal))
+            exchange.forget()
+            record.tell(received, str(refusal))
             octets = session.answer(replace(setpoint, io=(), transformations=()))
         self._answered = octets is not None
         return octets
 
     def _count(self, *, limited: bool) -> None:
         """Note how a setpoint came about."""
-        self._flags |= at.LIMITED if limited else 0
+        self.record.flags |= at.LIMITED if limited else 0
         self.session.counters.limited += limited
-        self.session.counters.filled += bool(self._flags & at.FILLED)
+        self.session.counters.filled += bool(self.record.flags & at.FILLED)
 
     def finish(self, now: int) -> None:
         """Publish the turn; called after its answer has left at `now` [ns]."""
         session, header = self.session, self.layout.header
         if self._answered:
             session.answered(now)
-            self._flags |= at.ANSWERED
-        for event in session.events():
-            self.tell(event.at, event.text, event.kind)
-        if session.trouble != self._trouble:
-            self._trouble = session.trouble
-            self.layout.trouble.write(self._trouble)
+            self.record.flags |= at.ANSWERED
+        self.record.tell_all()
         if self._fresh is not None:
-            self._publish(self._fresh, now - session.received if self._answered else 0)
+            self.record.publish(self._fresh, now - session.received if self._answered else 0)
         session.counters.save(header, at.COUNTS)
         if self.guard.was_limited:
             limited.publish(self.layout, self.guard.report)
@@ -179,9 +160,7 @@ class Cycle:
     def idle(self, now: int) -> None:
         """Nothing has come for a while."""
         self.layout.header[at.BEAT] = now
-        if self._trouble != self.session.trouble:
-            self._trouble = self.session.trouble
-            self.layout.trouble.write(self._trouble)
+        self.record.tell_all()
 
     def end(self) -> None:
         """From now on brake, whatever is commanded."""
@@ -194,12 +173,13 @@ class Cycle:
 
     # ----------------------------------------------------------------------------------------- what is wanted
 
-    def _follow(self, sample: Sample, received: int, before: int, step: int) -> None:
-        """Keep guard and filler in step with the session's state."""
-        session, guard, posing = self.session, self.guard, self.posing
+    def _follow(self, sample: Sample, received: int, before: int, leap: int) -> None:
+        """Keep guard and filler in step with the session's state; `leap` is how far the controller's counter went."""
+        step = leap if 0 < leap <= _MOST_LOST else 1
+        session, guard, posing, record = self.session, self.guard, self.posing, self.record
         by_pose = session.mode is m.CommandMode.CARTESIAN_POSE
         if by_pose:
-            posing.look(self._message(sample))
+            posing.look(sample.message)
         again = session.counters.restarts != self._restarts
         self._restarts = session.counters.restarts
         self._skipped = 0
@@ -216,19 +196,19 @@ class Cycle:
                 elif sample.q_ipo is not None:  # the client was not there when commanding began
                     guard.start(sample.q_ipo, _ZEROS7, period=period)
                 self.filler.start()
-                self.ticks = -1
+                record.ticks = -1
                 # a command given just before the start counts, an old one does not
                 self.commands_seen = max(0, self.layout.commands.count - 1)
                 self.started = received
                 step = 1
-            elif received - before > max(SILENT_PERIODS * period * 1e9, SILENT_LEAST):
+            elif (silent := self._silent(leap, received - before, period)) > 0.0:
                 if by_pose:
-                    posing.resume(period)
+                    posing.resume(sample.message, self.layout.states.newest(), time=silent, period=period)
                 else:
-                    guard.start(guard.q, _ZEROS7, period=period)
+                    self._resume(sample, time=silent, period=period)
             else:
                 self._skipped = (step - 1) // session.multiplier
-            self.ticks += step  # the controller's time goes on while messages are lost
+            record.ticks += step  # the controller's time goes on while messages are lost
             self.mirrored = None
         elif session.state is m.SessionState.COMMANDING_WAIT and by_pose:
             posing.mirror(sample.sequence, session.period)
@@ -241,6 +221,27 @@ class Cycle:
         else:
             self.mirrored = None
             posing.forget()
+
+    def _silent(self, leap: int, elapsed: int, period: float) -> float:
+        """How long nothing was heard, by the controller's counter [s]; 0.0 if not for long."""
+        time = leap * self.session.period if 0 < leap <= _MOST_LOST else elapsed
+        return time * 1e-9 if time > max(SILENT_PERIODS * period * 1e9, SILENT_LEAST) else 0.0
+
+    def _resume(self, sample: Sample, *, time: float, period: float) -> None:
+        """After a silence: go on from where the arm has come to, with the speed that it still has."""
+        guard, words = self.guard, self.layout.states.newest()
+        assert words is not None and sample.q is not None
+        then, now, is_exact = State(words).q, sample.q, True
+        if sample.q_cmd is not None:
+            then, now = State(words).q_cmd, sample.q_cmd
+        else:  # an arm that is soft may be measured beside its set-point
+            is_exact = sample.robot is not None and sample.robot.control_mode is m.ControlMode.POSITION
+        chain = [q - v for q, v in zip(guard.q, guard.v, strict=True)]
+        speeds = [v / period for v in guard.v]
+        places, later = carried_on(
+            chain, speeds, then.tolist(), now, time=time, period=period, is_exact=is_exact
+        )
+        guard.start(places, later, period=period)
 
     def _setpoint(self, sample: Sample, now: int) -> Setpoint:
         guard, ipo = self.guard, sample.q_ipo
@@ -261,9 +262,9 @@ class Cycle:
             self._take()
             wish = self.filler.wish(now, ipo)
             tau, wrench = self.filler.efforts(now)
-            self._flags |= at.FILLED if self.filler.is_filled else 0
+            self.record.flags |= at.FILLED if self.filler.is_filled else 0
         if wish is None:
-            self._flags |= at.BRAKING
+            self.record.flags |= at.BRAKING
         reach = ipo if guard.limits.reach < math.inf else None
         limited = self._catch_up(wish, reach)
         q = tuple(guard.position(wish, reach))
@@ -272,24 +273,29 @@ class Cycle:
         sent_tau = tuple(guard.torque(tau or _ZEROS7)) if mode is m.CommandMode.TORQUE else None
         sent_wrench = tuple(guard.force(wrench or _ZEROS6)) if mode is m.CommandMode.WRENCH else None
         guard.was_limited |= limited
-        self._sent = (q, sent_tau or _NAN7, sent_wrench or _NAN6, _NAN7)
+        self.record.sent = Sent(q, sent_tau or NAN7, sent_wrench or NAN6)
         return Setpoint(q=q, tau=sent_tau, wrench=sent_wrench)
 
     def _posed(self, sample: Sample, now: int) -> Setpoint:
-        """The setpoint of a session that commands poses; its redundancy stays the interpolator's."""
+        """The setpoint of a session that commands poses."""
         wish: Sequence[float] | None = None
+        elbow: float | None = None
         if not self.is_ending and self.law is not None:
             out = self._call(sample, now)
-            wish = None if out is None else out.pose.tolist()
+            wish, elbow = (None, None) if out is None else (out.pose.tolist(), float(out.e1))
         elif not self.is_ending:
             self._take()
             wish = self.filler.pose_wish(now, self.posing.ipo)
-            self._flags |= at.FILLED if self.filler.is_filled else 0
+            elbow = self.filler.elbow_wish(now, self.posing.ipo_e1)
+            self.record.flags |= at.FILLED if self.filler.is_filled else 0
         if wish is None:
-            self._flags |= at.BRAKING
+            self.record.flags |= at.BRAKING
         pose = self.posing.command(wish, min(self._skipped, _MOST_SKIPPED))
-        self._sent = (*_NOTHING_SENT[:3], pose.values)
-        return Setpoint(pose=pose)
+        redundancy = self.posing.command_elbow(elbow)
+        self.record.sent = Sent(
+            pose=pose.values, e1=math.nan if redundancy is None else redundancy.value
+        )
+        return Setpoint(pose=pose, redundancy=redundancy)
 
     def _catch_up(self, wish: Sequence[float] | None, reach: Sequence[float] | None) -> bool:
         """Do the cycles that were skipped, evenly towards the wish; says whether one of them was limited.
@@ -324,15 +330,16 @@ class Cycle:
             tau=numbers[at.C_TAU : at.C_TAU + 7] if given & at.GIVEN_TAU else None,
             wrench=numbers[at.C_WRENCH : at.C_WRENCH + 6] if given & at.GIVEN_WRENCH else None,
             pose=numbers[at.C_POSE : at.C_POSE + 7] if given & at.GIVEN_POSE else None,
+            e1=numbers[at.C_E1] if given & at.GIVEN_E1 else None,
         )
 
     def _call(self, sample: Sample, now: int) -> Output | None:
         """Let the law decide; if it fails, None, and brake from then on."""
-        out = self._out
-        out.q[:], out.tau[:], out.wrench[:] = sample.q_ipo or _NAN7, 0.0, 0.0
-        out.pose[:] = self.posing.ipo
-        _ROW.pack_into(self._slot, 8, *self._row(sample, 0))
-        self.ask(self._state, out, now)
+        out, posing, record = self._out, self.posing, self.record
+        out.q[:], out.tau[:], out.wrench[:] = sample.q_ipo or NAN7, 0.0, 0.0
+        out.pose[:], out.e1 = posing.ipo, posing.ipo_e1
+        record.fill(sample, 0)
+        self.ask(record.state, out, now)
         return None if self.is_ending else out
 
     def ask(self, state: State, out: Output, now: int) -> None:
@@ -347,131 +354,13 @@ class Cycle:
         try:
             self.law(state, out, self._params)
         except Exception as error:
-            self.tell(now, LAW_FAILED + _words(error))
+            self.record.tell(now, LAW_FAILED + _words(error))
             self.end()
 
-    @property
-    def is_plain(self) -> bool:
-        """No outputs and no transformations wait to be sent."""
-        return not self._outputs[0] and not self._outputs[2]
 
-    def _with_io(self, sample: Sample, setpoint: Setpoint) -> Setpoint:
-        """Adds the outputs and transformations that the user's process has left."""
-        note = self.layout.outputs
-        if note.tick != self.outputs_seen:
-            text = note.read()
-            if text is not None:
-                self.outputs_seen = note.tick
-                given = json.loads(text)
-                self._outputs = (REPEAT_OUTPUTS, given["io"], given["transformations"])
-        left, outputs, frames = self._outputs
-        if not left and not frames:
-            return setpoint
-        self._outputs = (max(0, left - 1), outputs, frames)
-        offered = self._message(sample).monitor
-        kinds = {one.name: one.type for one in (offered.io if offered is not None else ())}
-        return replace(
-            setpoint,
-            io=tuple(
-                m.IoValue(name, kinds.get(name, m.IoType.DIGITAL), m.IoDirection.OUTPUT, value)
-                for name, value in outputs.items()
-            )
-            if left
-            else (),
-            transformations=tuple(m.Transformation(name, tuple(values)) for name, values in frames.items()),
-        )
-
-    # ------------------------------------------------------------------------------------------- what is told
-
-    def tell(self, now: int, text: str, kind: Kind = Kind.CLIENT) -> None:
-        """Leave an event for the user's process."""
-        ring = self.layout.events
-        octets = text.encode()[: at.EVENT_TEXT].ljust(at.EVENT_TEXT, b"\0")
-        slot = ring.begin()
-        ring.ints[slot, 1], ring.ints[slot, 2] = now, _KINDS.index(kind)
-        ring.ints[slot, 3:] = memoryview(octets).cast("q")
-        ring.end()
-
-    def _row(self, sample: Sample, latency: int) -> tuple[float, ...]:
-        """The words of a state, without the sequence word."""
-        session = self.session
-        robot, link = sample.robot, sample.connection
-        if self.info[0] is not robot or self.info[1] is not link:
-            full = self._message(sample)
-            self.info = (robot, link, information(full))
-            self._read_inputs(full)
-        seconds, nanos = sample.stamp
-        wrench, pose, e1 = _NAN6, _NAN7, math.nan
-        if session.version is not None and session.version.traits.quaternions:
-            monitor = self._message(sample).monitor or m.MonitorData()
-            wrench = monitor.wrench or _NAN6  # type: ignore[assignment]
-            pose = monitor.pose.values if monitor.pose is not None else _NAN7  # type: ignore[assignment]
-            e1 = monitor.redundancy.value if monitor.redundancy is not None else math.nan
-        overlay, safety, operation, control, drive, multiplier = self.info[2]
-        sent = self._sent
-        return (
-            session.received,
-            sample.sequence,
-            seconds * 1_000_000_000 + nanos,
-            session.state,
-            session.quality,
-            session.mode,
-            overlay,
-            safety,
-            operation,
-            control,
-            drive,
-            session.period,
-            multiplier,
-            latency,
-            self._flags,
-            session.reflected,
-            session.sent,
-            max(0, self.ticks) if session.is_commanding else 0,
-            sample.tracking,
-            *(sample.q or _NAN7),
-            *(sample.tau or _NAN7),
-            *(sample.tau_cmd or _NAN7),
-            *(sample.tau_ext or _NAN7),
-            *(sample.q_cmd or _NAN7),
-            *(sample.q_ipo or _NAN7),
-            *wrench,
-            *pose,
-            e1,
-            *sent[0],
-            *sent[1],
-            *sent[2],
-            *(self.posing.on_wire if session.is_commanding else _NAN7),
-            *sent[3],
-        )
-
-    def _message(self, sample: Sample) -> m.Monitoring:
-        """The full message, decoded once."""
-        if self._full[0] is not sample:
-            self._full = (sample, sample.message)
-        return self._full[1]
-
-    def _read_inputs(self, full: m.Monitoring) -> None:
-        """Leave the signals for the user's process when they change."""
-        signals = full.monitor.io if full.monitor is not None else ()
-        if signals != self._inputs:
-            self._inputs = signals
-            self.layout.inputs.write(json.dumps({one.name: one.value for one in signals}))
-
-    def _publish(self, sample: Sample, latency: int) -> None:
-        ring = self.layout.states
-        row = self._row(sample, latency)
-        _ROW.pack_into(self._slot, 8, *row)
-        slot = ring.begin()
-        ring.ints[slot, 1:] = self._slot[8:].cast("q")
-        ring.end()
-
-
-_NOTHING = Setpoint()
 _MOST_SKIPPED = 25
 #: A counter that leaps further has been changed, not been lost.
 _MOST_LOST = 1000
-_KINDS = list(Kind)
 _ZEROS7, _ZEROS6 = (0.0,) * 7, (0.0,) * 6
 _JOINT_MODES = (m.CommandMode.POSITION, m.CommandMode.TORQUE, m.CommandMode.WRENCH)
 

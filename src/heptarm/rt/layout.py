@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 
+from heptarm.fri.messages import MAX_IO
 from heptarm.fri.statistics import BINS, COUNTERS
 from heptarm.io.shared import Block, Note, Ring
 
@@ -14,8 +15,8 @@ LIMITED_COUNTS, LIMITED_WORST, LIMITED_ALLOWED = 32, 81, 130
 LATENCY = 192
 JITTER = LATENCY + BINS + 1
 POSE_COUNTS = JITTER + BINS + 1
-POSE_WORST, POSE_ALLOWED = POSE_COUNTS + 8, POSE_COUNTS + 16
-HEADER_WORDS = POSE_COUNTS + 24
+POSE_WORST, POSE_ALLOWED = POSE_COUNTS + 12, POSE_COUNTS + 24
+HEADER_WORDS = POSE_COUNTS + 36
 
 assert COUNTS + len(COUNTERS) <= LIMITED_COUNTS
 
@@ -45,8 +46,9 @@ S_TRACKING = 19
 S_Q, S_TAU, S_TAU_CMD, S_TAU_EXT, S_Q_CMD, S_Q_IPO = range(20, 62, 7)
 S_WRENCH, S_POSE, S_E1 = 62, 68, 75
 S_Q_SENT, S_TAU_SENT, S_WRENCH_SENT = 76, 83, 90
-S_POSE_IPO, S_POSE_SENT = 96, 103
-STATE_WORDS = 110
+S_POSE_IPO, S_POSE_SENT, S_E1_IPO, S_E1_SENT = 96, 103, 110, 111
+S_IO = 112
+STATE_WORDS = S_IO + MAX_IO
 #: An enumeration that the controller did not send.
 ABSENT = -1
 
@@ -54,9 +56,9 @@ ABSENT = -1
 ANSWERED, FILLED, LIMITED, BRAKING = 1, 2, 4, 8
 
 # words of a command: sequence, time [ns], bits of what is given, then the numbers
-C_AT, C_GIVEN, C_Q, C_TAU, C_WRENCH, C_POSE = 1, 2, 3, 10, 17, 23
-COMMAND_WORDS, COMMAND_SLOTS = 30, 8
-GIVEN_Q, GIVEN_TAU, GIVEN_WRENCH, GIVEN_POSE = 1, 2, 4, 8
+C_AT, C_GIVEN, C_Q, C_TAU, C_WRENCH, C_POSE, C_E1 = 1, 2, 3, 10, 17, 23, 30
+COMMAND_WORDS, COMMAND_SLOTS = 31, 8
+GIVEN_Q, GIVEN_TAU, GIVEN_WRENCH, GIVEN_POSE, GIVEN_E1 = 1, 2, 4, 8, 16
 
 PARAM_SLOTS = 8
 # words of an event: sequence, time [ns], kind, then its text
@@ -100,7 +102,7 @@ class Layout:
         for _ in range(5):
             notes.append(Note(block, start=at, words=NOTE_WORDS))
             at += NOTE_WORDS
-        self.config, self.trouble, self.refused, self.inputs, self.outputs = notes
+        self.config, self.trouble, self.refused, self.offered, self.outputs = notes
         self.outputs_at = at - NOTE_WORDS
         self.header = block.view(0, LATENCY)
         self.latency = block.view(LATENCY, BINS + 1)

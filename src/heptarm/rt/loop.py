@@ -25,7 +25,9 @@ from heptarm.rt import layout as at
 from heptarm.rt import realtime
 from heptarm.rt.cycle import Cycle, Law
 from heptarm.rt.native import BROKEN, CALL_LAW, GIVEN_BACK, LOOK, TIMEOUT, Native, Unavailable
-from heptarm.rt.state import Output, Params, State
+from heptarm.rt.output import Output
+from heptarm.rt.params import Params
+from heptarm.rt.state import State
 
 #: A datagram is waited for this long before the loop looks around [s].
 PATIENCE = 0.05
@@ -73,7 +75,7 @@ class Loop:
         try:
             native = Native(self.cycle)
         except Unavailable as reason:
-            self.cycle.tell(time.monotonic_ns(), f"the loop runs in pure Python: {reason}")
+            self.cycle.record.tell(time.monotonic_ns(), f"the loop runs in pure Python: {reason}")
             self._run_in_python()
         else:
             self.layout.header[at.NATIVE] = 1
@@ -162,7 +164,7 @@ class Loop:
                 return False
             session.restart()
         self._peer = sender
-        self.cycle.tell(now, f"listening to {sender[0]}:{sender[1]}")
+        self.cycle.record.tell(now, f"listening to {sender[0]}:{sender[1]}")
         return True
 
     def _is_over(self, now: int) -> bool:

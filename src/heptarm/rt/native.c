@@ -23,8 +23,8 @@ enum { ANSWERED = 1, FILLED = 2, LIMITED = 4, BRAKING = 8 };
 /* words of the shared header, a state and a command, as in heptarm.rt.layout */
 enum { H_STATES = 0, H_COMMANDS = 1, H_STOP = 4, H_BEAT = 7, H_COUNTS = 16, H_LIMITED = 32, H_WORST = 81, H_ALLOWED = 130 };
 enum { RECEIVED_ALL = 0, ANSWERED_ALL, MISSED = 6, POOR = 8, COMMANDED = 12, FILLED_ALL, LIMITED_ALL };
-enum { STATE_WORDS = 110, S_TRACKING = 19, S_Q = 20, S_WRENCH = 62, S_POSE = 68, S_E1 = 75, S_SENT_Q = 76, S_POSES = 96 };
-enum { COMMAND_WORDS = 30, COMMAND_SLOTS = 8, C_Q = 3, C_TAU = 10, C_WRENCH = 17 };
+enum { STATE_WORDS = 122, S_TRACKING = 19, S_Q = 20, S_WRENCH = 62, S_POSE = 68, S_E1 = 75, S_SENT_Q = 76, S_POSES = 96 };
+enum { COMMAND_WORDS = 31, COMMAND_SLOTS = 8, C_Q = 3, C_TAU = 10, C_WRENCH = 17 };
 enum { BUFFER = 2048 };
 #define SHARE 0.8
 #define GRACE 50000000LL

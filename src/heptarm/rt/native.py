@@ -223,7 +223,9 @@ class Native:
             return
         if commanding and (mode not in _JOINT_MODES or sample.q_ipo is None):
             return
-        if state is SessionState.COMMANDING_ACTIVE and not (guard.is_started and cycle.is_plain):
+        if not cycle.exchange.is_idle:  # signals and frames are Python's
+            return
+        if state is SessionState.COMMANDING_ACTIVE and not guard.is_started:
             return
         parts = {
             tag: value for tag, _, value in fields(unwrap(datagram, version)) if isinstance(value, bytes)
@@ -240,10 +242,10 @@ class Native:
         memory.sequence, memory.received = sample.sequence, session.received
         memory.period, memory.multiplier = session.period, session.multiplier
         memory.waiting, memory.sent, memory.reflected = session.waiting, session.sent, session.reflected
-        memory.info[:] = cycle.info[2]
+        memory.info[:] = cycle.record.info[2]
         memory.is_started, memory.is_ending = guard.is_started, cycle.is_ending
-        memory.ticks, memory.started = cycle.ticks, cycle.started
-        memory.commands_seen, memory.outputs_seen = cycle.commands_seen, cycle.outputs_seen
+        memory.ticks, memory.started = cycle.record.ticks, cycle.started
+        memory.commands_seen, memory.outputs_seen = cycle.commands_seen, cycle.exchange.outputs_seen
         memory.ipo_known = cycle.mirrored is not None
         if cycle.mirrored is not None:
             memory.ipo[:], memory.ipo_sequence = cycle.mirrored
@@ -275,7 +277,7 @@ class Native:
         session.counters.load(header, at.COUNTS)
         session.sample.sequence, session.received = memory.sequence, memory.received
         session.waiting, session.sent, session.reflected = memory.waiting, memory.sent, memory.reflected
-        cycle.ticks, cycle.commands_seen = memory.ticks, memory.commands_seen
+        cycle.record.ticks, cycle.commands_seen = memory.ticks, memory.commands_seen
         if cycle.mirrored is not None:
             cycle.mirrored = (tuple(memory.ipo), memory.ipo_sequence)
             cycle.slope = list(memory.slope)

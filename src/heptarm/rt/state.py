@@ -1,15 +1,13 @@
-"""What a law and a user see of one monitoring message, what a law writes, and its parameters."""
+"""What a law and a user see of one monitoring message."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, ShapeError
+from heptarm.errors import CommandRejected
 from heptarm.fri.messages import (
     CommandMode,
     ControlMode,
@@ -24,6 +22,8 @@ from heptarm.fri.messages import (
     SessionState,
 )
 from heptarm.rt import layout as at
+from heptarm.rt.signals import Signals
+from heptarm.values.io import SignalValues
 from heptarm.values.pose import Pose
 
 Floats = npt.NDArray[np.float64]
@@ -34,14 +34,19 @@ class State:
     """One monitoring message with what was answered to it. Arrays are NaN where the controller sends nothing.
 
     Args:
-        words: one slot of the ring of states, shape (110,); it is not copied.
+        words: one slot of the ring of states, shape (122,); it is not copied.
+        signals: of the session.
+
+    Attributes:
+        signals: of the session.
     """
 
-    __slots__ = ("_floats", "_ints")
+    __slots__ = ("_floats", "_ints", "signals")
 
-    def __init__(self, words: Floats) -> None:
+    def __init__(self, words: Floats, signals: Signals | None = None) -> None:
         self._floats = words
         self._ints: Ints = words.view(np.int64)
+        self.signals = Signals() if signals is None else signals
 
     @property
     def q(self) -> Floats:
@@ -107,6 +112,17 @@ class State:
         return float(self._floats[at.S_E1])
 
     @property
+    def e1_ipo(self) -> float:
+        """Interpolator's redundancy angle [rad]; NaN if no pose is commanded, or there is none."""
+        return float(self._floats[at.S_E1_IPO])
+
+    @property
+    def io(self) -> SignalValues:
+        """The session's signals in this message: `s.io["Flange.UserButton"]` or `s.io.user_button`."""
+        numbers = self._floats[at.S_IO : at.S_IO + len(self.signals)]
+        return SignalValues(self.stamp, self.signals.values(numbers.tolist()))
+
+    @property
     def q_sent(self) -> Floats:
         """Position that was answered, shape (7,) [rad]."""
         return self._floats[at.S_Q_SENT : at.S_Q_SENT + 7]
@@ -129,6 +145,11 @@ class State:
             CommandRejected: no pose is commanded in this session, or not yet.
         """
         return _commanded(self._floats[at.S_POSE_SENT : at.S_POSE_SENT + 7])
+
+    @property
+    def e1_sent(self) -> float:
+        """Redundancy angle that was answered [rad]; NaN if none was."""
+        return float(self._floats[at.S_E1_SENT])
 
     @property
     def session(self) -> SessionState:
@@ -254,130 +275,6 @@ def _commanded(numbers: Floats) -> Pose:
             hint="poses are commanded in COMMANDING_ACTIVE of a session of kind pose",
         )
     return _pose(numbers)
-
-
-class Output:
-    """What a law wants; set again before every call.
-
-    Attributes:
-        q: position, shape (7,) [rad]; begins as the interpolator's.
-        tau: superposed torques, shape (7,) [Nm]; begin as zero.
-        wrench: superposed wrench, shape (6,) [N, Nm]; begins as zero.
-        pose: x y z [m] and quaternion x y z w, shape (7,), or a `Pose` assigned; begins as the interpolator's, NaN
-            where no pose is commanded.
-    """
-
-    __slots__ = ("_pose", "q", "tau", "wrench")
-
-    def __init__(self) -> None:
-        self.q: Floats = np.zeros(7)
-        self.tau: Floats = np.zeros(7)
-        self.wrench: Floats = np.zeros(6)
-        self._pose: Floats = np.full(7, np.nan)
-
-    @property
-    def pose(self) -> Floats:
-        """Wanted pose, shape (7,) [m, x y z w]."""
-        return self._pose
-
-    @pose.setter
-    def pose(self, value: Pose | npt.ArrayLike) -> None:
-        self._pose[:] = value.array if isinstance(value, Pose) else value
-
-    @classmethod
-    def on(cls, q: Any, tau: Any, wrench: Any) -> Output:
-        """An output on memory that is there."""
-        made = cls()
-        made.q, made.tau, made.wrench = (np.frombuffer(part, dtype=np.float64) for part in (q, tau, wrench))
-        return made
-
-
-class Params:
-    """Parameters of a law: numbers and arrays by name, all of them taken over at once.
-
-    Args:
-        values: numbers and arrays, flat.
-        schema: name, shape and place of each.
-        changed: called after an assignment; None makes them read-only.
-    """
-
-    __slots__ = ("_changed", "_schema", "_values")
-
-    def __init__(
-        self,
-        values: Floats,
-        schema: Mapping[str, tuple[tuple[int, ...], int]],
-        *,
-        changed: Callable[[], None] | None = None,
-    ) -> None:
-        object.__setattr__(self, "_values", values)
-        object.__setattr__(self, "_schema", dict(schema))
-        object.__setattr__(self, "_changed", changed)
-
-    def __getattr__(self, name: str) -> Any:
-        try:
-            shape, start = self._schema[name]
-        except KeyError:
-            raise AttributeError(
-                f"no parameter {name!r}; there are {', '.join(self._schema) or 'none'}"
-            ) from None
-        if not shape:
-            return float(self._values[start])
-        part = self._values[start : start + int(np.prod(shape))].reshape(shape)
-        part.flags.writeable = False
-        return part
-
-    def __setattr__(self, name: str, value: npt.ArrayLike) -> None:
-        self.set(**{name: value})
-
-    def set(self, **values: npt.ArrayLike) -> None:
-        """Change several parameters in one go: the law sees all of them or none.
-
-        Raises:
-            ShapeError: a value has another shape than at the start.
-            AttributeError: no such parameter, or they are read-only.
-        """
-        if self._changed is None:
-            raise AttributeError("parameters are read-only in a law")
-        checked = []
-        for name, value in values.items():
-            given: Floats = np.asarray(value, dtype=np.float64)
-            if name not in self._schema:
-                raise AttributeError(f"no parameter {name!r}; there are {', '.join(self._schema) or 'none'}")
-            shape, start = self._schema[name]
-            if given.shape != tuple(shape):
-                raise ShapeError(
-                    f"{name} has shape {given.shape}; {tuple(shape)} is wanted, as at the start",
-                    parameter=name,
-                )
-            checked.append((start, given.reshape(-1)))
-        for start, given in checked:
-            self._values[start : start + given.size] = given
-        self._changed()
-
-    def replace(self, values: Floats) -> None:
-        """Take over all values."""
-        self._values[:] = values
-
-    @staticmethod
-    def flat(values: Mapping[str, npt.ArrayLike]) -> tuple[Floats, dict[str, tuple[tuple[int, ...], int]]]:
-        """Flat numbers and schema of a mapping.
-
-        Raises:
-            ShapeError: a value is no number and no array of numbers.
-        """
-        parts: list[Floats] = []
-        schema: dict[str, tuple[tuple[int, ...], int]] = {}
-        start = 0
-        for name, value in values.items():
-            try:
-                given: Floats = np.asarray(value, dtype=np.float64)
-            except (TypeError, ValueError):
-                raise ShapeError(f"{name} is {value!r}; numbers are wanted", parameter=name) from None
-            schema[name] = (given.shape, start)
-            parts.append(given.reshape(-1))
-            start += given.size
-        return (np.concatenate(parts) if parts else np.zeros(0)), schema
 
 
 def information(full: Monitoring) -> tuple[int, ...]:
