@@ -101,9 +101,9 @@ class RunningCabinet:
         return f"sim://{self.host}:{self.port}"
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def cabinet() -> Iterator[RunningCabinet]:
-    """One virtual iiwa 14 for the whole run, in real time; tests leave it at rest and without a controller."""
+    """One virtual iiwa 14 for a module, in real time; tests leave it at rest and without a controller."""
     from heptarm.arm.private_cabinet import PrivateCabinet
     from heptarm.arm.target import Target
 
