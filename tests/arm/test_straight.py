@@ -1,4 +1,4 @@
-"""Straight servo motions through everything, and limits that a kind of stream does not heed."""
+"""Straight servo motions through everything, limits that a kind of stream does not heed, and the way home."""
 
 from __future__ import annotations
 
@@ -75,3 +75,12 @@ def test_the_direct_engine_takes_no_velocity(arm: ha.Arm) -> None:
         with pytest.raises(ha.CommandRejected, match="takes no velocity"):
             sv.set(sv.start.q, np.zeros(7))
         sv.set(sv.start.q)
+
+
+def test_home_is_where_the_cabinet_says(arm: ha.Arm) -> None:
+    assert "ptp_home" in arm.capabilities
+    seen = arm.move([ha.ptp_home(speed=0.8, blend_rel=0.2), ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0))])
+    assert seen.arrived
+    assert arm.move(ha.ptp_home(speed=0.8)).arrived
+    assert np.abs(arm.state.q).max() < 1e-3
+    arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)))

@@ -288,3 +288,11 @@ def test_the_end_of_the_server_stops_motion_tells_all_and_leaves_no_thread(
         for one in (peer, observer):
             assert one.wait_for(wire.Goodbye).code == Code.SHUTTING_DOWN
             assert one.is_closed()
+
+
+def test_home_is_a_motion_of_the_robot(peer: Peer) -> None:
+    assert finished(peer, peer.ask(run(ptp(0.1)))).q[0] == 0.1
+    assert finished(peer, peer.ask(run(wire.Item(motion=wire.PtpHome())))).q == (0.0,) * 7
+    slow = wire.PtpHome(dynamics=wire.JointDynamics(velocity=(0.0,) * 7))
+    refused = peer.ask(run(wire.Item(motion=slow)))
+    assert (refused.code, refused.parameter) == (Code.OUT_OF_RANGE, "items[0].motion.dynamics.velocity[0]")

@@ -105,6 +105,8 @@ def test_queue_listeners_pause_and_an_error_of_the_application(tmp_path: Path) -
 
 
 SERVING = (
+    "home is the stretched arm",
+    "or what was set",
     "no runtime before the motion is commanded",
     "SmartServo arrives",
     "the goal is told of",

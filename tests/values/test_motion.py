@@ -14,7 +14,20 @@ from hypothesis import strategies as st
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.values.limits import Blending, CartesianDynamics, JointDynamics
-from heptarm.values.motion import BASE, Hold, Lin, LinRel, Motion, Ptp, PtpPose, hold, lin, lin_rel, ptp
+from heptarm.values.motion import (
+    BASE,
+    Hold,
+    Lin,
+    LinRel,
+    Motion,
+    Ptp,
+    PtpPose,
+    hold,
+    lin,
+    lin_rel,
+    ptp,
+    ptp_home,
+)
 from heptarm.values.pose import Pose, deg
 from heptarm.values.redundancy import Redundancy
 
@@ -26,6 +39,7 @@ MAKERS: list[Callable[[], Motion]] = [
     lambda: ptp(Q),
     lambda: ptp(Q, speed=0.2, acceleration=[0.1] * 7, jerk=1.0, blend_rel=0.1),
     lambda: ptp(POSE, near=Q),
+    lambda: ptp_home(speed=0.3, blend_rel=0.2),
     lambda: ptp(POSE, redundancy=Redundancy(0.2, 2, 10), moving="flange"),
     lambda: lin(POSE, speed_mps=0.1, acceleration_mps2=1.0, jerk_mps3=10.0, near=Q),
     lambda: lin(POSE, speed_radps=0.5, joint_speed=0.3, blend_m=0.02, blend_rad=0.1),
@@ -111,7 +125,8 @@ def test_units_of_the_factories() -> None:
 
 @given(st.one_of(st.none(), st.floats(0.01, 1.0)), st.floats(0.01, 1.0))
 def test_a_ceiling_only_slows_down(speed: float | None, ceiling: float) -> None:
-    for motion in (ptp(Q, speed=speed), lin(POSE, joint_speed=speed), lin_rel(z=0.1, joint_speed=speed)):
+    joints = (ptp(Q, speed=speed), ptp_home(speed=speed))
+    for motion in (*joints, lin(POSE, joint_speed=speed), lin_rel(z=0.1, joint_speed=speed)):
         expected = ceiling if speed is None else min(speed, ceiling)
         limited = motion.under(ceiling)
         assert not isinstance(limited, Hold)

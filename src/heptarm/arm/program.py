@@ -13,13 +13,25 @@ from heptarm.model.inverse import redundancy
 from heptarm.values import motion as values
 from heptarm.values.arrays import Array
 from heptarm.values.limits import Blending, CartesianDynamics, JointDynamics
-from heptarm.values.motion import Circ, Hold, JointSpline, Lin, LinRel, Motion, Ptp, PtpPose, Spl, Spline
+from heptarm.values.motion import (
+    Circ,
+    Hold,
+    JointSpline,
+    Lin,
+    LinRel,
+    Motion,
+    Ptp,
+    PtpHome,
+    PtpPose,
+    Spl,
+    Spline,
+)
 from heptarm.values.orientation import Orientation
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 from heptarm.wire import messages as wire
 
-_MOTIONS = (Ptp, PtpPose, Lin, LinRel, Circ, Spline, JointSpline, Hold)
+_MOTIONS = (Ptp, PtpHome, PtpPose, Lin, LinRel, Circ, Spline, JointSpline, Hold)
 #: A motion may take this much longer than its slowest plausible estimate, and this much more [s].
 _GENEROUS, _AND_MORE = 3.0, 15.0
 #: The longest straight line and the longest arc inside the workspace of the largest arm [m].
@@ -131,6 +143,10 @@ def _item(motion: Motion, robot: RobotModel) -> wire.Item:
             motion=wire.Ptp(
                 q=_tuple(motion.q), dynamics=_joints(motion.joints), blending=_blending(motion.blending)
             )
+        )
+    if isinstance(motion, PtpHome):
+        return wire.Item(
+            motion=wire.PtpHome(dynamics=_joints(motion.joints), blending=_blending(motion.blending))
         )
     if isinstance(motion, PtpPose):
         return wire.Item(

@@ -14,7 +14,7 @@ from heptarm.values.arguments import TOOL
 from heptarm.values.arrays import Value, within
 from heptarm.values.circ import Circ, arc, circ
 from heptarm.values.lines import Lin, LinRel, lin, lin_rel
-from heptarm.values.ptp import Ptp, PtpPose, ptp
+from heptarm.values.ptp import Ptp, PtpHome, PtpPose, ptp, ptp_home
 from heptarm.values.spline import JointSpline, Spl, Spline, ellipse, spl, spline, spline_joints
 
 __all__ = [
@@ -27,6 +27,7 @@ __all__ = [
     "LinRel",
     "Motion",
     "Ptp",
+    "PtpHome",
     "PtpPose",
     "Spl",
     "Spline",
@@ -37,6 +38,7 @@ __all__ = [
     "lin",
     "lin_rel",
     "ptp",
+    "ptp_home",
     "spl",
     "spline",
     "spline_joints",
@@ -70,7 +72,7 @@ class Hold(Value):
         return self
 
 
-Motion: TypeAlias = Ptp | PtpPose | Lin | LinRel | Circ | Spline | JointSpline | Hold
+Motion: TypeAlias = Ptp | PtpHome | PtpPose | Lin | LinRel | Circ | Spline | JointSpline | Hold
 
 
 def hold(seconds: float = inf) -> Hold:

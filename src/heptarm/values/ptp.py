@@ -47,6 +47,23 @@ class Ptp(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class PtpHome(Value):
+    """Point to point to the home position that the cabinet's project has.
+
+    Attributes:
+        joints: fractions of the axes' maxima.
+        blending: into the following motion.
+    """
+
+    joints: JointDynamics = AXES
+    blending: Blending = EXACT
+
+    def under(self, ceiling: float) -> PtpHome:
+        """The same motion, no axis faster than that fraction of its maximum."""
+        return replace(self, joints=self.joints.under(ceiling))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class PtpPose(Value):
     """Point to point to a pose of the moved frame.
 
@@ -121,3 +138,31 @@ def ptp(
             hint="leave them out",
         )
     return Ptp(array(target, 7, "q"), joints, blending)
+
+
+def ptp_home(
+    *,
+    speed: npt.ArrayLike | None = None,
+    acceleration: npt.ArrayLike | None = None,
+    jerk: npt.ArrayLike | None = None,
+    blend_rel: float = 0.0,
+    blend_m: float = 0.0,
+    blend_rad: float = 0.0,
+) -> PtpHome:
+    """Point to point motion to the home position that the cabinet's project has.
+
+    Unless an application of the cabinet has set another one, that is the stretched arm: all joints at 0.
+
+    Args:
+        speed: fraction of each axis' maximum, (0, 1], one for all or shape (7,).
+        acceleration: likewise.
+        jerk: likewise.
+        blend_rel: see `ptp`.
+        blend_m: see `ptp`.
+        blend_rad: see `ptp`.
+
+    Raises:
+        ShapeError: a wrong shape.
+        LimitError: a value outside its range.
+    """
+    return PtpHome(joints_of(speed, acceleration, jerk), blending_of(blend_rel, blend_m, blend_rad))

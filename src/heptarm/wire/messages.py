@@ -431,6 +431,30 @@ class Ptp:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PtpHome:
+    """Point to point in joint space, to the home position that the cabinet's project has; all zeros unless it says otherwise."""
+
+    dynamics: JointDynamics = JointDynamics()
+    blending: Blending = Blending()
+
+    def _write(self, out: list[bytes]) -> None:
+        self.dynamics._write(out)
+        self.blending._write(out)
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[PtpHome, int]:
+        dynamics, pos = JointDynamics._read(data, pos)
+        blending, pos = Blending._read(data, pos)
+        return cls(dynamics=dynamics, blending=blending), pos
+
+    def _check(self, path: str) -> None:
+        self.dynamics._check(path + "dynamics.")
+        self.blending._check(path + "blending.")
+
+
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PtpPose:
     """Point to point in joint space, to a pose of the moved frame."""
 
@@ -1547,7 +1571,7 @@ class Trigger:
         self.action._check(path + "action.")
 
 
-Motion: TypeAlias = Ptp | PtpPose | Lin | LinRel | Circ | Spline | JointSpline | Hold | HandGuide
+Motion: TypeAlias = Ptp | PtpPose | Lin | LinRel | Circ | Spline | JointSpline | Hold | HandGuide | PtpHome
 _Motion_TAGS = {
     Ptp: 1,
     PtpPose: 2,
@@ -1558,6 +1582,7 @@ _Motion_TAGS = {
     JointSpline: 7,
     Hold: 8,
     HandGuide: 9,
+    PtpHome: 10,
 }
 
 
@@ -1586,7 +1611,9 @@ def _read_Motion(data: bytes, pos: int) -> tuple[Motion, int]:
         return Hold._read(data, pos)
     if tag == 9:
         return HandGuide._read(data, pos)
-    raise DecodeError(f"Motion has tag {tag}; legal are [1, 2, 3, 4, 5, 6, 7, 8, 9]")
+    if tag == 10:
+        return PtpHome._read(data, pos)
+    raise DecodeError(f"Motion has tag {tag}; legal are [1, 2, 3, 4, 5, 6, 7, 8, 9, 10]")
 
 
 Mode: TypeAlias = PositionMode | JointImpedance | CartesianImpedance | SineImpedance | SpiralPattern

@@ -1,6 +1,7 @@
 package sample;
 
 import static com.kuka.roboticsAPI.motionModel.BasicMotions.ptp;
+import static com.kuka.roboticsAPI.motionModel.BasicMotions.ptpHome;
 
 import java.io.PrintWriter;
 import java.util.concurrent.TimeUnit;
@@ -45,7 +46,11 @@ public class Serving extends RoboticsAPIApplication implements IServoOnGoalReach
 
     @Override
     public void run() throws Exception {
-        lbr.move(ptp(0, 0.5, 0, -1.3, 0, 0.9, 0));
+        lbr.move(ptpHome());
+        say("home is the stretched arm", isAt(new JointPosition(7)));
+        lbr.setHomePosition(new JointPosition(0, 0.5, 0, -1.3, 0, 0.9, 0));
+        lbr.move(ptpHome().setJointVelocityRel(0.8));
+        say("or what was set", isAt(new JointPosition(0, 0.5, 0, -1.3, 0, 0.9, 0)));
         smart();
         direct();
         straight();

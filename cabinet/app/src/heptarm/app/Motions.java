@@ -5,6 +5,7 @@ import static com.kuka.roboticsAPI.motionModel.BasicMotions.lin;
 import static com.kuka.roboticsAPI.motionModel.BasicMotions.linRel;
 import static com.kuka.roboticsAPI.motionModel.BasicMotions.positionHold;
 import static com.kuka.roboticsAPI.motionModel.BasicMotions.ptp;
+import static com.kuka.roboticsAPI.motionModel.BasicMotions.ptpHome;
 
 import java.util.concurrent.TimeUnit;
 
@@ -40,6 +41,7 @@ import heptarm.wire.OrientationReference;
 import heptarm.wire.OrientationType;
 import heptarm.wire.Pose;
 import heptarm.wire.Ptp;
+import heptarm.wire.PtpHome;
 import heptarm.wire.PtpPose;
 import heptarm.wire.Redundancy;
 import heptarm.wire.ServoOpen;
@@ -47,7 +49,7 @@ import heptarm.wire.Spline;
 
 /** Turns items of a program into Sunrise motions. What cannot be carried out is refused, never ignored. */
 final class Motions {
-    static final String[] CAPABILITIES = {"ptp", "ptp_pose", "lin", "lin_rel", "circ", "spline", "spline_joints", "hold", "blending", "override", "pause",
+    static final String[] CAPABILITIES = {"ptp", "ptp_pose", "ptp_home", "lin", "lin_rel", "circ", "spline", "spline_joints", "hold", "blending", "override", "pause",
         "servo", "servo_direct", "servo_pose", "conditions", "io", "user_keys", "process_data", "joint_impedance", "cartesian_impedance", "sine_impedance",
         "tools", "workpieces", "frames"};
 
@@ -85,7 +87,7 @@ final class Motions {
             checkOrientation(((LinRel) motion).orientation, at);
         } else if (motion instanceof Spline) {
             Splines.check((Spline) motion, at);
-        } else if (!(motion instanceof Ptp || motion instanceof JointSpline || motion instanceof Hold)) {
+        } else if (!(motion instanceof Ptp || motion instanceof PtpHome || motion instanceof JointSpline || motion instanceof Hold)) {
             throw unsupported(path + "motion", motion.getClass().getSimpleName());
         }
     }
@@ -155,6 +157,10 @@ final class Motions {
         if (motion instanceof Ptp) {
             Ptp one = (Ptp) motion;
             return blended(joints(ptp(new JointPosition(one.q)), one.dynamics), one.blending);
+        }
+        if (motion instanceof PtpHome) {
+            PtpHome one = (PtpHome) motion;
+            return blended(joints(ptpHome(), one.dynamics), one.blending);
         }
         if (motion instanceof PtpPose) {
             PtpPose one = (PtpPose) motion;

@@ -14,6 +14,7 @@ import heptarm.wire.Motion;
 import heptarm.wire.PathReached;
 import heptarm.wire.PositionMode;
 import heptarm.wire.Ptp;
+import heptarm.wire.PtpHome;
 import heptarm.wire.PtpPose;
 
 /** Which items of a program the robot gets as one batch, since one is blended into the next. */
@@ -39,6 +40,9 @@ final class Batches {
     private static Blending of(Motion motion) {
         if (motion instanceof Ptp) {
             return ((Ptp) motion).blending;
+        }
+        if (motion instanceof PtpHome) {
+            return ((PtpHome) motion).blending;
         }
         if (motion instanceof PtpPose) {
             return ((PtpPose) motion).blending;

@@ -30,6 +30,8 @@ public abstract class Motion {
                 return Hold.read(in);
             case 9:
                 return HandGuide.read(in);
+            case 10:
+                return PtpHome.read(in);
             default:
                 throw new WireException("Motion has tag " + tag);
         }

@@ -8,6 +8,7 @@ import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
 import com.kuka.connectivity.motionModel.smartServo.SmartServo;
 import com.kuka.connectivity.motionModel.smartServoLIN.SmartServoLIN;
 import com.kuka.roboticsAPI.conditionModel.ICondition;
+import com.kuka.roboticsAPI.deviceModel.JointPosition;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
@@ -24,6 +25,7 @@ import com.kuka.roboticsAPI.motionModel.IMotionOverlay;
 import com.kuka.roboticsAPI.motionModel.LIN;
 import com.kuka.roboticsAPI.motionModel.MotionBatch;
 import com.kuka.roboticsAPI.motionModel.PTP;
+import com.kuka.roboticsAPI.motionModel.PTPHome;
 import com.kuka.roboticsAPI.motionModel.PositionHold;
 import com.kuka.roboticsAPI.motionModel.RelativeLIN;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
@@ -130,6 +132,12 @@ public final class Orders {
         if (motion instanceof PTP) {
             order = new MotionOrder(id, "ptp");
             order.joints = ((PTP) motion).getDestination().get();
+        } else if (motion instanceof PTPHome) {
+            order = new MotionOrder(id, "ptp");
+            order.joints = robot.home() instanceof JointPosition ? ((JointPosition) robot.home()).get() : null;
+            if (order.joints == null) {
+                target(order, (AbstractFrame) robot.home(), robot);
+            }
         } else if (motion instanceof CartesianPTP) {
             order = new MotionOrder(id, "ptp");
             target(order, ((CartesianPTP) motion).getDestination(), robot);

@@ -28,6 +28,7 @@ import heptarm.wire.OperationMode;
 import heptarm.wire.Pose;
 import heptarm.wire.PoseState;
 import heptarm.wire.Ptp;
+import heptarm.wire.PtpHome;
 import heptarm.wire.Redundancy;
 import heptarm.wire.RobotInfo;
 import heptarm.wire.SafetyBits;
@@ -246,7 +247,7 @@ final class FakeRobot implements Robot, Runnable {
 
     @Override
     public Job start(Item item, Mode mode, Job.Listener listener) throws Refusal {
-        double[] target = item.motion instanceof Ptp ? ((Ptp) item.motion).q : null;
+        double[] target = item.motion instanceof Ptp ? ((Ptp) item.motion).q : item.motion instanceof PtpHome ? new double[7] : null;
         if (target != null && target[6] == FAILS_AT_PLANNING) {
             throw new Refusal(Code.UNREACHABLE, "Can not plan motion: not reachable");
         }
@@ -355,7 +356,7 @@ final class FakeRobot implements Robot, Runnable {
         if (item.triggers.length > 0) {
             throw new Refusal(Code.UNSUPPORTED, path + "triggers", "triggers", "", "not here");
         }
-        if (!(item.motion instanceof Ptp || item.motion instanceof Hold)) {
+        if (!(item.motion instanceof Ptp || item.motion instanceof PtpHome || item.motion instanceof Hold)) {
             throw new Refusal(Code.UNSUPPORTED, path + "motion", item.motion.getClass().getSimpleName(), "Ptp, Hold", "not here");
         }
     }

@@ -53,6 +53,7 @@ public class LBR extends Robot {
     private final Arm arm;
     private final ObjectFrame root;
     private final ObjectFrame flange;
+    private volatile Object home = new JointPosition(AXES);
     private final AtomicLong ids = new AtomicLong();
     private final Map<Container, Boolean> open = new LinkedHashMap<>(); // value: asynchronous
 
@@ -91,6 +92,22 @@ public class LBR extends Robot {
 
     /** Kept for safety functions, which the simulation does not have. */
     public void setSafetyWorkpiece(Workpiece workpiece) {
+    }
+
+    /** Where ptpHome leads; without a word all zeros. */
+    public void setHomePosition(JointPosition joints) {
+        checkLimits(joints);
+        home = new JointPosition(joints);
+    }
+
+    /** Where ptpHome leads, for its flange. */
+    public void setHomePosition(AbstractFrame frame) {
+        home = frame;
+    }
+
+    /** A JointPosition or an AbstractFrame; for the simulation. */
+    public Object home() {
+        return home;
     }
 
     /** Something was attached or detached: the controller takes the load over; for the simulation. */

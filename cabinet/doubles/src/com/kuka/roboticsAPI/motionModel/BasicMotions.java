@@ -25,6 +25,11 @@ public final class BasicMotions {
         return new CartesianPTP(frame);
     }
 
+    /** To the robot's home position. */
+    public static PTPHome ptpHome() {
+        return new PTPHome();
+    }
+
     public static LIN lin(AbstractFrame frame) {
         return new LIN(frame);
     }
