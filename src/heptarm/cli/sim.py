@@ -105,8 +105,10 @@ def run_application(
         command = [sys.executable, "-m", "heptarm.virtual.cabinet", "--parent-pipe", "--verbose"]
         command += ["--model", model, "--speed", str(speed), "--application", application.main]
         command += ["--classpath", out]
-        for jar in sorted(folder.rglob("*.jar")):
+        for jar in application.jars:
             command += ["--classpath", str(jar)]
+        for task in application.background:
+            command += ["--background", task]
         command += ["--project", str(application.project)] if application.project else []
         for one in data:
             command += ["--data", one]

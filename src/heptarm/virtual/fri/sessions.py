@@ -5,19 +5,21 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from heptarm.errors import CommandRejected, HeptarmError
-from heptarm.fri.messages import CommandMode
+from heptarm.fri.messages import CommandMode, IoDirection, IoType, IoValue
 from heptarm.fri.version import Version
 from heptarm.values.mode import Mode, Position
 from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.events import Event, OverlayEnded, QualityChanged, StateChanged
+from heptarm.virtual.fri.events import Event, OutputWritten, OverlayEnded, QualityChanged, StateChanged
 from heptarm.virtual.fri.overlay import MotionOverlay, Superposition
 from heptarm.virtual.fri.plant_arm import PlantArm
 from heptarm.virtual.fri.server import Address, Server
 from heptarm.virtual.fri.standalone import control_of, words
 from heptarm.virtual.order import Listener
 from heptarm.virtual.plant import Plant
+from heptarm.virtual.signals import Signals
 
 _log = logging.getLogger("heptarm.virtual.fri")
 
@@ -45,11 +47,52 @@ class _Arm(PlantArm):
         self._control = control_of(mode)
 
 
+@dataclass(frozen=True, slots=True)
+class Shared:
+    """A signal of the cabinet that the client sees, and writes if it is an output.
+
+    Attributes:
+        name: "Group.Signal".
+        type: as FRI has it.
+        is_output: seen from the cabinet.
+        place: in the IO image.
+    """
+
+    name: str
+    type: IoType
+    is_output: bool
+    place: int
+
+    def value(self, signals: Signals) -> int | float:
+        """Its value, as FRI transmits it."""
+        value = signals.at(self.place)
+        return value if self.type is IoType.ANALOG else max(0, round(value))
+
+    def first(self, signals: Signals) -> IoValue:
+        """What the session begins with."""
+        direction = IoDirection.OUTPUT if self.is_output else IoDirection.INPUT
+        return IoValue(self.name, self.type, direction, self.value(signals))
+
+
 class _Session:
-    def __init__(self, server: Server, arm: _Arm) -> None:
-        self.server, self.arm = server, arm
+    def __init__(self, server: Server, arm: _Arm, shared: tuple[Shared, ...]) -> None:
+        self.server, self.arm, self.shared = server, arm, shared
         self.order = 0  # whose motion is overlaid
         self.farewell = -1  # ticks until the port is free; -1: not closing
+
+    def share(self, signals: Signals) -> None:
+        """Show the client what its signals are now."""
+        exchange = self.server.controller.exchange
+        for one in self.shared:
+            value = one.value(signals)
+            if exchange.signals[one.name].value != value:
+                exchange.set(one.name, value)
+
+    def written(self, value: IoValue, signals: Signals) -> None:
+        """The client has written an output."""
+        for one in self.shared:
+            if one.name == value.name:
+                signals.put(one.place, float(value.value))
 
 
 class Sessions:
@@ -76,6 +119,7 @@ class Sessions:
         port: int | None,
         transformations: tuple[str, ...],
         channel: Channel,
+        signals: tuple[Shared, ...] = (),
     ) -> int:
         """Open a session to a client; returns its number.
 
@@ -83,16 +127,22 @@ class Sessions:
             HeptarmError: an illegal configuration, a port that is taken, an address that is none.
         """
         configuration = Configuration(
-            self._version, period_ms=period_ms, multiplier=multiplier, transformations=transformations
+            self._version,
+            period_ms=period_ms,
+            multiplier=multiplier,
+            signals=tuple(one.first(self._plant.signals) for one in signals),
+            transformations=transformations,
         )
         arm = _Arm(self._plant)
         server = Server(configuration, arm, client=client, port=port, speed=self._speed)
-        session = _Session(server, arm)
+        session = _Session(server, arm, signals)
 
         def hear(event: Event) -> None:
             text = words(event)
             if text:
                 _log.info("FRI: %s", text)
+            if isinstance(event, OutputWritten):
+                session.written(event.value, self._plant.signals)
             if isinstance(event, OverlayEnded) and event.is_error and session.order:
                 self._plant.abort(session.order, event.text)
             if isinstance(event, StateChanged | QualityChanged):
@@ -125,6 +175,7 @@ class Sessions:
         if not self._sessions:
             return
         for number, session in list(self._sessions.items()):
+            session.share(self._plant.signals)
             session.server.tick()
             if session.farewell > 0:
                 session.farewell -= 1

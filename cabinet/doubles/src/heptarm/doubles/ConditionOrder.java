@@ -7,6 +7,7 @@ import com.kuka.roboticsAPI.conditionModel.BooleanIOCondition;
 import com.kuka.roboticsAPI.conditionModel.ForceComponentCondition;
 import com.kuka.roboticsAPI.conditionModel.ForceCondition;
 import com.kuka.roboticsAPI.conditionModel.ICondition;
+import com.kuka.roboticsAPI.conditionModel.IORangeCondition;
 import com.kuka.roboticsAPI.conditionModel.JointTorqueCondition;
 import com.kuka.roboticsAPI.conditionModel.MotionPathCondition;
 import com.kuka.roboticsAPI.conditionModel.TorqueComponentCondition;
@@ -26,6 +27,7 @@ public final class ConditionOrder {
     private static final int FORCE_COMPONENT = 5;
     private static final int TORQUE_COMPONENT = 6;
     private static final int BOOLEAN_SIGNAL = 7;
+    private static final int OUTSIDE_RANGE = 8;
     private static final int PATH = 9;
     private static final int COMBINED = 32;
 
@@ -74,6 +76,10 @@ public final class ConditionOrder {
         } else if (condition instanceof BooleanIOCondition) {
             put(BOOLEAN_SIGNAL);
             put(((BooleanIOCondition) condition).numbers());
+        } else if (condition instanceof IORangeCondition) {
+            put(OUTSIDE_RANGE);
+            put(((IORangeCondition) condition).numbers());
+            put(COMBINED + Criterion.Kind.NOT.ordinal());
         } else if (condition instanceof MotionPathCondition) {
             put(PATH);
             put(((MotionPathCondition) condition).numbers());

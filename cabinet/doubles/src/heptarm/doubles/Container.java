@@ -2,14 +2,19 @@ package heptarm.doubles;
 
 import java.util.Collections;
 import java.util.IdentityHashMap;
+import java.util.List;
 import java.util.Set;
+import java.util.concurrent.CopyOnWriteArrayList;
 import java.util.concurrent.TimeUnit;
 import java.util.concurrent.TimeoutException;
+import java.util.function.Consumer;
 
+import com.kuka.roboticsAPI.commandModel.ICommandRuntimeData;
 import com.kuka.roboticsAPI.commandModel.IControllerCommand;
 import com.kuka.roboticsAPI.conditionModel.ICallbackAction;
 import com.kuka.roboticsAPI.conditionModel.ICondition;
 import com.kuka.roboticsAPI.conditionModel.ITriggerAction;
+import com.kuka.roboticsAPI.executionModel.CommandInvalidException;
 import com.kuka.roboticsAPI.executionModel.ExecutionState;
 import com.kuka.roboticsAPI.executionModel.IFiredConditionInfo;
 import com.kuka.roboticsAPI.motionModel.IMotion;
@@ -30,6 +35,10 @@ public final class Container implements IMotionContainer, MotionListener {
     private final Station station;
     private final IMotionContainerListener listener;
     private final Ending ending;
+    private final List<Appended> appended = new CopyOnWriteArrayList<>();
+    private volatile Consumer<IMotion> appender;
+    private volatile IMotion latest;
+    private volatile boolean firstEnded;
     private volatile ServoRuntime servo;
     private volatile int part;
     private final Set<ICondition> fired = Collections.newSetFromMap(new IdentityHashMap<>());
@@ -48,6 +57,36 @@ public final class Container implements IMotionContainer, MotionListener {
     /** Whoever waits for the activation of a servo motion hears of it here. */
     public void serve(ServoRuntime runtime) {
         servo = runtime;
+    }
+
+    /** How a motion is put behind this one; for the robot. */
+    public void appendBy(Consumer<IMotion> way) {
+        appender = way;
+    }
+
+    /** The listener of a motion that is put behind; for the robot. */
+    public synchronized Appended add(long number, IMotion more) {
+        if (isFinished()) {
+            throw new IllegalStateException("the motion has ended; nothing can be appended");
+        }
+        Appended one = new Appended(this, number, more);
+        appended.add(one);
+        return one;
+    }
+
+    @Override
+    public void append(IMotion more) {
+        appender.accept(more);
+    }
+
+    /** An appended motion begins. */
+    void begins(Appended one) {
+        IMotion before = latest == null ? part(part) : latest;
+        latest = one.motion;
+        if (listener != null) {
+            tell(() -> listener.motionFinished(before));
+            tell(() -> listener.motionStarted(one.motion));
+        }
     }
 
     private void activate() {
@@ -95,15 +134,36 @@ public final class Container implements IMotionContainer, MotionListener {
     public void finished(String cause, String text) {
         ExecutionState last = "done".equals(cause) || "condition".equals(cause) ? ExecutionState.Finished
                 : "cancelled".equals(cause) ? ExecutionState.Cancelled : ExecutionState.Error;
-        if (!change(last, last == ExecutionState.Error ? text : null)) {
-            return;
+        synchronized (this) {
+            firstEnded = true;
+            if (last == ExecutionState.Finished && !appended.isEmpty()) {
+                return; // the last of the appended ones ends it
+            }
+            if (!change(last, last == ExecutionState.Error ? text : null)) {
+                return;
+            }
         }
+        dropAppended();
         activate();
         tell(() -> ending.ended(this));
         if (listener != null) {
-            tell(() -> listener.motionFinished(part(part)));
+            IMotion ended = getLastExecutedMotion();
+            tell(() -> listener.motionFinished(ended));
             tell(() -> listener.onStateChanged(this, last));
             tell(() -> listener.containerFinished(this));
+        }
+    }
+
+    /** An appended motion has ended. */
+    void finished(Appended one, String cause, String text) {
+        appended.remove(one);
+        finished(cause, text);
+    }
+
+    /** What was appended does not run after an end before its time. */
+    private void dropAppended() {
+        for (Appended one : appended) {
+            station.dispatch.execute(() -> station.plant.cancel(one.id));
         }
     }
 
@@ -152,6 +212,9 @@ public final class Container implements IMotionContainer, MotionListener {
     public void cancel() {
         if (!isFinished()) {
             station.plant.cancel(id);
+            if (firstEnded) {
+                dropAppended();
+            }
         }
     }
 
@@ -186,17 +249,21 @@ public final class Container implements IMotionContainer, MotionListener {
 
     @Override
     public IMotion getCurrentMotion() {
-        return isFinished() ? null : part(part);
+        return isFinished() ? null : getLastExecutedMotion();
     }
 
     @Override
     public IMotion getLastExecutedMotion() {
-        return part(part);
+        return latest == null ? part(part) : latest;
     }
 
     @Override
     public void fired(boolean breaks, int index) {
-        RobotMotion<?> whole = (RobotMotion<?>) motion;
+        fired((RobotMotion<?>) motion, breaks, index);
+    }
+
+    /** A condition of the motion, or of one that was appended, has fired. */
+    void fired(RobotMotion<?> whole, boolean breaks, int index) {
         ICondition condition = breaks ? whole.breakConditions().get(index) : whole.triggerConditions().get(index);
         synchronized (this) {
             fired.add(condition);
@@ -220,6 +287,23 @@ public final class Container implements IMotionContainer, MotionListener {
     public synchronized IFiredConditionInfo getFiredBreakConditionInfo() {
         ICondition condition = broken;
         return condition == null || !isFinished() ? null : () -> condition;
+    }
+
+    @Override
+    public void validate() {
+        if (hasError()) {
+            throw new CommandInvalidException(getErrorMessage());
+        }
+    }
+
+    @Override
+    public ICommandRuntimeData getRuntimeData() {
+        return new ICommandRuntimeData() {
+            @Override
+            public String toString() {
+                return getCommand() + ", " + getState() + ", " + fired.size() + " conditions have fired";
+            }
+        };
     }
 
     @Override

@@ -19,10 +19,12 @@ import com.kuka.task.ITaskLogger;
 
 /** What the cabinet offers to the one application that runs: its data, its control, its log. */
 public final class Desk implements IApplicationData, IApplicationControl {
-    private static volatile Desk current;
+    /** That of the application; others are those of background tasks. */
+    private static volatile Desk application;
+    private static final InheritableThreadLocal<Desk> OWN = new InheritableThreadLocal<>();
 
     public final ITaskLogger logger = new JulLogger();
-    public final Pad pad = new Pad();
+    public final Pad pad;
     public final ObserverManager observers = new ObserverManager();
     private final Station station;
     private final Runnable terminate;
@@ -32,14 +34,36 @@ public final class Desk implements IApplicationData, IApplicationControl {
     Desk(Station station, Runnable terminate) {
         this.station = station;
         this.terminate = terminate;
-        current = this;
+        this.pad = station.pad;
     }
 
+    public static Desk ofApplication() {
+        return application;
+    }
+
+    /** The errors of asynchronous motions go to this one. */
+    void leads() {
+        application = this;
+    }
+
+    /** The calling thread, and those that it makes, work for this one; returns for whom it did before. */
+    Desk enter() {
+        Desk before = OWN.get();
+        OWN.set(this);
+        return before;
+    }
+
+    static void leave(Desk before) {
+        OWN.set(before);
+    }
+
+    /** That of the task whose thread this is; of a thread of the cabinet that of the application. */
     public static Desk current() {
-        return current;
+        Desk own = OWN.get();
+        return own == null ? application : own;
     }
 
-    /** An asynchronous motion has failed; called on the dispatch thread. */
+    /** An asynchronous motion has failed; called on the dispatch thread, for the application. */
     public void failed(IMotionContainer container, List<IMotionContainer> cancelled) {
         IErrorHandler handler = errorHandler;
         if (handler == null) {

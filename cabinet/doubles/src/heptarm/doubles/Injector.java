@@ -1,7 +1,10 @@
 package heptarm.doubles;
 
+import java.lang.annotation.Annotation;
 import java.lang.reflect.Constructor;
+import java.lang.reflect.Executable;
 import java.lang.reflect.Field;
+import java.lang.reflect.Method;
 import java.lang.reflect.Modifier;
 import java.util.HashMap;
 import java.util.Map;
@@ -10,36 +13,55 @@ import javax.inject.Inject;
 import javax.inject.Named;
 import javax.inject.Singleton;
 
+import com.kuka.roboticsAPI.RoboticsAPIContext;
+import com.kuka.roboticsAPI.annotations.AutomaticResumeManager;
 import com.kuka.roboticsAPI.applicationModel.IApplicationControl;
 import com.kuka.roboticsAPI.applicationModel.IApplicationData;
 import com.kuka.roboticsAPI.conditionModel.ObserverManager;
 import com.kuka.roboticsAPI.controllerModel.Controller;
-import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseController;
+import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseLBR;
 import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
+import com.kuka.roboticsAPI.persistenceModel.processDataModel.IProcessData;
 import com.kuka.roboticsAPI.uiModel.IApplicationUI;
 import com.kuka.task.ITaskLogger;
+import com.kuka.task.ITaskManager;
 
-/** Fills the fields that an application wants filled: the cabinet's objects, tools by their templates, classes of the project. */
+/** Fills what a task wants filled: the cabinet's objects, process data, tools by their templates, classes of the project. */
 final class Injector {
     private final Desk desk;
     private final Object[] offers;
-    private final Class<?>[] types = {LBR.class, Controller.class, IApplicationData.class, ITaskLogger.class, IApplicationUI.class,
-        ObserverManager.class, IApplicationControl.class};
+    private final Class<?>[] types = {SunriseLBR.class, SunriseController.class, Controller.class, IApplicationData.class,
+        ITaskLogger.class, IApplicationUI.class, ObserverManager.class, IApplicationControl.class, RoboticsAPIContext.class,
+        ITaskManager.class, AutomaticResumeManager.class};
     private final Map<Class<?>, Object> singletons = new HashMap<>();
 
     Injector(Desk desk, Station station) {
         this.desk = desk;
-        this.offers = new Object[] {station.robot, station.controller, desk, desk.logger, desk.pad, desk.observers, desk};
+        this.offers = new Object[] {station.robot, station.controller, station.controller, desk, desk.logger, desk.pad,
+            desk.observers, desk, station.context, station.tasks, station.resuming.manager};
     }
 
-    /** Fills the fields of an object, also those of its super classes up to one of the cabinet's. */
+    /** Fills an object's fields, then calls its marked methods; those of its super classes first, up to one of the cabinet's. */
     void fill(Object target) throws ReflectiveOperationException {
-        for (Class<?> c = target.getClass(); c != null && !isForeign(c); c = c.getSuperclass()) {
-            for (Field field : c.getDeclaredFields()) {
-                if (field.isAnnotationPresent(Inject.class)) {
-                    field.setAccessible(true);
-                    field.set(target, find(field.getType(), field.getAnnotation(Named.class), field.toString()));
-                }
+        fill(target, target.getClass());
+    }
+
+    private void fill(Object target, Class<?> c) throws ReflectiveOperationException {
+        if (c == null || isForeign(c)) {
+            return;
+        }
+        fill(target, c.getSuperclass());
+        for (Field field : c.getDeclaredFields()) {
+            if (field.isAnnotationPresent(Inject.class)) {
+                field.setAccessible(true);
+                field.set(target, find(field.getType(), field.getAnnotation(Named.class), field.toString()));
+            }
+        }
+        for (Method method : c.getDeclaredMethods()) {
+            if (method.isAnnotationPresent(Inject.class)) {
+                method.setAccessible(true);
+                method.invoke(target, arguments(method));
             }
         }
     }
@@ -47,6 +69,9 @@ final class Injector {
     private Object find(Class<?> type, Named named, String where) throws ReflectiveOperationException {
         if (named != null && PhysicalObject.class.isAssignableFrom(type)) {
             return desk.createFromTemplate(named.value());
+        }
+        if (named != null && type == IProcessData.class) {
+            return desk.getProcessData(named.value());
         }
         for (int i = 0; i < types.length; i++) {
             if (type.isAssignableFrom(types[i])) {
@@ -84,13 +109,21 @@ final class Injector {
             throw new IllegalArgumentException("nothing to inject into " + where + ": " + type.getName()
                     + " has no constructor for that");
         }
-        Object[] arguments = new Object[chosen.getParameterCount()];
-        for (int i = 0; i < arguments.length; i++) {
-            arguments[i] = find(chosen.getParameterTypes()[i], null, chosen.toString());
-        }
         chosen.setAccessible(true);
-        Object made = chosen.newInstance(arguments);
+        Object made = chosen.newInstance(arguments(chosen));
         fill(made);
         return made;
+    }
+
+    private Object[] arguments(Executable called) throws ReflectiveOperationException {
+        Object[] arguments = new Object[called.getParameterCount()];
+        for (int i = 0; i < arguments.length; i++) {
+            Named named = null;
+            for (Annotation one : called.getParameterAnnotations()[i]) {
+                named = one instanceof Named ? (Named) one : named;
+            }
+            arguments[i] = find(called.getParameterTypes()[i], named, called.toString());
+        }
+        return arguments;
     }
 }

@@ -11,6 +11,7 @@ import com.kuka.roboticsAPI.conditionModel.ICondition;
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
+import com.kuka.roboticsAPI.deviceModel.StatusTurnRedundancy;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.World;
@@ -18,6 +19,7 @@ import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
 import com.kuka.roboticsAPI.geometricModel.math.Matrix;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
+import com.kuka.roboticsAPI.motionModel.BrakeTest;
 import com.kuka.roboticsAPI.motionModel.CIRC;
 import com.kuka.roboticsAPI.motionModel.CartesianPTP;
 import com.kuka.roboticsAPI.motionModel.IMotion;
@@ -138,6 +140,9 @@ public final class Orders {
             if (order.joints == null) {
                 target(order, (AbstractFrame) robot.home(), robot);
             }
+        } else if (motion instanceof BrakeTest) {
+            order = new MotionOrder(id, "hold");
+            order.duration = ((BrakeTest) motion).seconds();
         } else if (motion instanceof CartesianPTP) {
             order = new MotionOrder(id, "ptp");
             target(order, ((CartesianPTP) motion).getDestination(), robot);
@@ -196,11 +201,21 @@ public final class Orders {
 
     private static void target(MotionOrder order, AbstractFrame frame, LBR robot) {
         order.pose = pose(frame.transformationFromWorld());
+        order.redundancy = redundancy(frame, robot);
+    }
+
+    /** E1, status and turn of a frame; NaN and -1 where it says nothing. */
+    public static double[] redundancy(AbstractFrame frame, LBR robot) {
         IRedundancyCollection redundancy = frame.getRedundancyInformationForDevice(robot);
-        if (redundancy instanceof LBRE1Redundancy) {
-            LBRE1Redundancy e1 = (LBRE1Redundancy) redundancy;
-            order.redundancy = new double[] {e1.getE1(), e1.getStatus(), e1.getTurn()};
+        double[] numbers = {Double.NaN, -1, -1};
+        if (redundancy instanceof StatusTurnRedundancy) {
+            numbers[1] = ((StatusTurnRedundancy) redundancy).getStatus();
+            numbers[2] = ((StatusTurnRedundancy) redundancy).getTurn();
         }
+        if (redundancy instanceof LBRE1Redundancy) {
+            numbers[0] = ((LBRE1Redundancy) redundancy).getE1();
+        }
+        return numbers;
     }
 
     /** Metres and quaternion x y z w of a transformation. */

@@ -42,15 +42,20 @@ public interface Plant {
     /** Place of a signal in the IO image, see {@link Ring#signal}; made where there is none yet. */
     int signal(String name, boolean output);
 
-    /** Joint positions [rad] that bring the flange to a pose in the base, nearest to others; null if there are none. */
-    double[] inverse(double[] pose, double[] near);
+    /**
+     * Joint positions [rad] that bring the flange to a pose in the base, nearest to others; null if there are none.
+     *
+     * @param redundancy E1, status and turn; NaN and -1: not given
+     */
+    double[] inverse(double[] pose, double[] redundancy, double[] near);
 
     /**
      * Opens an FRI session to a client; returns its number.
      *
+     * @param signals names of those that the client sees; kinds of each: type as FRI numbers it, 1 for an output, place
      * @param settings send period [ms], receive multiplier, port on the client, own port (-1: chosen)
      */
-    long friOpen(String host, int[] settings, String[] transformations, FriChannel channel);
+    long friOpen(String host, int[] settings, String[] transformations, String[] signals, int[] kinds, FriChannel channel);
 
     void friClose(long session);
 

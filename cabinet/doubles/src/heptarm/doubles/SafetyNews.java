@@ -35,6 +35,7 @@ public final class SafetyNews {
         boolean modeChanged = mode != newMode;
         flags = newFlags;
         mode = newMode;
+        station.resuming.changed(newFlags);
         SunriseSafetyState state = new SunriseSafetyState(newFlags, OperationMode.values()[(int) newMode]);
         boolean ready = (newFlags & Ring.READY) != 0 && (newFlags & Ring.PAUSED) == 0;
         for (IControllerStateListener one : states) {

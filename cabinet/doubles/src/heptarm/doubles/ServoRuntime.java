@@ -23,6 +23,8 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
     /** Remaining time when none is known. */
     private static final double UNKNOWN = -999.0;
 
+    private static final double[] FREE = {Double.NaN, -1, -1};
+
     private final Station station;
     private final LBR robot;
     private final Container container;
@@ -78,7 +80,7 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
         synchronized (this) {
             near = destination.get();
         }
-        double[] joints = station.plant.inverse(Orders.pose(flange), near);
+        double[] joints = station.plant.inverse(Orders.pose(flange), FREE, near);
         if (joints == null) {
             throw new CommandInvalidException("Can not plan motion: the destination of the servo motion is not reachable");
         }

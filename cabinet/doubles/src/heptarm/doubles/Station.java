@@ -6,9 +6,12 @@ import java.util.concurrent.ConcurrentHashMap;
 import java.util.concurrent.ExecutorService;
 import java.util.concurrent.Executors;
 
+import com.kuka.roboticsAPI.RoboticsAPIContext;
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseController;
+import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseLBR;
 import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.World;
 
@@ -25,6 +28,10 @@ public final class Station {
     public final Controller controller;
     public final LBR robot;
     public final SafetyNews safety = new SafetyNews(this);
+    public final RoboticsAPIContext context = new RoboticsAPIContext(this);
+    public final Pad pad = new Pad();
+    public final Tasks tasks = new Tasks(this);
+    public final Resuming resuming = new Resuming(this);
 
     private Station(ByteBuffer memory, Plant plant) {
         this.plant = plant;
@@ -36,7 +43,7 @@ public final class Station {
             return thread;
         });
         this.controller = new SunriseController("KUKA_Sunrise_Cabinet_1", this);
-        this.robot = new LBR(plant.title().replace(' ', '_') + "_1", controller, this);
+        this.robot = new SunriseLBR(plant.title().replace(' ', '_') + "_1", controller, this);
     }
 
     /** Sets the cabinet up; called once, before anything else. */
@@ -52,10 +59,15 @@ public final class Station {
         return current;
     }
 
+    /** Sleeps for a time of the simulation [ns]. */
+    public void sleep(long nanos) throws InterruptedException {
+        hub.sleep(ring.newest() * Ring.TICK_NS + nanos);
+    }
+
     /** Waits until what was just told to the plant counts in its states. */
     public void settle() {
         try {
-            hub.sleep((ring.newest() + 2) * Ring.TICK_NS);
+            sleep(2 * Ring.TICK_NS);
         } catch (InterruptedException e) {
             Thread.currentThread().interrupt();
         }
@@ -76,6 +88,15 @@ public final class Station {
             }
         }
         parent.add(parts[parts.length - 1], Template.transformation(fromParent));
+    }
+
+    /** The arm that a taught frame was taught with. */
+    public void setRedundancy(String path, double e1, int status, int turn) {
+        ObjectFrame frame = World.Current.getRootFrame();
+        for (String part : path.split("/")) {
+            frame = frame.getChild(part);
+        }
+        frame.setRedundancyInformation(robot, new LBRE1Redundancy(e1, status, turn));
     }
 
     /** The safety state has changed; called by the plant's thread. */

@@ -10,6 +10,7 @@ import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
 import com.kuka.roboticsAPI.geometricModel.Tool;
 import com.kuka.roboticsAPI.geometricModel.Workpiece;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
+import com.kuka.roboticsAPI.persistenceModel.PersistenceException;
 
 /** A tool or a workpiece of the project, to be made as often as an application asks. */
 public final class Template {
@@ -18,6 +19,7 @@ public final class Template {
     private final double[] centre;
     private final double[] inertia;
     private final String moved;
+    private String type = "";
     private final Map<String, double[]> frames = new LinkedHashMap<>();
 
     /**
@@ -39,9 +41,27 @@ public final class Template {
         frames.put(path, fromParent.clone());
     }
 
+    /** The project's own class of tools or workpieces, made by its name; empty: the usual. */
+    public void setType(String className) {
+        type = className;
+    }
+
+    private PhysicalObject bare(String name, LoadData load) {
+        if (type.isEmpty()) {
+            return isTool ? new Tool(name, load) : new Workpiece(name, load);
+        }
+        try {
+            PhysicalObject made = (PhysicalObject) Class.forName(type).getConstructor(String.class).newInstance(name);
+            made.getLoadData().take(load);
+            return made;
+        } catch (ReflectiveOperationException | ClassCastException e) {
+            throw new PersistenceException("template " + name + ": " + type + " cannot be made: " + e);
+        }
+    }
+
     PhysicalObject make(String name) {
         LoadData load = new LoadData(mass, transformation(centre), Inertia.of(inertia[0], inertia[1], inertia[2]));
-        PhysicalObject made = isTool ? new Tool(name, load) : new Workpiece(name, load);
+        PhysicalObject made = bare(name, load);
         for (Map.Entry<String, double[]> frame : frames.entrySet()) {
             int cut = frame.getKey().lastIndexOf('/');
             ObjectFrame parent = made.getFrame(cut < 0 ? "" : frame.getKey().substring(0, cut));

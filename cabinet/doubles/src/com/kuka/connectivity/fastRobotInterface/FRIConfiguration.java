@@ -1,10 +1,15 @@
 package com.kuka.connectivity.fastRobotInterface;
 
+import java.util.ArrayList;
 import java.util.LinkedHashMap;
+import java.util.List;
 import java.util.Map;
 
 import com.kuka.roboticsAPI.deviceModel.Device;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+import com.kuka.roboticsAPI.ioModel.AbstractIO;
+import com.kuka.roboticsAPI.ioModel.IOTypes;
+import com.kuka.roboticsAPI.ioModel.Output;
 
 /** Where an FRI session leads to and how often it sends. */
 public class FRIConfiguration {
@@ -15,6 +20,7 @@ public class FRIConfiguration {
     private final Device device;
     private final String host;
     private final Map<String, AbstractFrame> transformations = new LinkedHashMap<>();
+    private final List<AbstractIO> signals = new ArrayList<>();
     private int sendPeriod = 10;
     private int receiveMultiplier = 1;
     private int portOnRemote = 30200;
@@ -60,6 +66,14 @@ public class FRIConfiguration {
         transformations.put(name, frame);
     }
 
+    /** A signal that the client sees, and writes if it is an output; at most ten. */
+    public void registerIO(AbstractIO signal) {
+        if (signal == null) {
+            throw new IllegalArgumentException("a signal is wanted");
+        }
+        signals.add(signal);
+    }
+
     public String getHostName() {
         return host;
     }
@@ -84,6 +98,27 @@ public class FRIConfiguration {
     /** Own port, -1: chosen by the cabinet; for the simulation. */
     public int portOnController() {
         return portOnController;
+    }
+
+    /** Names of the signals that the client sees; for the simulation. */
+    public String[] signalNames() {
+        String[] names = new String[signals.size()];
+        for (int i = 0; i < names.length; i++) {
+            names[i] = signals.get(i).path();
+        }
+        return names;
+    }
+
+    /** Type, 1 for an output and place of each signal; for the simulation. */
+    public int[] signalKinds() {
+        int[] kinds = new int[3 * signals.size()];
+        for (int i = 0; i < signals.size(); i++) {
+            AbstractIO one = signals.get(i);
+            kinds[3 * i] = one.kind() == IOTypes.BOOLEAN ? 0 : one.kind() == IOTypes.ANALOG ? 2 : 1;
+            kinds[3 * i + 1] = one instanceof Output ? 1 : 0;
+            kinds[3 * i + 2] = one.place();
+        }
+        return kinds;
     }
 
     /** Names of the frames that the client leads; for the simulation. */

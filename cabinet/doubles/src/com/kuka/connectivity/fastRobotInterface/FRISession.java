@@ -26,7 +26,8 @@ public class FRISession implements FriChannel {
     public FRISession(FRIConfiguration configuration) {
         int[] settings = {configuration.getSendPeriodMilliSec(), configuration.getReceiveMultiplier(),
             configuration.getPortOnRemote(), configuration.portOnController()};
-        number = station.plant.friOpen(configuration.getHostName(), settings, configuration.transformationNames(), this);
+        number = station.plant.friOpen(configuration.getHostName(), settings, configuration.transformationNames(),
+                configuration.signalNames(), configuration.signalKinds(), this);
     }
 
     /** Waits until the client answers well enough for an overlay. */

@@ -1,60 +1,35 @@
 package com.kuka.roboticsAPI.applicationModel;
 
-import com.kuka.roboticsAPI.conditionModel.ObserverManager;
+import com.kuka.roboticsAPI.applicationModel.tasks.RoboticsAPITask;
 import com.kuka.roboticsAPI.controllerModel.Controller;
-import com.kuka.roboticsAPI.controllerModel.recovery.IRecovery;
-import com.kuka.roboticsAPI.deviceModel.Device;
-import com.kuka.roboticsAPI.uiModel.IApplicationUI;
-import com.kuka.task.ITaskLogger;
+import com.kuka.roboticsAPI.deviceModel.Robot;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
-import heptarm.doubles.Desk;
 import heptarm.doubles.Station;
 
-/** Base of applications: initialize, run, dispose. */
-public abstract class RoboticsAPIApplication {
-    private final Desk desk = Desk.current();
-
-    public void initialize() {
-    }
-
-    public abstract void run() throws Exception;
-
-    public void dispose() {
-    }
-
+/** Base of applications. */
+public abstract class RoboticsAPIApplication extends RoboticsAPITask {
     public void onApplicationStateChanged(RoboticsAPIApplicationState state) {
     }
 
-    public ITaskLogger getLogger() {
-        return desk.logger;
+    /** What a generated {@code main} calls; here, as on a robot, it is the cabinet that runs applications. */
+    public void runApplication() {
+        throw new IllegalStateException("the cabinet runs applications: heptarm sim --app FOLDER --app-class "
+                + getClass().getSimpleName());
     }
 
-    public IApplicationData getApplicationData() {
-        return desk;
-    }
-
-    public IApplicationControl getApplicationControl() {
-        return desk;
-    }
-
-    /** What has to be done before the application may go on; an arm that keeps its path needs nothing. */
-    public IRecovery getRecovery() {
-        return () -> false;
-    }
-
-    public IApplicationUI getApplicationUI() {
-        return desk.pad;
-    }
-
-    public ObserverManager getObserverManager() {
-        return desk.observers;
-    }
-
-    public Controller getController(String name) {
-        return Station.current().controller;
-    }
-
-    public Device getDevice(Controller controller, String name) {
+    /** The robot; there is one, whatever the name. */
+    public Robot getRobot(Controller controller, String name) {
         return Station.current().robot;
+    }
+
+    /** A new tool or workpiece as the project's template of that name describes it. */
+    public <T> T createFromTemplate(String name) {
+        return getApplicationData().createFromTemplate(name);
+    }
+
+    /** A taught frame, by its path. */
+    public ObjectFrame getFrame(String path) {
+        return getApplicationData().getFrame(path);
     }
 }

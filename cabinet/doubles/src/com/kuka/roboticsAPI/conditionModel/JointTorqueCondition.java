@@ -11,6 +11,9 @@ public class JointTorqueCondition extends Criterion {
     private final double[] band;
 
     public JointTorqueCondition(JointEnum joint, double low, double high) {
+        if (joint.ordinal() > JointEnum.J7.ordinal()) {
+            throw new IllegalArgumentException("the robot has 7 joints, not " + joint);
+        }
         this.joint = joint;
         this.band = band(low, high);
     }

@@ -6,6 +6,7 @@ import java.util.Collections;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseExecutionService;
 import com.kuka.roboticsAPI.deviceModel.Device;
 
+import heptarm.doubles.Referencing;
 import heptarm.doubles.Station;
 
 /** The cabinet. */
@@ -13,11 +14,13 @@ public class Controller {
     private final String name;
     private final Station station;
     private final SunriseExecutionService execution;
+    private final IRequestService requests;
 
     public Controller(String name, Station station) {
         this.name = name;
         this.station = station;
         this.execution = new SunriseExecutionService(station);
+        this.requests = new Referencing(station);
     }
 
     public String getName() {
@@ -38,5 +41,9 @@ public class Controller {
 
     public IExecutionService getExecutionService() {
         return execution;
+    }
+
+    public IRequestService getRequestService() {
+        return requests;
     }
 }

@@ -6,11 +6,13 @@ import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Map;
 import java.util.concurrent.atomic.AtomicLong;
+import java.util.regex.Pattern;
 
 import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
 import com.kuka.connectivity.motionModel.smartServo.SmartServo;
 import com.kuka.connectivity.motionModel.smartServoLIN.SmartServoLIN;
 import com.kuka.connectivity.motionModel.directServo.DirectServo;
+import com.kuka.roboticsAPI.RoboticsAPIContext;
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.controllerModel.sunrise.ISafetyState;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseSafetyState;
@@ -19,6 +21,7 @@ import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.Frame;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.Workpiece;
+import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
 import com.kuka.roboticsAPI.geometricModel.math.Matrix;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.geometricModel.math.Vector;
@@ -28,6 +31,7 @@ import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
 import com.kuka.roboticsAPI.sensorModel.ForceSensorData;
 import com.kuka.roboticsAPI.sensorModel.TorqueSensorData;
 
+import heptarm.doubles.Appended;
 import heptarm.doubles.Arm;
 import heptarm.doubles.Burden;
 import heptarm.doubles.Container;
@@ -40,7 +44,7 @@ import heptarm.doubles.ServoRuntime;
 import heptarm.doubles.Station;
 
 /** The robot. Motions of the robot itself move its flange. */
-public class LBR extends Robot {
+public abstract class LBR extends Robot {
     private static final int AXES = 7;
     /** Rounding [rad]. */
     private static final double ON_LIMIT = 1e-9;
@@ -48,6 +52,8 @@ public class LBR extends Robot {
     private static final double LARGEST_EXTERNAL = 10.0;
     private static final double AT_REST = 0.01;
     private static final double SINGULAR = 0.02;
+
+    private static final Pattern ESM_STATE = Pattern.compile("[1-9]|10");
 
     private final Station station;
     private final Arm arm;
@@ -57,7 +63,7 @@ public class LBR extends Robot {
     private final AtomicLong ids = new AtomicLong();
     private final Map<Container, Boolean> open = new LinkedHashMap<>(); // value: asynchronous
 
-    public LBR(String name, Controller controller, Station station) {
+    protected LBR(String name, Controller controller, Station station) {
         super(name, controller);
         this.station = station;
         arm = new Arm(station.plant.links());
@@ -114,6 +120,42 @@ public class LBR extends Robot {
     public void carries() {
         station.plant.carries(Burden.of(flange, getChildren()));
         station.settle();
+    }
+
+    /** Chooses one of the safety states "1" to "10" of the project; the simulation monitors none of them. */
+    public void setESMState(String state) {
+        if (!ESM_STATE.matcher(state).matches()) {
+            throw new IllegalArgumentException("the safety state is " + state + "; it has to be 1 to 10");
+        }
+        Desk.current().logger.info("ESM state " + state);
+    }
+
+    /** Changes where a frame of the robot, or of what it carries, is seen from its parent. */
+    public void changeFramePosition(ObjectFrame frame, ITransformation fromParent) {
+        frame.place(fromParent);
+    }
+
+    /**
+     * Joint positions for a frame of the flange and its redundancy; what it does not say is as near as possible to the present.
+     *
+     * @throws IllegalArgumentException there are none
+     */
+    public JointPosition getInverseKinematicFromFrameAndRedundancy(Frame frame) {
+        double[] found = station.plant.inverse(Orders.pose(frame.transformationFromWorld()), Orders.redundancy(frame, this),
+                numbers(Ring.Q_CMD, AXES));
+        if (found == null) {
+            throw new IllegalArgumentException("no joint positions bring the flange to " + frame.toStringInWorld());
+        }
+        return new JointPosition(found);
+    }
+
+    public RoboticsAPIContext getContext() {
+        return station.context;
+    }
+
+    /** Whether drives are on and nobody demands a stop; a pause does not count. */
+    public boolean isMotionEnabled() {
+        return flag(Ring.READY);
     }
 
     public int getJointCount() {
@@ -261,6 +303,7 @@ public class LBR extends Robot {
         MotionOrder order = Orders.of(id, motion, moved, this);
         Container container = new Container(id, motion, station, listener, this::ended);
         order.listener = container;
+        container.appendBy(more -> append(container, moved, more));
         if (motion instanceof ServoMotion) {
             serve((ServoMotion<?>) motion, container, moved);
         }
@@ -280,6 +323,17 @@ public class LBR extends Robot {
             container.finished("error", error);
         }
         return container;
+    }
+
+    private void append(Container container, ObjectFrame moved, IMotion motion) {
+        long id = ids.incrementAndGet();
+        MotionOrder order = Orders.of(id, motion, moved, this);
+        Appended appended = container.add(id, motion);
+        order.listener = appended;
+        String error = station.plant.submit(order);
+        if (error != null) {
+            appended.finished("error", error);
+        }
     }
 
     private void serve(ServoMotion<?> motion, Container container, ObjectFrame moved) {
@@ -308,7 +362,7 @@ public class LBR extends Robot {
             for (IMotionContainer other : tail) {
                 other.cancel();
             }
-            Desk.current().failed(container, tail);
+            Desk.ofApplication().failed(container, tail);
         }
     }
 

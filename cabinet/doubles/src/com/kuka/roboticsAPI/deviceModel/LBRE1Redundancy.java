@@ -1,20 +1,15 @@
 package com.kuka.roboticsAPI.deviceModel;
 
-import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
-
 /** Redundancy of an LBR: arm angle E1 [rad], status and turn bits. */
-public class LBRE1Redundancy implements IRedundancyCollection {
+public class LBRE1Redundancy extends StatusTurnRedundancy {
     private double e1;
-    private int status;
-    private int turn;
 
     public LBRE1Redundancy() {
     }
 
     public LBRE1Redundancy(double e1, int status, int turn) {
+        super(status, turn);
         this.e1 = e1;
-        this.status = status;
-        this.turn = turn;
     }
 
     public LBRE1Redundancy setE1(double value) {
@@ -22,13 +17,15 @@ public class LBRE1Redundancy implements IRedundancyCollection {
         return this;
     }
 
+    @Override
     public LBRE1Redundancy setStatus(int value) {
-        status = value;
+        super.setStatus(value);
         return this;
     }
 
+    @Override
     public LBRE1Redundancy setTurn(int value) {
-        turn = value;
+        super.setTurn(value);
         return this;
     }
 
@@ -36,11 +33,8 @@ public class LBRE1Redundancy implements IRedundancyCollection {
         return e1;
     }
 
-    public int getStatus() {
-        return status;
-    }
-
-    public int getTurn() {
-        return turn;
+    @Override
+    public String toString() {
+        return "E1 " + e1 + ", " + super.toString();
     }
 }

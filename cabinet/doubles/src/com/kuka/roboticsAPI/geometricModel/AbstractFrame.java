@@ -7,6 +7,7 @@ import java.util.Map;
 
 import com.kuka.roboticsAPI.deviceModel.Device;
 import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
+import com.kuka.roboticsAPI.geometricModel.math.Matrix;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
 
@@ -53,6 +54,31 @@ public abstract class AbstractFrame {
     public double distanceTo(AbstractFrame other) {
         Transformation t = transformationTo(other);
         return Math.sqrt(t.getX() * t.getX() + t.getY() * t.getY() + t.getZ() * t.getZ());
+    }
+
+    /** Whether it is that close to another: distance [mm], angle of the rotation between them [rad]. */
+    public boolean isCloseTo(AbstractFrame other, double distance, double angle) {
+        Matrix r = transformationTo(other).getRotationMatrix();
+        double cosine = (r.get(0, 0) + r.get(1, 1) + r.get(2, 2) - 1.0) / 2.0;
+        return distanceTo(other) <= distance && Math.acos(Math.max(-1.0, Math.min(1.0, cosine))) <= angle;
+    }
+
+    /** Whether it hangs in the same tree as another. */
+    public boolean hasPathTo(AbstractFrame other) {
+        return top(this) == top(other);
+    }
+
+    private static AbstractFrame top(AbstractFrame frame) {
+        AbstractFrame found = frame;
+        while (found.getParent() != null) {
+            found = found.getParent();
+        }
+        return found;
+    }
+
+    /** Where it is in the world. */
+    public String toStringInWorld() {
+        return transformationFromWorld().toString();
     }
 
     public double getX() {

@@ -63,6 +63,13 @@ public class Frame extends AbstractFrame {
         return this;
     }
 
+    /** Moves this frame by a transformation in the axes of another, about its own origin. */
+    public Frame transform(AbstractFrame reference, ITransformation by) {
+        Transformation to = transformationTo(reference);
+        Transformation turn = Transformation.ofRad(0, 0, 0, to.getAlphaRad(), to.getBetaRad(), to.getGammaRad());
+        return transform(turn.compose(by).compose(turn.invert()));
+    }
+
     public Frame setParent(AbstractFrame newParent) {
         return setParent(newParent, true);
     }

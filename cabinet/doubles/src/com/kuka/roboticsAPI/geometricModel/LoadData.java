@@ -18,6 +18,13 @@ public class LoadData {
         this.inertia = inertia;
     }
 
+    /** Becomes like another; for the simulation. */
+    public void take(LoadData other) {
+        mass = other.mass;
+        centre = other.centre;
+        inertia = other.inertia;
+    }
+
     public double getMass() {
         return mass;
     }

@@ -18,7 +18,8 @@ public class ObjectFrame extends AbstractFrame {
     private final String name;
     private final SceneGraphObject owner;
     private final Supplier<? extends AbstractFrame> parent;
-    private final Supplier<Transformation> fromParent;
+    private final Supplier<Transformation> fromParent; // null: placed by hand
+    private volatile Transformation placed;
     private final List<ObjectFrame> children = new CopyOnWriteArrayList<>();
 
     /** Made by the objects that have frames; the parent of an object's root is what the object is attached to. */
@@ -41,7 +42,15 @@ public class ObjectFrame extends AbstractFrame {
 
     @Override
     Transformation fromParent() {
-        return fromParent.get();
+        return fromParent == null ? placed : fromParent.get();
+    }
+
+    /** Puts it somewhere else as seen from its parent; for the simulation. */
+    public void place(ITransformation anew) {
+        if (fromParent != null) {
+            throw new IllegalArgumentException("the frame " + name + " cannot be moved by hand");
+        }
+        placed = Transformation.of(anew);
     }
 
     /** The child frame of a name; null if there is none. */
@@ -63,8 +72,8 @@ public class ObjectFrame extends AbstractFrame {
         if (childName.length() == 0 || getChild(childName) != null) {
             throw new IllegalArgumentException("a frame " + childName + " of " + name + " exists already");
         }
-        Transformation fixed = Transformation.of(fromHere);
-        ObjectFrame child = new ObjectFrame(childName, owner, () -> this, () -> fixed);
+        ObjectFrame child = new ObjectFrame(childName, owner, () -> this, null);
+        child.place(fromHere);
         children.add(child);
         return child;
     }
@@ -87,6 +96,15 @@ public class ObjectFrame extends AbstractFrame {
         Frame copy = new Frame(transformationFromWorld());
         copyRedundancyTo(copy);
         return copy;
+    }
+
+    /** Attaches the frame's object so that this frame comes to lie upon another. */
+    public void attachTo(AbstractFrame frame) {
+        if (!(owner instanceof SpatialObject)) {
+            throw new IllegalStateException("the frame " + name + " belongs to no object that could be attached");
+        }
+        SpatialObject object = (SpatialObject) owner;
+        object.attachTo(frame, object.getRootFrame().transformationTo(this).invert());
     }
 
     private LBR mover() {

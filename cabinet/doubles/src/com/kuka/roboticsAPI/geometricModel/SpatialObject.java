@@ -9,10 +9,11 @@ import com.kuka.roboticsAPI.persistenceModel.PersistenceException;
 public abstract class SpatialObject extends SceneGraphObject {
     private final ObjectFrame root;
     private volatile AbstractFrame attachedTo;
+    private volatile Transformation offset = Transformation.IDENTITY;
 
     protected SpatialObject(String name) {
         super(name);
-        root = new ObjectFrame(name, this, this::holder, () -> Transformation.IDENTITY);
+        root = new ObjectFrame(name, this, this::holder, () -> offset);
     }
 
     private AbstractFrame holder() {
@@ -44,6 +45,11 @@ public abstract class SpatialObject extends SceneGraphObject {
 
     /** Attaches this object's root to a frame; it leaves where it was. */
     public void attachTo(AbstractFrame frame) {
+        attachTo(frame, Transformation.IDENTITY);
+    }
+
+    /** The same with the root somewhere else than in the frame's origin. */
+    void attachTo(AbstractFrame frame, Transformation rootInFrame) {
         for (AbstractFrame one = frame; one != null; one = one.getParent()) {
             if (owner(one) == this) {
                 throw new IllegalArgumentException(getName() + " cannot be attached to itself");
@@ -51,6 +57,7 @@ public abstract class SpatialObject extends SceneGraphObject {
         }
         LBR before = release();
         attachedTo = frame;
+        offset = rootInFrame;
         if (owner(frame) != null) {
             owner(frame).adopt(this);
         }
@@ -81,6 +88,7 @@ public abstract class SpatialObject extends SceneGraphObject {
             owner(held).abandon(this);
         }
         attachedTo = null;
+        offset = Transformation.IDENTITY;
         return robot;
     }
 

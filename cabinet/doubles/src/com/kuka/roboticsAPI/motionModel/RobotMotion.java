@@ -112,6 +112,11 @@ public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
         return overlay;
     }
 
+    /** What is set now, to be printed. */
+    public MotionParameters getParams() {
+        return new MotionParameters(this);
+    }
+
     public IMotionControlMode getMode() {
         return mode;
     }

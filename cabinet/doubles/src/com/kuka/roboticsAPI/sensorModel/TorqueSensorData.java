@@ -15,6 +15,9 @@ public final class TorqueSensorData {
     }
 
     public double getSingleTorqueValue(JointEnum joint) {
+        if (joint.ordinal() >= values.length) {
+            throw new IllegalArgumentException("the robot has " + values.length + " joints, not " + joint);
+        }
         return values[joint.ordinal()];
     }
 }

@@ -12,7 +12,12 @@ public interface ISunriseControllerStateListener extends IControllerStateListene
 
     void onIsReadyToMoveChanged(Device device, boolean isReadyToMove);
 
-    void onStatePortChangeReceived(Controller controller, StatePortData data);
+    default void onStatePortChangeReceived(Controller controller, StatePortData data) {
+    }
+
+    /** Its older name. */
+    default void statePortChanged(Controller controller, StatePortData data) {
+    }
 
     void onFieldBusDeviceConfigurationChangeReceived(String controllerName, DispatchedEventData data);
 

@@ -65,6 +65,20 @@ public final class SunriseExecutionService implements IExecutionService {
         station.plant.cancelAll();
     }
 
+    /** Keeps motions from running until {@link #unblockExecutionForBrakeTest}. */
+    public void blockExecutionForBrakeTest() {
+        startPause();
+    }
+
+    public void unblockExecutionForBrakeTest() {
+        station.plant.resume();
+    }
+
+    /** Its older name. */
+    public int getActiveContainerCount() {
+        return getActiveMotionContainerCount();
+    }
+
     public int getActiveMotionContainerCount() {
         return station.robot.activeContainers();
     }

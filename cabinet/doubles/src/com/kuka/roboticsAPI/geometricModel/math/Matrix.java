@@ -12,6 +12,10 @@ public class Matrix {
         return e[row][column];
     }
 
+    public Vector getRow(int row) {
+        return Vector.of(e[row][0], e[row][1], e[row][2]);
+    }
+
     public double getElement00() {
         return e[0][0];
     }

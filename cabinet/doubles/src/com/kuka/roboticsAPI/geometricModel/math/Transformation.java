@@ -41,6 +41,20 @@ public final class Transformation implements ITransformation {
         return new Transformation(translation.getX(), translation.getY(), translation.getZ(), rotation.e);
     }
 
+    public static Transformation of(Vector translation, Rotation rotation) {
+        return of(translation, rotation.matrix());
+    }
+
+    /** The same rotation with another translation. */
+    public Transformation withTranslation(Vector translation) {
+        return of(translation, getRotationMatrix());
+    }
+
+    /** The same translation with another rotation. */
+    public Transformation withRotation(Rotation rotation) {
+        return of(Vector.of(x, y, z), rotation);
+    }
+
     /** Of any transformation. */
     public static Transformation of(ITransformation other) {
         return other instanceof Transformation ? (Transformation) other

@@ -1,0 +1,34 @@
+package com.kuka.roboticsAPI;
+
+import java.util.Collection;
+import java.util.Collections;
+
+import com.kuka.roboticsAPI.controllerModel.Controller;
+
+import heptarm.doubles.Station;
+
+/** Cabinets and devices of the project: here one of each. */
+public class RoboticsAPIContext {
+    private final Station station;
+
+    /** Made by the simulation. */
+    public RoboticsAPIContext(Station station) {
+        this.station = station;
+    }
+
+    public Collection<Controller> getControllers() {
+        return Collections.singletonList(station.controller);
+    }
+
+    public Controller getDefaultController() {
+        return station.controller;
+    }
+
+    /** The device of a type. */
+    public <T> T getDeviceFromType(Class<T> type) {
+        if (!type.isInstance(station.robot)) {
+            throw new IllegalArgumentException("the virtual cabinet has no " + type.getName());
+        }
+        return type.cast(station.robot);
+    }
+}

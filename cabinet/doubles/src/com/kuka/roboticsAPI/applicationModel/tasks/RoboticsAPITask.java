@@ -1,0 +1,76 @@
+package com.kuka.roboticsAPI.applicationModel.tasks;
+
+import com.kuka.roboticsAPI.RoboticsAPIContext;
+import com.kuka.roboticsAPI.applicationModel.IApplicationControl;
+import com.kuka.roboticsAPI.applicationModel.IApplicationData;
+import com.kuka.roboticsAPI.conditionModel.ObserverManager;
+import com.kuka.roboticsAPI.controllerModel.Controller;
+import com.kuka.roboticsAPI.controllerModel.recovery.IRecovery;
+import com.kuka.roboticsAPI.deviceModel.Device;
+import com.kuka.roboticsAPI.uiModel.IApplicationUI;
+import com.kuka.task.ITaskLogger;
+import com.kuka.task.ITaskManager;
+
+import heptarm.doubles.Desk;
+import heptarm.doubles.Station;
+
+/** Base of all that the cabinet runs, applications and background tasks: initialize, run, dispose. */
+public abstract class RoboticsAPITask {
+    private final Desk desk = Desk.current();
+
+    public void initialize() {
+    }
+
+    public abstract void run() throws Exception;
+
+    public void dispose() {
+    }
+
+    public ITaskLogger getLogger() {
+        return desk.logger;
+    }
+
+    public RoboticsAPIContext getContext() {
+        return Station.current().context;
+    }
+
+    public IApplicationData getApplicationData() {
+        return desk;
+    }
+
+    public IApplicationControl getApplicationControl() {
+        return desk;
+    }
+
+    public IApplicationUI getApplicationUI() {
+        return desk.pad;
+    }
+
+    public ObserverManager getObserverManager() {
+        return desk.observers;
+    }
+
+    /** What has to be done before the application may go on; an arm that keeps its path needs nothing. */
+    public IRecovery getRecovery() {
+        return () -> false;
+    }
+
+    /** The cabinet; there is one, whatever the name. */
+    public Controller getController(String name) {
+        return Station.current().controller;
+    }
+
+    /** The robot; there is one, whatever the name. */
+    public Device getDevice(Controller controller, String name) {
+        return Station.current().robot;
+    }
+
+    public ITaskManager getTaskManager() {
+        return Station.current().tasks;
+    }
+
+    /** A function that background tasks provide; its calls fail while none of them runs. */
+    public <T> T getTaskFunction(Class<T> type) {
+        return Station.current().tasks.function(type);
+    }
+}

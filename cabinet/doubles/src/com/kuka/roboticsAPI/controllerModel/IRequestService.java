@@ -1,0 +1,5 @@
+package com.kuka.roboticsAPI.controllerModel;
+
+/** Requests to the cabinet's safety controller. */
+public interface IRequestService {
+}

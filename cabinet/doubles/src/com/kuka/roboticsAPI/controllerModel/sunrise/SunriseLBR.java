@@ -1,0 +1,14 @@
+package com.kuka.roboticsAPI.controllerModel.sunrise;
+
+import com.kuka.roboticsAPI.controllerModel.Controller;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+
+import heptarm.doubles.Station;
+
+/** The robot of a cabinet. */
+public final class SunriseLBR extends LBR {
+    /** Made by the simulation. */
+    public SunriseLBR(String name, Controller controller, Station station) {
+        super(name, controller, station);
+    }
+}

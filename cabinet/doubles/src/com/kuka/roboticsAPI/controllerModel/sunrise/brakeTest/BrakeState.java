@@ -1,0 +1,16 @@
+package com.kuka.roboticsAPI.controllerModel.sunrise.brakeTest;
+
+/** What a brake test found. */
+public enum BrakeState {
+    Holds(LogLevel.Info), Slips(LogLevel.Error), NotTested(LogLevel.Warning);
+
+    private final LogLevel level;
+
+    BrakeState(LogLevel level) {
+        this.level = level;
+    }
+
+    public LogLevel getLogLevel() {
+        return level;
+    }
+}

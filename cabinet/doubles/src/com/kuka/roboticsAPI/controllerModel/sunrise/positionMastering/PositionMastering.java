@@ -1,0 +1,20 @@
+package com.kuka.roboticsAPI.controllerModel.sunrise.positionMastering;
+
+import com.kuka.roboticsAPI.deviceModel.LBR;
+
+/** Whether axes are mastered. */
+public class PositionMastering {
+    private final LBR robot;
+
+    public PositionMastering(LBR robot) {
+        this.robot = robot;
+    }
+
+    /** Of an axis, from 0. */
+    public boolean isAxisMastered(int axis) {
+        if (axis < 0 || axis >= robot.getJointCount()) {
+            throw new IllegalArgumentException("axis " + axis + "; there are 0 to " + (robot.getJointCount() - 1));
+        }
+        return robot.isMastered();
+    }
+}

@@ -1,0 +1,40 @@
+package com.kuka.roboticsAPI.deviceModel;
+
+import com.kuka.roboticsAPI.geometricModel.redundancy.AbstractRedundancyCollection;
+
+/** Which of the postures of a pose: status and turn bits; -1: not given. */
+public class StatusTurnRedundancy extends AbstractRedundancyCollection {
+    private int status;
+    private int turn;
+
+    public StatusTurnRedundancy() {
+    }
+
+    public StatusTurnRedundancy(int status, int turn) {
+        this.status = status;
+        this.turn = turn;
+    }
+
+    public StatusTurnRedundancy setStatus(int value) {
+        status = value;
+        return this;
+    }
+
+    public StatusTurnRedundancy setTurn(int value) {
+        turn = value;
+        return this;
+    }
+
+    public int getStatus() {
+        return status;
+    }
+
+    public int getTurn() {
+        return turn;
+    }
+
+    @Override
+    public String toString() {
+        return "status " + status + ", turn " + turn;
+    }
+}

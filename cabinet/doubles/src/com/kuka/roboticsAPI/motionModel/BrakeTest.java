@@ -1,0 +1,41 @@
+package com.kuka.roboticsAPI.motionModel;
+
+import com.kuka.roboticsAPI.controllerModel.sunrise.brakeTest.BrakeState;
+import com.kuka.roboticsAPI.controllerModel.sunrise.brakeTest.BrakeTestResult;
+
+import heptarm.doubles.Container;
+import heptarm.doubles.Station;
+
+/** Loads the brake of an axis, from 0, with a torque [Nm]. The simulated arm holds still meanwhile; its brakes hold what the axis can exert. */
+public class BrakeTest extends RobotMotion<BrakeTest> {
+    private static final double SECONDS = 1.0;
+
+    private final int axis;
+    private final double torque;
+
+    public BrakeTest(int axis, double torque) {
+        if (axis < 0 || axis > 6) {
+            throw new IllegalArgumentException("axis " + axis + "; there are 0 to 6");
+        }
+        this.axis = axis;
+        this.torque = notNegative("torque", torque);
+    }
+
+    /** What the test that has run found. */
+    public static BrakeTestResult evaluateResult(IMotionContainer container) {
+        IMotion motion = ((Container) container).getLastExecutedMotion();
+        if (!(motion instanceof BrakeTest)) {
+            throw new IllegalArgumentException("this was no brake test but " + container.getCommand());
+        }
+        BrakeTest test = (BrakeTest) motion;
+        double most = Station.current().plant.limits()[3 * 7 + test.axis];
+        boolean ended = container.isFinished() && container.getErrorMessage() == null;
+        BrakeState state = !ended ? BrakeState.NotTested : test.torque <= most ? BrakeState.Holds : BrakeState.Slips;
+        return new BrakeTestResult(test.axis, state, test.torque, most);
+    }
+
+    /** How long it lasts [s]; for the simulation. */
+    public double seconds() {
+        return SECONDS;
+    }
+}

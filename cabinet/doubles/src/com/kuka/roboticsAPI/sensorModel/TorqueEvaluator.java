@@ -1,0 +1,51 @@
+package com.kuka.roboticsAPI.sensorModel;
+
+import com.kuka.roboticsAPI.deviceModel.LBR;
+
+import heptarm.doubles.Ring;
+import heptarm.doubles.Sampling;
+import heptarm.doubles.Station;
+
+/** Finds the largest torque of each joint between two times; sampled every millisecond of the simulation. */
+public class TorqueEvaluator {
+    private static final long PERIOD_NS = 1000000L;
+
+    private final Station station = Station.current();
+    private final double[] most;
+    private boolean measured = true;
+    private Sampling sampling;
+
+    public TorqueEvaluator(LBR robot) {
+        most = new double[robot.getJointCount()];
+    }
+
+    /** True: the torques that the sensors measure; false: those that the model commands. */
+    public void setTorqueMeasured(boolean value) {
+        measured = value;
+    }
+
+    public synchronized void startEvaluation() {
+        if (sampling != null) {
+            throw new IllegalStateException("the evaluation runs already");
+        }
+        java.util.Arrays.fill(most, 0.0);
+        int word = measured ? Ring.TAU : Ring.TAU_CMD;
+        double[] torques = new double[most.length];
+        sampling = new Sampling(station, PERIOD_NS, nanos -> {
+            station.ring.read(word, torques);
+            for (int i = 0; i < most.length; i++) {
+                most[i] = Math.max(most[i], Math.abs(torques[i]));
+            }
+        });
+        sampling.start();
+    }
+
+    public synchronized TorqueStatistic stopEvaluation() {
+        if (sampling == null) {
+            throw new IllegalStateException("no evaluation runs");
+        }
+        sampling.stop();
+        sampling = null;
+        return new TorqueStatistic(most);
+    }
+}
