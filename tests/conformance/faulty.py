@@ -2,7 +2,7 @@
 
     .venv/bin/python tests/conformance/faulty.py [options of heptarm.virtual.cabinet]
 
-follows, frozen, lags: how the arm does what a servo motion tells it. press, release: the emergency stop.
+follows, frozen, lags: how the arm does what its set-points say, whoever makes them. press, release: the emergency stop.
 Every line is answered by itself on standard output.
 """
 
@@ -13,25 +13,21 @@ import signal
 import sys
 import threading
 from collections import deque
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from heptarm.virtual import cabinet as virtual
-from heptarm.virtual import servo
-from heptarm.virtual.plant import Plant
+from heptarm.virtual.control import Control
+from heptarm.virtual.law import Sensed
 from heptarm.virtual.safety import Demand
 
-#: So many targets of a servo motion, or ticks of FRI, late is an arm that lags.
-LAG, LAG_TICKS = 40, 400
-#: An arm that was frozen catches up no faster [rad per tick].
+#: So many ticks late is an arm that lags.
+LAG = 400
+#: An arm that did not follow catches up no faster [rad per tick].
 CATCH_UP = 5e-4
 
 _behaviour = "follows"
-_late: deque[tuple[Any, Any]] = deque()
-_late_ticks: deque[Any] = deque()
-_catching_up = False
 _cabinets: list[virtual.VirtualCabinet] = []
 
 
@@ -41,49 +37,40 @@ class _Cabinet(virtual.VirtualCabinet):
         _cabinets.append(self)
 
 
-def _falsify(kind: type[Any]) -> None:
-    honest = kind.aim
+class _Unruly:
+    """Set-points as an arm takes them that does not do what it is told."""
 
-    def aim(self: Any, q: Any, dq: Any = None) -> None:
-        if _behaviour == "follows":
-            honest(self, q, dq)
-        elif _behaviour == "lags":
-            _late.append((q.copy(), dq))
-            if len(_late) > LAG:
-                honest(self, *_late.popleft())
+    def __init__(self, honest: Any) -> None:
+        self._honest = honest
+        self._late: deque[Any] = deque()
+        self._taken: list[
+            Any
+        ] = []  # instead of those of the last, this and the next tick; empty: as they are
 
-    kind.aim = aim
-
-
-def _falsify_overlay(kind: type[Any]) -> None:
-    honest = kind.overlay
-
-    def overlay(self: Any, action: Any) -> None:
-        global _catching_up
-        here = self._command[2].copy()
-        if action is not None and _behaviour == "frozen":
-            action = replace(action, q=here)
-        elif action is not None and _behaviour == "lags":
-            _late_ticks.append(action.q)
-            action = replace(action, q=_late_ticks.popleft() if len(_late_ticks) > LAG_TICKS else here)
-        if action is not None and _catching_up and _behaviour != "frozen":
-            way = action.q - here
-            _catching_up = bool(np.abs(way).max() > 4 * CATCH_UP)
-            if _catching_up:
-                action = replace(action, q=here + np.clip(way, -CATCH_UP, CATCH_UP))
-        honest(self, action)
-
-    kind.overlay = overlay
+    def torque(self, control: Any, sensed: Any) -> Any:
+        told, how = sensed.after, _behaviour
+        if how == "follows" and not self._taken:
+            return self._honest(control, sensed)
+        self._taken = self._taken or [sensed.before, sensed.now, sensed.now]
+        here = self._taken[2]
+        self._late.append(told)
+        late = self._late.popleft() if len(self._late) > LAG else here
+        there = {"frozen": here, "lags": late, "follows": here + np.clip(told - here, -CATCH_UP, CATCH_UP)}[
+            how
+        ]
+        self._taken = [*self._taken[1:], there]
+        sensed.before, sensed.now, sensed.after = self._taken
+        if how == "follows" and (there == told).all():
+            self._taken, self._late = [], deque()
+        return self._honest(control, sensed)
 
 
 def _listen() -> None:
-    global _behaviour, _catching_up
+    global _behaviour
     for line in sys.stdin:
         word = line.strip()
         if word in ("follows", "frozen", "lags"):
-            _late.clear()
-            _late_ticks.clear()
-            _behaviour, _catching_up = word, True
+            _behaviour = word
         elif word == "press":
             _cabinets[0].plant.safety.demand(Demand.EMERGENCY_STOP)
         elif word == "release":
@@ -93,9 +80,13 @@ def _listen() -> None:
 
 
 if __name__ == "__main__":
-    for follower in (servo.SmartFollower, servo.DirectFollower):
-        _falsify(follower)
+    unruly = _Unruly(Control.torque)
+
+    def torque(control: Control, sensed: Sensed) -> Any:
+        """The law's torque for the set-points as the arm takes them."""
+        return unruly.torque(control, sensed)
+
+    Control.torque = torque  # type: ignore[method-assign]
     virtual.VirtualCabinet = _Cabinet  # type: ignore[misc]
-    _falsify_overlay(Plant)
     threading.Thread(target=_listen, daemon=True).start()
     sys.exit(virtual.main())

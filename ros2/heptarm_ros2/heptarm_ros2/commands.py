@@ -13,6 +13,7 @@ from std_msgs.msg import Empty
 from trajectory_msgs.msg import JointTrajectory
 
 from heptarm.bridge.driver import Answer, Driver
+from heptarm.bridge.messages import trajectory_goal
 from heptarm.bridge.names import Meaning
 from heptarm.bridge.services import SERVICES, Names, Service, Services
 from heptarm.errors import HeptarmError, NotReady
@@ -131,7 +132,7 @@ class Commands:
         if not message.points and not message.joint_names:  # as in ROS 1: an empty one stops
             self._stopped(driver)
             return
-        driver.accept(convert.trajectory_goal(message, now=driver.now, clock=self._node.seconds()))
+        driver.accept(trajectory_goal(self._node.ros, message, now=driver.now))
 
 
 def _type(row: Service) -> Any:

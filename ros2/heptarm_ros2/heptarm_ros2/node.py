@@ -22,7 +22,7 @@ from heptarm.bridge.parameters import Configuration, Parameter
 from heptarm.bridge.runner import Feedback
 from heptarm.errors import HeptarmError
 from heptarm.values.state import State
-from heptarm_ros2 import peers
+from heptarm_ros2 import convert, peers
 from heptarm_ros2.commands import Commands
 from heptarm_ros2.moves import MoveActions
 from heptarm_ros2.peers import Peers
@@ -38,6 +38,7 @@ class HeptarmNode(LifecycleNode):
 
     def __init__(self, name: str = "heptarm", **options: Any) -> None:
         super().__init__(name, **options)
+        self.ros = convert.ros(self)
         self.driver: Driver | None = None
         self._outputs: Publishers | None = None
         self._inputs: Commands | None = None
@@ -216,10 +217,6 @@ class HeptarmNode(LifecycleNode):
     def _lives(self) -> bool:
         """Whether there is anybody to tell: ROS may have ended before the node."""
         return not self._ending.is_set() and bool(self.context.ok())
-
-    def seconds(self) -> float:
-        """ROS' time [s]."""
-        return float(self.get_clock().now().nanoseconds * 1e-9)
 
     def _tell(self) -> None:
         """Diagnostics, and the status if it has changed."""

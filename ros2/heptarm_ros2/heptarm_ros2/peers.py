@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from geometry_msgs.msg import Pose, Wrench
-from rclpy.duration import Duration
 from sensor_msgs.msg import JointState
 
 from heptarm.bridge import names
 from heptarm.bridge.driver import Driver
 from heptarm.bridge.names import PRESETS, Entry, Meaning
+from heptarm.bridge.outputs import theirs
 from heptarm.values.state import State
-from heptarm_ros2 import convert
 
 if TYPE_CHECKING:
     from heptarm_ros2.node import HeptarmNode
@@ -28,7 +27,6 @@ class Peers:
 
     def __init__(self, node: HeptarmNode) -> None:
         self._node = node
-        self._joints = node.configuration.joints
         kinds = {Meaning.JOINT_STATES: JointState, Meaning.POSE: Pose, Meaning.WRENCH: Wrench}
         self._publishers = [
             (entry, node.create_publisher(kinds[entry.meaning], entry.name, 10))
@@ -38,21 +36,9 @@ class Peers:
     def state(self, state: State) -> None:
         """Publish a state."""
         for entry, one in self._publishers:
-            message = self._message(entry, state)
+            message = theirs(self._node.ros, entry, state, self._node.configuration.joints)
             if message is not None:
                 one.publish(message)
-
-    def _message(self, entry: Entry, state: State) -> Any:
-        if entry.meaning is Meaning.POSE:
-            return None if state.cartesian is None else convert.pose_message(state.pose)
-        if entry.meaning is Meaning.WRENCH:
-            return None if state.external is None else convert.wrench_message(state)
-        age = Duration(nanoseconds=max(0, round(state.age * 1e9)))
-        stamp = (self._node.get_clock().now() - age).to_msg()
-        message = convert.joint_state(state, self._joints, stamp)
-        if entry.external and state.torques is not None:
-            message.effort = state.tau_ext.tolist()
-        return message
 
     def destroy(self) -> None:
         """End them."""

@@ -11,9 +11,9 @@ from control_msgs.action import FollowJointTrajectory
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.task import Future
 
+from heptarm.bridge import messages
 from heptarm.bridge.goal import Code, End, GoalRefused, Outcome
 from heptarm.bridge.runner import Feedback
-from heptarm_ros2 import convert
 
 if TYPE_CHECKING:
     from heptarm_ros2.node import HeptarmNode
@@ -31,7 +31,6 @@ class TrajectoryAction:
         self._numbers: dict[int, int] = {}  # of a goal message on its way to its handle
         self._ends: dict[int, Future[End]] = {}
         self._handles: dict[int, Any] = {}
-        self._told = 0.0
         self._servers = [
             ActionServer(
                 node,
@@ -56,7 +55,7 @@ class TrajectoryAction:
         try:
             if driver is None:
                 raise GoalRefused("the node is not configured")
-            goal = convert.action_goal(message, now=driver.now, clock=self._node.seconds())
+            goal = messages.action_goal(self._node.ros, message, now=driver.now)
             with self._lock:
                 number = driver.accept(goal)
                 self._numbers[id(message)] = number
@@ -102,14 +101,10 @@ class TrajectoryAction:
 
     def on_feedback(self, value: Feedback) -> None:
         """A goal went on."""
-        now = time.monotonic()
-        period = 1.0 / self._node.value("action_monitor_rate")
         handle = self._handles.get(value.number)
-        if handle is None or (now - self._told < period and value.elapsed > 0.0) or not handle.is_active:
-            return
-        self._told = now
-        names = self._node.configuration.joints
-        handle.publish_feedback(convert.feedback(value, names, self._node.get_clock().now().to_msg()))
+        if handle is not None and handle.is_active:
+            joints = self._node.configuration.joints
+            handle.publish_feedback(messages.feedback(self._node.ros, value, joints))
 
     def on_end(self, end: End) -> None:
         """A goal ended."""

@@ -18,11 +18,13 @@ import numpy as np
 from heptarm.arm.arm import Arm
 from heptarm.arm.connect import connect
 from heptarm.arm.handle import MotionHandle
-from heptarm.bridge.execution import Execution, Listener, ServoExecution
+from heptarm.bridge.execution import Execution, Listener
 from heptarm.bridge.fri_execution import FriExecution
-from heptarm.bridge.goal import Goal, GoalRefused
+from heptarm.bridge.goal import End, Goal, GoalRefused
 from heptarm.bridge.parameters import Configuration
 from heptarm.bridge.report import Report, report
+from heptarm.bridge.runner import Feedback
+from heptarm.bridge.servo_execution import ServoExecution
 from heptarm.bridge.spline_execution import SplineExecution
 from heptarm.bridge.stream import Stream
 from heptarm.errors import HeptarmError, NotReady, ShapeError
@@ -93,27 +95,22 @@ class Driver:
             name=_name(),
             watchdog=values["watchdog"],
         )
+        self._told = (0, 0.0)  # the last feedback: of which goal, and when
         self._execution = self._way()
         self._stream = Stream(self._arm, timeout=values["command_timeout"], options=configuration.servo)
         self._pump = threading.Thread(target=self._run, name="heptarm-states")
         self._pump.start()
         listener.on_link("")
 
-    def _way(self) -> Execution | SplineExecution:
+    def _way(self) -> Execution:
         """The way of execution that the parameters choose."""
         known = self.configuration
         if known.values["execution"] == "spline":
             speed = known.values["servo.speed"]
-            return SplineExecution(
-                self._arm, known.joints, self._listener, speed=speed, settings=known.settings
-            )
+            return SplineExecution(self._arm, known.joints, self, speed=speed, settings=known.settings)
         if known.values["execution"] == "fri":
-            return FriExecution(
-                self._arm, known.joints, self._listener, options=known.fri, settings=known.settings
-            )
-        return ServoExecution(
-            self._arm, known.joints, self._listener, options=known.servo, settings=known.settings
-        )
+            return FriExecution(self._arm, known.joints, self, options=known.fri, settings=known.settings)
+        return ServoExecution(self._arm, known.joints, self, options=known.servo, settings=known.settings)
 
     # ------------------------------------------------------------------------------------ life
 
@@ -248,6 +245,20 @@ class Driver:
     def cancel(self, number: int) -> bool:
         """End a goal early; the arm brakes. False: it is not under way."""
         return self._execution.cancel(number)
+
+    def on_feedback(self, feedback: Feedback) -> None:
+        """From the execution: goes on to the listener as often as the parameter `action_monitor_rate` says."""
+        number, then = self._told
+        if (
+            number != feedback.number
+            or self.now - then >= 1.0 / self.configuration.values["action_monitor_rate"]
+        ):
+            self._told = feedback.number, self.now
+            self._listener.on_feedback(feedback)
+
+    def on_end(self, end: End) -> None:
+        """From the execution."""
+        self._listener.on_end(end)
 
     def _check_ready(self) -> None:
         safety = self._arm.state.status

@@ -17,7 +17,8 @@ from heptarm.arm.arm import Arm
 from heptarm.arm.fri import Fri
 from heptarm.bridge import fri_law
 from heptarm.bridge.course import Course
-from heptarm.bridge.execution import Execution, Follower, Listener
+from heptarm.bridge.execution import Listener
+from heptarm.bridge.following import Follower, Following
 from heptarm.bridge.runner import Settings, Step
 from heptarm.io.clock import Clock
 from heptarm.rt import State
@@ -52,8 +53,8 @@ class FriOptions:
         within(self.linger, "fri.linger", 0.0, 60.0, unit="s")
 
 
-class FriExecution(Execution):
-    """Executes goals as a position overlay; `options` say how, for the rest see `Execution`."""
+class FriExecution(Following):
+    """Executes goals as a position overlay; `options` say how, for the rest see `Following`."""
 
     def __init__(
         self,

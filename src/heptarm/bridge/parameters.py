@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from heptarm.bridge.check import Rules
-from heptarm.bridge.execution import ServoOptions
 from heptarm.bridge.fri_execution import FriOptions
 from heptarm.bridge.runner import Settings
+from heptarm.bridge.servo_execution import ServoOptions
 from heptarm.bridge.tolerance import Bounds, Tolerances
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.values.arrays import frozen, within
@@ -107,7 +107,9 @@ PARAMETERS = (
         "fri.host", "", 'address at which the cabinet reaches this machine; "": as the connection does'
     ),
     Parameter("fri.linger", 2.0, "how long the FRI session stays open after a goal [s]", 0.0, 60.0),
-    Parameter("fri.lookahead", 0.0, "how long a command takes to become motion, beyond a period [s]", 0.0, 0.5),
+    Parameter(
+        "fri.lookahead", 0.0, "how long a command takes to become motion, beyond a period [s]", 0.0, 0.5
+    ),
     Parameter(
         "command_timeout",
         0.2,

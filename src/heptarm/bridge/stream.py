@@ -9,7 +9,7 @@ import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.arm.servo import JointServo, PoseServo
-from heptarm.bridge.execution import ServoOptions
+from heptarm.bridge.servo_execution import ServoOptions
 from heptarm.errors import HeptarmError
 from heptarm.io.clock import RealClock
 from heptarm.values.arrays import Array, array

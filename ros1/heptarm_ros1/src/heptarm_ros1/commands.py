@@ -15,6 +15,7 @@ from std_msgs.msg import Empty
 from trajectory_msgs.msg import JointTrajectory
 
 from heptarm.bridge.driver import Driver
+from heptarm.bridge.messages import trajectory_goal
 from heptarm.bridge.services import SERVICES, Names, Service, Services
 from heptarm.errors import HeptarmError, NotReady
 from heptarm_ros1 import convert
@@ -55,8 +56,7 @@ def joint_trajectory(driver: Driver, message: JointTrajectory) -> None:
     if not message.points and not message.joint_names:
         stop(driver, message)
         return
-    clock = rospy.Time.now().to_sec()
-    driver.accept(convert.trajectory_goal(message, now=driver.now, clock=clock))
+    driver.accept(trajectory_goal(convert.ROS, message, now=driver.now))
 
 
 def stop(driver: Driver, message: object) -> None:

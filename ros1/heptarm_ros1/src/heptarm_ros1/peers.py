@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import rospy
 from geometry_msgs.msg import Pose, Wrench
@@ -13,9 +13,11 @@ from trajectory_msgs.msg import JointTrajectory
 
 from heptarm.bridge import names
 from heptarm.bridge.driver import Driver
-from heptarm.bridge.names import PRESETS, Entry, Meaning
+from heptarm.bridge.names import PRESETS, Meaning
+from heptarm.bridge.outputs import theirs
 from heptarm.values.state import State
-from heptarm_ros1 import commands, convert
+from heptarm_ros1 import commands
+from heptarm_ros1.convert import ROS
 from heptarm_ros1.publishers import publisher
 
 if TYPE_CHECKING:
@@ -57,19 +59,9 @@ class Peers:
     def state(self, state: State) -> None:
         """Publish a state."""
         for entry, one in self._publishers:
-            message = self._message(entry, state)
+            message = theirs(ROS, entry, state, self._joints)
             if message is not None:
                 one.publish(message)
-
-    def _message(self, entry: Entry, state: State) -> Any:
-        if entry.meaning is Meaning.POSE:
-            return None if state.cartesian is None else convert.pose_message(state.pose)
-        if entry.meaning is Meaning.WRENCH:
-            return None if state.external is None else convert.wrench_message(state)
-        message = convert.joint_state(state, self._joints, convert.stamp(state.age))
-        if entry.external and state.torques is not None:
-            message.effort = state.tau_ext.tolist()
-        return message
 
     def destroy(self) -> None:
         """End them."""

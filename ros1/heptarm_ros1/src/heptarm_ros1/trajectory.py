@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import queue
 import threading
-import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import rospy
 from actionlib import ActionServer
-from control_msgs.msg import FollowJointTrajectoryAction
+from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryResult
 
+from heptarm.bridge import messages
 from heptarm.bridge.goal import Code, End, GoalRefused, Outcome
 from heptarm.bridge.runner import Feedback
-from heptarm_ros1 import convert
+from heptarm_ros1.convert import ROS
 
 if TYPE_CHECKING:
     from heptarm_ros1.node import HeptarmNode
@@ -34,7 +34,6 @@ class TrajectoryAction:
         self._node = node
         self._lock = threading.Lock()
         self._handles: dict[int, Any] = {}
-        self._told = 0.0
         # The driver's threads must not wait for the server's lock, so they leave their news here.
         self._news: queue.SimpleQueue[Feedback | End | None] = queue.SimpleQueue()
         self._teller = threading.Thread(target=self._tell, name="heptarm-goals")
@@ -56,14 +55,13 @@ class TrajectoryAction:
         try:
             if driver is None:
                 raise GoalRefused("the node is not configured")
-            clock = rospy.Time.now().to_sec()
-            goal = convert.action_goal(handle.get_goal(), now=driver.now, clock=clock)
+            goal = messages.action_goal(ROS, handle.get_goal(), now=driver.now)
             with self._lock:
                 self._handles[driver.accept(goal)] = handle
                 handle.set_accepted()
         except GoalRefused as error:
             rospy.logwarn(f"goal rejected ({error.reason.name}): {error}")
-            handle.set_rejected(convert.refusal(error), str(error))
+            handle.set_rejected(_result(error.reason, str(error)), str(error))
 
     def _on_cancel(self, handle: Any) -> None:
         with self._lock:
@@ -75,11 +73,7 @@ class TrajectoryAction:
 
     def on_feedback(self, value: Feedback) -> None:
         """A goal went on."""
-        now = time.monotonic()
-        period = 1.0 / self._node.configuration.values["action_monitor_rate"]
-        if now - self._told >= period or value.elapsed == 0.0:
-            self._told = now
-            self._news.put(value)
+        self._news.put(value)
 
     def on_end(self, end: End) -> None:
         """A goal ended."""
@@ -99,7 +93,7 @@ class TrajectoryAction:
         with self._lock:
             handle = self._handles.get(value.number)
         if handle is not None:
-            handle.publish_feedback(convert.feedback(value, self._node.configuration.joints))
+            handle.publish_feedback(messages.feedback(ROS, value, self._node.configuration.joints))
 
     def _end(self, end: End) -> None:
         with self._lock:
@@ -111,10 +105,14 @@ class TrajectoryAction:
             rospy.logwarn(text)
         if handle is None:  # it came by a topic
             return
-        result = convert.result(end)
+        result = _result(end.code, end.text)
         if end.outcome is Outcome.SUCCEEDED:
             handle.set_succeeded(result, end.text)
         elif end.outcome is Outcome.ABORTED:
             handle.set_aborted(result, end.text)
         else:  # in ROS 1 a goal that ran and was cancelled is a preempted one, too
             handle.set_canceled(result, end.text)
+
+
+def _result(code: Code, text: str) -> FollowJointTrajectoryResult:
+    return FollowJointTrajectoryResult(error_code=int(code), error_string=text)

@@ -1,0 +1,214 @@
+"""Execution of goals by a motion that follows commands from tick to tick, in a thread of its own."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from typing import Protocol
+
+from heptarm.arm.arm import Arm
+from heptarm.bridge.execution import Listener, measured
+from heptarm.bridge.goal import End, Goal, GoalRefused
+from heptarm.bridge.runner import Feedback, Runner, Settings, Step
+from heptarm.errors import HeptarmError
+from heptarm.io.clock import Clock, RealClock
+
+_log = logging.getLogger("heptarm.bridge")
+
+#: How long to wait for the thread at the end [s].
+_PATIENCE = 10.0
+
+
+class Follower(Protocol):
+    """A motion that follows commands, tick by tick."""
+
+    @property
+    def why(self) -> str:
+        """Why it has ended."""
+        ...
+
+    def tick(self) -> float | None:
+        """Wait for the next tick; the time for which to command now [s], None: the motion has ended."""
+        ...
+
+    def follow(self, step: Step) -> None:
+        """Do what the runner wants."""
+        ...
+
+
+class Following(ABC):
+    """Executes goals in a motion that opens with a goal and closes a moment after the last one.
+
+    In between the arm is free for others.
+
+    Args:
+        arm: in control.
+        names: of its joints, seven.
+        listener: hears of goals.
+        linger: how long the motion stays open after a goal [s].
+        settings: how to run goals.
+        clock: the arm's.
+    """
+
+    def __init__(
+        self,
+        arm: Arm,
+        names: Sequence[str],
+        listener: Listener,
+        *,
+        linger: float = 0.5,
+        settings: Settings | None = None,
+        clock: Clock | None = None,
+    ) -> None:
+        self._arm = arm
+        self._listener = listener
+        self._linger = linger
+        self._runner = Runner(names, arm.robot, settings)
+        self._clock = clock or RealClock()
+        self._changed = threading.Condition()
+        self._closing = False
+        self._dropped = False
+        self._is_open = False
+        self._thread = threading.Thread(target=self._run, name="heptarm-execution")
+        self._thread.start()
+
+    @property
+    def settings(self) -> Settings:
+        """How goals are run; exchange it, and the next goal has it."""
+        return self._runner.settings
+
+    @settings.setter
+    def settings(self, value: Settings) -> None:
+        with self._changed:
+            self._runner.settings = value
+
+    @property
+    def busy(self) -> bool:
+        """Whether a goal is under way or the arm brakes after one."""
+        return self._runner.busy
+
+    @property
+    def goal(self) -> int:
+        """Number of the goal under way; 0: none."""
+        return self._runner.goal
+
+    @property
+    def now(self) -> float:
+        """The time on the clock that goals start by [s]."""
+        return self._clock.nanos() * 1e-9
+
+    def accept(self, goal: Goal) -> int:
+        """Take a goal; see `Execution`."""
+        try:
+            state = measured(self._arm.state)
+        except HeptarmError as error:
+            raise GoalRefused(f"nothing is known of the arm: {error}") from error
+        with self._changed:
+            if self._closing:
+                raise GoalRefused("the execution is closed")
+            number = self._runner.accept(goal, now=self.now, state=state)
+            if self._runner.warning:
+                _log.warning("goal %d: all default tolerances count: %s", number, self._runner.warning)
+            self._changed.notify_all()
+            return number
+
+    def cancel(self, number: int) -> bool:
+        """End a goal early; the arm brakes. False: it is not under way."""
+        with self._changed:
+            cancelled = self._runner.cancel(number, self.now)
+            self._changed.notify_all()
+            return cancelled
+
+    def abort(self, text: str) -> None:
+        """End the goal under way because of something outside; the arm brakes."""
+        with self._changed:
+            self._runner.abort(text, now=self.now)
+            self._changed.notify_all()
+
+    def drop(self, text: str) -> None:
+        """Likewise, but nothing more is commanded: a stop of the safety controller holds the arm already."""
+        with self._changed:
+            self._runner.abort(text)
+            self._dropped = True
+            self._changed.notify_all()
+
+    def wait_idle(self, timeout: float) -> bool:
+        """Wait until nothing runs and the servo motion is closed; False: not within `timeout` [s]."""
+        with self._changed:
+            return self._changed.wait_for(lambda: not self._runner.busy and not self._is_open, timeout)
+
+    def close(self) -> None:
+        """End the goal under way and leave the arm at rest."""
+        self.abort("the driver closes")
+        with self._changed:
+            self._closing = True
+            self._changed.notify_all()
+        self._thread.join(_PATIENCE)
+
+    # ------------------------------------------------------------------------------------ thread
+
+    def _run(self) -> None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._closing or self._runner.busy)
+                if self._closing and not self._runner.busy:
+                    ends = self._runner.ends()
+                    break
+            try:
+                self._stream()
+            except HeptarmError as error:
+                self._lose(str(error))
+            except Exception as error:
+                _log.exception("executing a goal")
+                self._lose(f"{type(error).__name__}: {error}")
+        self._tell(None, ends)
+
+    @abstractmethod
+    def _motion(self) -> AbstractContextManager[Follower]:
+        """A motion that follows commands."""
+
+    def _stream(self) -> None:
+        """One motion: from the first goal to some time after the last one."""
+        self._dropped = False
+        with self._motion() as follower:
+            self._is_open = True
+            last = None
+            while (now := follower.tick()) is not None:
+                state = measured(self._arm.state)
+                with self._changed:
+                    step = self._runner.advance(now, state)
+                    busy = self._runner.busy
+                follower.follow(step)
+                self._tell(step.feedback, step.ends)
+                last = now if busy or last is None else last
+                if not busy and (self._closing or self._dropped or now - last >= self._linger):
+                    break
+        with self._changed:
+            if now is None:
+                self._runner.abort(f"the motion ended: {follower.why}")
+            self._runner.forget()
+            self._is_open = False
+            ends = self._runner.ends()
+            self._changed.notify_all()
+        self._tell(None, ends)
+
+    def _lose(self, text: str) -> None:
+        """The arm follows no more."""
+        with self._changed:
+            self._runner.abort(text)
+            self._is_open = False
+            ends = self._runner.ends()
+            self._changed.notify_all()
+        self._tell(None, ends)
+
+    def _tell(self, feedback: Feedback | None, ends: Sequence[End]) -> None:
+        try:
+            if feedback is not None:
+                self._listener.on_feedback(feedback)
+            for end in ends:
+                self._listener.on_end(end)
+        except Exception:
+            _log.exception("telling of a goal")
