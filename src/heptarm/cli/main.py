@@ -486,6 +486,44 @@ def bench(
     )
 
 
+@app.command
+def check(
+    *only: Annotated[
+        str, Parameter(help="Scenarios: names, groups, or patterns such as 'motions.*'. None: all.")
+    ],
+    list_only: Annotated[bool, Parameter(name="--list", negative="", help="Name them, run nothing.")] = False,
+    contact: Annotated[
+        bool, Parameter(negative="", help="On a robot, also those that touch something.")
+    ] = False,
+    faults: Annotated[
+        bool, Parameter(negative="", help="On a robot, also those in which something goes wrong.")
+    ] = False,
+    sim_speed: Annotated[float, Parameter(help="Without a target: simulated seconds per second.")] = 2.0,
+    junit: Annotated[Path | None, Parameter(help="Write a report for CI systems, JUnit XML.")] = None,
+    yes: Yes = False,
+    target: Target = None,
+    json: Json = False,
+) -> int:
+    """Show what a robot can do, scenario by scenario, by measurement; exit code 1 if one fails.
+
+    Without a target a simulator with a table, signals and tools is started. A real robot moves at a tenth of its speed,
+    and every scenario that moves it asks first.
+    """
+    from heptarm.cli import check as work
+
+    return work.run(
+        only=only,
+        list_only=list_only,
+        contact=contact,
+        faults=faults,
+        sim_speed=sim_speed,
+        junit=junit,
+        yes=yes,
+        target=target,
+        as_json=json,
+    )
+
+
 @app.command(name="install-cabinet")
 def install_cabinet(
     *,

@@ -1,0 +1,100 @@
+"""`heptarm check`: scenarios, one after the other, and a table of what they showed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from heptarm import testing
+from heptarm.arm.connect import connect
+from heptarm.arm.target import VARIABLE
+from heptarm.cli.output import confirm, emit
+from heptarm.testing import Outcome, Report, Scenario, Verdict
+
+#: Patience of the link: a machine that simulates and looks at it may be late [s].
+_WATCHDOG, _TIMEOUT = 5.0, 20.0
+_STYLES = {Verdict.SHOWN: "green", Verdict.FAILED: "red", Verdict.LEFT_OUT: "yellow"}
+
+
+def run(
+    *,
+    only: tuple[str, ...],
+    list_only: bool,
+    contact: bool,
+    faults: bool,
+    sim_speed: float,
+    junit: Path | None,
+    yes: bool,
+    target: str | None,
+    as_json: bool,
+) -> int:
+    """Run scenarios, or name them; the exit code is 1 if one fails or none could be shown.
+
+    Raises:
+        HeptarmError: no such scenario, or no connection.
+    """
+    chosen = testing.find(only)
+    if list_only:
+        _list(chosen, as_json)
+        return 0
+    target = target or os.environ.get(VARIABLE, "").strip() or testing.stage(speed=sim_speed)
+    console = Console()
+    with connect(target, watchdog=_WATCHDOG, timeout=_TIMEOUT) as arm:
+        if not as_json:
+            console.print(
+                f"{len(chosen)} scenarios on {arm.robot.title}{' (virtual)' if arm.is_virtual else ''}"
+            )
+
+        def ended(outcome: Outcome) -> None:
+            if as_json:
+                emit(outcome.data)
+            else:
+                style = _STYLES[outcome.verdict]
+                console.print(f"[{style}]{outcome.verdict.value:8}[/] {outcome.scenario.name}")
+
+        report = testing.run(
+            arm,
+            only=only,
+            contact=contact,
+            faults=faults,
+            ask=(lambda _: True) if yes else confirm,
+            on_end=ended,
+        )
+    if junit is not None:
+        junit.write_text(report.junit(), encoding="utf-8")
+    if as_json:
+        emit({"ok": report.ok, "summary": report.summary})
+    else:
+        console.print(_table(report))
+        console.print(report.summary)
+    return 0 if report.ok else 1
+
+
+def _list(chosen: tuple[Scenario, ...], as_json: bool) -> None:
+    if as_json:
+        for one in chosen:
+            emit({"scenario": one.name, "title": one.title, "risk": one.risk.value, "space_m": one.space})
+        return
+    table = Table(box=None, pad_edge=False)
+    for name in ("scenario", "shows", "risk"):
+        table.add_column(name, overflow="fold")
+    for one in chosen:
+        table.add_row(one.name, escape(one.title), f"{one.risk.value}{', simulator' if one.virtual else ''}")
+    Console().print(table)
+
+
+def _table(report: Report) -> Table:
+    table = Table(box=None, pad_edge=False)
+    for name in ("", "scenario", "s", "shows"):
+        table.add_column(name, overflow="fold")
+    for one in report.outcomes:
+        words = one.scenario.title if not one.text else f"{one.scenario.title}: {one.text}"
+        style = _STYLES[one.verdict]
+        table.add_row(
+            f"[{style}]{one.verdict.value}[/]", one.scenario.name, f"{one.seconds:.1f}", escape(words)
+        )
+    return table

@@ -1,0 +1,35 @@
+"""Scenarios: what a robot can do, shown by measurement; on the virtual cabinet and, with care, on a robot.
+
+::
+
+    import heptarm as ha
+    from heptarm import testing
+
+    with ha.connect(testing.stage()) as arm:
+        report = testing.run(arm, only=["motions.*"])
+    print(report.table())
+
+`heptarm check` does the same from the command line.
+"""
+
+from heptarm.testing.measure import NotShown, Unfit
+from heptarm.testing.report import Outcome, Report, Verdict
+from heptarm.testing.runner import run
+from heptarm.testing.scenario import Risk, Scenario
+from heptarm.testing.stage import HOME, stage
+from heptarm.testing.suite import find, scenarios
+
+__all__ = [
+    "HOME",
+    "NotShown",
+    "Outcome",
+    "Report",
+    "Risk",
+    "Scenario",
+    "Unfit",
+    "Verdict",
+    "find",
+    "run",
+    "scenarios",
+    "stage",
+]

@@ -1,0 +1,114 @@
+"""Scenarios: people and things that the arm touches."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heptarm.arm.arm import Arm
+from heptarm.testing.measure import Unfit, above, below, fresh, holds, near, watch
+from heptarm.testing.modes import held, let_go
+from heptarm.testing.scenario import Risk, scenario
+from heptarm.testing.stage import DEEPEST, HOME
+from heptarm.values.mode import CartesianImpedance, JointImpedance
+from heptarm.values.motion import hold, lin, lin_rel, ptp
+from heptarm.values.pose import Pose, deg
+from heptarm.values.result import Cause
+from heptarm.values.signals import Force, force, io
+from heptarm.values.tool import Workpiece
+
+_LONG = 60.0
+
+
+@scenario(
+    line=8,
+    rows="H6 H7 G18",
+    risk=Risk.CONTACT,
+    operator=True,
+    space=0.2,
+    needs=("conditions", "joint_impedance"),
+)
+def reaction(arm: Arm) -> None:
+    """A bump ends a motion at once, then the arm is soft; the result is the collision flag."""
+    bump = force > 20
+    handle = arm.start(lin_rel(y=0.15, frame="base", speed_mps=0.03), until=bump)
+    arm.wait_until(lambda s: np.linalg.norm(s.dq) > 0.01, timeout=20.0)
+    arm.operator.push((0.0, -28.0, 0.0), duration=_LONG)
+    result = handle.wait()
+    holds(result.cause is Cause.CONDITION and result.stopped_by == bump, f"ended by {result.stopped_by}")
+    arm.operator.push((0.0, -9.0, 0.0), duration=_LONG)
+    arm.wait_until(lambda s: np.abs(s.tau_ext).max() < 8.0, timeout=20.0)
+    rests = arm.wait_for_rest()
+    soft = held(arm, JointImpedance(300.0))
+    watch(arm, 0.5)
+    above(fresh(arm).pose.distance_to(rests.pose), 5e-3, "then it yields to a light push by", unit="m")
+    arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+    let_go(arm, soft)
+
+
+@scenario(line=8, rows="H1 H8", risk=Risk.CONTACT, operator=True, space=0.2, needs=("cartesian_impedance",))
+def plane(arm: Arm) -> None:
+    """Soft in one plane only; led too far, the arm goes back by itself."""
+    start = arm.wait_for_rest()
+    mode = CartesianImpedance((200.0, 200.0, 5000.0, 300.0, 300.0, 300.0), damping=0.9, frame="base")
+    soft = held(arm, mode)
+    arm.operator.push((0.0, 14.0, -14.0), duration=_LONG)
+    led = arm.wait_until(lambda s: s.pose.distance_to(start.pose) > 0.05, timeout=20.0)
+    way = led.pose.xyz - start.pose.xyz
+    above(abs(float(way[1])), 0.045, "led in the plane by", unit="m")
+    below(abs(float(way[2])), 0.006, "across it by", unit="m")
+    arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+    back = arm.start(ptp(HOME, speed=0.3), when="replace")
+    holds(soft.wait().cause is Cause.REPLACED and back.wait().arrived, "it went back")
+    near(arm.wait_for_rest().q, HOME, 2e-3, "home", unit="rad")
+
+
+@scenario(line=8, rows="H14 H18", risk=Risk.CONTACT, operator=True, space=0.02)
+def waits(arm: Arm) -> None:
+    """The arm waits for a touch, seen in the pushed states."""
+    arm.operator.push((0.0, 0.0, -12.0), duration=0.5)
+    state = arm.wait_until(lambda s: s.wrench.force[2] < -8.0, timeout=20.0)
+    near(state.wrench.force[:2], (0.0, 0.0), 2.0, "it came from above: force across", unit="N")
+    arm.wait_until(lambda s: abs(s.wrench.force[2]) < 2.0, timeout=20.0)
+
+
+@scenario(line=8, rows="H15 H13 I5", risk=Risk.CONTACT, operator=True, space=0.3,
+          needs=("conditions", "workpieces", "io"), signals=("MediaFlange.UserButton",))  # fmt: skip
+def pick(arm: Arm) -> None:
+    """Pick and place: down to the table, up with a workpiece, wait for a person's button, put it down."""
+    start = arm.wait_for_rest().pose
+    contact = Force(frame="base").along("z") > 8
+    part = Workpiece("scenario-part", mass=0.8, com=(0.0, 0.0, 0.03))
+    down = lin_rel(z=-DEEPEST + 0.05, frame="base", speed_mps=0.15)
+    result = arm.move(down, until=contact)
+    if result.stopped_by is None:
+        raise Unfit("there is no table below the flange")
+    arm.move(lin_rel(z=0.03, frame="base", speed_mps=0.2))
+    arm.wait_for_rest()
+    with arm.attached(part):
+        aside = Pose.of(start.xyz + [0.0, 0.12, 0.0], start.quat)
+        arm.move(lin(aside, speed_mps=0.4))
+        waiting = arm.start(hold(_LONG), until=io.user_button)
+        arm.wait_until(lambda _: waiting.started, timeout=20.0)
+        arm.operator.set_signal("UserButton", True)
+        holds(waiting.wait().stopped_by == io.user_button, "a person said go on")
+        arm.operator.set_signal("UserButton", False)
+        holds(arm.move(down, until=contact).stopped_by == contact, "put down on the table")
+        arm.wait_for_rest()
+    holds(fresh(arm).control is not None and fresh(arm).control.workpiece == "", "the hand is empty")  # type: ignore[union-attr]
+    arm.move([lin_rel(z=0.1, frame="base", speed_mps=0.4), ptp(HOME + deg(0, 0, 0, 0, 0, 0, 1))])
+
+
+@scenario(line=8, rows="H11", risk=Risk.CONTACT, operator=True, space=0.2, needs=("joint_impedance",))
+def led(arm: Arm) -> None:
+    """A soft arm is led by hand, and keeps the place where it was led: what is felt becomes the set-point."""
+    start = arm.wait_for_rest()
+    with arm.servo(
+        "joint", rate=50, speed=0.5, acceleration=1.0, mode=JointImpedance(200.0), watchdog=2.0
+    ) as servo:
+        arm.operator.push((0.0, 20.0, 0.0), duration=1.0)
+        first = arm.state.stamp
+        while servo.tick() and arm.state.stamp < first + 1.5e9:
+            servo.set(arm.state.q)
+    there = arm.wait_for_rest()
+    above(there.pose.distance_to(start.pose), 0.02, "led by", unit="m")
+    near(fresh(arm, after=0.2).pose.xyz, there.pose.xyz, 2e-3, "and it stays there", unit="m")

@@ -1,0 +1,203 @@
+"""Measuring: what a scenario saw has to be what it should be; every measurement is kept for the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextvars import ContextVar
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.arm.arm import Arm
+from heptarm.errors import HeptarmError
+from heptarm.values.arrays import Array
+from heptarm.values.condition import Condition
+from heptarm.values.mode import Mode
+from heptarm.values.motion import Motion
+from heptarm.values.result import Result
+from heptarm.values.state import State
+
+#: More numbers than this are told by their least and largest.
+_MANY = 16
+_SEEN: ContextVar[list[str] | None] = ContextVar("heptarm_measured", default=None)
+
+
+class NotShown(HeptarmError):
+    """A measurement is not what it should be."""
+
+
+class Unfit(HeptarmError):
+    """There is nothing here to show it with."""
+
+
+def collect() -> list[str]:
+    """A list to which everything measured from now on, in this thread, is added in words."""
+    seen: list[str] = []
+    _SEEN.set(seen)
+    return seen
+
+
+def note(words: str) -> None:
+    """Keep something that was measured."""
+    seen = _SEEN.get()
+    if seen is not None:
+        seen.append(words)
+
+
+def holds(truth: object, what: str) -> None:
+    """Something is so.
+
+    Raises:
+        NotShown: it is not.
+    """
+    note(what if truth else f"NOT {what}")
+    if not truth:
+        raise NotShown(f"it is not so: {what}")
+
+
+def near(value: npt.ArrayLike, wanted: npt.ArrayLike, by: float, what: str, *, unit: str = "") -> None:
+    """Numbers are what they should be.
+
+    Args:
+        value: what was measured.
+        wanted: what it should be, of the same shape or a single number.
+        by: how far it may be off.
+        what: in words.
+        unit: of all of them.
+
+    Raises:
+        NotShown: one is farther off, or not finite.
+    """
+    off = float(np.max(np.abs(np.asarray(value, dtype=np.float64) - np.asarray(wanted, dtype=np.float64))))
+    words = f"{what}: {_text(value)} {unit}".rstrip()
+    aim = f"wanted {_text(wanted)} within {by:.3g}, off by {off:.3g}"
+    note(f"{words} ({aim})")
+    if not off <= by:
+        raise NotShown(f"{words}; {aim}")
+
+
+def below(value: float, limit: float, what: str, *, unit: str = "") -> None:
+    """A number is below a limit.
+
+    Raises:
+        NotShown: it is not.
+    """
+    words = f"{what}: {value:.4g} {unit}".rstrip() + f" (below {limit:.4g})"
+    note(words)
+    if not value < limit:
+        raise NotShown(words)
+
+
+def above(value: float, limit: float, what: str, *, unit: str = "") -> None:
+    """A number is above a limit.
+
+    Raises:
+        NotShown: it is not.
+    """
+    words = f"{what}: {value:.4g} {unit}".rstrip() + f" (above {limit:.4g})"
+    note(words)
+    if not value > limit:
+        raise NotShown(words)
+
+
+def _text(value: npt.ArrayLike) -> str:
+    numbers = np.asarray(value, dtype=np.float64)
+    if numbers.size > _MANY:
+        return f"{numbers.size} numbers from {numbers.min():.4g} to {numbers.max():.4g}"
+    return f"{float(numbers):.5g}" if numbers.ndim == 0 else " ".join(f"{v:.4g}" for v in numbers.flat)
+
+
+@dataclass(frozen=True, slots=True)
+class Course:
+    """What the pushed states told while something ran, one after the other.
+
+    Attributes:
+        result: how it ended.
+        states: what was seen.
+    """
+
+    result: Result
+    states: tuple[State, ...]
+
+    @property
+    def t(self) -> Array:
+        """Cabinet time since the first state, shape (n,) [s]."""
+        stamps = np.array([state.stamp for state in self.states], dtype=np.float64)
+        return np.asarray((stamps - stamps[0]) * 1e-9)
+
+    @property
+    def q(self) -> Array:
+        """Measured joint positions, shape (n, 7) [rad]."""
+        return np.array([state.q for state in self.states])
+
+    @property
+    def q_cmd(self) -> Array:
+        """Commanded joint positions, shape (n, 7) [rad]."""
+        return np.array([state.q_cmd for state in self.states])
+
+    @property
+    def xyz(self) -> Array:
+        """Measured places of the moved frame, shape (n, 3) [m]."""
+        return np.array([state.pose.xyz for state in self.states])
+
+    @property
+    def xyz_cmd(self) -> Array:
+        """Commanded places of the moved frame, shape (n, 3) [m]."""
+        return np.array([state.pose_cmd.xyz for state in self.states])
+
+    @property
+    def rates(self) -> Array:
+        """Commanded joint speeds between two states, shape (n - 1, 7) [rad/s]."""
+        return np.asarray(np.diff(self.q_cmd, axis=0) / np.diff(self.t)[:, None])
+
+    @property
+    def speeds(self) -> Array:
+        """Commanded speeds of the moved frame between two states, shape (n - 1,) [m/s]."""
+        return np.asarray(np.linalg.norm(np.diff(self.xyz_cmd, axis=0), axis=1) / np.diff(self.t))
+
+    @property
+    def turns(self) -> Array:
+        """Commanded turning speeds of the moved frame between two states, shape (n - 1,) [rad/s]."""
+        pairs = zip(self.states, self.states[1:])
+        return np.array([b.pose_cmd.angle_to(a.pose_cmd) for a, b in pairs]) / np.diff(self.t)
+
+
+def record(
+    arm: Arm,
+    motion: Motion | Sequence[Motion],
+    *,
+    mode: Mode | None = None,
+    until: Condition | None = None,
+    speed: float | None = None,
+) -> Course:
+    """Carry out a motion, or several, and keep all states meanwhile. Raises as `Arm.move` does."""
+    before = arm.state.stamp
+    handle = arm.start(motion, mode=mode, until=until, speed=speed)
+    states: dict[int, State] = {}
+    end = None
+    for state in arm.states(duration=handle.limit):
+        if state.stamp > before:
+            states[state.stamp] = state  # a group that is sampled less often makes two of one stamp
+        if end is None and handle.done:
+            end = arm.state.stamp  # a slow machine has not seen all of them yet
+        if end is not None and state.stamp >= end:
+            break
+    return Course(handle.wait(), tuple(states.values()))
+
+
+def fresh(arm: Arm, *, after: float = 0.03) -> State:
+    """A state that is sampled later than now by so many cabinet seconds: everything before counts in it."""
+    now = arm.state.stamp
+    return arm.wait_until(lambda state: state.stamp > now + round(after * 1e9))
+
+
+def watch(arm: Arm, seconds: float) -> tuple[State, ...]:
+    """States of so many cabinet seconds."""
+    first = arm.state.stamp
+    states: dict[int, State] = {}
+    for state in arm.states():
+        states[state.stamp] = state
+        if state.stamp - first > seconds * 1e9:
+            break
+    return tuple(states.values())

@@ -1,0 +1,143 @@
+"""Scenarios: the model on this side against what the robot measures."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heptarm import model
+from heptarm.arm.arm import Arm
+from heptarm.testing.measure import above, below, holds, near, note, record
+from heptarm.testing.scenario import Risk, scenario
+from heptarm.testing.stage import HOME
+from heptarm.values.arrays import Array
+from heptarm.values.links import LINKS
+from heptarm.values.motion import lin_rel, ptp
+from heptarm.values.pose import Pose, deg
+from heptarm.values.robot import ROBOTS
+
+#: Time between two states whose difference makes a velocity here [s].
+_GAP = 4
+
+
+@scenario(line=11, rows="K1 K13 K14 G8 G9", risk=Risk.STILL)
+def forward(arm: Arm) -> None:
+    """Forward kinematics gives the pose that the cabinet tells, as matrix, quaternion and angles."""
+    state = arm.wait_for_rest()
+    told = arm.pose("flange")
+    made = Pose.from_matrix(model.forward(arm.robot, state.q))
+    near(made.xyz, told.xyz, 2e-4, "place of the flange", unit="m")
+    near(made.angle_to(told), 0.0, 1e-3, "its orientation is off by", unit="rad")
+    again = Pose.xyz_abc(*told.xyz, *told.abc)
+    near(again.matrix, told.matrix, 1e-9, "the same from its angles")
+    near(np.linalg.det(told.rotation), 1.0, 1e-9, "determinant of its rotation")
+    for name, robot in ROBOTS.items():
+        near(
+            model.forward(robot, np.zeros(7))[2, 3],
+            robot.d_bs + robot.d_se + robot.d_ew + robot.d_wf,
+            1e-12,
+            f"height of the stretched {name}",
+            unit="m",
+        )
+        holds(LINKS[name].mass.shape == (7,), f"inertial data of the {name} are there")
+
+
+@scenario(line=11, rows="K4 K5", risk=Risk.STILL)
+def inverse(arm: Arm) -> None:
+    """Inverse kinematics finds the present joints, all other arm positions, and the nearest to a hint."""
+    q = arm.wait_for_rest().q
+    pose = Pose.from_matrix(model.forward(arm.robot, q))
+    near(
+        model.solve(arm.robot, pose, near=q.tolist()), q, 1e-9, "joints from the pose and a hint", unit="rad"
+    )
+    told = arm.state.redundancy
+    near(
+        model.solve(arm.robot, pose, e1=told.e1, status=told.status),
+        q,
+        2e-3,
+        "joints from the pose, E1 and Status as the cabinet tells them",
+        unit="rad",
+    )
+    bent = HOME + deg(10, 5, 15, 10, -10, 5, 20)
+    pose = Pose.from_matrix(model.forward(arm.robot, bent))
+    found = model.solve_all(arm.robot, pose)
+    above(len(found), 1.5, "arm positions that lead to another pose")
+    for one in found:
+        near(model.forward(arm.robot, one), pose.matrix, 1e-9, "each does")
+    near(model.solve(arm.robot, pose, near=bent.tolist()), bent, 1e-9, "the one next to a hint", unit="rad")
+
+
+@scenario(line=11, rows="K2 K3 K6 G2", space=0.15, needs=("ptp",))
+def jacobian(arm: Arm) -> None:
+    """The Jacobian turns measured joint speeds into the measured velocity of the flange and of a point on it."""
+    course = record(arm, ptp(HOME + deg(12, 4, -6, 5, 6, 8, 10), speed=0.25))
+    middle = len(course.states) // 2
+    a, b = course.states[middle - _GAP], course.states[middle + _GAP]
+    seconds = (b.stamp - a.stamp) * 1e-9
+    q, dq = (a.q_cmd + b.q_cmd) / 2, (b.q_cmd - a.q_cmd) / seconds
+    matrix = model.jacobian(arm.robot, q)
+    velocity = (b.pose_cmd.xyz - a.pose_cmd.xyz) / seconds
+    above(float(np.linalg.norm(velocity)), 0.005, "speed of the flange", unit="m/s")
+    near(matrix[:3] @ dq, velocity, 0.02 * float(np.linalg.norm(velocity)) + 2e-4, "J dq", unit="m/s")
+    lever = Pose.at(0.0, 0.05, 0.1)
+    seen = ((b.pose_cmd @ lever).xyz - (a.pose_cmd @ lever).xyz) / seconds
+    at = (Pose.from_matrix(model.forward(arm.robot, q)) @ lever).xyz
+    near(
+        model.jacobian(arm.robot, q, at)[:3] @ dq,
+        seen,
+        0.02 * float(np.linalg.norm(seen)) + 2e-4,
+        "J dq of a point of the last link",
+        unit="m/s",
+    )
+    still = model.nullspace(arm.robot, q) @ dq
+    near(matrix @ still, np.zeros(6), 1e-9, "what is left of it in the null space moves the flange by")
+    above(model.manipulability(arm.robot, q), 0.0, "manipulability")
+
+
+@scenario(line=11, rows="K10 G3", risk=Risk.STILL, virtual=True)
+def gravity(arm: Arm) -> None:
+    """At rest the measured torques are gravity's, as the model has them."""
+    state = arm.wait_for_rest()
+    near(state.tau, model.gravity(arm.robot, state.q), 0.5, "measured torques", unit="Nm")
+
+
+@scenario(line=11, rows="K7 K8 K9 K11 K12", space=0.5, virtual=True, needs=("ptp",))
+def dynamics(arm: Arm) -> None:
+    """Mass matrix, Coriolis and centrifugal torques explain what the joints measure in a fast motion, and back."""
+    course = record(arm, ptp(HOME + deg(50, -20, 10, 30, 20, -20, 40), speed=0.8))
+    middle = [k for k in range(_GAP, len(course.states) - _GAP) if 0.15 < k / len(course.states) < 0.85]
+    worst, largest = 0.0, 0.0
+    for k in middle:
+        a, here, b = course.states[k - _GAP], course.states[k], course.states[k + _GAP]
+        half = (b.stamp - a.stamp) * 0.5e-9
+        dq = (b.q_cmd - a.q_cmd) / (2 * half)
+        ddq = (b.q_cmd - 2 * here.q_cmd + a.q_cmd) / half**2
+        made = model.inverse_dynamics(arm.robot, here.q, dq, ddq)
+        moved = made - model.gravity(arm.robot, here.q)
+        largest = max(largest, float(np.abs(moved).max()))
+        worst = max(worst, float(np.abs(here.tau - made).max()))
+        near(model.forward_dynamics(arm.robot, here.q, dq, made), ddq, 1e-6, "forward dynamics give ddq back")
+        parts = model.mass_matrix(arm.robot, here.q) @ ddq + model.coriolis_matrix(arm.robot, here.q, dq) @ dq
+        near(parts, moved, 1e-9, "M ddq + C dq")
+    note(f"movement takes up to {largest:.1f} Nm")
+    below(worst, 0.15 * largest + 1.5, "measured torque is off by up to", unit="Nm")
+
+
+@scenario(line=11, rows="K15 F13 B15", risk=Risk.STILL, needs=("ptp", "lin_rel"))
+def limits(arm: Arm) -> None:
+    """Joint limits are known here: what breaks them is refused, and nothing moves."""
+    from heptarm.errors import HeptarmError, LimitError
+
+    before = arm.wait_for_rest().q
+    q: Array = before.copy()
+    q[1] = arm.robot.q_max[1] + 0.1
+    try:
+        arm.move(ptp(q))
+        holds(False, "a target behind a limit of A2 is refused")
+    except LimitError as error:
+        holds("A2" in error.text and "deg" in error.text, f"refused by name and range: {error.text}")
+    try:
+        arm.move(lin_rel(z=3.0, frame="base"))
+        holds(False, "a line out of the workspace is refused")
+    except HeptarmError as error:
+        holds(error.code != 0, f"the cabinet's planner says why: {error.text}")
+    near(arm.wait_for_rest().q, before, 1e-4, "and the arm is where it was", unit="rad")

@@ -1,0 +1,195 @@
+"""Scenarios: several motions, one after the other, and what becomes of them."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from dataclasses import replace as replaced
+
+import numpy as np
+
+from heptarm.arm.arm import Arm
+from heptarm.arm.handle import MotionHandle
+from heptarm.errors import HeptarmError, ModeConflict, MotionAborted
+from heptarm.testing.measure import above, below, fresh, holds, near, note, record, watch
+from heptarm.testing.scenario import scenario
+from heptarm.testing.stage import HOME
+from heptarm.values.limits import Blending
+from heptarm.values.mode import JointImpedance
+from heptarm.values.motion import Motion, hold, lin, lin_rel, ptp
+from heptarm.values.pose import Pose, deg
+from heptarm.values.result import Cause
+
+
+def _turned(degrees: float) -> Motion:
+    return ptp(HOME + deg(0, 0, 0, 0, 0, 0, degrees), speed=0.4)
+
+
+def _under_way(arm: Arm, handle: MotionHandle) -> None:
+    """Wait until A7 has left home."""
+    arm.wait_until(lambda s: abs(s.q[6] - HOME[6]) > 0.03 or handle.done, timeout=20.0)
+    holds(not handle.done, "it is under way")
+
+
+@scenario(line=2, rows="B2 B3 B4 B5 B7 B8 G15", space=0.1, needs=("ptp",))
+def queue(arm: Arm) -> None:
+    """Motions are started, wait for each other on the cabinet, and can be awaited; states flow meanwhile."""
+    first, second = arm.start(_turned(20)), arm.start(_turned(0))
+    holds(not first.done and not second.done, "both calls return before anything is done")
+    arm.wait_until(
+        lambda s: s.motion is not None and (s.motion.id, s.motion.queued) == (first.id, 1), timeout=10.0
+    )
+    note("the cabinet says that one runs and one waits")
+    farthest = 0.0
+    for state in arm.states():
+        farthest = max(farthest, state.q[6])
+        if first.done:
+            break
+    near(farthest, np.radians(20), 0.02, "seen while it ran: A7 got to", unit="rad")
+    ended: list[int] = []
+    second.add_done_callback(lambda handle: ended.append(handle.id))
+
+    async def wait() -> bool:
+        return (await second).arrived
+
+    holds(asyncio.run(wait()), "the second one, awaited, arrives")
+    holds(first.done and first.progress == 1.0, "both have told that they are done")
+    arm.wait_until(lambda _: ended == [second.id], timeout=5.0)
+    near(arm.wait_for_rest().q, HOME, 1e-3, "back home", unit="rad")
+
+
+@scenario(line=2, rows="B9 B16", space=0.1, needs=("ptp",))
+def replace(arm: Arm) -> None:
+    """A new motion replaces what runs and what waits; one that shall not do so is refused."""
+    first, waiting = arm.start(_turned(60)), arm.start(_turned(30))
+    _under_way(arm, first)
+    try:
+        arm.start(_turned(0), when="reject")
+        holds(False, "one that shall not wait is refused")
+    except ModeConflict as error:
+        note(error.text)
+    last = arm.start(_turned(-10), when="replace")
+    holds(last.wait().arrived, "the new one arrives")
+    for handle in (first, waiting):
+        holds(handle.wait().cause is Cause.REPLACED, "the others know that they were replaced")
+    near(arm.wait_for_rest().q[6], np.radians(-10), 1e-3, "A7", unit="rad")
+
+
+@scenario(line=2, rows="B10 B14", space=0.1, needs=("ptp",))
+def cancel(arm: Arm) -> None:
+    """A motion is cancelled under way: it brakes, says so, and the arm stays where it stopped."""
+    handle = arm.start(_turned(80))
+    _under_way(arm, handle)
+    handle.cancel()
+    result = handle.wait()
+    holds(result.cause is Cause.CANCELLED and not result.arrived, f"interrupted: {result.cause.value}")
+    rests = arm.wait_for_rest()
+    below(rests.q[6], np.radians(75), "A7 stopped at", unit="rad")
+    near(fresh(arm, after=0.2).q, rests.q, 1e-3, "and a little later", unit="rad")
+
+
+@scenario(line=2, rows="B10 B11 B15", space=0.1, needs=("ptp", "joint_impedance"))
+def stop(arm: Arm) -> None:
+    """A stop from another thread ends a blocking move with an error; the arm holds its place, stiff, then soft."""
+    timer = threading.Timer(0.4 / max(arm.pace, 0.1), arm.stop)
+    timer.start()
+    try:
+        arm.move(ptp(HOME + deg(0, 0, 0, 0, 0, 0, 90), speed=0.1))
+        holds(False, "the move ends with an error")
+    except MotionAborted as error:
+        holds(error.cause is Cause.STOPPED and len(error.history) > 3, f"{error.text}, with its last states")
+    timer.join()
+    rests = arm.wait_for_rest()
+    near(fresh(arm, after=0.2).q, rests.q, 1e-3, "held, stiff", unit="rad")
+    soft = record(arm, hold(0.4), mode=JointImpedance(300.0))
+    near(soft.q[-1], rests.q, 0.02, "held, soft", unit="rad")
+
+
+@scenario(line=2, rows="F12", space=0.2, needs=("lin_rel", "pause"))
+def pause(arm: Arm) -> None:
+    """A motion pauses on its path, and goes on along it."""
+    start = arm.wait_for_rest().pose
+    handle = arm.start(lin_rel(y=0.12, frame="base", speed_mps=0.06))
+    arm.wait_until(lambda s: s.pose.distance_to(start) > 0.02, timeout=20.0)
+    arm.pause()
+    arm.wait_until(lambda s: s.safety.paused and np.abs(s.dq).max() < 1e-3, timeout=20.0)
+    paused = arm.state
+    holds(not handle.done and paused.pose.distance_to(start) < 0.11, "it rests on its way")
+    arm.resume()
+    states = [state for state in watch(arm, 0.1)]
+    holds(handle.wait().arrived, "it arrives")
+    places = np.array([state.pose.xyz for state in states]) - start.xyz
+    below(float(np.abs(places[:, [0, 2]]).max()), 5e-4, "way from its path", unit="m")
+    near(arm.wait_for_rest().pose.xyz - start.xyz, (0, 0.12, 0), 5e-4, "end", unit="m")
+
+
+@scenario(line=2, rows="B13", space=0.25, needs=("lin", "blending"))
+def blending(arm: Arm) -> None:
+    """At a blended corner the arm does not stop; without blending it does."""
+    start = arm.wait_for_rest().pose
+    corner = Pose(start.xyz + [0.0, 0.06, 0.0], start.quat)
+    end = Pose(start.xyz + [0.05, 0.06, 0.0], start.quat)
+    sides = [
+        lin(corner, speed_mps=0.07, acceleration_mps2=0.15),
+        lin(end, speed_mps=0.07, acceleration_mps2=0.15),
+    ]
+    blended = record(arm, [replaced(sides[0], blending=Blending(distance=0.02)), sides[1]])
+    near(arm.wait_for_rest().pose.xyz, end.xyz, 5e-4, "end", unit="m")
+    fast = np.flatnonzero(blended.speeds > 0.9 * 0.07)
+    above(float(blended.speeds[fast[0] : fast[-1]].min()), 0.3 * 0.07, "slowest at the corner", unit="m/s")
+    arm.move(lin(start, speed_mps=0.3))
+    exact = record(arm, sides)
+    fast = np.flatnonzero(exact.speeds > 0.9 * 0.07)
+    below(float(exact.speeds[fast[0] : fast[-1]].min()), 0.1 * 0.07, "without blending", unit="m/s")
+
+
+@scenario(line=2, rows="B6 B5", space=0.1, needs=("ptp",))
+def progress(arm: Arm) -> None:
+    """Progress grows, the time to the destination shrinks as time passes."""
+    handle = arm.start(_turned(60))
+    seen = []
+    for state in arm.states():
+        if state.motion is not None and state.motion.id == handle.id:
+            seen.append((state.motion.stamp * 1e-9, handle.progress, state.motion.remaining))
+        if handle.done:
+            break
+    told = np.array([one for one in seen if np.isfinite(one[2])])
+    above(len(told), 5, "states that tell the time to the destination")
+    holds((np.diff([one[1] for one in seen]) >= 0).all(), "progress never goes back")
+    ends = told[:, 0] + told[:, 2]
+    below(float(np.ptp(ends[2:])), 0.05, "the end that they foretell moves by", unit="s")
+
+
+@scenario(line=2, rows="B12", space=0.1, needs=("ptp", "hold"))
+def wait(arm: Arm) -> None:
+    """The cabinet waits between two motions of a program."""
+    course = record(arm, [_turned(10), hold(0.4), _turned(0)])
+    still = np.abs(course.rates).max(axis=1) < 1e-3
+    apart = course.q_cmd[1:, 6] > np.radians(9.9)
+    near(float(np.diff(course.t)[still & apart].sum()), 0.4, 0.15, "rest at the turning point", unit="s")
+    holds(course.result.arrived and course.result.item == 2, "all three were done")
+
+
+@scenario(line=2, rows="B15 G20", space=0.1, needs=("ptp", "lin_rel"))
+def error(arm: Arm) -> None:
+    """What fails tells why, what waits behind it is dropped, and the next motion knows nothing of it."""
+    try:
+        arm.move([_turned(3), lin_rel(x=3.0, frame="base")])
+        holds(False, "a line that leaves the workspace fails")
+    except HeptarmError as trouble:
+        holds(trouble.code != 0, f"code {trouble.code}: {trouble.text}")
+    arm.wait_for_rest()
+    holds(arm.move(_turned(5)).arrived, "the next one arrives")
+
+
+@scenario(line=2, rows="F1", space=0.1, needs=("ptp",))
+def ceiling(arm: Arm) -> None:
+    """No motion is faster than the arm's ceiling, whatever it says itself."""
+    before, limit = arm.speed, 0.5 * min(arm.speed, 0.4)
+    arm.speed = limit
+    try:
+        course = record(arm, ptp(HOME + deg(0, 0, 0, 0, 0, 0, 30), speed=1.0))
+    finally:
+        arm.speed = before
+    top = float(np.abs(course.rates[:, 6]).max() / arm.robot.dq_max[6])
+    near(top, limit, 0.03 * limit, "fraction of A7's maximum")

@@ -1,0 +1,217 @@
+"""Scenarios: streams of targets that the arm follows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from heptarm.arm.arm import Arm
+from heptarm.arm.servo import JointServo, PoseServo
+from heptarm.errors import HeptarmError, MotionAborted, Starved
+from heptarm.testing.measure import above, below, fresh, holds, near, note
+from heptarm.testing.scenario import Risk, scenario
+from heptarm.values.arrays import Array
+from heptarm.values.pose import Pose
+from heptarm.values.result import Cause
+from heptarm.values.state import State
+
+_A7 = np.array([0.0, 0, 0, 0, 0, 0, 1.0])
+#: Targets per second [Hz], and the watchdog: long, since a busy machine is none of the robot's business [s].
+_RATE, _PATIENT = 50.0, 2.0
+
+
+def stream(
+    arm: Arm, servo: JointServo | PoseServo, seconds: float, target: Callable[[float], None]
+) -> tuple[State, ...]:
+    """Call `target` with the cabinet time since now [s], tick by tick; the states that were seen."""
+    first = arm.state.stamp
+    states: dict[int, State] = {}
+    while servo.tick():
+        state = arm.state
+        states[state.stamp] = state
+        t = (state.stamp - first) * 1e-9
+        target(t)
+        if t > seconds:
+            break
+    return tuple(states.values())
+
+
+def _swing(arm: Arm, servo: JointServo, start: Array) -> float:
+    """A7 is led away, and back when it has got there; how far it went [rad]."""
+    far = 0.0
+    for begin, end in ((0.0, 0.15), (0.15, 0.0)):
+
+        def target(t: float, begin: float = begin, end: float = end) -> None:
+            servo.set(start + (begin + (end - begin) * min(t / 0.8, 1.0)) * _A7)
+
+        first = arm.state.stamp
+        while servo.tick():
+            state = arm.state
+            far = max(far, float(state.q[6] - start[6]))
+            target((state.stamp - first) * 1e-9)
+            late = state.stamp - first > 10e9
+            if late or (abs(state.q[6] - start[6] - end) < 5e-3 and state.stamp - first > 0.8e9):
+                break
+    return far
+
+
+@scenario(line=5, rows="E2 E12 E13", space=0.1, needs=("servo",))
+def joints(arm: Arm) -> None:
+    """SmartServo, joint targets: the arm follows; targets are not answered, state flows beside them."""
+    with arm.servo("joint", rate=_RATE, speed=0.5, acceleration=1.0, watchdog=_PATIENT) as servo:
+        start = servo.start.q
+        far = _swing(arm, servo, start)
+    near(far, 0.15, 0.01, "A7 swung by", unit="rad")
+    near(arm.wait_for_rest().q, start, 5e-3, "and came back", unit="rad")
+    stats = servo.stats
+    holds(stats.refused == 0 and stats.received == stats.sent, f"{stats.sent} targets sent, all received")
+    below(stats.set_median, 2e-3, "median cost of a target here", unit="s")
+    holds(servo.result is not None and servo.result.cause is Cause.CANCELLED, "it ended when the block did")
+
+
+@scenario(line=5, rows="E5", space=0.1, needs=("servo_direct",))
+def direct(arm: Arm) -> None:
+    """DirectServo, joint targets: the arm goes straight for them."""
+    with arm.servo(
+        "joint", rate=_RATE, engine="direct", speed=0.8, acceleration=1.0, watchdog=_PATIENT
+    ) as servo:
+        start = servo.start.q
+        far = _swing(arm, servo, start)
+    near(far, 0.15, 0.01, "A7 swung by", unit="rad")
+    near(arm.wait_for_rest().q, start, 5e-3, "and came back", unit="rad")
+
+
+@scenario(line=5, rows="E3 E6", space=0.15, needs=("servo_pose",))
+def poses(arm: Arm) -> None:
+    """Pose targets, smart and direct; one that cannot be reached is refused and told of, the arm goes on."""
+    for engine in ("smart", "direct"):
+        with arm.servo(
+            "pose",
+            rate=_RATE,
+            engine=engine,
+            speed=0.5,
+            acceleration=1.0,
+            watchdog=_PATIENT,
+        ) as servo:
+            start = servo.start.pose
+
+            def target(t: float, start: Pose = start, servo: PoseServo = servo) -> None:
+                share = (1.0 - np.cos(np.pi * min(t / 1.5, 1.0))) / 2
+                servo.set(Pose.of(start.xyz + share * np.array([0.0, 0.06, 0.03]), start.quat))
+
+            stream(arm, servo, 2.0, target)
+            if engine == "smart":
+                for _ in range(5):
+                    servo.set(Pose.of([3.0, 0.0, 0.0], start.quat))
+                    servo.tick()
+                target(2.0)
+        near(arm.wait_for_rest().pose.xyz - start.xyz, (0.0, 0.06, 0.03), 1e-3, f"way, {engine}", unit="m")
+        if engine == "smart":
+            stats = servo.stats
+            holds(stats.refused >= 1 and stats.text, f"refused: {stats.text}")
+
+
+@scenario(line=5, rows="E7 E8 B17", space=0.1, needs=("servo",))
+def velocities(arm: Arm) -> None:
+    """Targets with the velocity to pass them at, and a stream of velocities: A7 turns as fast as it is told."""
+    speed = 0.2
+    with arm.servo("joint", rate=_RATE, speed=0.5, acceleration=1.0, watchdog=_PATIENT) as servo:
+        start = servo.start.q
+
+        def target(t: float) -> None:
+            servo.set(start + speed * min(t, 1.5) * _A7, speed * _A7 if t < 1.5 else 0 * _A7)
+
+        states = stream(arm, servo, 2.2, target)
+    seen = [abs(s.dq[6]) for s in states if 0.6e9 < s.stamp - states[0].stamp < 1.3e9]
+    near(float(np.median(seen)), speed, 0.05, "speed of A7", unit="rad/s")
+    near(arm.wait_for_rest().q[6] - start[6], 1.5 * speed, 0.03, "way of A7", unit="rad")
+
+
+@scenario(line=5, rows="E9", space=0.15, needs=("servo_pose",))
+def twist(arm: Arm) -> None:
+    """A stream of Cartesian velocities, made of poses: the flange moves and turns as it is told."""
+    speed, turn = 0.04, 0.1
+    with arm.servo("pose", rate=_RATE, speed=0.5, acceleration=1.0, watchdog=_PATIENT) as servo:
+        start = servo.start.pose
+
+        def target(t: float) -> None:
+            now = min(t, 1.5)
+            servo.set(
+                Pose.of(start.xyz + [0.0, speed * now, 0.0], start.quat)
+                @ Pose.xyz_abc(0, 0, 0, turn * now, 0, 0)
+            )
+
+        states = stream(arm, servo, 2.2, target)
+    top = max(s.pose.distance_to(states[0].pose) for s in states if s.stamp - states[0].stamp < 1.0e9)
+    near(top, 0.9 * speed, 0.35 * speed, "way in the first second", unit="m")
+    end = arm.wait_for_rest().pose
+    near(end.xyz - start.xyz, (0.0, 1.5 * speed, 0.0), 5e-3, "way", unit="m")
+    near(end.angle_to(start), 1.5 * turn, 0.02, "turned", unit="rad")
+
+
+@scenario(line=5, rows="E14 E15 F10", space=0.15, needs=("servo",))
+def jump(arm: Arm) -> None:
+    """A target far away is approached within the limits of speed and acceleration, and not faster than it may be."""
+    tops, times = [], []
+    for share, acceleration, shortest in ((0.1, 0.5, None), (0.1, 0.02, None), (0.3, 1.0, 1.0)):
+        with arm.servo(
+            "joint",
+            rate=_RATE,
+            speed=share,
+            acceleration=acceleration,
+            watchdog=_PATIENT,
+            min_trajectory_time=shortest,
+            goal_timeout=100.0,
+        ) as servo:
+            goal = servo.start.q + 0.12 * _A7
+            first, top, sent = arm.state.stamp, 0.0, False
+            while servo.tick() and abs(arm.state.q[6] - goal[6]) > 2e-3:
+                if shortest is None or not sent:
+                    servo.set(goal)
+                sent = True
+                top = max(top, abs(float(arm.state.dq[6])))
+                if arm.state.stamp - first > 15e9:
+                    break
+            times.append((arm.state.stamp - first) * 1e-9)
+            tops.append(top / arm.robot.dq_max[6])
+        near(arm.wait_for_rest().q[6], goal[6], 5e-3, "A7", unit="rad")
+    below(tops[0], 0.11, "top speed at a limit of 0.1, fraction of the maximum")
+    above(times[1], times[0] + 0.1, "with a small acceleration it takes", unit="s")
+    above(times[2], 0.7, "with a shortest trajectory of 1 s it takes", unit="s")
+
+
+@scenario(line=5, rows="E14", space=0.1, risk=Risk.FAULT, virtual=True, needs=("servo",))
+def starved(arm: Arm) -> None:
+    """When no target comes in time, the arm comes to rest, and the block says why."""
+    try:
+        with arm.servo("joint", rate=_RATE, watchdog=0.3) as servo:
+            servo.tick()
+            servo.set(servo.start.q + 0.2 * _A7)
+            arm.wait_until(lambda _: not servo.active, timeout=20.0)
+        holds(False, "the missed watchdog is an error")
+    except Starved as error:
+        note(error.text)
+    rests = arm.wait_for_rest()
+    near(fresh(arm, after=0.2).q, rests.q, 1e-3, "the arm rests", unit="rad")
+
+
+@scenario(line=5, rows="B14 F13", space=0.1, needs=("servo", "ptp"))
+def exclusive(arm: Arm) -> None:
+    """While a stream is followed, another motion is refused; targets beyond limits are brought back."""
+    from heptarm.values.motion import ptp
+
+    with arm.servo("joint", rate=_RATE, watchdog=_PATIENT) as servo:
+        servo.tick()
+        far = servo.start.q.copy()
+        far[6] = 10.0
+        near(servo.set(far)[6], arm.robot.q_max[6], 1e-9, "what was sent for A7", unit="rad")
+        servo.set(servo.start.q)
+        try:
+            arm.start(ptp(servo.start.q), when="reject")
+            holds(False, "the motion is refused")
+        except (MotionAborted, HeptarmError) as error:
+            note(error.text)
+        servo.tick()
+        servo.set(servo.start.q)
+        holds(servo.active, "and the stream goes on")

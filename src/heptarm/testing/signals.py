@@ -1,0 +1,129 @@
+"""Scenarios: signals of the cabinet, the smartPAD, process data."""
+
+from __future__ import annotations
+
+import threading
+
+from heptarm.arm.arm import Arm
+from heptarm.errors import HeptarmError
+from heptarm.testing.measure import holds, near, note
+from heptarm.testing.scenario import Risk, scenario
+
+_FLANGE = ("MediaFlange.OutputX3Pin1", "MediaFlange.OutputX3Pin11")
+_PATIENCE = 20.0
+
+
+@scenario(line=7, rows="J3 I9", risk=Risk.STILL, virtual=True, needs=("io",), signals=_FLANGE)
+def outputs(arm: Arm) -> None:
+    """Outputs of the flange are written, all or none, and read back; two of them open and close a gripper."""
+    close, open_ = _FLANGE
+    for closed in (True, False):
+        arm.io.set({close: closed, open_: not closed})
+        arm.io.wait(close, closed, timeout=_PATIENCE)
+        holds(
+            arm.io[close] is closed and arm.io[open_] is not closed,
+            f"gripper {'closed' if closed else 'open'}",
+        )
+    try:
+        arm.io.set({close: True, "MediaFlange.UserButton": True})
+        holds(False, "an input is not written")
+    except HeptarmError as error:
+        note(error.text)
+    holds(arm.io[close] is False, "and nothing else was")
+    arm.io.set({open_: False})
+
+
+@scenario(line=7, rows="J4 J5", risk=Risk.STILL, operator=True, needs=("io",),
+          signals=("MediaFlange.UserButton", "MediaFlange.InputX3Pin3"))  # fmt: skip
+def inputs(arm: Arm) -> None:
+    """Inputs of the flange and its button are seen as they change."""
+    for name in ("UserButton", "InputX3Pin3"):
+        arm.io.wait(name, False, timeout=_PATIENCE)
+        arm.operator.set_signal(name, True)
+        arm.io.wait(name, True, timeout=_PATIENCE)
+        holds(arm.io[name] is True, f"{name} is seen")
+        arm.operator.set_signal(name, False)
+        arm.io.wait(name, False, timeout=_PATIENCE)
+
+
+@scenario(line=7, rows="J1 J2", risk=Risk.STILL, virtual=True, needs=("io",),
+          signals=("MediaFlange.LEDBlue", "MediaFlange.LEDRed", "MediaFlange.LEDGreen"))  # fmt: skip
+def lamp(arm: Arm) -> None:
+    """The flange's lamp: blue, red, green, off."""
+    for colour in ("blue", "red", "green", "off"):
+        arm.io.led = colour
+        if colour == "off":
+            arm.io.wait("LEDGreen", False, timeout=_PATIENCE)
+        else:
+            arm.io.wait(f"LED{colour.capitalize()}", True, timeout=_PATIENCE)
+        holds(arm.io.led == colour, colour)
+
+
+@scenario(
+    line=7, rows="J6", risk=Risk.STILL, virtual=True, needs=("io",), signals=("Cell.Offset", "Cell.Level")
+)
+def groups(arm: Arm) -> None:
+    """Signals of other groups: numbers with a sign, analog ones; what a signal cannot be is refused."""
+    arm.io.set({"Cell.Offset": -300, "Cell.Level": 2.5})
+    arm.io.wait("Cell.Offset", -300.0, timeout=_PATIENCE)
+    near(float(arm.io["Cell.Level"]), 2.5, 0.01, "analog output")
+    for value in (0.5, 1e6):
+        try:
+            arm.io["Cell.Offset"] = value
+            holds(False, f"{value} is refused")
+        except HeptarmError as error:
+            note(error.text)
+    near(float(arm.io["Cell.Offset"]), -300.0, 0.0, "it is as it was")
+
+
+@scenario(line=7, rows="J7", risk=Risk.STILL, operator=True, needs=("user_keys",))
+def keys(arm: Arm) -> None:
+    """User keys of the smartPAD: set by the client, pressed by a person, heard by the client."""
+    heard: list[tuple[int, bool]] = []
+    end = arm.pad.on_key(lambda slot, down: heard.append((slot, down)))
+    arm.pad.set_key(2, "next part", led="green")
+    presses = threading.Timer(0.1, arm.operator.press_key, (2,))
+    presses.start()
+    holds(arm.pad.wait_for_key(2, timeout=_PATIENCE) == 2, "key 2 was waited for")
+    presses.join()
+    arm.wait_until(lambda _: len(heard) == 2, timeout=_PATIENCE)
+    holds(heard == [(2, True), (2, False)], "pressed and released")
+    end()
+    arm.pad.set_key(2, "", enabled=False)
+    try:
+        arm.operator.press_key(2)
+        holds(False, "a key that is off cannot be pressed")
+    except HeptarmError as error:
+        note(error.text)
+
+
+@scenario(line=7, rows="J8", risk=Risk.STILL)
+def message(arm: Arm) -> None:
+    """A text is shown in the smartPAD's log; one that is too long is refused."""
+    arm.pad.show("heptarm: a scenario says hello")
+    try:
+        arm.pad.show("x" * 513)
+        holds(False, "too long a text is refused")
+    except HeptarmError as error:
+        note(error.text[:60])
+
+
+@scenario(line=7, rows="", risk=Risk.STILL, virtual=True, needs=("process_data",))
+def process_data(arm: Arm) -> None:
+    """Process data of the project are read and changed, and keep their types; heptarm's own are not changed."""
+    name = "cell.count"
+    try:
+        before = arm.pad.process_data(name)
+    except HeptarmError as error:
+        from heptarm.testing.measure import Unfit
+
+        raise Unfit(f"the project has no process data {name}") from error
+    arm.pad.set_process_data(name, int(before) + 1)
+    near(float(arm.pad.process_data(name)), float(before) + 1, 0.0, name)
+    for wrong, value in ((name, "many"), ("heptarm.port", 1)):
+        try:
+            arm.pad.set_process_data(wrong, value)
+            holds(False, f"{wrong} = {value} is refused")
+        except HeptarmError as error:
+            note(error.text)
+    arm.pad.set_process_data(name, int(before))

@@ -1,0 +1,92 @@
+"""Scenarios: what the robot tells of itself."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heptarm import model
+from heptarm.arm.arm import Arm
+from heptarm.testing.measure import below, fresh, holds, near, record, watch
+from heptarm.testing.scenario import Risk, scenario
+from heptarm.testing.stage import HOME
+from heptarm.values.motion import hold, ptp
+from heptarm.values.pose import deg
+
+
+@scenario(line=9, rows="G1 G2 G4 G5 G6 G7 G10 G11 G12 G14 G16 G17 G23", risk=Risk.STILL)
+def whole(arm: Arm) -> None:
+    """One state has joints, torques, pose, wrench, safety and mode, each group with its own time stamp."""
+    state = fresh(arm)
+    near(state.q, state.q_cmd, 0.01, "measured and commanded joints agree", unit="rad")
+    near(state.dq, np.zeros(7), 0.01, "joint speeds at rest", unit="rad/s")
+    holds(state.tau.shape == state.tau_ext.shape == (7,), "torques of all joints, measured and external")
+    near(state.tau_ext[3], 0.0, 5.0, "external torque of A4", unit="Nm")
+    near(state.pose.xyz, arm.pose().xyz, 1e-6, "place of the moved frame", unit="m")
+    near(float(np.linalg.norm(state.pose.quat)), 1.0, 1e-9, "norm of its quaternion")
+    below(float(np.linalg.norm(state.wrench.force)), 30.0, "nobody pushes: force", unit="N")
+    holds(state.wrench.force_inaccuracy.shape == (3,), "the force comes with its inaccuracy")
+    holds(state.safety.ready_to_move and state.safety.mastered, "ready to move, mastered")
+    holds(state.safety.mode.value in ("t1", "t2", "aut"), f"operation mode {state.safety.mode.value}")
+    groups = (state.joints, state.torques, state.cartesian, state.external, state.motion, state.status)
+    holds(all(group is not None and group.stamp > 0 for group in groups), "each group has its own time stamp")
+
+
+@scenario(line=9, rows="G2", space=0.1, needs=("ptp",))
+def velocity(arm: Arm) -> None:
+    """The filtered joint velocity is that of the measured positions, a little later."""
+    course = record(arm, ptp(HOME + deg(0, 0, 0, 0, 0, 0, 30), speed=0.3))
+    told = np.array([state.dq[6] for state in course.states])
+    peak = 0.3 * arm.robot.dq_max[6] if arm.speed >= 0.3 else arm.speed * arm.robot.dq_max[6]
+    near(np.nanmax(told), peak, 0.05 * peak, "top speed of A7", unit="rad/s")
+    way = np.nansum(told[1:] * np.diff(course.t))
+    near(way, np.radians(30), 0.05 * np.radians(30), "its integral", unit="rad")
+
+
+@scenario(line=9, rows="G10 G11 G18 H18", risk=Risk.CONTACT, operator=True, space=0.02)
+def push(arm: Arm) -> None:
+    """A push is felt: the wrench is the force's, and the joints' external torques are J^T f."""
+    force = np.array([12.0, -8.0, -15.0])
+    arm.operator.push(force, duration=2.0)
+    state = arm.wait_until(lambda s: np.linalg.norm(s.wrench.force - force) < 1.0, timeout=10.0)
+    near(state.wrench.force, force, 1.0, "force at the flange, base axes", unit="N")
+    matrix = model.jacobian(arm.robot, state.q)
+    near(state.tau_ext, matrix[:3].T @ force, 1.0, "external torques", unit="Nm")
+    made = np.linalg.lstsq(matrix.T, state.tau_ext, rcond=None)[0]
+    near(made[:3], force, 1.0, "the force estimated from the torques here", unit="N")
+    turned = arm.wrench("flange", axes="flange").force
+    near(turned, arm.pose("flange").rotation.T @ force, 1.0, "in the flange's axes", unit="N")
+    arm.wait_until(lambda s: np.linalg.norm(s.wrench.force) < 2.0, timeout=10.0)
+
+
+@scenario(line=9, rows="G15 G21 E16", space=0.1, needs=("ptp",))
+def stream(arm: Arm) -> None:
+    """States are pushed at the wanted rate, none twice, with the cabinet's time, and say what runs."""
+    handle = arm.start(ptp(HOME + deg(0, 0, 0, 0, 0, 0, 20), speed=0.2))
+    states = watch(arm, 0.5)
+    stamps = np.array([state.stamp for state in states])
+    holds((np.diff(stamps) > 0).all(), "time goes on from state to state")
+    near(np.median(np.diff(stamps)) * 1e-9, 0.01, 0.002, "period of the states", unit="s")
+    seen = [state.motion for state in states if state.motion is not None]
+    holds(any(one.id == handle.id for one in seen), "they name the motion that runs")
+    handle.wait()
+    rested = arm.wait_for_rest().motion
+    holds(rested is not None and not rested.active, "and that nothing runs any more")
+
+
+@scenario(line=9, rows="D26 G19", space=0.05, needs=("hold",))
+def mode(arm: Arm) -> None:
+    """The control mode in force is read back with its parameters, and the limits of the robot are known."""
+    from heptarm.values.mode import JointImpedance, Position
+
+    holds(fresh(arm).mode == Position(), "position control while nothing runs")
+    soft = JointImpedance((800, 800, 800, 800, 300, 300, 300), damping=0.6)
+    handle = arm.start(hold(20.0), mode=soft)
+    state = arm.wait_until(lambda s: s.mode == soft, timeout=10.0)
+    holds(state.mode == soft, f"in force: {state.mode}")
+    handle.cancel()
+    handle.wait()
+    robot = arm.robot
+    holds(
+        (robot.q_min < 0).all() and (robot.dq_max > 0.5).all(), "limits of position and speed, joint by joint"
+    )
+    near(arm.speed, min(arm.speed, 1.0), 0.0, "ceiling of the speed")

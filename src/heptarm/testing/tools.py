@@ -1,0 +1,94 @@
+"""Scenarios: what hangs on the flange, and the frames that it brings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heptarm import model
+from heptarm.arm.arm import Arm
+from heptarm.errors import CommandRejected
+from heptarm.testing.measure import Unfit, above, fresh, holds, near
+from heptarm.testing.scenario import Risk, scenario
+from heptarm.values.motion import hold, lin, lin_rel
+from heptarm.values.pose import Pose, deg
+from heptarm.values.tool import Tool, Workpiece
+
+_TIP = Pose.xyz_abc(0.03, 0.0, 0.12, *deg(0, 90, 0))
+_GRIPPER = Tool(
+    "scenario-gripper", mass=1.5, com=(0.0, 0.0, 0.06), tcp=_TIP, frames={"pad": Pose.at(0.0, 0.04, 0.1)}
+)
+_PART = Workpiece("scenario-part", mass=1.0, com=(0.0, 0.0, 0.05), frames={"peg": Pose.at(0.0, 0.0, 0.08)})
+
+
+@scenario(line=6, rows="I1 I2", virtual=True, risk=Risk.STILL, needs=("tools",))
+def template(arm: Arm) -> None:
+    """A tool template of the project is attached by its name, moves its own frame, and is taken off."""
+    if not arm.tools:
+        raise Unfit("the project has no tool templates")
+    name, tool = next(iter(arm.tools.items()))
+    flange = fresh(arm).pose
+    arm.attach_tool(name)
+    state = fresh(arm)
+    holds(state.tool == name, f"attached: {state.tool}")
+    near(state.pose.xyz, (flange @ tool.frames[0][1]).xyz, 2e-4, "place of its tip", unit="m")
+    arm.detach_tool()
+    state = fresh(arm)
+    holds(state.tool == "", "taken off")
+    near(state.pose.xyz, flange.xyz, 2e-4, "what is moved is the flange", unit="m")
+
+
+@scenario(line=6, rows="I3 I6 C5", virtual=True, space=0.25, needs=("tools", "lin_rel"))
+def tip(arm: Arm) -> None:
+    """A tool that is defined here: its tip moves, along its own axes, or another frame that is named."""
+    with arm.tool(_GRIPPER):
+        start = fresh(arm).pose
+        arm.move(lin_rel(z=0.04, speed_mps=0.2))
+        near(fresh(arm).pose.xyz, (start @ Pose.at(0, 0, 0.04)).xyz, 5e-4, "tip, along its own z", unit="m")
+        target = arm.pose("pad") @ Pose.at(0.0, 0.03, 0.0)
+        arm.move(lin(target, moving="pad", speed_mps=0.2))
+        fresh(arm)
+        near(arm.pose("pad").xyz, target.xyz, 5e-4, "another frame, by its name", unit="m")
+        arm.attach_tool(_GRIPPER, frame="pad")
+        near(fresh(arm).pose.xyz, target.xyz, 5e-4, "chosen at run time, it is what poses mean", unit="m")
+        try:
+            arm.move(lin_rel(z=0.01, moving="nothing"))
+            holds(False, "an unknown frame is refused")
+        except CommandRejected as error:
+            holds("pad" in error.text, error.text)
+
+
+@scenario(line=6, rows="I4 I5", virtual=True, space=0.02, needs=("tools", "workpieces", "hold"))
+def load(arm: Arm) -> None:
+    """Mass and centre of mass of tool and workpiece: the motors carry them, nothing is felt as a force."""
+    before = fresh(arm)
+    with arm.tool(_GRIPPER):
+        arm.move(hold(0.4))
+        state = fresh(arm)
+        more = model.gravity(arm.robot, state.q, load=_GRIPPER.body) - model.gravity(arm.robot, state.q)
+        near(state.tau - before.tau, more, 0.15, "the tool's share of the torques", unit="Nm")
+        near(state.tau_ext, np.zeros(7), 0.1, "external torques", unit="Nm")
+        with arm.attached(_PART):
+            arm.move(hold(0.4))
+            held = fresh(arm)
+            above(abs(float(held.tau[1] - state.tau[1])), 2.0, "the workpiece's share in A2", unit="Nm")
+            near(held.wrench.force, np.zeros(3), 0.3, "force", unit="N")
+            peg = arm.pose("scenario-part/peg")
+            near(peg.xyz, (arm.pose() @ Pose.at(0, 0, 0.08)).xyz, 2e-4, "its own frame", unit="m")
+
+
+@scenario(line=6, rows="I6 G10", virtual=True, operator=True, risk=Risk.CONTACT, space=0.02, needs=("tools",))
+def wrench(arm: Arm) -> None:
+    """The wrench at the tip, at the flange, in the axes of either."""
+    push = np.array([0.0, 14.0, -6.0])
+    with arm.tool(_GRIPPER):
+        arm.move(hold(0.3))
+        arm.operator.push(push, duration=60.0)
+        arm.wait_until(lambda s: np.linalg.norm(s.wrench.force - push) < 0.5, timeout=20.0)
+        tip, flange = arm.wrench(), arm.wrench("flange")
+        near(tip.force, push, 0.5, "force", unit="N")
+        near(flange.torque, np.zeros(3), 0.3, "torque at the flange, where the push acts", unit="Nm")
+        lever = arm.pose("flange").xyz - arm.pose().xyz
+        near(tip.torque, np.cross(lever, push), 0.3, "torque at the tip", unit="Nm")
+        own = arm.wrench(axes="tool").force
+        near(own, arm.pose().rotation.T @ push, 0.5, "force in the tip's axes", unit="N")
+        arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
