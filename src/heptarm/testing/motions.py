@@ -162,6 +162,8 @@ def joint_speeds(arm: Arm) -> None:
     course = record(arm, ptp(HOME, speed=slow))
     top = float(np.abs(course.rates[:, 0]).max() / robot.dq_max[0])
     near(top, share / 4, 0.03 * share, "A1 alone slowed down")
+    there = HOME + deg(0, 0, 0, 0, 0, 0, 12)
+    arm.move(ptp(HOME))
     times = [
         arm.move(ptp(target, speed=share, acceleration=acceleration, jerk=jerk)).duration
         for target, acceleration, jerk in ((there, 1.0, 1.0), (HOME, 0.1, 1.0), (there, 1.0, 0.03))
