@@ -64,8 +64,9 @@ public class Own extends RoboticsAPIApplication {
         try {
             arm.move(Move.ptp(0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0).speed(0.8));
             double before = arm.pose().xyz[2];
-            int cause = arm.move(Move.linRel(0.0, 0.0, 0.05).along("base").velocity(0.2)).cause;
-            getLogger().info("cause " + cause + ", lifted by " + Math.round(1000 * (arm.pose().xyz[2] - before)) + " mm");
+            String how = "" + arm.move(Move.linRel(0.0, 0.0, 0.05).along("base").velocity(0.2)).cause;
+            long way = Math.round(1000 * (arm.pose().xyz[2] - before));
+            getLogger().info(how + ", lifted by " + way + " mm");
             arm.move(Move.ptp(0.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0));
         } catch (Refusal e) {
             getLogger().info("refused " + e.parameter + ": " + e.getMessage());
@@ -113,5 +114,5 @@ def foreign(arm: Arm) -> None:
 def own(arm: Arm) -> None:
     """An application on heptarm's core, without any network: motions, their results, a refusal."""
     said = _sim("Own", _OWN)
-    holds("lifted by 50 mm" in said, "its line was 50 mm long")
+    holds("FINISHED, lifted by 50 mm" in said, "its line was 50 mm long")
     holds("A2 would be at" in said, "what cannot be done was refused by name")

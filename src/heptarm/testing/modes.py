@@ -15,6 +15,7 @@ from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, Positi
 from heptarm.values.motion import circ, ellipse, hold, lin, lin_rel, ptp
 from heptarm.values.pose import Pose, deg
 from heptarm.values.redundancy import Redundancy
+from heptarm.values.state import State
 
 #: Of a force over a stiffness.
 _SHARE = 0.02
@@ -41,9 +42,17 @@ def bent(arm: Arm, seconds: float = 0.3) -> Array:
     return np.asarray(np.mean([s.pose.xyz - s.pose_cmd.xyz for s in watch(arm, seconds)], axis=0))
 
 
-def settled(arm: Arm) -> None:
-    """Wait until no joint moves."""
-    arm.wait_until(lambda s: np.abs(s.dq).max() < 2e-3, timeout=20.0)
+def settled(arm: Arm, *, seconds: float = 0.3) -> None:
+    """Wait until no joint has moved for so many cabinet seconds."""
+    quiet = arm.state.stamp
+
+    def rests(state: State) -> bool:
+        nonlocal quiet
+        if np.abs(state.dq).max() > 2e-3:
+            quiet = state.stamp
+        return state.stamp - quiet > seconds * 1e9
+
+    arm.wait_until(rests, timeout=30.0)
 
 
 @scenario(line=3, rows="D1 D25", risk=Risk.CONTACT, operator=True, space=0.02)

@@ -10,7 +10,7 @@ from heptarm.testing.measure import above, below, holds, near, record
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
 from heptarm.values.arrays import Array
-from heptarm.values.motion import hold, lin, lin_rel, ptp
+from heptarm.values.motion import hold, lin, lin_rel, ptp, ptp_home
 from heptarm.values.pose import Pose, deg
 from heptarm.values.redundancy import Redundancy
 
@@ -128,6 +128,16 @@ def named(arm: Arm) -> None:
     for what, target in (("stretched", np.zeros(7)), ("transport position", TRANSPORT)):
         arm.move(ptp(target))
         near(arm.wait_for_rest().q, target, 1e-3, what, unit="rad")
+
+
+@scenario(line=1, rows="C19", space=1.3, virtual=True, needs=("ptp_home",))
+def project_home(arm: Arm) -> None:
+    """PTP to the home position of the cabinet's project, which nobody has to know here."""
+    first = arm.move(ptp_home()).arrived
+    there = arm.wait_for_rest().q
+    arm.move(ptp(HOME))
+    holds(first and arm.move(ptp_home()).arrived, "it arrives")
+    near(arm.wait_for_rest().q, there, 1e-3, "always at the same joints", unit="rad")
 
 
 @scenario(line=1, rows="C21", space=0.02, needs=("hold",))

