@@ -56,7 +56,7 @@ def test_a_session_of_kind_pose_takes_poses_and_nothing_else() -> None:
         goal = ha.Pose.at(0.0, 0.0, 0.01) @ rt.start.pose
         with pytest.raises(ha.ModeConflict, match=r'q is not commanded .* "pose"') as refused:
             rt.command(q=np.zeros(7))
-        assert refused.value.allowed == "pose"
+        assert refused.value.allowed == "pose, e1"
         rt.command(pose=goal)
         deadline = time.monotonic() + 20.0
         while time.monotonic() < deadline:

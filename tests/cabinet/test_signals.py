@@ -45,7 +45,8 @@ def test_signals_are_told_written_and_pushed(peer: Peer) -> None:
     )
     assert (count.low, count.high) == (0, 255) and peer.welcome.groups & wire.Groups.IO
     assert isinstance(peer.ask(wish(Flange_Lamp=1.0, Cell_Count=200.0, Cell_Level=-2.5)), wire.Accepted)
-    assert seen(peer) == {"Flange.Button": 0.0, "Flange.Lamp": 1.0, "Cell.Count": 200.0, "Cell.Level": -2.5}
+    known = {"Flange.Button": 0.0, "Flange.Lamp": 1.0, "Cell.Count": 200.0, "Cell.Level": -2.5}
+    assert seen(peer) == {**known, "Cell.Offset": 0.0}
 
 
 @pytest.mark.parametrize(
@@ -77,7 +78,7 @@ def test_a_slow_cabinet_reads_them_a_few_at_a_time(make: Maker) -> None:
         states = peer.all(wire.State)
         fresh = {state.joints.stamp for state in states if state.joints is not None}
         assert len(fresh) > 10, "signals do not keep the joints from being read"
-        assert all(state.io is not None and len(state.io.values) == 4 for state in states)
+        assert all(state.io is not None and len(state.io.values) == 5 for state in states)
 
 
 def test_only_the_controller_writes(cabinet: FakeCabinet, peer: Peer) -> None:

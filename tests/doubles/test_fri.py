@@ -18,6 +18,8 @@ SAID = (
     "the client answers",
     "the client moves the arm",
     "commanding is active",
+    "the client's outputs are the cabinet's",
+    "an output out of its range is not written",
     "cancelling the motion ends the overlay",
     "the session monitors on",
     "all states were told",
@@ -52,6 +54,11 @@ def test_an_fri_application_and_its_client(tmp_path: Path) -> None:
         while application.poll() is None and time.monotonic() - began < 60.0:
             swing = 0.1 * (1.0 - np.cos(min(time.monotonic() - began, np.pi / 2) * 2.0)) / 2.0
             client.command(q=start + [0, 0, 0, 0, 0, 0, swing])
+            if time.monotonic() - began < 1.0:  # the count is odd: 300 does not fit its 8 bits
+                assert client.inputs == {"Sample.Button": False}
+                client.output("Sample.Offset", 2**64 - 3)
+                client.output("Sample.Level", 2.5)
+                client.output("Sample.Count", 300)
             time.sleep(0.005)
         output = application.communicate(timeout=10)[0]
     assert application.returncode == 0, output

@@ -532,6 +532,7 @@ class Arm(Equipment, Stopping):
                 policy: what is sent while commands stay away, `heptarm.fri.Policy`; by default the arm brakes.
                 limits: what the guard keeps, `heptarm.fri.Limits`; the robot's, a little inside.
                 pose_limits: what it keeps of commanded poses, `heptarm.fri.PoseLimits`; 0.25 m/s and 1 rad/s.
+                io: up to ten names of signals, as in `arm.io`, that the session carries: `state.io`, `Fri.output`.
                 version: FRI release of the cabinet such as "1.15"; None: told from the first message.
                 host: under which address the cabinet reaches this machine; empty: as this connection does.
                 port: own UDP port; 0: any free one; None: the first free one of FRI's.

@@ -15,18 +15,18 @@ The client listens before the cabinet is asked to open the session, so nobody wa
 from __future__ import annotations
 
 import contextlib
-import logging
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
 from math import inf
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 import numpy.typing as npt
 
+from heptarm.arm.block import Block
 from heptarm.arm.fri_advice import advice, summary
-from heptarm.arm.fri_settings import Request
+from heptarm.arm.fri_ends import ended, explained, nothing_told
+from heptarm.arm.fri_settings import Request, check_command
 from heptarm.arm.handle import MotionHandle
 from heptarm.errors import (
     CommandRejected,
@@ -37,7 +37,6 @@ from heptarm.errors import (
     MotionAborted,
     NeedsOperator,
     NotReady,
-    QualityLost,
     SafetyStop,
     StreamError,
     Timeout,
@@ -57,16 +56,6 @@ from heptarm.wire import messages as wire
 if TYPE_CHECKING:
     from heptarm.arm.connection import Connection
 
-_log = logging.getLogger("heptarm.fri")
-
-#: What the client may command, by kind.
-COMMANDS: dict[str, tuple[str, ...]] = {
-    "position": ("q",),
-    "torque": ("q", "tau"),
-    "wrench": ("q", "wrench"),
-    "pose": ("pose",),
-    "monitor": (),
-}
 #: How long to wait for the end of a session, and for a message of a session that stands [s].
 _PATIENCE = 5.0
 #: How often the end of a session is looked for without messages [s].
@@ -75,7 +64,7 @@ _LOOK = 0.05
 _EVENTS = 256
 
 
-class Fri:
+class Fri(Block):
     """An FRI session; made by `Arm.fri`, used once, in a `with` block.
 
     Leaving the block ends overlay and session, and the arm rests. What ended it earlier rises there as an error. The
@@ -85,6 +74,8 @@ class Fri:
         connection: to the cabinet.
         request: what is asked for.
     """
+
+    what = "FRI session"
 
     def __init__(self, connection: Connection, request: Request) -> None:
         self._connection = connection
@@ -167,21 +158,7 @@ class Fri:
                 raise ConnectFailed(error.text, code=error.code, hint=hint or error.hint) from error
         elif trouble is not None:
             raise trouble
-        raise ConnectFailed(self._last_words().text or self._ended(), hint=hint)
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """End the session; raises what ended it early, unless another error is on its way."""
-        try:
-            self.close()
-        except HeptarmError as trouble:
-            if error is None:
-                raise
-            _log.warning("closing the FRI session: %s", trouble)
+        raise ConnectFailed(self._last_words().text or ended(controls=self._connection.controls), hint=hint)
 
     def close(self) -> None:
         """End overlay and session, and give the port back; raises what ended it early. Closing twice is legal.
@@ -219,33 +196,14 @@ class Fri:
 
     def _explained(self, error: MotionAborted | None, hint: str) -> HeptarmError:
         """What ended a session early, with what this side knows of it."""
-        told = self._last_words()
-        text, code = (told.text, told.code) if error is None else (error.text, error.code)
-        if told.quality.value < Quality.GOOD and (error is None or error.cause is Cause.FAILED):
-            return QualityLost(text or self._ended(), code=code, hint=hint)
-        if error is None:
-            return StreamError(text or self._ended(), code=code, hint=hint)
-        limited = self.client.limited
-        guard = f"the guard had limited: {'; '.join(limited[:3])}" if limited else ""
-        return MotionAborted(
-            text, result=error.result, history=error.history, code=code, hint=guard or error.hint
+        controls = self._connection.controls
+        return explained(
+            error, self._last_words(), hint=hint, controls=controls, limited=self.client.limited
         )
-
-    def _ended(self) -> str:
-        """What is known where the cabinet gives no reason."""
-        if self._connection.controls:
-            return "the FRI session was ended by the cabinet"
-        return "the cabinet ended the FRI session, since this client no longer controls the robot"
 
     def _last_words(self) -> wire.FriChanged:
         """The last that the cabinet told of this session."""
-        return self._connection.fri_change(self._number) or wire.FriChanged(
-            session=self._number,
-            state=wire.FriSessionState.IDLE,
-            quality=wire.FriQuality.EXCELLENT,
-            code=0,
-            text="",
-        )
+        return self._connection.fri_change(self._number) or nothing_told(self._number)
 
     def _why(self) -> str:
         """What spoilt the session, as far as this side can tell."""
@@ -337,6 +295,7 @@ class Fri:
         tau: npt.ArrayLike | None = None,
         wrench: npt.ArrayLike | None = None,
         pose: Pose | npt.ArrayLike | None = None,
+        e1: float | None = None,
     ) -> None:
         """Give a command; it stands until the next one, or until the policy's patience ends.
 
@@ -348,28 +307,20 @@ class Fri:
             tau: torques on top of the control mode's, shape (7,) [Nm]; "torque" only.
             wrench: wrench on top of the control mode's, shape (6,) [N, Nm]; "wrench" only.
             pose: of the flange in the base, or x y z [m] and quaternion x y z w, shape (7,); "pose" only.
+            e1: redundancy angle of the pose [rad]; "pose" only.
 
         Raises:
             ModeConflict: this session commands something else, or a law does it.
             ShapeError: an array has another shape.
             ConnectionLost: the loop's process has ended.
         """
-        allowed = COMMANDS[self.kind]
-        for name, value in (("q", q), ("tau", tau), ("wrench", wrench), ("pose", pose)):
-            if value is not None and name not in allowed:
-                other = {"q": "position", "tau": "torque"}.get(name, name)
-                raise ModeConflict(
-                    f'{name} is not commanded in an FRI session of kind "{self.kind}"',
-                    parameter=name,
-                    allowed=", ".join(allowed) or "nothing",
-                    hint=f'open the session with arm.fri("{other}")',
-                )
+        check_command(self.kind, {"q": q, "tau": tau, "wrench": wrench, "pose": pose, "e1": e1})
         if self._request.has_law:
             raise ModeConflict(
                 "the law commands in this session", hint="change rt.params, or open it without a law"
             )
         if self._stands:
-            self.client.command(q=q, tau=tau, wrench=wrench, pose=pose)
+            self.client.command(q=q, tau=tau, wrench=wrench, pose=pose, e1=e1)
 
     @property
     def params(self) -> Params:
@@ -378,11 +329,16 @@ class Fri:
 
     @property
     def inputs(self) -> dict[str, SignalValue]:
-        """The cabinet's inputs that the session carries, as they are now, by name."""
+        """The inputs that `io=` named, as they are now, by name; `state.io` has them for every message."""
         return self.client.inputs
 
-    def output(self, name: str, value: float) -> None:
-        """Set an output that the session offers."""
+    @property
+    def outputs(self) -> dict[str, SignalValue]:
+        """The outputs that `io=` named, as the cabinet shows them now, by name."""
+        return self.client.outputs
+
+    def output(self, name: str, value: SignalValue) -> None:
+        """Write an output that `io=` named; see `heptarm.fri.Client.output`."""
         self.client.output(name, value)
 
     # ------------------------------------------------------------------------------- the report

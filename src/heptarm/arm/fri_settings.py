@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypedDict
 
@@ -11,12 +11,14 @@ import numpy.typing as npt
 from heptarm.arm.modes import mode_message
 from heptarm.errors import CommandRejected, ConnectFailed, LimitError, ModeConflict, ShapeError
 from heptarm.fri.guard import Limits
+from heptarm.fri.messages import MAX_IO, MAX_NAME
 from heptarm.fri.policy import Policy
 from heptarm.fri.pose_guard import PoseLimits
 from heptarm.io.udp import UdpSocket
 from heptarm.rt import Client, Output, Params
 from heptarm.rt import State as FriState
 from heptarm.values.arrays import within
+from heptarm.values.io import find_name
 from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, Position, SineImpedance
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
@@ -28,6 +30,14 @@ if TYPE_CHECKING:
 Law = Callable[[FriState, Output, Params], object]
 
 KINDS = {mode.name.lower(): mode for mode in wire.FriCommandMode}
+#: What the client may command, by kind.
+COMMANDS: dict[str, tuple[str, ...]] = {
+    "position": ("q",),
+    "torque": ("q", "tau"),
+    "wrench": ("q", "wrench"),
+    "pose": ("pose", "e1"),
+    "monitor": (),
+}
 #: FRI's own ports.
 PORTS = range(30200, 30210)
 #: Period unless another one is asked for [ms].
@@ -48,6 +58,7 @@ class FriSettings(TypedDict, total=False):
     policy: Policy | None
     limits: Limits | None
     pose_limits: PoseLimits | None
+    io: Sequence[str]
     version: str | None
     host: str
     port: int | None
@@ -86,6 +97,7 @@ def request(
     policy: Policy | None = None,
     limits: Limits | None = None,
     pose_limits: PoseLimits | None = None,
+    io: Sequence[str] = (),
     version: str | None = None,
     host: str = "",
     port: int | None = None,
@@ -127,6 +139,7 @@ def request(
         command=KINDS[kind],
         mode=None if kind == "monitor" else mode_message(mode),
         timeout=within(timeout, "timeout", 0.1, 60.0, unit="s"),
+        io=_signals(io, connection),
     )
 
     def make() -> Client:
@@ -169,6 +182,48 @@ def _check_kind(kind: str, capabilities: tuple[str, ...]) -> None:
         allowed=", ".join(offered),
         hint=hint,
     )
+
+
+def _signals(names: Sequence[str], connection: Connection) -> tuple[str, ...]:
+    """Full names of the signals that the session shall carry, checked as the cabinet does."""
+    if isinstance(names, str):
+        raise ShapeError(f"io is {names!r}; a list of names is wanted", parameter="io", hint=f'io=["{names}"]')
+    if not names:
+        return ()
+    if "fri_io" not in connection.welcome.capabilities:
+        raise CommandRejected(
+            "this cabinet's FRI carries no signals",
+            code=int(Code.UNSUPPORTED),
+            parameter="io",
+            hint="they came with FRI 1.14; arm.io reads and writes them over the application",
+        )
+    known = connection.signals
+    all_names = tuple(one.name for one in known)
+    found = [known[find_name(name, all_names)] for name in names]
+    full = tuple(one.name for one in found)
+    if len(full) > MAX_IO:
+        raise LimitError(
+            f"{len(full)} signals; FRI carries at most {MAX_IO}",
+            code=int(Code.BAD_LENGTH),
+            parameter="io",
+            value=len(full),
+            allowed=f"[0, {MAX_IO}]",
+        )
+    for place, one in enumerate(found):
+        if one.name in full[:place]:
+            raise CommandRejected(
+                f"{one.name} is named twice", code=int(Code.UNKNOWN_NAME), parameter=f"io[{place}]"
+            )
+        if one.kind == "integer" or len(one.name) > MAX_NAME:
+            what = (
+                f"{one.name} is a number with a sign, and FRI carries none"
+                if one.kind == "integer"
+                else f"FRI carries names of at most {MAX_NAME} octets; {one.name} has {len(one.name)}"
+            )
+            raise CommandRejected(
+                what, code=int(Code.UNSUPPORTED), parameter=f"io[{place}]", hint="arm.io reads and writes it"
+            )
+    return full
 
 
 def _check_pace(kind: str, period: float, multiplier: int) -> None:
@@ -226,6 +281,23 @@ def check_mode(kind: str, mode: Mode | None) -> None:
         allowed=example.partition("(")[0],
         hint=f'arm.fri("{kind}", mode={example}), with the mode from heptarm.modes',
     )
+
+
+def check_command(kind: str, given: Mapping[str, object]) -> None:
+    """Check that a session of a kind commands what is given; None is not.
+
+    Raises:
+        ModeConflict: it commands something else.
+    """
+    for name, value in given.items():
+        if value is not None and name not in COMMANDS[kind]:
+            other = {"q": "position", "tau": "torque", "e1": "pose"}.get(name, name)
+            raise ModeConflict(
+                f'{name} is not commanded in an FRI session of kind "{kind}"',
+                parameter=name,
+                allowed=", ".join(COMMANDS[kind]) or "nothing",
+                hint=f'open the session with arm.fri("{other}")',
+            )
 
 
 def _listening(port: int | None, make: Callable[[int], Client]) -> Client:

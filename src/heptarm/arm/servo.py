@@ -11,19 +11,18 @@ Each target brings the time within which the next one has to come; a program tha
 
 from __future__ import annotations
 
-import logging
 from collections import deque
 from dataclasses import dataclass
 from math import inf, nan
-from types import TracebackType
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from heptarm.arm.block import Block
 from heptarm.arm.handle import MotionHandle
 from heptarm.arm.modes import mode_message
-from heptarm.errors import CommandRejected, HeptarmError, LocalProtocolError, ShapeError, Timeout
+from heptarm.errors import CommandRejected, LocalProtocolError, ShapeError, Timeout
 from heptarm.values.arrays import Array, array
 from heptarm.values.condition import Condition
 from heptarm.values.mode import Mode
@@ -34,8 +33,6 @@ from heptarm.wire import messages as wire
 
 if TYPE_CHECKING:
     from heptarm.arm.connection import Connection
-
-_log = logging.getLogger("heptarm.servo")
 
 #: How long to wait for the start, and for rest at the end [s].
 _PATIENCE = 5.0
@@ -76,7 +73,7 @@ class ServoStats:
     text: str = ""
 
 
-class Servo:
+class Servo(Block):
     """A stream of targets; made by `Arm.servo`, used in a `with` block. Its subclasses say what targets are.
 
     Leaving the block ends the motion at rest. An error that ended it earlier, such as a missed watchdog, rises there.
@@ -85,6 +82,8 @@ class Servo:
         period: pause between two ticks [s].
         watchdog: within this time after a target the next one has to come [s].
     """
+
+    what = "servo motion"
 
     def __init__(
         self,
@@ -137,20 +136,6 @@ class Servo:
         )
         self._began = self._due = self._last = self._clock.nanos()
         return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        """End the motion and wait for rest; raises what ended it early, unless another error is on its way."""
-        try:
-            self.close()
-        except HeptarmError as trouble:
-            if error is None:
-                raise
-            _log.warning("closing the servo motion: %s", trouble)
 
     def close(self) -> None:
         """End the motion at rest; raises what ended it early. Closing twice is legal."""

@@ -23,7 +23,6 @@ import numpy as np
 
 from heptarm import _resources
 from heptarm.errors import CommandRejected, HeptarmError, MissingExtra, Unreachable
-from heptarm.fri.messages import IoType
 from heptarm.model.inverse import solve
 from heptarm.values.arrays import Array
 from heptarm.values.links import Body
@@ -31,7 +30,8 @@ from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, SineIm
 from heptarm.values.motion import TOOL
 from heptarm.values.orientation import REFERENCES, TYPES, Orientation
 from heptarm.values.pose import Pose
-from heptarm.virtual.fri.sessions import Sessions, Shared
+from heptarm.virtual.fri.sessions import Sessions
+from heptarm.virtual.fri.signals import SessionSignal
 from heptarm.virtual.order import Order, PlanError, Watch
 from heptarm.virtual.plant import Plant
 from heptarm.virtual.templates import Project
@@ -131,15 +131,6 @@ class _Listener:
 
 def _numbers(values: Any) -> tuple[float, ...]:
     return tuple(float(v) for v in values[:])
-
-
-def _shared(names: Any, kinds: Any) -> tuple[Shared, ...]:
-    """Signals for a client: of each its type, 1 if it is an output, and its place."""
-    rows = [tuple(int(value) for value in kinds[i : i + 3]) for i in range(0, len(kinds), 3)]
-    return tuple(
-        Shared(str(name), IoType(kind), bool(is_output), place)
-        for name, (kind, is_output, place) in zip(names, rows, strict=True)
-    )
 
 
 def _numbers_if(values: Any) -> tuple[float, ...] | None:
@@ -375,9 +366,7 @@ def open_station(plant: Plant, sessions: Sessions) -> Any:
             return jpype.JArray(jpype.JDouble)(found.tolist())
 
         @jpype.JOverride  # type: ignore[untyped-decorator]
-        def friOpen(
-            self, host: Any, settings: Any, transformations: Any, signals: Any, kinds: Any, channel: Any
-        ) -> int:
+        def friOpen(self, host: Any, settings: Any, transformations: Any, signals: Any, channel: Any) -> int:
             period, multiplier, port, own = (int(value) for value in settings[:])
             try:
                 return sessions.open(
@@ -386,8 +375,8 @@ def open_station(plant: Plant, sessions: Sessions) -> Any:
                     multiplier=multiplier,
                     port=None if own < 0 else own,
                     transformations=tuple(str(name) for name in transformations),
+                    signals=tuple(SessionSignal.of(one) for one in signals),
                     channel=channel.changed,
-                    signals=_shared(signals, kinds),
                 )
             except HeptarmError as error:  # Java would see a proxy without a word
                 raise jpype.JClass("java.lang.IllegalStateException")(str(error)) from error

@@ -55,14 +55,6 @@ class Signals:
             raise ValueError(f"no signal {name!r}, or several; there are {', '.join(self.names) or 'none'}")
         return (exact or found)[0]
 
-    def at(self, place: int) -> float:
-        """Value at a place."""
-        return float(self._values[place])
-
-    def put(self, place: int, value: float) -> None:
-        """Give the signal at a place a value."""
-        self._values[place] = value
-
     def get(self, name: str) -> float:
         """Value of a signal. Raises as `find` does."""
         return float(self._values[self.find(name)])

@@ -4041,6 +4041,7 @@ class FriOpen:
     command: FriCommandMode
     mode: Mode | None = None
     timeout: float = 10.0
+    io: tuple[str, ...] = ()
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_str(self.host))
@@ -4051,6 +4052,9 @@ class FriOpen:
             out.append(b"\x01")
             _write_Mode(self.mode, out)
         out.append(_FriOpen_1.pack(self.timeout))
+        out.append(codec.put_count(len(self.io)))
+        for one_io in self.io:
+            out.append(codec.put_str(one_io))
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[FriOpen, int]:
@@ -4068,7 +4072,13 @@ class FriOpen:
         v = codec.unpack(_FriOpen_1, data, pos)
         pos += _FriOpen_1.size
         timeout = v[0]
-        return cls(host=host, port=port, period=period, receive_multiplier=receive_multiplier, command=command, mode=mode, timeout=timeout), pos
+        size, pos = codec.read_count(data, pos)
+        io_list: list[str] = []
+        for _ in range(size):
+            one_io, pos = codec.read_str(data, pos)
+            io_list.append(one_io)
+        io = tuple(io_list)
+        return cls(host=host, port=port, period=period, receive_multiplier=receive_multiplier, command=command, mode=mode, timeout=timeout, io=io), pos
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.host.encode()), path + "host", 1, 64)
@@ -4078,6 +4088,7 @@ class FriOpen:
         if self.mode is not None:
             self.mode._check(path + "mode.")
         codec.check(self.timeout, path + "timeout", 0.1, 60.0, False, False)
+        codec.check_length(len(self.io), path + "io", 0, 10)
 
     def encode(self) -> bytes:
         """The body."""

@@ -20,13 +20,39 @@ import com.kuka.connectivity.fastRobotInterface.FRIJointOverlay;
 import com.kuka.connectivity.fastRobotInterface.FRISession;
 import com.kuka.connectivity.fastRobotInterface.IFRISessionListener;
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
+import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.ioModel.AbstractIOGroup;
+import com.kuka.roboticsAPI.ioModel.IOTypes;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.PositionHold;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.PositionControlMode;
 
 /** An FRI application as Sunrise programmers write it; each step leaves a line that the test reads. */
 public class Overlaying extends RoboticsAPIApplication implements IFRISessionListener {
+    /** As a project's generated groups are. */
+    private static final class Signals extends AbstractIOGroup {
+        Signals(Controller controller) {
+            super(controller, "Sample");
+            addInput("Button", IOTypes.BOOLEAN, 1);
+            addDigitalOutput("Count", IOTypes.UNSIGNED_INTEGER, 8);
+            addDigitalOutput("Offset", IOTypes.INTEGER, 8);
+            addAnalogOutput("Level", IOTypes.ANALOG, 12, 0, 10);
+        }
+
+        long count() {
+            return getNumberIOValue("Count", true).longValue();
+        }
+
+        long offset() {
+            return getNumberIOValue("Offset", true).longValue();
+        }
+
+        double level() {
+            return getAnalogIOValue("Level", true);
+        }
+    }
+
     @Inject
     private LBR lbr;
 
@@ -51,6 +77,11 @@ public class Overlaying extends RoboticsAPIApplication implements IFRISessionLis
         configuration.setSendPeriodMilliSec(5);
         configuration.setReceiveMultiplier(1);
         configuration.setPortOnRemote(port);
+        Signals signals = new Signals(lbr.getController());
+        configuration.registerIO(signals.getInput("Button"));
+        configuration.registerIO(signals.getOutput("Count"));
+        configuration.registerIO(signals.getOutput("Offset"));
+        configuration.registerIO(signals.getOutput("Level"));
         boolean refused = false;
         try {
             configuration.setSendPeriodMilliSec(0);
@@ -72,6 +103,8 @@ public class Overlaying extends RoboticsAPIApplication implements IFRISessionLis
         say("the client moves the arm", lbr.getCurrentJointPosition().get(6) > before + 0.09);
         say("commanding is active",
                 session.getFRIChannelInformation().getFRISessionState() == FRISessionState.COMMANDING_ACTIVE);
+        say("the client's outputs are the cabinet's", signals.offset() == -3 && signals.level() == 2.5);
+        say("an output out of its range is not written", signals.count() == 0);
         container.cancel();
         ThreadUtil.milliSleep(700);
         say("cancelling the motion ends the overlay", container.isFinished() && !container.hasError());

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import isfinite
 
 from heptarm.errors import CommandRejected
@@ -16,11 +17,13 @@ class Exchange:
     Attributes:
         signals: inputs and outputs by name, with their present values.
         frames: newest frames of the client by name.
+        veto: says why the cabinet does not take an output; empty if it does.
     """
 
     def __init__(self, configuration: Configuration) -> None:
         self.signals: dict[str, m.IoValue] = {signal.name: signal for signal in configuration.signals}
         self.frames: dict[str, m.Transformation] = {}
+        self.veto: Callable[[m.IoValue], str] = _takes_all
         self._wanted = configuration.transformations
 
     def set(self, name: str, value: int | float) -> None:
@@ -65,6 +68,9 @@ class Exchange:
             return Refused(f"the client writes {value.name!r}, which is {known.type.name}, an illegal value")
         if known.value == value.value:
             return None
+        why = self.veto(value)
+        if why:
+            return Refused(why)
         self.signals[value.name] = value
         return OutputWritten(value)
 
@@ -77,6 +83,10 @@ class Exchange:
             return Refused(f"the client provides the frame {frame.name!r} with numbers that are not finite")
         before, self.frames[frame.name] = self.frames.get(frame.name), frame
         return None if before is not None and before.values == frame.values else FrameProvided(frame)
+
+
+def _takes_all(value: m.IoValue) -> str:
+    return ""
 
 
 def fits(kind: m.IoType, value: int | float) -> bool:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from heptarm.errors import CommandRejected, HeptarmError
-from heptarm.fri.messages import CommandMode, IoDirection, IoType, IoValue
+from heptarm.fri.messages import CommandMode, IoValue
 from heptarm.fri.version import Version
 from heptarm.values.mode import Mode, Position
 from heptarm.virtual.fri.configuration import Configuration
@@ -16,15 +15,18 @@ from heptarm.virtual.fri.events import Event, OutputWritten, OverlayEnded, Quali
 from heptarm.virtual.fri.overlay import MotionOverlay, Superposition
 from heptarm.virtual.fri.plant_arm import PlantArm
 from heptarm.virtual.fri.server import Address, Server
+from heptarm.virtual.fri.signals import Bridge, SessionSignal
 from heptarm.virtual.fri.standalone import control_of, words
 from heptarm.virtual.order import Listener
 from heptarm.virtual.plant import Plant
-from heptarm.virtual.signals import Signals
+from heptarm.virtual.safety import Demand
 
 _log = logging.getLogger("heptarm.virtual.fri")
 
 #: Hears of a session: numbers of state and quality as FRI transmits them, latency and jitter [s].
 Channel = Callable[[int, int, float, float], None]
+#: During these a cabinet writes no outputs.
+_STOPS = {Demand.EMERGENCY_STOP, Demand.EXTERNAL_EMERGENCY_STOP}
 #: Ticks after `close` in which the last message leaves.
 _FAREWELL = 2
 
@@ -47,52 +49,11 @@ class _Arm(PlantArm):
         self._control = control_of(mode)
 
 
-@dataclass(frozen=True, slots=True)
-class Shared:
-    """A signal of the cabinet that the client sees, and writes if it is an output.
-
-    Attributes:
-        name: "Group.Signal".
-        type: as FRI has it.
-        is_output: seen from the cabinet.
-        place: in the IO image.
-    """
-
-    name: str
-    type: IoType
-    is_output: bool
-    place: int
-
-    def value(self, signals: Signals) -> int | float:
-        """Its value, as FRI transmits it."""
-        value = signals.at(self.place)
-        return value if self.type is IoType.ANALOG else max(0, round(value))
-
-    def first(self, signals: Signals) -> IoValue:
-        """What the session begins with."""
-        direction = IoDirection.OUTPUT if self.is_output else IoDirection.INPUT
-        return IoValue(self.name, self.type, direction, self.value(signals))
-
-
 class _Session:
-    def __init__(self, server: Server, arm: _Arm, shared: tuple[Shared, ...]) -> None:
-        self.server, self.arm, self.shared = server, arm, shared
+    def __init__(self, server: Server, arm: _Arm, bridge: Bridge) -> None:
+        self.server, self.arm, self.bridge = server, arm, bridge
         self.order = 0  # whose motion is overlaid
         self.farewell = -1  # ticks until the port is free; -1: not closing
-
-    def share(self, signals: Signals) -> None:
-        """Show the client what its signals are now."""
-        exchange = self.server.controller.exchange
-        for one in self.shared:
-            value = one.value(signals)
-            if exchange.signals[one.name].value != value:
-                exchange.set(one.name, value)
-
-    def written(self, value: IoValue, signals: Signals) -> None:
-        """The client has written an output."""
-        for one in self.shared:
-            if one.name == value.name:
-                signals.put(one.place, float(value.value))
 
 
 class Sessions:
@@ -118,31 +79,32 @@ class Sessions:
         multiplier: int,
         port: int | None,
         transformations: tuple[str, ...],
+        signals: tuple[SessionSignal, ...],
         channel: Channel,
-        signals: tuple[Shared, ...] = (),
     ) -> int:
         """Open a session to a client; returns its number.
 
         Raises:
             HeptarmError: an illegal configuration, a port that is taken, an address that is none.
         """
+        image = self._plant.ring.signals
         configuration = Configuration(
             self._version,
             period_ms=period_ms,
             multiplier=multiplier,
-            signals=tuple(one.first(self._plant.signals) for one in signals),
+            signals=tuple(one.value(float(image[one.place])) for one in signals),
             transformations=transformations,
         )
         arm = _Arm(self._plant)
         server = Server(configuration, arm, client=client, port=port, speed=self._speed)
-        session = _Session(server, arm, signals)
+        session = _Session(server, arm, Bridge(signals, image))
 
         def hear(event: Event) -> None:
             text = words(event)
             if text:
                 _log.info("FRI: %s", text)
             if isinstance(event, OutputWritten):
-                session.written(event.value, self._plant.signals)
+                session.bridge.write(event.value)
             if isinstance(event, OverlayEnded) and event.is_error and session.order:
                 self._plant.abort(session.order, event.text)
             if isinstance(event, StateChanged | QualityChanged):
@@ -155,7 +117,11 @@ class Sessions:
                     1e-9 * meter.jitter_ns,
                 )
 
+        def veto(value: IoValue) -> str:
+            return session.bridge.veto(value, stopped=not _STOPS.isdisjoint(self._plant.safety.demands))
+
         server.listener = hear
+        server.controller.exchange.veto = veto
         server.open()
         with self._lock:
             self._last += 1
@@ -175,7 +141,7 @@ class Sessions:
         if not self._sessions:
             return
         for number, session in list(self._sessions.items()):
-            session.share(self._plant.signals)
+            session.bridge.show(session.server.controller.exchange)
             session.server.tick()
             if session.farewell > 0:
                 session.farewell -= 1

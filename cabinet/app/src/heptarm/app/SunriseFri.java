@@ -1,5 +1,8 @@
 package heptarm.app;
 
+import java.util.ArrayList;
+import java.util.Arrays;
+import java.util.List;
 import java.util.concurrent.TimeUnit;
 
 import com.kuka.connectivity.fastRobotInterface.ClientCommandMode;
@@ -9,6 +12,7 @@ import com.kuka.connectivity.fastRobotInterface.FRIJointOverlay;
 import com.kuka.connectivity.fastRobotInterface.FRISession;
 import com.kuka.connectivity.fastRobotInterface.IFRISessionListener;
 import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.ioModel.AbstractIO;
 import com.kuka.roboticsAPI.motionModel.PositionHold;
 
 import heptarm.core.Fri;
@@ -40,7 +44,8 @@ final class SunriseFri implements Fri, IFRISessionListener {
         Job move(PositionHold hold, Job.Listener listener) throws Refusal;
     }
 
-    private SunriseFri(FriOpen open, LBR robot, Modes modes, Mover mover, Fri.Listener listener) {
+    private SunriseFri(FriOpen open, LBR robot, Modes modes, IoSignals signals, Mover mover, Fri.Listener listener)
+            throws Refusal {
         this.open = open;
         this.modes = modes;
         this.mover = mover;
@@ -49,12 +54,35 @@ final class SunriseFri implements Fri, IFRISessionListener {
         configuration.setPortOnRemote(open.port);
         configuration.setSendPeriodMilliSec(milliseconds(open.period));
         configuration.setReceiveMultiplier(open.receive_multiplier);
+        if (open.io.length > 0) {
+            register(open.io, signals, configuration);
+        }
         session = new FRISession(configuration);
         session.addFRISessionListener(this);
     }
 
-    static SunriseFri of(FriOpen open, LBR robot, Modes modes, Mover mover, Fri.Listener listener) {
-        SunriseFri fri = new SunriseFri(open, robot, modes, mover, listener);
+    private static void register(String[] names, IoSignals signals, FRIConfiguration configuration) throws Refusal {
+        if (!carriesSignals()) {
+            throw new Refusal(Code.UNSUPPORTED, "io", names[0], "none", "this cabinet's FRI carries no signals; they came with 1.14");
+        }
+        for (int i = 0; i < names.length; i++) {
+            configuration.registerIO(signals.signal(names[i]));
+        }
+    }
+
+    /** FRI 1.11 has none. */
+    private static boolean carriesSignals() {
+        try {
+            FRIConfiguration.class.getMethod("registerIO", AbstractIO.class);
+            return true;
+        } catch (NoSuchMethodException e) {
+            return false;
+        }
+    }
+
+    static SunriseFri of(FriOpen open, LBR robot, Modes modes, IoSignals signals, Mover mover, Fri.Listener listener)
+            throws Refusal {
+        SunriseFri fri = new SunriseFri(open, robot, modes, signals, mover, listener);
         FRIChannelInformation now = fri.session.getFRIChannelInformation(); // from before the listener was there
         FRIChannelInformation told;
         do {
@@ -67,7 +95,12 @@ final class SunriseFri implements Fri, IFRISessionListener {
 
     /** What the option adds to the cabinet's capabilities. */
     static String[] capabilities() {
-        return new String[] {"fri", "fri_monitor", "fri_position", "fri_torque", "fri_wrench"};
+        List<String> all = new ArrayList<String>(
+                Arrays.asList("fri", "fri_monitor", "fri_position", "fri_torque", "fri_wrench"));
+        if (carriesSignals()) {
+            all.add("fri_io");
+        }
+        return all.toArray(new String[0]);
     }
 
     /** Refuses what FRI cannot do. */

@@ -292,7 +292,7 @@ final class SunriseRobot implements Robot, IErrorHandler {
 
     public Fri fri(FriOpen open, Fri.Listener listener) throws Refusal {
         try {
-            return SunriseFri.of(open, lbr, new Modes(tools), new SunriseFri.Mover() {
+            return SunriseFri.of(open, lbr, new Modes(tools), panel.signals, new SunriseFri.Mover() {
                 public Job move(PositionHold hold, Job.Listener jobListener) throws Refusal {
                     return begin(hold, jobListener);
                 }

@@ -232,6 +232,7 @@ final class Dispatcher {
 
     private long open(FriOpen open) throws Refusal {
         checkMode(open.mode, "mode.");
+        FriRules.check(open.io, server.robot.signals());
         server.robot.check(open);
         FriRun run = new FriRun(server, open);
         if (!run.onlyMonitors()) {

@@ -13,8 +13,10 @@ public final class FriOpen extends Message {
     public final Mode mode;
     /** for the client to answer [s] */
     public final double timeout;
+    /** names of signals that the session carries: inputs for the client to read, outputs also to write; boolean, unsigned or analog, of at most 63 octets */
+    public final String[] io;
 
-    public FriOpen(String host, int port, double period, int receive_multiplier, FriCommandMode command, Mode mode, double timeout) {
+    public FriOpen(String host, int port, double period, int receive_multiplier, FriCommandMode command, Mode mode, double timeout, String[] io) {
         this.host = host;
         this.port = port;
         this.period = period;
@@ -22,6 +24,7 @@ public final class FriOpen extends Message {
         this.command = command;
         this.mode = mode;
         this.timeout = timeout;
+        this.io = io;
     }
 
     public static final int TYPE = 80;
@@ -42,6 +45,10 @@ public final class FriOpen extends Message {
             mode.write(out);
         }
         out.putF64(timeout);
+        out.putCount(io.length);
+        for (int i = 0; i < io.length; i++) {
+            out.putStr(io[i]);
+        }
     }
 
     public static FriOpen read(Decoder in) throws WireException {
@@ -52,7 +59,12 @@ public final class FriOpen extends Message {
         FriCommandMode command = FriCommandMode.fromValue(in.getU8());
         Mode mode = in.getBool() ? Mode.read(in) : null;
         double timeout = in.getF64();
-        return new FriOpen(host, port, period, receive_multiplier, command, mode, timeout);
+        int ioSize = in.getCount();
+        String[] io = new String[ioSize];
+        for (int i = 0; i < ioSize; i++) {
+            io[i] = in.getStr();
+        }
+        return new FriOpen(host, port, period, receive_multiplier, command, mode, timeout, io);
     }
 
     public void validate(String path) throws Violation {
@@ -64,5 +76,6 @@ public final class FriOpen extends Message {
             mode.validate(path + "mode.");
         }
         Check.number(timeout, path + "timeout", 0.1, 60.0, false, false);
+        Check.length(io.length, path + "io", 0, 10);
     }
 }

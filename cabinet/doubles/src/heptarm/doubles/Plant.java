@@ -52,10 +52,10 @@ public interface Plant {
     /**
      * Opens an FRI session to a client; returns its number.
      *
-     * @param signals names of those that the client sees; kinds of each: type as FRI numbers it, 1 for an output, place
+     * @param signals those that the client sees
      * @param settings send period [ms], receive multiplier, port on the client, own port (-1: chosen)
      */
-    long friOpen(String host, int[] settings, String[] transformations, String[] signals, int[] kinds, FriChannel channel);
+    long friOpen(String host, int[] settings, String[] transformations, FriSignal[] signals, FriChannel channel);
 
     void friClose(long session);
 

@@ -68,6 +68,7 @@ final class FakeRobot implements Robot, Runnable {
         new SignalInfo("Flange.Lamp", IoDirection.OUTPUT, IoType.BOOLEAN, 0, 1),
         new SignalInfo("Cell.Count", IoDirection.OUTPUT, IoType.UNSIGNED, 0, 255),
         new SignalInfo("Cell.Level", IoDirection.OUTPUT, IoType.ANALOG, -10, 10),
+        new SignalInfo("Cell.Offset", IoDirection.INPUT, IoType.INTEGER, -128, 127),
     };
     private static final long SLOWLY_NS = 500000000L;
     private static final long TICK_NS = 2000000L;

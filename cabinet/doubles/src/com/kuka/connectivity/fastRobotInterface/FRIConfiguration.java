@@ -8,8 +8,8 @@ import java.util.Map;
 import com.kuka.roboticsAPI.deviceModel.Device;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.ioModel.AbstractIO;
-import com.kuka.roboticsAPI.ioModel.IOTypes;
-import com.kuka.roboticsAPI.ioModel.Output;
+
+import heptarm.doubles.FriSignal;
 
 /** Where an FRI session leads to and how often it sends. */
 public class FRIConfiguration {
@@ -20,7 +20,7 @@ public class FRIConfiguration {
     private final Device device;
     private final String host;
     private final Map<String, AbstractFrame> transformations = new LinkedHashMap<>();
-    private final List<AbstractIO> signals = new ArrayList<>();
+    private final List<FriSignal> signals = new ArrayList<>();
     private int sendPeriod = 10;
     private int receiveMultiplier = 1;
     private int portOnRemote = 30200;
@@ -61,17 +61,17 @@ public class FRIConfiguration {
         portOnController = within("portOnController", port, 1, PORTS);
     }
 
+    /** An input that the client sees, or an output that it sees and writes; at most ten. */
+    public void registerIO(AbstractIO io) {
+        if (io == null) {
+            throw new IllegalArgumentException("no signal is given");
+        }
+        signals.add(io.forFri());
+    }
+
     /** A frame that the client leads; at most five. */
     public void registerTransformationProvider(String name, AbstractFrame frame) {
         transformations.put(name, frame);
-    }
-
-    /** A signal that the client sees, and writes if it is an output; at most ten. */
-    public void registerIO(AbstractIO signal) {
-        if (signal == null) {
-            throw new IllegalArgumentException("a signal is wanted");
-        }
-        signals.add(signal);
     }
 
     public String getHostName() {
@@ -100,25 +100,9 @@ public class FRIConfiguration {
         return portOnController;
     }
 
-    /** Names of the signals that the client sees; for the simulation. */
-    public String[] signalNames() {
-        String[] names = new String[signals.size()];
-        for (int i = 0; i < names.length; i++) {
-            names[i] = signals.get(i).path();
-        }
-        return names;
-    }
-
-    /** Type, 1 for an output and place of each signal; for the simulation. */
-    public int[] signalKinds() {
-        int[] kinds = new int[3 * signals.size()];
-        for (int i = 0; i < signals.size(); i++) {
-            AbstractIO one = signals.get(i);
-            kinds[3 * i] = one.kind() == IOTypes.BOOLEAN ? 0 : one.kind() == IOTypes.ANALOG ? 2 : 1;
-            kinds[3 * i + 1] = one instanceof Output ? 1 : 0;
-            kinds[3 * i + 2] = one.place();
-        }
-        return kinds;
+    /** Signals that the client sees; for the simulation. */
+    public FriSignal[] signals() {
+        return signals.toArray(new FriSignal[0]);
     }
 
     /** Names of the frames that the client leads; for the simulation. */

@@ -27,7 +27,7 @@ public class FRISession implements FriChannel {
         int[] settings = {configuration.getSendPeriodMilliSec(), configuration.getReceiveMultiplier(),
             configuration.getPortOnRemote(), configuration.portOnController()};
         number = station.plant.friOpen(configuration.getHostName(), settings, configuration.transformationNames(),
-                configuration.signalNames(), configuration.signalKinds(), this);
+                configuration.signals(), this);
     }
 
     /** Waits until the client answers well enough for an overlay. */

@@ -1,20 +1,21 @@
 package com.kuka.roboticsAPI.ioModel;
 
+import heptarm.doubles.FriSignal;
 import heptarm.doubles.Station;
 
 /** An input or output of a group. */
 public abstract class AbstractIO {
     private final Station station = Station.current();
-    private final String path;
+    private final String group;
     private final String name;
     private final IOTypes type;
     private final int place;
 
     AbstractIO(String group, String name, IOTypes type, boolean output) {
+        this.group = group;
         this.name = name;
         this.type = type;
-        this.path = group + "." + name;
-        this.place = station.plant.signal(path, output);
+        this.place = station.plant.signal(group + "." + name, output);
     }
 
     /** For the simulation. */
@@ -22,14 +23,17 @@ public abstract class AbstractIO {
         return place;
     }
 
-    /** "Group.Name"; for the simulation. */
-    public final String path() {
-        return path;
+    /** With its group, its type, and the values that it can have; for the simulation. */
+    public final FriSignal forFri() {
+        return new FriSignal(group + "." + name, type.ordinal(), this instanceof Output, place, low(), high());
     }
 
-    /** For the simulation. */
-    public final IOTypes kind() {
-        return type;
+    double low() {
+        return Double.NEGATIVE_INFINITY;
+    }
+
+    double high() {
+        return Double.POSITIVE_INFINITY;
     }
 
     final String name() {

@@ -11,6 +11,16 @@ public class Output extends AbstractIO {
         this.high = high;
     }
 
+    @Override
+    double low() {
+        return low;
+    }
+
+    @Override
+    double high() {
+        return high;
+    }
+
     void check(double value) {
         if (!(value >= low && value <= high)) {
             throw new IllegalArgumentException("output " + name() + " is to be " + value + "; it can be " + low + " to " + high);
