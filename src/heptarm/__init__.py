@@ -21,8 +21,10 @@ if TYPE_CHECKING:
     from heptarm.arm.handle import MotionHandle
     from heptarm.arm.servo import JointServo, PoseServo, ServoStats
     from heptarm.arm.target import target_from_env
+    from heptarm.arm.teaching import Replay
     from heptarm.errors import (
         ArrivalError,
+        CollisionDetected,
         CommandRejected,
         ConnectFailed,
         ConnectionLost,
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
         MotionAborted,
         MotionError,
         NeedsOperator,
+        NoContact,
         NotInControl,
         NotReady,
         ProtocolError,
@@ -48,10 +51,13 @@ if TYPE_CHECKING:
         Unreachable,
         VersionMismatch,
     )
+    from heptarm.values.collision import Collision, CollisionGuard
+    from heptarm.values.contact import Contact
     from heptarm.values.motion import (
         arc,
         circ,
         ellipse,
+        hand_guide,
         hold,
         lin,
         lin_rel,
@@ -67,6 +73,7 @@ if TYPE_CHECKING:
     from heptarm.values.result import Cause, Result
     from heptarm.values.state import State
     from heptarm.values.tool import Tool, Workpiece
+    from heptarm.values.trajectory import Trajectory
 
 __version__ = "0.1.0"
 
@@ -74,9 +81,13 @@ __all__ = [
     "Arm",
     "ArrivalError",
     "Cause",
+    "Collision",
+    "CollisionDetected",
+    "CollisionGuard",
     "CommandRejected",
     "ConnectFailed",
     "ConnectionLost",
+    "Contact",
     "Fri",
     "HeptarmError",
     "JointServo",
@@ -88,6 +99,7 @@ __all__ = [
     "MotionError",
     "MotionHandle",
     "NeedsOperator",
+    "NoContact",
     "NotInControl",
     "NotReady",
     "Pose",
@@ -97,6 +109,7 @@ __all__ = [
     "Recovery",
     "Redundancy",
     "RemoteProtocolError",
+    "Replay",
     "Result",
     "SafetyStop",
     "ServoStats",
@@ -108,6 +121,7 @@ __all__ = [
     "StreamError",
     "Timeout",
     "Tool",
+    "Trajectory",
     "Unreachable",
     "VersionMismatch",
     "Workpiece",
@@ -117,6 +131,7 @@ __all__ = [
     "connect",
     "deg",
     "ellipse",
+    "hand_guide",
     "hold",
     "lin",
     "lin_rel",
@@ -145,11 +160,17 @@ _HOMES = {
     "spl": "values.motion",
     "spline": "values.motion",
     "spline_joints": "values.motion",
+    "hand_guide": "values.motion",
     "hold": "values.motion",
     "lin": "values.motion",
     "lin_rel": "values.motion",
     "ptp": "values.motion",
     "ptp_home": "values.motion",
+    "Collision": "values.collision",
+    "CollisionGuard": "values.collision",
+    "Contact": "values.contact",
+    "Replay": "arm.teaching",
+    "Trajectory": "values.trajectory",
     "Pose": "values.pose",
     "deg": "values.pose",
     "Recovery": "values.recovery",

@@ -17,6 +17,8 @@
     │   └── NotInControl                    this client does not control the robot
     ├── MotionError                         a motion did not end as it should; carries its result
     │   ├── MotionAborted                   it was stopped under way
+    │   │   └── CollisionDetected           by a collision guard; `collision` says which joint and how much
+    │   ├── NoContact                       nothing was touched
     │   └── ArrivalError                    it ended short of its target
     ├── StreamError
     │   ├── Starved                         no target within the watchdog time
@@ -146,6 +148,22 @@ class MotionError(HeptarmError):
 
 class MotionAborted(MotionError):
     """The motion was ended under way, or could not be planned."""
+
+
+class CollisionDetected(MotionAborted):
+    """A collision guard ended it.
+
+    Attributes:
+        collision: which joint, and how much; None if nothing is known of it.
+    """
+
+    def __init__(self, text: str, *, collision: Any = None, **details: Any) -> None:
+        super().__init__(text, **details)
+        self.collision = collision
+
+
+class NoContact(MotionError):
+    """Something was to be touched, and was not."""
 
 
 class ArrivalError(MotionError):

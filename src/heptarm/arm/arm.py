@@ -11,8 +11,10 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Literal, TypedDict, overload
 
 from heptarm.arm import fri_settings, program, servo_settings
+from heptarm.arm.collision import Guarding
 from heptarm.arm.conditions import condition_message
 from heptarm.arm.connection import GROUPS, Connection
+from heptarm.arm.contact import Touching
 from heptarm.arm.equipment import Equipment
 from heptarm.arm.feed import States
 from heptarm.arm.fri import Fri
@@ -23,6 +25,7 @@ from heptarm.arm.operator import Operator
 from heptarm.arm.pad import Pad
 from heptarm.arm.servo import JointServo, PoseServo
 from heptarm.arm.stopping import REST_TIMEOUT, Stopping
+from heptarm.arm.teaching import Teaching
 from heptarm.arm.tooling import Tooling
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, StaleState, Timeout
 from heptarm.values.arrays import within
@@ -64,7 +67,7 @@ class _ServoSettings(TypedDict, total=False):
     until: Condition | None
 
 
-class Arm(Equipment, Stopping):
+class Arm(Equipment, Stopping, Touching, Guarding, Teaching):
     """A connected arm; made by `connect`. Its methods may be called from any thread.
 
     In a `with` block it is left at rest, however the block ends.
@@ -422,7 +425,7 @@ class Arm(Equipment, Stopping):
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
         chosen = mode_message(mode or self._mode)
         self._tooling.check(motions, mode or self._mode)
-        ends, parts = condition_message(until, self._connection.welcome.signals)
+        ends, parts = condition_message(self._guarded(until), self._connection.welcome.signals)
         self._tooling.check_until(parts)
         items = program.items(motions, self.robot, ceiling, mode=chosen, until=ends)
         message = wire.Run(items=items, when=_WHEN[when])
@@ -507,7 +510,7 @@ class Arm(Equipment, Stopping):
         )
         self._tooling.check_moved(moving, "moving")
         self._tooling.check_mode(mode or self._mode)
-        ends, parts = condition_message(until, self._connection.welcome.signals)
+        ends, parts = condition_message(self._guarded(until), self._connection.welcome.signals)
         self._tooling.check_until(parts)
         stream = JointServo if kind == "joint" else PoseServo
         return stream(

@@ -21,6 +21,7 @@ from heptarm.errors import CommandRejected, ConnectionLost, HeptarmError, Timeou
 from heptarm.io.clock import Clock
 from heptarm.io.transport import Transport
 from heptarm.values.arrays import within
+from heptarm.values.collision import CollisionGuard
 from heptarm.values.condition import Condition
 from heptarm.values.io import Signal
 from heptarm.values.result import Result
@@ -68,6 +69,7 @@ class Connection:
         controls: whether this client took control and has not lost it.
         controller: name of the client that controls the robot; empty: nobody.
         closed: set when the arm is closed.
+        guard: the collision guard in force.
     """
 
     def __init__(
@@ -85,6 +87,7 @@ class Connection:
         self.controls = False
         self.controller = ""
         self.closed = threading.Event()
+        self.guard: CollisionGuard | None = None
         self._dial = dial
         self._link: Link | None = None
         self._welcome: wire.Welcome | None = None
@@ -268,7 +271,7 @@ class Connection:
 
         The handle waits for up to `limit` seconds. `until` says which part of its break condition each node is.
         """
-        handle = MotionHandle(self, count, limit, until=until)
+        handle = MotionHandle(self, count, limit, until=until, guard=self.guard)
         handle.is_stiff = isinstance(message, wire.Run) and _ends_stiffly(message.items[-1])
 
         def claim(answer: Message) -> None:

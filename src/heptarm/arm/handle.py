@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout
 from dataclasses import replace
@@ -18,6 +18,7 @@ from heptarm import errors
 from heptarm.arm.refusals import error_of
 from heptarm.errors import (
     ArrivalError,
+    CollisionDetected,
     CommandRejected,
     ConnectionLost,
     HeptarmError,
@@ -26,6 +27,7 @@ from heptarm.errors import (
     Starved,
     Timeout,
 )
+from heptarm.values.collision import Collision, CollisionGuard
 from heptarm.values.condition import Condition
 from heptarm.values.result import Cause, Result
 from heptarm.values.state import State
@@ -48,12 +50,19 @@ class MotionHandle:
     """
 
     def __init__(
-        self, connection: Connection, count: int, limit: float, *, until: tuple[Condition, ...] = ()
+        self,
+        connection: Connection,
+        count: int,
+        limit: float,
+        *,
+        until: tuple[Condition, ...] = (),
+        guard: CollisionGuard | None = None,
     ) -> None:
         self._connection = connection
         self._count = count
         self._limit = limit
         self._until = until
+        self._guard = guard
         self._fired: State | None = None
         self._id = 0
         self._furthest = 0.0
@@ -188,6 +197,10 @@ class MotionHandle:
         result = self._connection.result_of(message)
         if 0 <= message.fired < len(self._until):
             result = replace(result, stopped_by=self._until[message.fired], fired_at=self._fired)
+            if self._guard is not None and result.stopped_by in self._guard.parts:
+                found = self._guard.named(result.stopped_by, result.fired_at or result.state)
+                self._end(collided(found, result, self._connection.history()))
+                return
         if result.cause is Cause.FINISHED and self.is_stiff and result.residual > ARRIVAL:
             self._end(
                 ArrivalError(
@@ -228,6 +241,17 @@ class MotionHandle:
         with contextlib.suppress(Exception):  # InvalidStateError: it has ended before
             self._future.set_exception(error)
         self._begun.set()
+
+
+def collided(found: Collision, result: Result | None, history: Sequence[State]) -> CollisionDetected:
+    """The error of a collision."""
+    return CollisionDetected(
+        f"collision at {found}",
+        collision=found,
+        result=result,
+        history=history,
+        hint="look what the arm has met; arm.collision_guard() takes the baseline anew",
+    )
 
 
 _WORDS = {

@@ -57,6 +57,14 @@ class Operator:
         """Let the enabling switch go."""
         self.do("release")
 
+    def guide(self) -> None:
+        """Hold the enabling switch of the hand guiding device."""
+        self.do("guide")
+
+    def let_go(self) -> None:
+        """Let the enabling switch of the hand guiding device go."""
+        self.do("let_go")
+
     def choose(self, mode: Literal["t1", "t2", "aut"]) -> None:
         """Choose the operation mode."""
         if mode not in ("t1", "t2", "aut"):

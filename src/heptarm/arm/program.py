@@ -15,6 +15,7 @@ from heptarm.values.arrays import Array
 from heptarm.values.limits import Blending, CartesianDynamics, JointDynamics
 from heptarm.values.motion import (
     Circ,
+    HandGuide,
     Hold,
     JointSpline,
     Lin,
@@ -31,7 +32,7 @@ from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 from heptarm.wire import messages as wire
 
-_MOTIONS = (Ptp, PtpHome, PtpPose, Lin, LinRel, Circ, Spline, JointSpline, Hold)
+_MOTIONS = (Ptp, PtpHome, PtpPose, Lin, LinRel, Circ, Spline, JointSpline, Hold, HandGuide)
 #: A motion may take this much longer than its slowest plausible estimate, and this much more [s].
 _GENEROUS, _AND_MORE = 3.0, 15.0
 #: The longest straight line and the longest arc inside the workspace of the largest arm [m].
@@ -105,6 +106,8 @@ def longest(motions: Sequence[Motion], robot: RobotModel, ceiling: float) -> flo
 def _slowest(motion: Motion, robot: RobotModel) -> float:
     if isinstance(motion, Hold):
         return motion.duration
+    if isinstance(motion, HandGuide):
+        return inf
     if isinstance(motion, JointSpline):
         return sum(_turn(point.joints, robot) for point in motion.points)
     turn = _turn(motion.joints, robot)
@@ -210,12 +213,29 @@ def _item(motion: Motion, robot: RobotModel) -> wire.Item:
         return wire.Item(
             motion=wire.JointSpline(
                 points=tuple(
-                    wire.JointPoint(q=_tuple(point.q), dynamics=_joints(point.joints)) for point in motion.points
+                    wire.JointPoint(q=_tuple(point.q), dynamics=_joints(point.joints))
+                    for point in motion.points
                 ),
                 dynamics=_joints(motion.joints),
             )
         )
+    if isinstance(motion, HandGuide):
+        return wire.Item(motion=_guide(motion, robot))
     return wire.Item(motion=wire.Hold(duration=nan if isinf(motion.duration) else motion.duration))
+
+
+def _guide(motion: HandGuide, robot: RobotModel) -> wire.HandGuide:
+    for name in ("q_min", "q_max"):
+        limits = getattr(motion, name)
+        robot.check(np.where(np.isnan(limits), 0.5 * (robot.q_min + robot.q_max), limits), name)
+    return wire.HandGuide(
+        q_min=_tuple(motion.q_min),
+        q_max=_tuple(motion.q_max),
+        joint_velocity=motion.joint_velocity,
+        cartesian_velocity=motion.cartesian_velocity,
+        freezes_all=motion.at_limit == "all",
+        pulls_back=motion.outside == "pull",
+    )
 
 
 def _segment(one: Spl | Lin | Circ) -> wire.SplineSegment:
@@ -284,4 +304,7 @@ def _tuple(values: Array) -> tuple[float, ...]:
 
 def is_endless(motions: Sequence[Motion]) -> bool:
     """Whether it ends only when it is cancelled."""
-    return any(isinstance(motion, Hold) and motion.duration == inf for motion in motions)
+    return any(
+        isinstance(motion, HandGuide) or (isinstance(motion, Hold) and motion.duration == inf)
+        for motion in motions
+    )

@@ -13,6 +13,7 @@ from typing import TypeAlias
 from heptarm.values.arguments import TOOL
 from heptarm.values.arrays import Value, within
 from heptarm.values.circ import Circ, arc, circ
+from heptarm.values.guiding import HandGuide, hand_guide
 from heptarm.values.lines import Lin, LinRel, lin, lin_rel
 from heptarm.values.ptp import Ptp, PtpHome, PtpPose, ptp, ptp_home
 from heptarm.values.spline import JointSpline, Spl, Spline, ellipse, spl, spline, spline_joints
@@ -21,6 +22,7 @@ __all__ = [
     "BASE",
     "TOOL",
     "Circ",
+    "HandGuide",
     "Hold",
     "JointSpline",
     "Lin",
@@ -34,6 +36,7 @@ __all__ = [
     "arc",
     "circ",
     "ellipse",
+    "hand_guide",
     "hold",
     "lin",
     "lin_rel",
@@ -72,7 +75,7 @@ class Hold(Value):
         return self
 
 
-Motion: TypeAlias = Ptp | PtpHome | PtpPose | Lin | LinRel | Circ | Spline | JointSpline | Hold
+Motion: TypeAlias = Ptp | PtpHome | PtpPose | Lin | LinRel | Circ | Spline | JointSpline | Hold | HandGuide
 
 
 def hold(seconds: float = inf) -> Hold:

@@ -197,6 +197,7 @@ class Safety(Value):
         torque_referenced: the torque sensors are referenced.
         position_referenced: the positions are referenced.
         recovery_required: the robot has to be recovered first.
+        hand_guiding_switch: the enabling switch of the hand guiding device is held.
     """
 
     stamp: int
@@ -213,6 +214,7 @@ class Safety(Value):
     torque_referenced: bool = False
     position_referenced: bool = False
     recovery_required: bool = False
+    hand_guiding_switch: bool = False
 
     @property
     def stops(self) -> tuple[str, ...]:

@@ -6,10 +6,12 @@ import mujoco
 import numpy as np
 
 from heptarm.values.arrays import Array
+from heptarm.values.guiding import HandGuide
 from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, SineImpedance
 from heptarm.values.pose import rotation
 from heptarm.values.robot import RobotModel
 from heptarm.virtual.fri.overlay import Superposition
+from heptarm.virtual.guiding import HandLaw
 from heptarm.virtual.impedance import CartesianSpring, Flange
 from heptarm.virtual.law import JointSpring, Law, PositionLaw, Sensed
 from heptarm.virtual.order import Order
@@ -83,6 +85,14 @@ class Control:
         else:
             return self.stiffen()
         return yielding
+
+    def guide(self, guide: HandGuide, q: Array, *, tcp: tuple[float, ...], ceiling: float) -> HandLaw:
+        """The law for a hand guiding that begins at joints of shape (7,) [rad]; `lead` brings it into force."""
+        return HandLaw(guide, self._robot, self._flange, q=q, tcp=tcp, ceiling=ceiling)
+
+    def lead(self, law: HandLaw) -> None:
+        """Bring a hand guiding's law into force."""
+        self._law, self._fitting = law, None
 
     def stiffen(self) -> bool:
         """Return to position control; says whether the arm was yielding, as `take` does."""

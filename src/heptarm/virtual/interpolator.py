@@ -7,27 +7,30 @@ along their paths or after servo targets, and brakes on the path or off it where
 from __future__ import annotations
 
 from collections import deque
-from math import nan
+from math import inf, nan
 
 import numpy as np
 
 from heptarm.errors import Unreachable
 from heptarm.values.arrays import Array
+from heptarm.values.guiding import HandGuide
 from heptarm.values.mode import Mode as ControlMode
 from heptarm.values.robot import RobotModel
 from heptarm.virtual import ring
 from heptarm.virtual.condition import Lookout, Watching
 from heptarm.virtual.control import Control
 from heptarm.virtual.fri.overlay import Superposition
+from heptarm.virtual.guiding import Guidance
 from heptarm.virtual.law import Sensed
 from heptarm.virtual.load import Load
+from heptarm.virtual.order import Order
 from heptarm.virtual.pace import TICK, Pace
 from heptarm.virtual.path import JointLine, JointPath
 from heptarm.virtual.planner import Plan
 from heptarm.virtual.profile import Limits, TimeLaw, brake
 from heptarm.virtual.queue import Cancellation, Queue
 from heptarm.virtual.safety import Mode, Safety
-from heptarm.virtual.servo import Follower, follower
+from heptarm.virtual.servo import Follower, SmartFollower, follower
 
 #: A motion is done when every measured joint is this near to its command [rad] and this slow [rad/s] ...
 SETTLED = 5e-5
@@ -62,6 +65,7 @@ class Run:
         "ended",
         "failure",
         "follower",
+        "guidance",
         "part",
         "path",
         "plan",
@@ -88,6 +92,7 @@ class Run:
         self.settling = 0
         self.started = False
         self.follower: Follower | None = None
+        self.guidance: Guidance | None = None
         self.broken = False
 
 
@@ -206,6 +211,8 @@ class Interpolator:
             self.run = run = Run(planned, accepted.serial, self.lookout.begin(planned))
             if order.is_servo:
                 run.follower = follower(self._robot, order, self.command[2])
+            if order.guide is not None:
+                run.guidance = self._guidance(order, order.guide)
             return run
         return None
 
@@ -242,6 +249,10 @@ class Interpolator:
                 self._brake_on_path(run)
         if run.ended:
             return self._settle(run)
+        if run.guidance is not None:
+            self._give_way(run, run.guidance)
+            if run.guidance is not None:
+                return nan, nan
         if run.follower is not None:
             return self._serve(run, run.follower)
         if self.action is not None and planned.order.kind == "hold" and not (run.cancelled or run.failure):
@@ -311,7 +322,9 @@ class Interpolator:
 
     def _halt(self, run: Run, *, jerk: float = 1.0) -> None:
         """Brake every axis by itself, straight on from where the last set-points led."""
-        run.braking, run.ended, run.follower = True, False, None
+        if run.guidance is not None:
+            self._control.stiffen()
+        run.braking, run.ended, run.follower, run.guidance = True, False, None, None
         before, now, here = self.command
         step = here - (before if now is here else now)  # whether or not the set-points were shifted in this tick
         speed = np.clip(step / TICK, -self._robot.dq_max, self._robot.dq_max)
@@ -340,6 +353,9 @@ class Interpolator:
             self._brake_on_path(run)
 
     def _brake_on_path(self, run: Run) -> None:
+        if run.guidance is not None:
+            self._let_go(run, run.guidance)
+            return
         rate = self._pace.rate
         if run.follower is not None:
             run.follower.brake(scale=self._pace.scale, rate=rate)
@@ -360,12 +376,44 @@ class Interpolator:
         run.time, run.braking = 0.0, True
 
     def _brake_fast(self, run: Run) -> None:
-        if run.failure or run.ended:
+        if run.failure or run.ended or run.guidance is not None:
             self._brake(run)
             return
         run.cancelled = True
         if not self.is_overlaid:  # else the next tick brakes from the overlay's speed
             self._halt(run, jerk=FAST_JERK)
+
+    # ------------------------------------------------------------------------------ hand guiding
+
+    def _guidance(self, order: Order, guide: HandGuide) -> Guidance:
+        ceiling = REDUCED_SPEED if self._safety.mode is Mode.T1 else inf
+        law = self._control.guide(guide, self._q, tcp=order.tcp[:3], ceiling=ceiling)
+        return Guidance(law, self._robot)
+
+    def _give_way(self, run: Run, guidance: Guidance) -> None:
+        """Give way while the switch is held and nothing else stops the arm; end when it has been let go."""
+        safety = self._safety
+        if guidance.has_begun and not safety.guides:
+            self._let_go(run, guidance)
+        elif safety.guides and not (safety.latched or self.is_paused or guidance.law.is_frozen):
+            guidance.has_begun, guidance.rest = True, None
+            self._control.lead(guidance.law)
+            self.command[2] = self._q + self._dq * TICK
+        elif guidance.has_begun:
+            self._go(run, self._stopped(guidance).advance(TICK))
+
+    def _let_go(self, run: Run, guidance: Guidance) -> None:
+        """Come to rest, and end."""
+        if guidance.has_begun:
+            run.follower = self._stopped(guidance)
+        else:
+            run.ended = True
+        run.braking, run.guidance = True, None
+
+    def _stopped(self, guidance: Guidance) -> SmartFollower:
+        """What brings an arm to rest that nobody leads any more."""
+        self._control.stiffen()
+        return guidance.halt(self._q.copy(), self._dq)
 
     # ------------------------------------------------------------------------------ servo motions and yielding
 

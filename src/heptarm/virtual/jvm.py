@@ -25,6 +25,7 @@ from heptarm import _resources
 from heptarm.errors import CommandRejected, HeptarmError, MissingExtra, Unreachable
 from heptarm.model.inverse import solve
 from heptarm.values.arrays import Array
+from heptarm.values.guiding import HandGuide
 from heptarm.values.links import Body
 from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, SineImpedance
 from heptarm.values.motion import TOOL
@@ -208,6 +209,21 @@ def _orientation(java: Any) -> Orientation:
     return Orientation(TYPES[kind], REFERENCES[reference])
 
 
+def _guide(java: Any) -> HandGuide | None:
+    """Limits of a hand guiding as heptarm.doubles.MotionOrder describes them."""
+    if java is None:
+        return None
+    *limits, joint_velocity, cartesian_velocity, freezes, pulls = _numbers(java)
+    return HandGuide(
+        np.array(limits[:7]),
+        np.array(limits[7:]),
+        joint_velocity,
+        cartesian_velocity,
+        "all" if freezes else "axis",
+        "pull" if pulls else "free",
+    )
+
+
 def _order(java: Any) -> Order:
     relative, cartesian = _filled(java.relative, 1.0), _numbers(java.cartesian)
     relative_blending, distance, turn_blending = _filled(java.blending, 0.0)
@@ -237,6 +253,7 @@ def _order(java: Any) -> Order:
         ori_jerk=cartesian[5],
         blending=(relative_blending, distance, turn_blending),
         parts=tuple(_order(part) for part in java.parts[:]),
+        guide=_guide(java.guiding),
         duration=float(java.duration),
         mode=mode,
         axes=axes,
@@ -292,7 +309,11 @@ def open_station(plant: Plant, sessions: Sessions) -> Any:
                 made = _order(order)
                 if order.friSession:
                     overlaid = sessions.overlaid(
-                        int(order.friSession), int(order.friCommand), made.id, made.mode, _Listener(order.listener)
+                        int(order.friSession),
+                        int(order.friCommand),
+                        made.id,
+                        made.mode,
+                        _Listener(order.listener),
                     )
                     made = replace(made, listener=overlaid)
                 plant.submit(made)

@@ -33,6 +33,8 @@ WORDS = {
     "singularity": "let it fail at a singularity",
     "release": "let the enabling switch go",
     "enable": "hold the enabling switch",
+    "guide": "hold the enabling switch of the hand guiding device",
+    "let_go": "let that one go",
     "clear [NAME]": "end one stop, or all, and acknowledge it",
     "t1, t2, aut": "choose the operation mode",
     "override FACTOR": "set the override at the smartPAD, 0 to 1",
@@ -53,7 +55,20 @@ _DEMANDS = tuple(demand.value for demand in Demand)
 #: How many values a word takes.
 _COUNTS = {
     **dict.fromkeys(
-        (*_DEMANDS, "singularity", "release", "enable", "t1", "t2", "aut", "pause", "start"), (0, 0)
+        (
+            *_DEMANDS,
+            "singularity",
+            "release",
+            "enable",
+            "guide",
+            "let_go",
+            "t1",
+            "t2",
+            "aut",
+            "pause",
+            "start",
+        ),
+        (0, 0),
     ),
     **dict.fromkeys(("drive_error", "joint_limit", "clear"), (0, 1)),
     "override": (1, 1),
@@ -143,6 +158,8 @@ class Operator:
             "singularity": lambda: plant.abort(0, "the path leads through a singularity"),
             "release": plant.safety.release,
             "enable": plant.safety.enable,
+            "guide": plant.safety.guide,
+            "let_go": plant.safety.let_go,
             "clear": self._clear,
             "override": self._override,
             "pause": plant.pause,

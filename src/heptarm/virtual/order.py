@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from math import nan
 from typing import Protocol
 
+from heptarm.values.guiding import HandGuide
 from heptarm.values.mode import Mode
 from heptarm.values.orientation import VARIABLE, Orientation
 
@@ -65,7 +66,8 @@ class Order:
     Attributes:
         id: chosen by the caller, unique.
         kind: "ptp", "lin", "lin_rel", "circ", "hold", or of several parts: "batch",
-            "spline" and "spline_joints"; or a servo motion: "servo", "direct" or "straight". Of a spline only: "spl".
+            "spline" and "spline_joints"; "guide"; or a servo motion: "servo", "direct" or "straight". Of a spline only:
+            "spl".
         joints: target of a ptp [rad]; None: `pose` is the target.
         pose: target of the moved frame in the base: x y z [m], quaternion x y z w.
         via: of a circ: the auxiliary point, as `pose`.
@@ -80,6 +82,7 @@ class Order:
         blending: where it may turn into the next part of its batch: fraction of the path, distance from its end
             [m], rotation from its end [rad]; zeros: nowhere.
         parts: motions of a batch, segments of a spline; mode, tcp and listener of the whole count.
+        guide: limits of a hand guiding.
         duration: of a hold [s]; NaN: until cancelled.
         mode: control mode; None: position.
         axes: of the mode's frame as a quaternion in the base; None: as the mode says, "tool" or "base".
@@ -113,6 +116,7 @@ class Order:
     ori_jerk: float = nan
     blending: tuple[float, float, float] = (0.0, 0.0, 0.0)
     parts: tuple[Order, ...] = ()
+    guide: HandGuide | None = None
     duration: float = nan
     mode: Mode | None = None
     axes: Seven | None = None

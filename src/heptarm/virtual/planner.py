@@ -87,7 +87,7 @@ def plan(robot: RobotModel, order: Order, start: Array) -> Plan:
 
 def _plan(robot: RobotModel, order: Order, start: Array) -> Plan:
     check_speeds(order)
-    if order.kind == "hold" or order.is_servo:
+    if order.kind in ("hold", "guide") or order.is_servo:
         return Plan(order, start, start, None, None, Limits(1.0, 1.0, 1.0))
     if order.kind == "ptp":
         return _plan_joints(robot, order, start, joint_target(robot, order, start))

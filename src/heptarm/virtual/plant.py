@@ -343,6 +343,8 @@ class Plant:
             flags |= ring.PAUSED
         if safety.enabled:
             flags |= ring.ENABLED
+        if safety.guides:
+            flags |= ring.HAND_GUIDING
         if not safety.halts:
             return flags | ring.READY
         flags |= ring.PROTECTIVE_STOP

@@ -31,7 +31,7 @@ TO_JOINTS, TO_JOINTS_WITH_VELOCITY = 1, 2  # a straight servo motion takes a pos
 
 # bits of the flags word
 READY, PAUSED, BRAKES_OPEN, MOVING, MASTERED, EMERGENCY_STOP, ENABLED = (1 << i for i in range(7))
-EXTERNAL_STOP, SAFEGUARD_OPEN, PROTECTIVE_STOP, DRIVE_ERROR = (1 << i for i in range(7, 11))
+EXTERNAL_STOP, SAFEGUARD_OPEN, PROTECTIVE_STOP, DRIVE_ERROR, HAND_GUIDING = (1 << i for i in range(7, 12))
 
 NEVER = 2**63 - 1
 

@@ -44,6 +44,7 @@ class Safety:
         self.halts = False
         self.latched = False
         self._enabled = False
+        self._guides = False
         self._demands: frozenset[Demand] = frozenset()
         self._lock = threading.Lock()
 
@@ -58,9 +59,14 @@ class Safety:
         return self._enabled
 
     @property
+    def guides(self) -> bool:
+        """Whether the enabling switch of the hand guiding device is held."""
+        return self._guides
+
+    @property
     def lacks_enabling(self) -> bool:
-        """Whether the enabling switch would have to be held."""
-        return self.mode is not Mode.AUT and not self._enabled
+        """Whether an enabling switch would have to be held."""
+        return self.mode is not Mode.AUT and not (self._enabled or self._guides)
 
     def demand(self, what: Demand) -> None:
         """Demand a stop until `withdraw`."""
@@ -84,6 +90,18 @@ class Safety:
         """Let the enabling switch go."""
         with self._lock:
             self._enabled = False
+            self._settle()
+
+    def guide(self) -> None:
+        """Hold the enabling switch of the hand guiding device."""
+        with self._lock:
+            self._guides = True
+            self._settle()
+
+    def let_go(self) -> None:
+        """Let the enabling switch of the hand guiding device go."""
+        with self._lock:
+            self._guides = False
             self._settle()
 
     def choose(self, mode: Mode) -> None:

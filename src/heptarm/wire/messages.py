@@ -218,6 +218,7 @@ class SafetyBits(enum.IntFlag):
     TORQUE_REFERENCED = 512
     POSITION_REFERENCED = 1024
     RECOVERY_REQUIRED = 2048
+    HAND_GUIDING_SWITCH = 4096
 
 
 _Pose_0 = Struct(">3d4d")
@@ -840,21 +841,22 @@ class Hold:
         codec.check(self.duration, path + "duration", 0.0, 1000000.0, True, True)
 
 
-_HandGuide_0 = Struct(">7d7dddB")
+_HandGuide_0 = Struct(">7d7dddBB")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HandGuide:
-    """Lets a person lead the arm by hand."""
+    """Lets a person lead the arm by hand while the enabling switch of the hand guiding device is held; ends when it is let go."""
 
     q_min: tuple[float, ...] = (nan,) * 7
     q_max: tuple[float, ...] = (nan,) * 7
     joint_velocity: float = nan
     cartesian_velocity: float = nan
-    precise: bool = False
+    freezes_all: bool = False
+    pulls_back: bool = False
 
     def _write(self, out: list[bytes]) -> None:
-        out.append(_HandGuide_0.pack(*self.q_min, *self.q_max, self.joint_velocity, self.cartesian_velocity, self.precise))
+        out.append(_HandGuide_0.pack(*self.q_min, *self.q_max, self.joint_velocity, self.cartesian_velocity, self.freezes_all, self.pulls_back))
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[HandGuide, int]:
@@ -864,8 +866,9 @@ class HandGuide:
         q_max = v[7:14]
         joint_velocity = v[14]
         cartesian_velocity = v[15]
-        precise = codec.read_bool(v[16])
-        return cls(q_min=q_min, q_max=q_max, joint_velocity=joint_velocity, cartesian_velocity=cartesian_velocity, precise=precise), pos
+        freezes_all = codec.read_bool(v[16])
+        pulls_back = codec.read_bool(v[17])
+        return cls(q_min=q_min, q_max=q_max, joint_velocity=joint_velocity, cartesian_velocity=cartesian_velocity, freezes_all=freezes_all, pulls_back=pulls_back), pos
 
     def _check(self, path: str) -> None:
         codec.check_array(self.q_min, path + "q_min", -inf, inf, False, True)

@@ -28,6 +28,7 @@ import heptarm.wire.Blending;
 import heptarm.wire.CartesianDynamics;
 import heptarm.wire.Circ;
 import heptarm.wire.Code;
+import heptarm.wire.HandGuide;
 import heptarm.wire.Hold;
 import heptarm.wire.Item;
 import heptarm.wire.JointDynamics;
@@ -87,7 +88,8 @@ final class Motions {
             checkOrientation(((LinRel) motion).orientation, at);
         } else if (motion instanceof Spline) {
             Splines.check((Spline) motion, at);
-        } else if (!(motion instanceof Ptp || motion instanceof PtpHome || motion instanceof JointSpline || motion instanceof Hold)) {
+        } else if (!(motion instanceof Ptp || motion instanceof PtpHome || motion instanceof JointSpline || motion instanceof Hold
+                || motion instanceof HandGuide)) {
             throw unsupported(path + "motion", motion.getClass().getSimpleName());
         }
     }

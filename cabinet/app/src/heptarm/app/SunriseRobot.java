@@ -41,6 +41,7 @@ import heptarm.wire.Code;
 import heptarm.wire.Condition;
 import heptarm.wire.FrameInfo;
 import heptarm.wire.FriOpen;
+import heptarm.wire.HandGuide;
 import heptarm.wire.Item;
 import heptarm.wire.Mode;
 import heptarm.wire.PoseState;
@@ -116,6 +117,11 @@ final class SunriseRobot implements Robot, IErrorHandler {
             all.addAll(Arrays.asList(SunriseFri.capabilities()));
         } catch (LinkageError e) {
             log.info("this cabinet has no FRI: " + e);
+        }
+        try {
+            all.add(SunriseGuiding.capability());
+        } catch (LinkageError e) {
+            log.info("this cabinet has no hand guiding: " + e);
         }
         return all.toArray(new String[0]);
     }
@@ -234,9 +240,19 @@ final class SunriseRobot implements Robot, IErrorHandler {
 
     public void check(Item item, String path) throws Refusal {
         motions.check(item, path);
+        if (item.motion instanceof HandGuide) {
+            try {
+                SunriseGuiding.of((HandGuide) item.motion, lbr);
+            } catch (LinkageError e) {
+                throw new Refusal(Code.UNSUPPORTED, path + "motion", "HandGuide", "", "this cabinet lacks hand guiding (" + e + ")");
+            }
+        }
     }
 
     public Job start(Item item, Mode mode, Job.Listener listener) throws Refusal {
+        if (item.motion instanceof HandGuide) {
+            return begin(SunriseGuiding.of((HandGuide) item.motion, lbr), item.frame, listener);
+        }
         SunriseJob job = new SunriseJob(listener);
         try {
             RobotMotion<?> motion = motions.motion(item, mode);
@@ -294,7 +310,7 @@ final class SunriseRobot implements Robot, IErrorHandler {
         try {
             return SunriseFri.of(open, lbr, new Modes(tools), panel.signals, new SunriseFri.Mover() {
                 public Job move(PositionHold hold, Job.Listener jobListener) throws Refusal {
-                    return begin(hold, jobListener);
+                    return begin(hold, "", jobListener);
                 }
             }, listener);
         } catch (LinkageError e) {
@@ -305,10 +321,10 @@ final class SunriseRobot implements Robot, IErrorHandler {
         }
     }
 
-    private Job begin(IMotion motion, Job.Listener listener) {
+    private Job begin(IMotion motion, String frame, Job.Listener listener) throws Refusal {
         SunriseJob job = new SunriseJob(listener);
         try {
-            adopt(tools.moved().moveAsync(motion, job), job);
+            adopt(tools.moved(frame).moveAsync(motion, job), job);
         } catch (RuntimeException e) {
             log.warn("a motion was refused by the cabinet: " + e);
             job.fail(e.getMessage());

@@ -47,6 +47,8 @@ final class SunriseSafety {
         bits |= safety.getOperatorSafetyState() != SunriseSafetyState.OperatorSafety.OPERATOR_SAFETY_CLOSED
                 ? SafetyBits.OPERATOR_SAFETY_OPEN : 0;
         bits |= safety.getEnablingDeviceState() != SunriseSafetyState.EnablingDeviceState.NONE ? SafetyBits.ENABLING_SWITCH : 0;
+        bits |= safety.getEnablingDeviceState() == SunriseSafetyState.EnablingDeviceState.HANDGUIDING
+                ? SafetyBits.HAND_GUIDING_SWITCH : 0;
         bits |= safety.areAllAxesGMSReferenced() ? SafetyBits.TORQUE_REFERENCED : 0;
         bits |= safety.areAllAxesPositionReferenced() ? SafetyBits.POSITION_REFERENCED : 0;
         IRecovery told = recovery;

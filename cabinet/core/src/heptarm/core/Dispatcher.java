@@ -7,6 +7,7 @@ import heptarm.wire.Condition;
 import heptarm.wire.FriClose;
 import heptarm.wire.FriOpen;
 import heptarm.wire.Goodbye;
+import heptarm.wire.HandGuide;
 import heptarm.wire.Hold;
 import heptarm.wire.Item;
 import heptarm.wire.JointPoint;
@@ -265,6 +266,9 @@ final class Dispatcher {
                 for (int k = 0; k < points.length; k++) {
                     checkJoints(points[k].q, info, path + "motion.points[" + k + "].q");
                 }
+            }
+            if (item.motion instanceof HandGuide) {
+                GuideRules.check(item, info, path);
             }
             server.rack.checkMoved(item.frame, path + "frame");
             if (item.motion instanceof LinRel) {

@@ -7,6 +7,7 @@ import java.util.List;
 import heptarm.wire.Cause;
 import heptarm.wire.Code;
 import heptarm.wire.Condition;
+import heptarm.wire.HandGuide;
 import heptarm.wire.ItemReached;
 import heptarm.wire.Mode;
 import heptarm.wire.MotionFinished;
@@ -328,7 +329,8 @@ final class Executor {
     /** Waits for the end of a motion with a break condition; watches the condition if the robot does not. */
     private void watch(Program program, int item) throws InterruptedException {
         Condition until = program.run.items[item].until;
-        if (server.robot.watches(until)) {
+        // the robot's API does not say that hand guiding has break conditions
+        if (!(program.run.items[item].motion instanceof HandGuide) && server.robot.watches(until)) {
             program.await(item);
             return;
         }

@@ -5,6 +5,7 @@ import heptarm.wire.CartesianDynamics;
 import heptarm.wire.Circ;
 import heptarm.wire.Condition;
 import heptarm.wire.ConditionNode;
+import heptarm.wire.HandGuide;
 import heptarm.wire.Hold;
 import heptarm.wire.Item;
 import heptarm.wire.JointDynamics;
@@ -25,7 +26,7 @@ import heptarm.wire.Trigger;
 public final class Move implements Cloneable {
     private static final int JOINTS = 7;
 
-    private enum Kind { PTP, PTP_POSE, LIN, LIN_REL, CIRC, HOLD }
+    private enum Kind { PTP, PTP_POSE, LIN, LIN_REL, CIRC, HOLD, HAND_GUIDE }
 
     private final Kind kind;
     private final double[] q;
@@ -79,6 +80,14 @@ public final class Move implements Cloneable {
     /** Holds the position for a time [s]; NaN: until it is cancelled. */
     public static Move hold(double duration) {
         return new Move(Kind.HOLD, null, null, null, duration);
+    }
+
+    /**
+     * A person leads the arm while the switch of the hand guiding device is held, no faster than {@link #velocity}; it ends when
+     * the switch is let go.
+     */
+    public static Move handGuide() {
+        return new Move(Kind.HAND_GUIDE, null, null, null, 0.0);
     }
 
     /** A pose that is not turned: at a place in the base [m]. */
@@ -185,6 +194,8 @@ public final class Move implements Cloneable {
                 return new LinRel(target, reference, path, joints, blend, led);
             case CIRC:
                 return new Circ(via, target, redundancy, path, joints, blend, led);
+            case HAND_GUIDE:
+                return new HandGuide(all(nan), all(nan), nan, velocity, false, false);
             default:
                 return new Hold(duration);
         }

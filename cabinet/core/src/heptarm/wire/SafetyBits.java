@@ -15,6 +15,7 @@ public final class SafetyBits {
     public static final int TORQUE_REFERENCED = 512;
     public static final int POSITION_REFERENCED = 1024;
     public static final int RECOVERY_REQUIRED = 2048;
+    public static final int HAND_GUIDING_SWITCH = 4096;
 
     private SafetyBits() {
     }

@@ -47,6 +47,11 @@ public final class MotionOrder {
     public double[] timing = {0.02, 30.0, 0.1};
     /** Of a straight servo motion: largest velocity x y z, about x y z, then acceleration; NaN: the usual. */
     public double[] straight;
+    /**
+     * Of a hand guiding: lower limits, upper limits [rad], NaN: the axis' own; joint velocity [rad/s], velocity of the moved
+     * frame [m/s], NaN: unlimited; 1 if a limit freezes all axes, 1 if it pulls back.
+     */
+    public double[] guiding;
     /** FRI session whose client overlays the motion; 0: none. */
     public long friSession;
     /** What that client commands, as FRI numbers it. */

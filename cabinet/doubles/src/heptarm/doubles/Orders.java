@@ -22,6 +22,7 @@ import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
 import com.kuka.roboticsAPI.motionModel.BrakeTest;
 import com.kuka.roboticsAPI.motionModel.CIRC;
 import com.kuka.roboticsAPI.motionModel.CartesianPTP;
+import com.kuka.roboticsAPI.motionModel.HandGuidingMotion;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionOverlay;
 import com.kuka.roboticsAPI.motionModel.LIN;
@@ -167,6 +168,10 @@ public final class Orders {
         } else if (motion instanceof PositionHold) {
             order = new MotionOrder(id, "hold");
             order.duration = ((PositionHold) motion).seconds();
+        } else if (motion instanceof HandGuidingMotion) {
+            order = new MotionOrder(id, "guide");
+            order.guiding = ((HandGuidingMotion) motion).terms();
+            order.guiding[15] *= MM;
         } else if (motion instanceof SmartServo || motion instanceof DirectServo) {
             order = new MotionOrder(id, motion instanceof SmartServo ? "servo" : "direct");
             order.timing = ((ServoMotion<?>) motion).timing();

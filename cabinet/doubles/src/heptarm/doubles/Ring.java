@@ -39,6 +39,7 @@ public final class Ring {
     public static final int SAFEGUARD_OPEN = 256;
     public static final int PROTECTIVE_STOP = 512;
     public static final int DRIVE_ERROR = 1024;
+    public static final int HAND_GUIDING = 2048;
 
     static final long TICK_NS = 1000000L;
 

@@ -13,7 +13,7 @@ import com.kuka.roboticsAPI.deviceModel.OperationMode;
 /** Tells listeners of changes of the safety state, of readiness and of pauses, on the dispatch thread. */
 public final class SafetyNews {
     private static final long SAFETY = Ring.EMERGENCY_STOP | Ring.EXTERNAL_STOP | Ring.SAFEGUARD_OPEN | Ring.PROTECTIVE_STOP
-            | Ring.DRIVE_ERROR | Ring.ENABLED;
+            | Ring.DRIVE_ERROR | Ring.ENABLED | Ring.HAND_GUIDING;
 
     public final List<IControllerStateListener> states = new CopyOnWriteArrayList<>();
     public final List<IExecutionListener> executions = new CopyOnWriteArrayList<>();

@@ -19,6 +19,7 @@ import heptarm.wire.FriCommandMode;
 import heptarm.wire.FriOpen;
 import heptarm.wire.FriQuality;
 import heptarm.wire.FriSessionState;
+import heptarm.wire.HandGuide;
 import heptarm.wire.Hold;
 import heptarm.wire.IoDirection;
 import heptarm.wire.IoType;
@@ -258,9 +259,9 @@ final class FakeRobot implements Robot, Runnable {
         if (target != null && target[6] == PLANS_SLOWLY) {
             sleep(SLOWLY_NS);
         }
-        double seconds = item.motion instanceof Hold ? ((Hold) item.motion).duration : 0.0;
+        double seconds = item.motion instanceof Hold ? ((Hold) item.motion).duration : item.motion instanceof HandGuide ? 1e9 : 0.0;
         FakeJob job = new FakeJob(target, Double.isNaN(seconds) ? 1e9 : seconds, listener);
-        job.until = watches(item.until) ? Conditions.alternatives(item.until) : new Conditions.Tree[0];
+        job.until = watches(item.until) && !(item.motion instanceof HandGuide) ? Conditions.alternatives(item.until) : new Conditions.Tree[0];
         synchronized (jobs) {
             jobs.add(job);
         }
@@ -357,8 +358,10 @@ final class FakeRobot implements Robot, Runnable {
         if (item.triggers.length > 0) {
             throw new Refusal(Code.UNSUPPORTED, path + "triggers", "triggers", "", "not here");
         }
-        if (!(item.motion instanceof Ptp || item.motion instanceof PtpHome || item.motion instanceof Hold)) {
-            throw new Refusal(Code.UNSUPPORTED, path + "motion", item.motion.getClass().getSimpleName(), "Ptp, Hold", "not here");
+        if (!(item.motion instanceof Ptp || item.motion instanceof PtpHome || item.motion instanceof Hold
+                || item.motion instanceof HandGuide)) {
+            throw new Refusal(Code.UNSUPPORTED, path + "motion", item.motion.getClass().getSimpleName(), "Ptp, Hold, HandGuide",
+                    "not here");
         }
     }
 

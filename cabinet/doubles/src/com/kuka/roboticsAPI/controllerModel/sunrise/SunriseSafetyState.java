@@ -61,6 +61,9 @@ public final class SunriseSafetyState implements ISafetyState {
 
     @Override
     public EnablingDeviceState getEnablingDeviceState() {
+        if (has(Ring.HAND_GUIDING)) {
+            return EnablingDeviceState.HANDGUIDING;
+        }
         return has(Ring.ENABLED) ? EnablingDeviceState.NORMAL : EnablingDeviceState.NONE;
     }
 

@@ -1,0 +1,65 @@
+package heptarm.app;
+
+import com.kuka.roboticsAPI.deviceModel.JointLimits;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.motionModel.HandGuidingMotion;
+import com.kuka.roboticsAPI.motionModel.IMotion;
+
+import heptarm.core.Refusal;
+import heptarm.wire.Code;
+import heptarm.wire.HandGuide;
+
+/** Hand guiding of Sunrise. Only this class names the option's classes, so that a cabinet without it still runs. */
+final class SunriseGuiding {
+    private static final int JOINTS = 7;
+
+    private SunriseGuiding() {
+    }
+
+    /** What the option is called; a LinkageError if it is not installed. */
+    static String capability() {
+        new HandGuidingMotion();
+        return "hand_guide";
+    }
+
+    /** The motion of a checked order. */
+    static IMotion of(HandGuide guide, LBR robot) throws Refusal {
+        HandGuidingMotion motion = new HandGuidingMotion();
+        JointLimits own = robot.getJointLimits();
+        double[] lowest = own.getMinJointPosition().get();
+        double[] highest = own.getMaxJointPosition().get();
+        boolean[] enabled = new boolean[JOINTS];
+        for (int i = 0; i < JOINTS; i++) {
+            enabled[i] = !(Double.isNaN(guide.q_min[i]) && Double.isNaN(guide.q_max[i]));
+            lowest[i] = Double.isNaN(guide.q_min[i]) ? lowest[i] : guide.q_min[i];
+            highest[i] = Double.isNaN(guide.q_max[i]) ? highest[i] : guide.q_max[i];
+        }
+        try {
+            motion.setJointLimitsMin(lowest);
+            motion.setJointLimitsMax(highest);
+            motion.setJointLimitsEnabled(enabled);
+            motion.setJointLimitViolationFreezesAll(guide.freezes_all);
+        } catch (NoSuchMethodError e) { // older cabinets have other names for the same
+            motion.setAxisLimitsMin(lowest);
+            motion.setAxisLimitsMax(highest);
+            motion.setAxisLimitsEnabled(enabled);
+            motion.setAxisLimitViolationFreezesAll(guide.freezes_all);
+        }
+        motion.setPermanentPullOnViolationAtStart(guide.pulls_back);
+        limitSpeed(motion, guide);
+        return motion;
+    }
+
+    private static void limitSpeed(HandGuidingMotion motion, HandGuide guide) throws Refusal {
+        try {
+            if (!Double.isNaN(guide.joint_velocity)) {
+                motion.setJointVelocityLimit(guide.joint_velocity);
+            }
+            if (!Double.isNaN(guide.cartesian_velocity)) {
+                motion.setCartVelocityLimit(Convert.toMillimetres(guide.cartesian_velocity));
+            }
+        } catch (NoSuchMethodError e) {
+            throw new Refusal(Code.UNSUPPORTED, "the hand guiding of this cabinet cannot limit the speed (" + e.getMessage() + ")");
+        }
+    }
+}

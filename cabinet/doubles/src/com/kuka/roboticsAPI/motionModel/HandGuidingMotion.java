@@ -1,0 +1,119 @@
+package com.kuka.roboticsAPI.motionModel;
+
+import java.util.Arrays;
+
+/** A person leads the arm while the enabling switch of the hand guiding device is held; it ends when the switch is let go. */
+public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
+    private static final int AXES = 7;
+
+    private double[] lowest = every(-Math.PI);
+    private double[] highest = every(Math.PI);
+    private boolean[] enabled = new boolean[AXES];
+    private boolean freezes = true;
+    private boolean pulls;
+    private double jointVelocity = Double.NaN;
+    private double cartesianVelocity = Double.NaN;
+
+    private static double[] every(double value) {
+        double[] result = new double[AXES];
+        Arrays.fill(result, value);
+        return result;
+    }
+
+    private static double[] seven(String name, double[] radians) {
+        if (radians.length != AXES) {
+            throw new IllegalArgumentException(name + " takes " + AXES + " values, not " + radians.length);
+        }
+        for (double value : radians) {
+            if (Double.isNaN(value) || Double.isInfinite(value)) {
+                throw new IllegalArgumentException(name + " is " + value + "; it has to be finite");
+            }
+        }
+        return radians.clone();
+    }
+
+    /** Upper limits [rad]; they count for axes whose limits are enabled. */
+    public HandGuidingMotion setJointLimitsMax(double... radians) {
+        highest = seven("jointLimitsMax", radians);
+        return this;
+    }
+
+    /** Lower limits [rad]. */
+    public HandGuidingMotion setJointLimitsMin(double... radians) {
+        lowest = seven("jointLimitsMin", radians);
+        return this;
+    }
+
+    /** Which axes have limits of their own. */
+    public HandGuidingMotion setJointLimitsEnabled(boolean... axes) {
+        if (axes.length != AXES) {
+            throw new IllegalArgumentException("jointLimitsEnabled takes " + AXES + " values, not " + axes.length);
+        }
+        enabled = axes.clone();
+        return this;
+    }
+
+    /** Whether at a limit every axis is held until the switch is let go, or only the one at its limit. */
+    public HandGuidingMotion setJointLimitViolationFreezesAll(boolean all) {
+        freezes = all;
+        return this;
+    }
+
+    /** Whether an axis that is beyond its limit at the start is pulled back, or can only be led back. */
+    public HandGuidingMotion setPermanentPullOnViolationAtStart(boolean pull) {
+        pulls = pull;
+        return this;
+    }
+
+    /** No axis is led faster [rad/s]. */
+    public HandGuidingMotion setJointVelocityLimit(double radiansPerSecond) {
+        jointVelocity = positive("jointVelocityLimit", radiansPerSecond);
+        return this;
+    }
+
+    /** The moved frame is led no faster [mm/s]. */
+    public HandGuidingMotion setCartVelocityLimit(double millimetresPerSecond) {
+        cartesianVelocity = positive("cartVelocityLimit", millimetresPerSecond);
+        return this;
+    }
+
+    /** The older name of {@link #setJointLimitsMax}. */
+    public HandGuidingMotion setAxisLimitsMax(double... radians) {
+        return setJointLimitsMax(radians);
+    }
+
+    /** The older name of {@link #setJointLimitsMin}. */
+    public HandGuidingMotion setAxisLimitsMin(double... radians) {
+        return setJointLimitsMin(radians);
+    }
+
+    /** The older name of {@link #setJointLimitsEnabled}. */
+    public HandGuidingMotion setAxisLimitsEnabled(boolean... axes) {
+        return setJointLimitsEnabled(axes);
+    }
+
+    /** The older name of {@link #setJointLimitViolationFreezesAll}. */
+    public HandGuidingMotion setAxisLimitViolationFreezesAll(boolean all) {
+        return setJointLimitViolationFreezesAll(all);
+    }
+
+    /**
+     * Lower limits, upper limits [rad], NaN where an axis has none of its own; joint velocity [rad/s], Cartesian velocity
+     * [mm/s], NaN: unlimited; 1 if a limit freezes all axes, 1 if it pulls back; for the simulation.
+     */
+    public double[] terms() {
+        double[] terms = new double[2 * AXES + 4];
+        for (int i = 0; i < AXES; i++) {
+            if (enabled[i] && !(lowest[i] < highest[i])) {
+                throw new IllegalArgumentException("the lower limit of A" + (i + 1) + " is not below the upper one");
+            }
+            terms[i] = enabled[i] ? lowest[i] : Double.NaN;
+            terms[AXES + i] = enabled[i] ? highest[i] : Double.NaN;
+        }
+        terms[14] = jointVelocity;
+        terms[15] = cartesianVelocity;
+        terms[16] = freezes ? 1 : 0;
+        terms[17] = pulls ? 1 : 0;
+        return terms;
+    }
+}

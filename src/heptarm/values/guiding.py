@@ -1,0 +1,103 @@
+"""Hand guiding: a person leads the arm while holding the enabling switch of its hand guiding device."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import nan
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import LimitError, ShapeError
+from heptarm.values.arrays import Array, Value, array, frozen, within
+
+#: What can happen at a limit, and what to an axis that is beyond its limit at the start.
+AT_LIMIT = ("axis", "all")
+OUTSIDE = ("free", "pull")
+_FASTEST = 10.0
+
+
+def _open() -> Array:
+    return frozen(np.full(7, nan))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandGuide(Value):
+    """A person leads the arm; made by `hand_guide`.
+
+    Attributes:
+        q_min: lowest positions, shape (7,) [rad]; NaN: the axis' own limit.
+        q_max: highest positions, likewise.
+        joint_velocity: no axis is led faster [rad/s]; NaN: the cabinet's limit.
+        cartesian_velocity: the moved frame is led no faster [m/s]; NaN: the cabinet's limit.
+        at_limit: "axis" or "all".
+        outside: "free" or "pull".
+    """
+
+    q_min: Array = field(default_factory=_open)
+    q_max: Array = field(default_factory=_open)
+    joint_velocity: float = nan
+    cartesian_velocity: float = nan
+    at_limit: str = "axis"
+    outside: str = "free"
+
+    def under(self, ceiling: float) -> HandGuide:
+        """The same: the person leads as fast as its own limits let them."""
+        within(ceiling, "speed", 0.0, 1.0, above=True)
+        return self
+
+
+def hand_guide(
+    *,
+    q_min: npt.ArrayLike | None = None,
+    q_max: npt.ArrayLike | None = None,
+    joint_velocity: float | None = None,
+    cartesian_velocity: float | None = None,
+    at_limit: str = "axis",
+    outside: str = "free",
+) -> HandGuide:
+    """Let a person lead the arm by hand.
+
+    It begins standing. While the switch of the hand guiding device is held the arm gives way, without weight; when the
+    switch is let go the motion ends, at rest. It is not for the cabinet to say when that is: give a timeout.
+
+    Args:
+        q_min: lowest positions that it can be led to, shape (7,) [rad]; NaN or None: the axis' own limits.
+        q_max: highest positions, likewise.
+        joint_velocity: no axis is led faster [rad/s], up to 10; None: the cabinet's limit.
+        cartesian_velocity: the moved frame is led no faster [m/s], up to 10; None: the cabinet's limit.
+        at_limit: "axis": an axis at its limit goes no further, all others are free; "all": every axis is held until
+            the switch is let go.
+        outside: an axis that is beyond its limit at the start can be led back freely but no further out ("free"), or
+            is pulled back while the arm is guided ("pull").
+
+    Raises:
+        ShapeError: a wrong shape or word.
+        LimitError: a value outside its range, or a lower limit that is not below the upper one.
+    """
+    low = _open() if q_min is None else array(q_min, 7, "q_min", nan=True)
+    high = _open() if q_max is None else array(q_max, 7, "q_max", nan=True)
+    crossed = low >= high
+    if crossed.any():
+        axis = int(crossed.argmax())
+        raise LimitError(
+            f"q_min[{axis}] is {low[axis]:g} rad, q_max[{axis}] is {high[axis]:g} rad; the lower has to be below",
+            code=2,
+            parameter=f"q_min[{axis}]",
+            value=float(low[axis]),
+            allowed=f"below {high[axis]:g} rad",
+        )
+    for word, name, words in ((at_limit, "at_limit", AT_LIMIT), (outside, "outside", OUTSIDE)):
+        if word not in words:
+            allowed = ", ".join(map(repr, words))
+            raise ShapeError(
+                f"{name} is {word!r}; allowed are {allowed}", parameter=name, value=word, allowed=allowed
+            )
+    return HandGuide(
+        low,
+        high,
+        within(joint_velocity, "joint_velocity", 0.0, _FASTEST, above=True, unit="rad/s"),
+        within(cartesian_velocity, "cartesian_velocity", 0.0, _FASTEST, above=True, unit="m/s"),
+        at_limit,
+        outside,
+    )

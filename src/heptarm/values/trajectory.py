@@ -1,0 +1,195 @@
+"""Taught trajectories: joint positions over time, to be thinned, kept in a file and replayed."""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.values.arrays import Array, Value, frozen, within
+from heptarm.values.motion import JointSpline, spline_joints
+
+#: What a file says of itself, so that another .npz is not taken for one.
+FORMAT = "heptarm trajectory 1"
+#: Points that the cabinet takes for one spline.
+MOST_POINTS = 1000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory(Value):
+    """Joint positions over time; between two of them they change evenly.
+
+    Attributes:
+        times: ascending, the first is 0, shape (n,) [s].
+        q: joint positions, shape (n, 7) [rad].
+        robot: model that it was taught on, such as "iiwa14"; empty: unknown.
+    """
+
+    times: Array
+    q: Array
+    robot: str = ""
+
+    @staticmethod
+    def of(times: npt.ArrayLike, q: npt.ArrayLike, *, robot: str = "") -> Trajectory:
+        """A trajectory from times and joint positions; time begins at the first of them.
+
+        Raises:
+            ShapeError: fewer than two points, or shapes that do not fit.
+            LimitError: a number that is not finite, or times that do not ascend.
+        """
+        t, points = np.array(times, dtype=np.float64), np.array(q, dtype=np.float64)
+        if t.ndim != 1 or len(t) < 2 or points.shape != (len(t), 7):
+            raise ShapeError(
+                f"times have shape {t.shape}, q has {points.shape}; (n,) and (n, 7) with n >= 2 are wanted",
+                parameter="q",
+            )
+        if not (np.isfinite(t).all() and np.isfinite(points).all()):
+            raise LimitError("a trajectory has finite numbers only", code=1, parameter="q")
+        if not (np.diff(t) > 0).all():
+            raise LimitError("the times of a trajectory have to ascend", code=2, parameter="times")
+        return Trajectory(frozen(t - t[0]), frozen(points), robot)
+
+    def __len__(self) -> int:
+        """How many points it has."""
+        return len(self.times)
+
+    @property
+    def duration(self) -> float:
+        """Time of the last point [s]."""
+        return float(self.times[-1])
+
+    @property
+    def fastest(self) -> Array:
+        """Highest speed of each axis, shape (7,) [rad/s]."""
+        return np.asarray(np.abs(self._slopes()).max(axis=0))
+
+    def _slopes(self) -> Array:
+        slopes: Array = np.diff(self.q, axis=0) / np.diff(self.times)[:, None]
+        return slopes
+
+    def at(self, t: float) -> tuple[Array, Array]:
+        """Positions [rad] and velocities [rad/s] at a time [s], shape (7,) each; before and behind it, it rests."""
+        piece = int(np.searchsorted(self.times, t, side="right")) - 1
+        if piece < 0 or t >= self.duration:
+            return self.q[0 if piece < 0 else -1], np.zeros(7)
+        slope = (self.q[piece + 1] - self.q[piece]) / (self.times[piece + 1] - self.times[piece])
+        return self.q[piece] + slope * (t - self.times[piece]), slope
+
+    def positions(self, times: Array) -> Array:
+        """Positions at times of shape (m,) [s], shape (m, 7) [rad]."""
+        return np.stack([np.interp(times, self.times, column) for column in self.q.T], axis=1)
+
+    def trimmed(self, *, still: float = 1e-3) -> Trajectory:
+        """Without the rests at its ends.
+
+        Args:
+            still: an axis that has not left its first (last) position by more than this has not moved [rad].
+
+        Raises:
+            CommandRejected: nothing moves at all.
+        """
+        away = np.flatnonzero(np.abs(self.q - self.q[0]).max(axis=1) > still)
+        before = np.flatnonzero(np.abs(self.q - self.q[-1]).max(axis=1) > still)
+        if not len(away) or not len(before):
+            raise CommandRejected(
+                f"nothing moves by more than {still:g} rad",
+                parameter="still",
+                hint="teach again, or give a smaller one",
+            )
+        begin, end = max(int(away[0]) - 1, 0), min(int(before[-1]) + 1, len(self) - 1)
+        return Trajectory.of(self.times[begin : end + 1], self.q[begin : end + 1], robot=self.robot)
+
+    def thinned(self, *, tolerance: float = 2e-3) -> Trajectory:
+        """With as few of its points as needed.
+
+        The points are chosen as Douglas and Peucker do ("Algorithms for the reduction of the number of points required
+        to represent a digitized line", 1973), with the distance at equal times.
+
+        Args:
+            tolerance: no axis is farther off at any recorded time [rad].
+        """
+        within(tolerance, "tolerance", 0.0, 1.0, above=True, unit="rad")
+        return self._chosen(_needed(self.times, self.q, tolerance))
+
+    def _chosen(self, indices: list[int]) -> Trajectory:
+        return Trajectory.of(self.times[indices], self.q[indices], robot=self.robot)
+
+    def spline(self, *, tolerance: float = 5e-3, speed: float | None = None) -> JointSpline:
+        """A joint spline through its points, at the cabinet's own pace.
+
+        Args:
+            tolerance: the points are chosen so that the straight way between them leaves no axis farther off [rad].
+            speed: fraction of each axis' maximum, (0, 1]; None: the cabinet's default.
+
+        Raises:
+            CommandRejected: nothing moves, or it takes more points than a spline may have.
+        """
+        within(tolerance, "tolerance", 0.0, 1.0, above=True, unit="rad")
+        moved = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(self.q, axis=0)).max(axis=1))])
+        keep = np.concatenate([[True], np.diff(moved) > 1e-9])  # a rest is one place on the way
+        way, points = moved[keep], self.q[keep]
+        if len(way) < 2:
+            raise CommandRejected("nothing moves", parameter="trajectory", hint="teach again")
+        chosen = points[_needed(way, points, tolerance)]
+        if len(chosen) > MOST_POINTS + 1:
+            raise CommandRejected(
+                f"a spline through it takes {len(chosen)} points; allowed are {MOST_POINTS}",
+                parameter="tolerance",
+                value=tolerance,
+                hint="give a larger tolerance, or replay it by servo",
+            )
+        return spline_joints([*chosen[1:]], speed=speed)
+
+    def save(self, path: str | Path) -> Path:
+        """Write it into a file, .npz; returns its path.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        file = Path(path).with_suffix(".npz")
+        np.savez_compressed(file, format=FORMAT, times=self.times, q=self.q, robot=self.robot)
+        return file
+
+    @staticmethod
+    def load(path: str | Path) -> Trajectory:
+        """Read it from a file.
+
+        Raises:
+            OSError: there is none, or it cannot be read.
+            CommandRejected: it is no trajectory of heptarm.
+        """
+        try:
+            with np.load(Path(path), allow_pickle=False) as file:
+                if str(file["format"]) != FORMAT:
+                    raise ValueError(f"its format is {file['format']}")
+                return Trajectory.of(file["times"], file["q"], robot=str(file["robot"]))
+        except (KeyError, ValueError, zipfile.BadZipFile, EOFError) as error:
+            raise CommandRejected(
+                f"{path} holds no trajectory: {error}",
+                parameter="path",
+                value=str(path),
+                hint="heptarm teach writes one",
+            ) from None
+
+
+def _needed(along: Array, points: Array, tolerance: float) -> list[int]:
+    """Indices of the points that are needed: between them straight lines are near enough, at equal places along."""
+    kept = {0, len(along) - 1}
+    stack = [(0, len(along) - 1)]
+    while stack:
+        first, last = stack.pop()
+        if last - first < 2:
+            continue
+        share = (along[first + 1 : last] - along[first]) / (along[last] - along[first])
+        straight = points[first] + share[:, None] * (points[last] - points[first])
+        off = np.abs(points[first + 1 : last] - straight).max(axis=1)
+        worst = int(off.argmax())
+        if off[worst] > tolerance:
+            middle = first + 1 + worst
+            kept.add(middle)
+            stack += [(first, middle), (middle, last)]
+    return sorted(kept)

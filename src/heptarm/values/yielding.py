@@ -1,0 +1,57 @@
+"""The mode of precise guiding: soft along some directions, stiff along all others."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heptarm.errors import ShapeError
+from heptarm.values.directions import DIRECTIONS, one
+from heptarm.values.impedance import STIFFEST, CartesianImpedance
+from heptarm.values.motion import TOOL
+
+#: Stiffness of the directions that are held, along [N/m] and about an axis [Nm/rad].
+HOLDING = (4000.0, 300.0)
+
+
+def yielding(
+    free: str,
+    *,
+    frame: str = TOOL,
+    stiffness: float = HOLDING[0],
+    turning: float = HOLDING[1],
+    damping: float = 1.0,
+    nullspace_stiffness: float = 0.0,
+) -> CartesianImpedance:
+    """Cartesian impedance that lets the arm be led along some directions and holds it in all others.
+
+    Args:
+        free: the directions, such as "z" (a line), "xy" (a plane), "a" (about z), "xya" (the plane, and turning in it);
+            "b" is about y, "c" about x.
+        frame: whose axes: "tool" (the moved frame's own at the start), "base", or a frame's name.
+        stiffness: along the axes that are held [N/m], up to 5000.
+        turning: about the axes that are held [Nm/rad], up to 300.
+        damping: damping ratio, 0.1 to 1.
+        nullspace_stiffness: of the spring that keeps the elbow [Nm/rad]; without one it goes where it is led.
+
+    Raises:
+        ShapeError: no directions, unknown ones, or one twice.
+        LimitError: a value outside its range.
+    """
+    if (
+        not isinstance(free, str)
+        or not free
+        or len(set(free)) != len(free)
+        or not set(free) <= set(DIRECTIONS)
+    ):
+        raise ShapeError(
+            f"free is {free!r}; letters of 'xyzabc' are wanted, each once",
+            parameter="free",
+            value=free,
+            hint='for example "z", "xy", or "a" for turning about z',
+        )
+    held = np.array(
+        [one(stiffness, "stiffness", 0.0, STIFFEST[0], "N/m")] * 3
+        + [one(turning, "turning", 0.0, STIFFEST[1], "Nm/rad")] * 3
+    )
+    held[[DIRECTIONS[name] for name in free]] = 0.0
+    return CartesianImpedance(held, damping=damping, nullspace_stiffness=nullspace_stiffness, frame=frame)
