@@ -34,12 +34,14 @@ def arm(table: ha.Arm) -> Iterator[ha.Arm]:
     table.operator.push([0, 0, 0], duration=0.0)
 
 
-def pushing(arm: ha.Arm, moving: ha.MotionHandle, push: list[float], *, seconds: float) -> None:
-    """Push a while; return when the arm has been seen moving and the push is over."""
-    assert moving.wait_started(20.0)
+def lead(arm: ha.Arm, push: list[float], way: float) -> None:
+    """Push until a joint has turned so far [rad]."""
     before = arm.state.q
-    arm.operator.push(push, duration=seconds)
-    arm.wait_until(lambda state: np.abs(state.q - before).max() > 0.03)
+    arm.operator.push(push, duration=300.0)
+    try:
+        arm.wait_until(lambda state: np.abs(state.q - before).max() > way, timeout=120.0)
+    finally:
+        arm.operator.push([0, 0, 0], duration=0.0)
     arm.wait_until(lambda state: np.abs(state.wrench.force).max() < 1.0)
 
 
@@ -52,7 +54,7 @@ def test_led_by_hand_until_the_switch_is_let_go(arm: ha.Arm) -> None:
     assert handle.wait_started(20.0)
     arm.operator.guide()
     assert arm.wait_until(lambda state: state.safety.hand_guiding_switch).safety.enabling_switch
-    pushing(arm, handle, [0, 15, 15], seconds=1.0)
+    lead(arm, [0, 15, 15], 0.2)
     assert not handle.done
     arm.operator.let_go()
     result = handle.wait(timeout=20.0)
@@ -103,11 +105,12 @@ def test_what_makes_no_sense_is_refused(arm: ha.Arm) -> None:
 def test_led_precisely_along_one_axis(arm: ha.Arm) -> None:
     start = arm.wait_for_rest().pose
     handle = arm.start(ha.hold(30.0), mode=yielding("y", frame="base"))
-    pushing(arm, handle, [10, 10, 10], seconds=1.0)
+    assert handle.wait_started(20.0)
+    lead(arm, [10, 10, 10], 0.1)
     handle.cancel()
     handle.wait(timeout=20.0)
     end = arm.wait_for_rest().pose
-    assert end.xyz[1] - start.xyz[1] > 0.02
+    assert end.xyz[1] - start.xyz[1] > 0.01
     assert np.abs((end.xyz - start.xyz)[[0, 2]]).max() < 5e-3 and end.angle_to(start) < 0.02
     result = arm.guide_precisely("xy", frame="base", seconds=30.0, until=~(force > 1))
     assert result.cause is ha.Cause.CONDITION
@@ -236,11 +239,10 @@ def test_taught_by_hand_and_replayed(arm: ha.Arm) -> None:
     def hand() -> None:
         arm.operator.guide()
         arm.wait_until(lambda state: state.motion is not None and state.motion.active)
-        arm.operator.push([0, 6, 6], duration=1.0)
-        arm.wait_until(lambda state: np.abs(state.q - HOME).max() > 0.05)
-        arm.wait_until(lambda state: np.abs(state.wrench.force).max() < 1.0)
+        lead(arm, [0, 6, 6], 0.1)
         arm.operator.let_go()
 
+    arm.wait_for_rest()
     person = Thread(target=hand)
     person.start()
     whole = arm.teach(ha.hand_guide(joint_velocity=0.5), timeout=60.0)

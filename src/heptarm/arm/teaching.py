@@ -205,6 +205,7 @@ class Teaching:
     ) -> Replay:
         per_second = pace * self._connection.pace
         seen: list[tuple[float, Array]] = []
+        due = 0
         with self.servo(
             "joint", rate=rate, watchdog=_WATCHDOG, speed=1.0, acceleration=1.0, mode=mode, until=until
         ) as sv:
@@ -215,8 +216,10 @@ class Teaching:
                 if state is None:
                     continue
                 seen.append((t, state.q))
-                late = sv.t - trajectory.duration / per_second
-                if late > 0 and (float(np.abs(state.q - trajectory.q[-1]).max()) < _THERE or late > _SETTLE):
+                if t < trajectory.duration:
+                    continue
+                due = due or state.stamp + round(_SETTLE * 1e9)  # by the cabinet's clock, which the arm follows
+                if float(np.abs(state.q - trajectory.q[-1]).max()) < _THERE or state.stamp > due:
                     break
         result = sv.result
         if result is None:
