@@ -1,7 +1,8 @@
 """Paces ticks in real time (or N times faster) and counts how well that went.
 
 The loop sleeps to shortly before a tick is due and spins the rest; when it wakes late it catches up, since a
-tick costs a tenth of a millisecond; beyond 20 missed ticks it re-bases and counts that. Real-time priority
+tick costs a tenth of a millisecond; beyond 20 missed ticks it re-bases and counts that. Beside an FRI session it
+re-bases at once: no client could answer ticks that follow each other without a pause. Real-time priority
 and a short timer slack are asked for and, where refused, named in the report. Memory is not locked: that would
 make all that the JVM has only reserved real.
 """
@@ -23,6 +24,8 @@ from heptarm.virtual.ring import ANCHOR, NEWEST, RATE, Ring
 
 #: Ticks that are caught up in one go; beyond them time is given up.
 CATCH_UP = 20
+#: The same while somebody has to answer each tick.
+ANSWERED = 1
 #: Wake this long before a tick is due and spin [ns]; small, since a spinning real-time thread starves the machine.
 SPIN_NS = 60_000
 #: At most this share of a period is spun.
@@ -70,6 +73,9 @@ class Pacer:
         ring: whose anchor tells Java the wall time of plant time zero.
         tick: one tick.
         speed: plant seconds per second; 0: as fast as it goes.
+
+    Attributes:
+        catch_up: ticks that are caught up in one go; may be set at any time.
     """
 
     def __init__(self, ring: Ring, tick: Callable[[], None], *, speed: float = 1.0) -> None:
@@ -77,6 +83,7 @@ class Pacer:
         self._tick = tick
         self._period = int(TICK_NS / speed) if speed > 0 else 0
         self._speed = speed
+        self.catch_up = CATCH_UP
         self._stop = False
         self._cost = np.zeros(_HISTORY, dtype=np.int64)
         self._late = np.zeros(_HISTORY, dtype=np.int64)
@@ -117,7 +124,7 @@ class Pacer:
                     time.sleep((due - now - spin) * 1e-9)
                 while now_ns() < due:
                     pass
-            elif now - due > CATCH_UP * period:
+            elif now - due > self.catch_up * period:
                 self._rebased += 1
                 time.sleep(BREATH)
                 due = now_ns()

@@ -136,6 +136,11 @@ class Sessions:
             session.server.close()
             session.farewell = _FAREWELL
 
+    @property
+    def any(self) -> bool:
+        """Whether a session stands."""
+        return bool(self._sessions)
+
     def tick(self) -> None:
         """What comes before a tick of the plant."""
         if not self._sessions:

@@ -20,7 +20,7 @@ from heptarm.virtual.fri.events import Event, OverlayEnded, QualityChanged, Refu
 from heptarm.virtual.fri.faults import Scenario
 from heptarm.virtual.fri.overlay import HoldingTarget, MotionOverlay
 from heptarm.virtual.fri.server import PORT, Address, Server
-from heptarm.virtual.pacer import Pacer
+from heptarm.virtual.pacer import ANSWERED, Pacer
 from heptarm.virtual.ring import Ring
 
 #: After an overlay has ended by an error, the next one begins so many ticks later at the earliest.
@@ -142,6 +142,7 @@ class Standalone:
             listener=self._hear,
         )
         self.pacer = Pacer(arm.ring, self.tick, speed=settings.speed)
+        self.pacer.catch_up = ANSWERED
 
     def tick(self) -> None:
         """One millisecond of session and arm."""
