@@ -22,13 +22,13 @@ ROS2_PACKAGES := $(shell find ros2/interfaces ros2/heptarm_msgs -type f)
 
 $(STAMPS)/ros2: scripts/setup_ros2.sh scripts/ros2_interfaces.py scripts/ros2_requirements.txt $(ROS2_PACKAGES) $(STAMPS)/venv
 	scripts/setup_ros2.sh
-	@mkdir -p $(STAMPS) && touch $@
+	@mkdir -p $(STAMPS) && if [ -x build/ros2/bin/python ]; then touch $@; fi  # asked again where there is none
 
 ROS1_PACKAGES := $(shell find ros1/interfaces -type f)
 
 $(STAMPS)/ros1: scripts/setup_ros1.sh scripts/ros1_interfaces.py $(ROS1_PACKAGES) $(ROS2_PACKAGES) $(STAMPS)/venv
 	scripts/setup_ros1.sh
-	@mkdir -p $(STAMPS) && touch $@
+	@mkdir -p $(STAMPS) && if [ -x build/ros1/bin/python ]; then touch $@; fi
 
 cabinet: $(STAMPS)/jdk  ## compile the cabinet application and its doubles
 	@$(PY) cabinet/build.py

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Makes build/ros1: rospy from Debian's packages, our interfaces, our node. Where there are no such packages, it says so and
-# ends well: the tests are skipped then.
+# ends well without build/ros1: the tests are skipped then. Where making it fails, it fails.
 set -eu
 cd "$(dirname "$0")/.."
 venv=build/ros1
@@ -15,6 +15,11 @@ no() {
     exit 0
 }
 
+failed() {
+    echo "setting up ROS 1 failed: $1" >&2
+    exit 1
+}
+
 complete() {
     $python -c "import rospy, actionlib, roslaunch, sensor_msgs, trajectory_msgs, diagnostic_msgs, std_srvs, genpy, rostopic, rosservice" 2>/dev/null &&
         [ -d /usr/share/trajectory_msgs/msg ] && [ -d /usr/share/actionlib_msgs/msg ] && command -v roscore >/dev/null
@@ -24,15 +29,16 @@ complete() {
 $python -c 'import sys; sys.exit(sys.version_info < (3, 10))' || no "$($python -V) is too old for heptarm"
 if ! complete; then
     command -v apt-get >/dev/null && [ "$(id -u)" = 0 ] || no "rospy is missing; type: sudo apt-get install -y $(echo $packages)"
-    apt-get -qq update || no "the package lists cannot be had"
+    apt-get -qq update || failed "the package lists cannot be had"
+    apt-cache show python3-rospy >/dev/null 2>&1 || no "this system has no packages of it"
     DEBIAN_FRONTEND=noninteractive apt-get -qq install -y --no-install-recommends python3-venv $packages >/dev/null ||
-        no "Debian's packages of ROS cannot be installed"
-    complete || no "Debian's packages of ROS are not complete"
+        failed "Debian's packages of ROS cannot be installed"
+    complete || failed "Debian's packages of ROS are not complete"
 fi
 # Without pip of its own, which Debian keeps in a further package.
 [ -x $venv/bin/python ] || $python -m venv --system-site-packages --without-pip $venv
 .venv/bin/python -m pip --python $venv/bin/python install -q --disable-pip-version-check "numpy>=1.22,<3" "pytest>=8" "pytest-timeout>=2.3" "hypothesis>=6.100" ||
-    no "numpy, pytest and hypothesis cannot be installed for $($venv/bin/python -V)"
+    failed "numpy, pytest and hypothesis cannot be installed for $($venv/bin/python -V)"
 site=$($venv/bin/python -c 'import sysconfig; print(sysconfig.get_paths()["purelib"])')
 $venv/bin/python scripts/ros1_interfaces.py "$site" ros1/interfaces/control_msgs ros1/heptarm_msgs
 printf '%s\n' "$PWD/src" "$PWD/ros1/heptarm_ros1/src" >"$site/heptarm_sources.pth"

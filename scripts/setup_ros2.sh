@@ -1,6 +1,6 @@
 #!/bin/sh
 # Makes build/ros2: rclpy from PyPI's wheels, our interfaces, our node, for machines without ROS. Where there are no
-# wheels, it says so and ends well: the tests are skipped then.
+# wheels, it says so and ends well without build/ros2: the tests are skipped then. Where making it fails, it fails.
 set -eu
 cd "$(dirname "$0")/.."
 venv=build/ros2
@@ -9,6 +9,11 @@ no() {
     echo "no ROS 2 here: $1; its tests will be skipped"
     rm -rf $venv
     exit 0
+}
+
+failed() {
+    echo "setting up ROS 2 failed: $1" >&2
+    exit 1
 }
 
 [ "$(uname -s)-$(uname -m)" = Linux-x86_64 ] || no "there are wheels for Linux on x86_64 only"
@@ -21,8 +26,14 @@ for compiler in gcc g++; do
 done
 python=$(.venv/bin/python -c 'import sys; print(sys._base_executable)')
 [ -x $venv/bin/python ] || "$python" -m venv $venv
-$venv/bin/python -m pip install -q --disable-pip-version-check -r scripts/ros2_requirements.txt ||
-    no "the wheels cannot be installed for $($venv/bin/python -V)"
+if ! said=$($venv/bin/python -m pip install -q --disable-pip-version-check -r scripts/ros2_requirements.txt 2>&1); then
+    echo "$said" >&2
+    case $said in
+    *onnection* | *imed\ out* | *resolution*) failed "the wheels cannot be fetched" ;;
+    *"No matching distribution"*) no "there are no wheels for $($venv/bin/python -V)" ;;
+    esac
+    failed "the wheels cannot be installed"
+fi
 headers=$($venv/bin/python -c 'import sysconfig; print(sysconfig.get_paths()["include"])')
 [ -e "$headers/Python.h" ] || no "Python's headers are missing (python3-dev)"
 $venv/bin/python scripts/ros2_interfaces.py ros2/interfaces/control_msgs ros2/heptarm_msgs

@@ -41,7 +41,7 @@ def sources() -> dict[str, str]:
     """Environment in which ROS' own tools find our packages and messages."""
     return {
         "ROS_PACKAGE_PATH": str(PACKAGES),
-        "PYTHONPATH": sysconfig.get_paths()["purelib"],
+        "PYTHONPATH": f"{ROOT / 'src'}:{PACKAGES / 'heptarm_ros1' / 'src'}:{sysconfig.get_paths()['purelib']}",
         "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
     }
 
