@@ -1,8 +1,7 @@
 package heptarm.app;
 
-import com.kuka.roboticsAPI.applicationModel.IApplicationControl;
+import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
 import com.kuka.roboticsAPI.deviceModel.LBR;
-import com.kuka.task.ITaskLogger;
 
 import heptarm.core.Arm;
 import heptarm.core.Log;
@@ -12,9 +11,23 @@ public final class CabinetArm {
     private CabinetArm() {
     }
 
-    /** To be closed in the application's dispose(). */
-    public static Arm of(LBR lbr, IApplicationControl control, ITaskLogger logger) {
-        Log log = new TaskLog(logger, true);
-        return Arm.alone(new SunriseRobot(lbr, new Tools(lbr, null, "", "", log), control, log), log);
+    /**
+     * To be closed in the application's dispose(). Tools of the project, taught frames and signals are found as heptarm's own
+     * application finds them: by the process data heptarm.tools, heptarm.frames and heptarm.io, where there are any.
+     */
+    public static Arm of(LBR lbr, RoboticsAPIApplication application) {
+        Log log = new TaskLog(application.getLogger(), true);
+        return Arm.alone(robot(lbr, application, new ProcessSettings(application.getApplicationData(), log), log), log);
+    }
+
+    /** The robot with what an application's project has for it. */
+    static SunriseRobot robot(LBR lbr, RoboticsAPIApplication application, ProcessSettings settings, Log log) {
+        Tools tools = new Tools(lbr, application.getApplicationData(), settings.text("heptarm.tools", ""),
+                settings.text("heptarm.frames", ""), log);
+        SunriseRobot robot = new SunriseRobot(lbr, tools, application.getApplicationControl(), log);
+        robot.heed(application.getRecovery());
+        IoSignals signals = new IoSignals(lbr.getController(), settings.text("heptarm.io", IoSignals.FLANGE), log);
+        robot.furnish(new CabinetPanel(signals, application.getApplicationData()));
+        return robot;
     }
 }

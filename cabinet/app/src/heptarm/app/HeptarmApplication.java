@@ -7,7 +7,6 @@ import javax.inject.Inject;
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplicationState;
 import com.kuka.roboticsAPI.deviceModel.LBR;
-import com.kuka.roboticsAPI.persistenceModel.PersistenceException;
 
 import heptarm.core.Clocks;
 import heptarm.core.Config;
@@ -25,42 +24,20 @@ public class HeptarmApplication extends RoboticsAPIApplication {
 
     @Override
     public void initialize() {
-        Log log = new TaskLog(getLogger(), number("heptarm.verbosity", 1) < 1);
-        Config config = new Config(text("heptarm.bind", "0.0.0.0"), (int) number("heptarm.port", Protocol.PORT),
-                text("heptarm.key", ""), text("heptarm.allow", ""), number("heptarm.heartbeat", 0.5),
-                number("heptarm.max_rate", 200.0));
-        Tools tools = new Tools(lbr, getApplicationData(), text("heptarm.tools", ""), text("heptarm.frames", ""), log);
-        SunriseRobot robot = new SunriseRobot(lbr, tools, getApplicationControl(), log);
-        robot.heed(getRecovery());
-        CabinetPanel panel = new CabinetPanel(new IoSignals(lbr.getController(), text("heptarm.io", IoSignals.FLANGE), log),
-                getApplicationData());
-        robot.furnish(panel);
+        ProcessSettings settings = new ProcessSettings(getApplicationData(), new TaskLog(getLogger(), true));
+        Log log = new TaskLog(getLogger(), settings.number("heptarm.verbosity", 1) < 1);
+        Config config = new Config(settings.text("heptarm.bind", "0.0.0.0"),
+                (int) settings.number("heptarm.port", Protocol.PORT), settings.text("heptarm.key", ""),
+                settings.text("heptarm.allow", ""), settings.number("heptarm.heartbeat", 0.5),
+                settings.number("heptarm.max_rate", 200.0));
+        SunriseRobot robot = CabinetArm.robot(lbr, this, settings, log);
         server = new Server(robot, config, Clocks.find(), log);
         try {
-            panel.show(UserKeys.publish(this, server, log));
+            robot.panel().show(UserKeys.publish(this, server, log));
         } catch (LinkageError e) { // an old cabinet; everything else works without them
             log.warn("this cabinet has no user keys: " + e);
         } catch (RuntimeException e) {
             log.error("publishing the user keys", e);
-        }
-    }
-
-    private String text(String name, String otherwise) {
-        try {
-            Object value = getApplicationData().getProcessData(name).getValue();
-            return value == null ? otherwise : value.toString();
-        } catch (PersistenceException e) {
-            return otherwise;
-        }
-    }
-
-    private double number(String name, double otherwise) {
-        String value = text(name, "");
-        try {
-            return value.trim().length() == 0 ? otherwise : Double.parseDouble(value.trim());
-        } catch (NumberFormatException e) {
-            getLogger().warn("process data " + name + " is " + value + ", which is no number; " + otherwise + " is used");
-            return otherwise;
         }
     }
 

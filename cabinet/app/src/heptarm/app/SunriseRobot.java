@@ -94,6 +94,10 @@ final class SunriseRobot implements Robot, IErrorHandler {
         panel = furnished;
     }
 
+    CabinetPanel panel() {
+        return panel;
+    }
+
     public RobotInfo info() {
         return info;
     }

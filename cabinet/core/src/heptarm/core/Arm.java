@@ -3,12 +3,15 @@ package heptarm.core;
 import java.util.HashMap;
 import java.util.Map;
 
+import heptarm.wire.AttachLoad;
+import heptarm.wire.AttachTool;
 import heptarm.wire.Cancel;
 import heptarm.wire.CartesianDynamics;
 import heptarm.wire.Cause;
 import heptarm.wire.Code;
 import heptarm.wire.Condition;
 import heptarm.wire.ConditionNode;
+import heptarm.wire.DefineTool;
 import heptarm.wire.Item;
 import heptarm.wire.Message;
 import heptarm.wire.Mode;
@@ -17,14 +20,20 @@ import heptarm.wire.Pause;
 import heptarm.wire.PoseState;
 import heptarm.wire.Recover;
 import heptarm.wire.Resume;
+import heptarm.wire.RobotInfo;
 import heptarm.wire.Run;
 import heptarm.wire.SafetyState;
 import heptarm.wire.ServoClose;
 import heptarm.wire.ServoEngine;
 import heptarm.wire.ServoOpen;
+import heptarm.wire.ServoSettings;
 import heptarm.wire.SetOverride;
+import heptarm.wire.SetSignal;
+import heptarm.wire.SetSignals;
+import heptarm.wire.SignalInfo;
 import heptarm.wire.Stop;
 import heptarm.wire.StopKind;
+import heptarm.wire.ToolInfo;
 import heptarm.wire.TorqueState;
 import heptarm.wire.When;
 import heptarm.wire.WrenchState;
@@ -109,6 +118,17 @@ public final class Arm implements Server.Hearer {
         return servo(new ServoOpen(ServoEngine.SMART, "", mode, speed, acceleration, UNBOUNDED, SHORTEST, PATIENCE, watchdog, NEVER));
     }
 
+    /**
+     * Opens a stream of poses that the moved frame follows on straight lines.
+     *
+     * @param most limits along and about each axis of the base; NaN: as the cabinet has it; there are none of the jerk
+     * @param watchdog see {@link #servo(double, double, double, Mode)}
+     * @param mode likewise
+     */
+    public Steering servoLin(CartesianDynamics most, double watchdog, Mode mode) throws Refusal {
+        return servo(new ServoOpen(ServoEngine.LIN, "", mode, 1.0, 1.0, most, SHORTEST, PATIENCE, watchdog, NEVER));
+    }
+
     /** The same with everything that can be said. */
     public Steering servo(ServoOpen open) throws Refusal {
         return new Steering(this, begin(open), open.watchdog);
@@ -158,6 +178,10 @@ public final class Arm implements Server.Hearer {
         command(new ServoClose(servo));
     }
 
+    void change(long servo, Mode mode) throws Refusal {
+        command(new ServoSettings(servo, mode));
+    }
+
     void follow(Message target) throws Refusal {
         server.dispatcher.follow(target, server.clock.nanos());
     }
@@ -182,7 +206,86 @@ public final class Arm implements Server.Hearer {
         }
     }
 
+    // ------------------------------------------------------------------------------------- tools and signals
+
+    /** Tools that can be attached by name: templates of the project as far as their names are known, and defined ones. */
+    public ToolInfo[] tools() {
+        return server.rack.known();
+    }
+
+    /** Makes a tool known, or says otherwise what one is. */
+    public void define(ToolInfo tool) throws Refusal {
+        command(new DefineTool(tool));
+    }
+
+    /** A defined tool, or a template of the project, hangs on the flange from now on; motions move its first frame. */
+    public void attach(String tool) throws Refusal {
+        attach(tool, "");
+    }
+
+    /** The same; motions move one of its frames. */
+    public void attach(String tool, String frame) throws Refusal {
+        command(new AttachTool(tool, frame));
+    }
+
+    /** Nothing hangs on the flange any more; a workpiece goes with its tool. */
+    public void detach() throws Refusal {
+        command(new AttachTool("", ""));
+    }
+
+    /** The tool holds a workpiece, in the frame that motions move. */
+    public void load(ToolInfo workpiece) throws Refusal {
+        command(new AttachLoad(workpiece, true));
+    }
+
+    /** It does not hold it any more. */
+    public void unload(ToolInfo workpiece) throws Refusal {
+        command(new AttachLoad(workpiece, false));
+    }
+
+    /** Names of the attached tool, of the workpiece (empty: none), and of the frame that motions move. */
+    public String[] fitted() {
+        return server.rack.fitted();
+    }
+
+    /** Signals of the cabinet's IO groups, each named "group.name". */
+    public SignalInfo[] signals() {
+        return server.robot.signals();
+    }
+
+    /** Value of a signal; of a boolean one 0 or 1. */
+    public double read(String signal) throws Refusal {
+        SignalInfo[] all = server.robot.signals();
+        int place = Signals.of(signal, all, "signal");
+        double[] values = new double[all.length];
+        server.robot.readSignals(values, place, 1);
+        return values[place];
+    }
+
+    /** Writes an output; of a boolean one 0 or 1. */
+    public void write(String signal, double value) throws Refusal {
+        command(new SetSignals(new SetSignal[] {new SetSignal(signal, value)}));
+    }
+
     // ----------------------------------------------------------------------------------------------- state
+
+    public RobotInfo info() {
+        return server.robot.info();
+    }
+
+    /** What can be asked for: names of motions, modes and functions. */
+    public String[] capabilities() {
+        return server.robot.capabilities();
+    }
+
+    public double override() {
+        return server.robot.override();
+    }
+
+    /** Control mode of what runs, with its parameters; position control while nothing does. */
+    public Mode mode() {
+        return server.executor.mode();
+    }
 
     /** Measured joint positions [rad]. */
     public double[] joints() {
@@ -200,14 +303,20 @@ public final class Arm implements Server.Hearer {
         return new TorqueState(server.clock.nanos(), measured, external, commanded);
     }
 
-    /** Of the flange in the base, measured and commanded. */
+    /** Of the moved frame in the base, measured and commanded. */
     public PoseState pose() {
         return server.robot.readPose(server.clock.nanos());
     }
 
-    /** External, at the flange, in the axes of the base. */
+    /** External, at the moved frame, in the axes of the base. */
     public WrenchState wrench() {
         return server.robot.readWrench(server.clock.nanos());
+    }
+
+    /** The same in the axes of another frame: "" (the moved frame), "flange", or a frame's name. */
+    public WrenchState wrench(String axes) throws Refusal {
+        server.rack.checkReference(axes, "axes");
+        return server.robot.readWrench(axes, server.clock.nanos());
     }
 
     public SafetyState safety() {

@@ -9,18 +9,25 @@ import heptarm.app.CabinetArm;
 import heptarm.core.Arm;
 import heptarm.core.Move;
 import heptarm.core.Refusal;
+import heptarm.core.Spring;
 import heptarm.core.Steering;
+import heptarm.wire.CartesianDynamics;
+import heptarm.wire.FrameInfo;
 import heptarm.wire.JointImpedance;
 import heptarm.wire.MotionFinished;
 import heptarm.wire.PoseState;
 import heptarm.wire.SafetyBits;
+import heptarm.wire.ToolInfo;
 
-/** Stirs: a servo motion along a circle, soft joints, and how far the arm was off. Everything in SI. */
+/** Stirs with a spoon: a servo motion along a circle, soft joints, then straight lines that yield. Everything in SI. */
 public class Stir extends RoboticsAPIApplication {
     private static final double RADIUS = 0.03;
     private static final double PERIOD = 2.0;
     private static final double[] STIFFNESS = {1500, 1500, 1500, 1500, 1000, 1000, 1000};
     private static final double[] DAMPING = {0.7, 0.7, 0.7, 0.7, 0.7, 0.7, 0.7};
+
+    private static final ToolInfo SPOON = new ToolInfo("spoon", 0.2, new double[] {0, 0, 0.08}, new double[6],
+            new FrameInfo[] {new FrameInfo("bowl", Move.pose(0, 0, 0.15))});
 
     @Inject
     private LBR lbr;
@@ -28,13 +35,20 @@ public class Stir extends RoboticsAPIApplication {
 
     @Override
     public void initialize() {
-        arm = CabinetArm.of(lbr, getApplicationControl(), getLogger());
+        arm = CabinetArm.of(lbr, this);
     }
 
     @Override
     public void run() throws Exception {
         arm.move(Move.ptp(0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0).speed(0.5));
+        arm.define(SPOON);
+        arm.attach(SPOON.name);
+        arm.write("MediaFlange.LEDGreen", 1);
+        getLogger().info("tool = " + arm.fitted()[0] + ", moving its " + arm.fitted()[2]);
         stir(new JointImpedance(STIFFNESS, DAMPING));
+        scrape();
+        arm.write("MediaFlange.LEDGreen", 0);
+        arm.detach();
         getLogger().info("ready = " + ((arm.safety().bits & SafetyBits.READY_TO_MOVE) != 0));
     }
 
@@ -54,6 +68,25 @@ public class Stir extends RoboticsAPIApplication {
         }
         MotionFinished end = stream.close();
         getLogger().info("stirred = " + end.cause + ", " + Math.round(1000 * farthest) + " mm to the side");
+    }
+
+    /** Along the edge of the bowl and back: straight lines, yielding downwards, more and more so. */
+    private void scrape() throws Refusal, InterruptedException {
+        PoseState start = arm.pose();
+        Spring soft = Spring.of(2000, 2000, 800, 200, 200, 200).damping(0.8).along("base");
+        double[] corner = start.xyz.clone();
+        corner[1] += RADIUS;
+        double nan = Double.NaN;
+        Steering line = arm.servoLin(new CartesianDynamics(0.1, 0.5, nan, 0.5, 2.0, nan), 0.5, soft.mode());
+        for (int i = 0; i < 150 && !line.isFinished(); i++) {
+            line.follow(i < 75 ? corner : start.xyz, start.quat);
+            if (i == 75) {
+                line.change(Spring.of(2000, 2000, 400, 200, 200, 200).damping(0.8).along("base").mode());
+            }
+            Thread.sleep(10);
+        }
+        MotionFinished end = line.close();
+        getLogger().info("scraped = " + end.cause + ", lamp " + arm.read("MediaFlange.LEDGreen"));
     }
 
     @Override

@@ -10,10 +10,13 @@ import heptarm.core.Arm;
 import heptarm.core.Handle;
 import heptarm.core.Move;
 import heptarm.core.Refusal;
+import heptarm.core.Until;
+import heptarm.wire.Axis;
 import heptarm.wire.MotionFinished;
 import heptarm.wire.Pose;
+import heptarm.wire.PoseState;
 
-/** Visits places one after the other, blocking and not, and shows how a refusal reads. Everything in SI. */
+/** Visits places one after the other, blocking and not, along curves and until something is touched. Everything in SI. */
 public class Visit extends RoboticsAPIApplication {
     private static final Move HOME = Move.ptp(0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0).speed(0.5);
 
@@ -23,14 +26,16 @@ public class Visit extends RoboticsAPIApplication {
 
     @Override
     public void initialize() {
-        arm = CabinetArm.of(lbr, getApplicationControl(), getLogger());
+        arm = CabinetArm.of(lbr, this);
     }
 
     @Override
     public void run() throws Exception {
         arm.move(HOME);
         square();
+        curve();
         interrupted();
+        touched();
         refused();
     }
 
@@ -40,6 +45,27 @@ public class Visit extends RoboticsAPIApplication {
         MotionFinished end = arm.move(side, Move.linRel(0.0, 0.1, 0.0).along("base").velocity(0.2),
                 Move.linRel(-0.1, 0.0, 0.0).along("base").velocity(0.2), Move.linRel(0.0, -0.1, 0.0).along("base").velocity(0.2));
         say("square", end.cause + " after " + Math.round(end.duration) + " s");
+    }
+
+    /** Three places that are passed without a stop, and back. */
+    private void curve() throws Refusal, InterruptedException {
+        PoseState here = arm.pose();
+        Pose start = new Pose(here.xyz, here.quat);
+        MotionFinished end = arm.move(Move.spline(Move.spl(beside(start, 0.04, 0.03)), Move.spl(beside(start, 0.08, 0.0)).velocity(0.1),
+                Move.circ(beside(start, 0.04, -0.03), start)).velocity(0.2));
+        say("curve", end.cause + " in " + arm.info().title);
+    }
+
+    private static Pose beside(Pose place, double y, double z) {
+        return new Pose(new double[] {place.xyz[0], place.xyz[1] + y, place.xyz[2] + z}, place.quat);
+    }
+
+    /** A motion that ends at what it touches; here nothing stands in its way but the end of what it may go. */
+    private void touched() throws Refusal, InterruptedException {
+        Until touch = Until.forceAlong(Axis.Z, 15.0).or(Until.signal("MediaFlange.UserButton", true)).or(Until.travelled(0.05));
+        MotionFinished end = arm.move(Move.linRel(0.0, 0.0, -0.2).along("base").velocity(0.1).until(touch));
+        say("touched", end.cause + " by condition " + end.fired);
+        arm.move(Move.home().speed(0.5), HOME);
     }
 
     /** A motion that is watched while it runs, and cancelled half way. */
