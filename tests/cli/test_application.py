@@ -121,7 +121,7 @@ def test_applications_are_found_and_one_has_to_be_chosen(lab: Path) -> None:
                 "refused = items[0].motion.q[1]: A2 would be at",
             ),
         ),
-        ("Stir", ("tool = spoon, moving its bowl", "stirred = CANCELLED", "mm to the side", "lamp 1.0", "ready = true")),
+        ("Stir", ("spoon, moving its bowl", "stirred = CANCELLED", "mm to the side", "lamp 1.0", "ready = true")),
     ],
 )
 def test_an_application_on_heptarms_core_needs_no_network(name: str, said: tuple[str, ...]) -> None:
