@@ -45,7 +45,8 @@ class Joints(Value):
         stamp: cabinet time of the measurement [ns].
         q: measured, shape (7,) [rad].
         q_cmd: commanded, shape (7,) [rad].
-        dq: low-pass filtered velocity, shape (7,) [rad/s]; NaN before the second sample.
+        dq: velocity, shape (7,) [rad/s]: the difference of measured positions behind a first-order low-pass of 10 ms,
+            since a cabinet tells none; NaN before the second sample.
     """
 
     stamp: int
@@ -187,7 +188,7 @@ class Safety(Value):
         mode: operation mode.
         ready_to_move: the robot would accept a motion.
         paused: execution is paused.
-        brakes_open: the brakes are open.
+        brakes_open: the brakes are open, as a simulator tells; never true on a cabinet, which does not tell of them.
         moving: a motion command is active.
         mastered: all axes are mastered.
         emergency_stop: a local or external emergency stop is active.
