@@ -31,6 +31,7 @@ from heptarm.virtual.planner import (
 )
 from heptarm.virtual.profile import Limits
 from heptarm.virtual.timing import Relay, paced
+from heptarm.virtual.way import Way
 
 _LINES = ("lin", "lin_rel", "circ")
 #: Samples of a part to find its blending zones with.
@@ -132,7 +133,9 @@ def timed(
     courses = tuple(course(robot, chain, seen, a, b) for a, b in pairwise(edges))
     law = Relay([paced(one) for one in courses])
     halts = Halts(tuple(chain.marks[edge] for edge in edges[1:]), courses, law)
-    return Plan(order, start, seen.q[-1][-1], chain, law, Limits(1.0, 1.0, 1.0), halts, tuple(marks))
+    shares = [np.linspace(low, high, len(q)) for q, (low, high) in zip(seen.q, pairwise(chain.marks), strict=True)]
+    way = Way.through(np.concatenate(shares), np.concatenate([places for places, _ in seen.poses]))
+    return Plan(order, start, seen.q[-1][-1], chain, law, Limits(1.0, 1.0, 1.0), halts, tuple(marks), way)
 
 
 def _part(robot: RobotModel, order: Order, start: Array) -> _Part:

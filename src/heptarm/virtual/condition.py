@@ -21,16 +21,17 @@ from math import hypot, inf, sqrt
 
 import numpy as np
 
-from heptarm.model.kinematics import flange, forward
+from heptarm.model.kinematics import flange
 from heptarm.values.arrays import Array
 from heptarm.values.pose import rotation
 from heptarm.values.robot import RobotModel
 from heptarm.virtual.planner import Plan
+from heptarm.virtual.profile import TimeLaw
+from heptarm.virtual.way import Way
 
 Vec = tuple[float, float, float]
 
-_SAMPLES = 201
-_HALVINGS = 40
+_HALVINGS = 30
 
 
 class Sight:
@@ -133,32 +134,34 @@ class PathPoint:
         """Whether it is reached."""
         return sight.elapsed >= self.due
 
-    def find(self, robot: RobotModel, plan: Plan) -> None:
-        """Find it on a motion's path; a motion without one never reaches it."""
+    def find(self, robot: RobotModel, plan: Plan, part: int) -> None:
+        """Find it on the path of a motion, or of a part of it; one that is there already has its ends only."""
         self.due = inf
         path, profile = plan.path, plan.profile
         if path is None or profile is None:
+            is_still = plan.order.kind == "hold" or plan.order.is_servo
+            if not is_still and not (self.from_start and self.distance > 0):
+                self.due = max(0.0, self.delay)
             return
-        shares = np.linspace(0.0, 1.0, _SAMPLES)
-        q, points = plan.start, []
-        offset = np.array(plan.order.tcp[:3])
-        for share in shares.tolist():
-            q = path.at(share, q)
-            pose = forward(robot, q)
-            points.append(pose[:3, :3] @ offset + pose[:3, 3])
-        steps = np.linalg.norm(np.diff(np.array(points), axis=0), axis=1)
-        lengths = np.concatenate([[0.0], np.cumsum(steps)])
-        wanted = self.distance if self.from_start else float(lengths[-1]) + self.distance
-        if wanted > lengths[-1] + 1e-9:
-            return
-        goal = 0.0 if wanted <= 0 else float(np.interp(wanted, lengths, shares))
-        low, high = 0.0, profile.duration
-        if goal >= 1.0:
-            low = high
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if profile.at(middle)[0] < goal else (low, middle)
-        self.due = (high if goal > 0.0 else 0.0) + self.delay
+        way = plan.way or Way.along(robot, path, plan.start, plan.order.tcp)
+        low, high = plan.span(part)
+        place = way.place(self.distance, low, high, from_start=self.from_start)
+        if place is not None:
+            begin = _time(profile, low)
+            self.due = max(begin, (begin if place == low else _time(profile, place)) + self.delay)
+
+
+def _time(profile: TimeLaw, s: float) -> float:
+    """When s is reached [s]."""
+    if s <= 0.0:
+        return 0.0
+    low, high = 0.0, profile.duration
+    if s >= 1.0:
+        return high
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if profile.at(middle)[0] < s else (low, middle)
+    return high
 
 
 @dataclass(slots=True, eq=False)
@@ -169,6 +172,7 @@ class Watching:
         holds: whether it holds.
         tell: called when it begins or ceases to hold, from the tick.
         breaks: it ends the motion it belongs to.
+        part: see `Watch`.
         points: points on the path in it.
         at_once: told of, too, if it holds when looked at first.
         held: whether it held when looked at last; None before the first look.
@@ -177,9 +181,14 @@ class Watching:
     holds: Holds
     tell: Callable[[bool], None]
     breaks: bool = False
+    part: int = -1
     points: tuple[PathPoint, ...] = ()
     at_once: bool = True
     held: bool | None = field(default=None)
+
+    def concerns(self, part: int) -> bool:
+        """Whether it is watched while a part runs; a mere point of the path may lie some time behind its own part."""
+        return self.part < 0 or self.part == part or (self.part < part and isinstance(self.holds, PathPoint))
 
     def look(self, sight: Sight) -> bool:
         """Look at it, and tell of a change; says whether it holds."""
@@ -226,11 +235,12 @@ class Lookout:
     def begin(self, plan: Plan) -> tuple[Watching, ...]:
         """What to watch while a motion runs."""
         made = tuple(
-            watching(one.condition, _once(one.fired), breaks=one.breaks) for one in plan.order.watches
+            watching(one.condition, _once(one.fired), breaks=one.breaks, part=one.part)
+            for one in plan.order.watches
         )
         for one in made:
             for point in one.points:
-                point.find(self._robot, plan)
+                point.find(self._robot, plan, one.part)
         return made
 
     @property
@@ -239,7 +249,14 @@ class Lookout:
         return bool(self._observers)
 
     def look(
-        self, q: Array, external: Array, wrench: Array, *, watches: tuple[Watching, ...], elapsed: float
+        self,
+        q: Array,
+        external: Array,
+        wrench: Array,
+        *,
+        watches: Sequence[Watching],
+        elapsed: float,
+        part: int = 0,
     ) -> bool:
         """Look at everything in this tick; says whether a motion's break condition begins to hold.
 
@@ -249,6 +266,7 @@ class Lookout:
             wrench: external wrench at the flange in base axes, shape (6,).
             watches: what belongs to the running motion.
             elapsed: time of its profile [s].
+            part: of a batch or a spline: which part of it runs.
         """
         observers = self._observers
         if not observers and not watches:
@@ -256,7 +274,7 @@ class Lookout:
         self._sight.renew(q, external, wrench, elapsed)
         for observer in observers.values():
             observer.look(self._sight)
-        breaks = [one.look(self._sight) and one.breaks for one in watches]
+        breaks = [one.look(self._sight) and one.breaks for one in watches if one.concerns(part)]
         return any(breaks)
 
 
@@ -273,7 +291,9 @@ def _once(fired: Callable[[], None]) -> Callable[[bool], None]:
     return tell
 
 
-def watching(numbers: Sequence[float], tell: Callable[[bool], None], *, breaks: bool = False) -> Watching:
+def watching(
+    numbers: Sequence[float], tell: Callable[[bool], None], *, breaks: bool = False, part: int = -1
+) -> Watching:
     """A condition from its numbers.
 
     Raises:
@@ -301,7 +321,7 @@ def watching(numbers: Sequence[float], tell: Callable[[bool], None], *, breaks: 
             stack.append(_leaf(kind, values))
     if len(stack) != 1:
         raise ValueError(f"the numbers of a condition leave {len(stack)} results")
-    return Watching(stack[0], tell, breaks, tuple(points))
+    return Watching(stack[0], tell, breaks, part, tuple(points))
 
 
 _SIZES = {1: 3, 2: 11, 3: 11, 4: 11, 5: 12, 6: 12, 7: 2, 8: 3, 9: 3, 32: 1, 33: 1, 34: 1}

@@ -7,6 +7,7 @@ along their paths or after servo targets, and brakes on the path or off it where
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from math import inf, nan
 
 import numpy as np
@@ -219,10 +220,12 @@ class Interpolator:
     def _look(self) -> None:
         """Look at the conditions; one that breaks the running motion brakes it on its path."""
         run = self.run
-        watches = () if run is None or run.braking or run.ended else run.watches
-        elapsed = 0.0 if run is None else run.time
+        watches: Sequence[Watching] = () if run is None or run.braking else run.watches
+        if run is not None and run.ended:  # nothing is left to break, but a trigger may sit at the very end
+            watches = [one for one in watches if not one.breaks]
+        elapsed, part = (0.0, 0) if run is None else (run.time, run.part)
         breaks = self.lookout.look(
-            self._q, self._load.torque, self._load.wrench, watches=watches, elapsed=elapsed
+            self._q, self._load.torque, self._load.wrench, watches=watches, elapsed=elapsed, part=part
         )
         if breaks and run is not None and not run.cancelled and not run.failure:
             run.broken = True
@@ -266,21 +269,27 @@ class Interpolator:
         if run.path is None or run.profile is None:
             if run.cancelled or run.time >= planned.duration or planned.order.kind != "hold":
                 run.ended = True
+                self._reach(run, 1.0)
             return min(1.0, run.time / planned.duration), planned.duration - run.time
         s = run.profile.at(run.time)[0]
         if run.time >= run.profile.duration:
             run.ended = True
         s = min(max(s, 0.0), 1.0)
-        while run.part < len(planned.marks) and s >= planned.marks[run.part]:
-            run.part += 1
-            if planned.order.part_listener is not None:
-                planned.order.part_listener.reached(run.part)
+        self._reach(run, s)
         # at the very end take the planned joints: the path's samples may end a rounding error beside them
         if s == 1.0 and run.path is planned.path:
             self.command[2] = planned.end
         else:
             self._lead(run, s)
         return (nan if run.failure else planned.progress(s, run.part)), run.profile.duration - run.time
+
+    def _reach(self, run: Run, s: float) -> None:
+        """Tell of the parts that have begun at s."""
+        marks, listener = run.plan.marks, run.plan.order.part_listener
+        while run.part < len(marks) and s >= marks[run.part]:
+            run.part += 1
+            if listener is not None:
+                listener.reached(run.part)
 
     def _lead(self, run: Run, s: float) -> None:
         """Set the next set-point; one that no axis could follow ends the motion."""

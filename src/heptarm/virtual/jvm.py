@@ -197,10 +197,12 @@ def _filled(values: Any, default: float) -> tuple[float, ...]:
 def _watches(java: Any) -> tuple[Watch, ...]:
     """Triggers, then break conditions: one that is both is told of before it ends the motion."""
     found = []
-    for breaks, conditions in ((False, java.triggers), (True, java.breaks)):
+    lists = [(-1, False, java.triggers), (-1, True, java.breaks)]
+    lists[1:1] = [(part, False, java.parts[part].triggers) for part in range(len(java.parts))]
+    for part, breaks, conditions in lists:
         for index in range(len(conditions)):
-            fired = partial(java.listener.fired, breaks, index)
-            found.append(Watch(_numbers(conditions[index]), fired, breaks))
+            fired = partial(java.listener.fired, part, breaks, index)
+            found.append(Watch(_numbers(conditions[index]), fired, breaks, part))
     return tuple(found)
 
 
@@ -224,7 +226,7 @@ def _guide(java: Any) -> HandGuide | None:
     )
 
 
-def _order(java: Any) -> Order:
+def _order(java: Any, *, is_part: bool = False) -> Order:
     relative, cartesian = _filled(java.relative, 1.0), _numbers(java.cartesian)
     relative_blending, distance, turn_blending = _filled(java.blending, 0.0)
     listener = None if java.listener is None else _Listener(java.listener)
@@ -252,7 +254,7 @@ def _order(java: Any) -> Order:
         ori_acceleration=cartesian[4],
         ori_jerk=cartesian[5],
         blending=(relative_blending, distance, turn_blending),
-        parts=tuple(_order(part) for part in java.parts[:]),
+        parts=tuple(_order(part, is_part=True) for part in java.parts[:]),
         guide=_guide(java.guiding),
         duration=float(java.duration),
         mode=mode,
@@ -262,7 +264,7 @@ def _order(java: Any) -> Order:
         speed_timeout=speed_timeout,
         straight=_numbers_if(java.straight),
         listener=listener,
-        watches=_watches(java),
+        watches=() if is_part else _watches(java),
         part_listener=listener,
     )
 

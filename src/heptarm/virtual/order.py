@@ -26,7 +26,7 @@ class Listener(Protocol):
 
 
 class PartListener(Listener, Protocol):
-    """Hears of the parts of a batch, too."""
+    """Hears of the parts of a batch or a spline, too."""
 
     def reached(self, part: int) -> None:
         """A part begins, another than the first."""
@@ -52,11 +52,13 @@ class Watch:
         condition: as heptarm.virtual.condition reads it.
         fired: called when it holds for the first time, by the thread that ticks the plant; must not block.
         breaks: it ends the motion.
+        part: of a batch or a spline which part it is watched in; -1: in all of them.
     """
 
     condition: tuple[float, ...]
     fired: Callable[[], None]
     breaks: bool = False
+    part: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +93,8 @@ class Order:
         speed_timeout: how long a servo target's velocity is kept after it was passed [s].
         straight: of a straight servo motion: largest velocity x y z, about x y z, then acceleration; NaN: the usual.
         listener: hears of start and end.
-        part_listener: hears of a batch's parts.
-        watches: break conditions and triggers.
+        part_listener: hears of the parts of a batch or a spline.
+        watches: break conditions and triggers, of the parts as well.
     """
 
     id: int

@@ -24,6 +24,7 @@ from heptarm.virtual.geometry import Geometry, JointTurn, Slerp, Straight, Turn
 from heptarm.virtual.order import Order, PlanError
 from heptarm.virtual.path import CartesianPath, JointLine, JointPath
 from heptarm.virtual.profile import Limits, Profile, TimeLaw, travel
+from heptarm.virtual.way import Way
 
 #: What a Cartesian motion does where its order says nothing: m/s, m/s², m/s³ and rad/s, rad/s², rad/s³.
 CARTESIAN_DEFAULT = (1.0, 4.0, 40.0)
@@ -47,7 +48,8 @@ class Plan:
         profile: s over time; None for a hold.
         braking: limits of s when it is cancelled.
         halts: of a path with parts: where it rests on the way, and its limits of s when it is cancelled.
-        marks: s at which the parts of a batch begin, without the first.
+        marks: s at which the parts of a batch or a spline begin, without the first.
+        way: of the moved frame; None: it was not measured.
     """
 
     order: Order
@@ -58,6 +60,7 @@ class Plan:
     braking: Limits
     halts: Halts | None = None
     marks: tuple[float, ...] = ()
+    way: Way | None = None
 
     @property
     def duration(self) -> float:
@@ -66,10 +69,14 @@ class Plan:
             return self.profile.duration
         return _NEVER if isnan(self.order.duration) else self.order.duration
 
-    def progress(self, s: float, part: int) -> float:
-        """How far a part of it has come at s, 0 to 1; a motion by itself is its only part."""
+    def span(self, part: int) -> tuple[float, float]:
+        """Path parameter at which a part begins and ends; -1: the whole."""
         marks = (0.0, *self.marks, 1.0)
-        low, high = marks[part], marks[part + 1]
+        return (0.0, 1.0) if part < 0 else (marks[part], marks[part + 1])
+
+    def progress(self, s: float, part: int) -> float:
+        """How far a motion of a batch has come at s, 0 to 1; a motion by itself is its only part."""
+        low, high = self.span(part if self.order.kind == "batch" else -1)
         return min(1.0, max(0.0, (s - low) / (high - low))) if high > low else 1.0
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import isnan
@@ -91,7 +92,18 @@ def plan_spline(robot: RobotModel, order: Order, start: Array) -> Plan:
         for segment, (low, high) in zip(segments, pairwise(track.marks), strict=True)
     ]
     rests = [i for i, (one, two) in enumerate(pairwise(segments)) if _is_corner(one, two)]
-    return timed(robot, order, start, Chain(pieces), [*rests, len(pieces) - 1], ())
+    begins = _begins(order.parts, [segment.order for segment in segments], track.marks)
+    return timed(robot, order, start, Chain(pieces), [*rests, len(pieces) - 1], begins)
+
+
+def _begins(parts: Sequence[Order], kept: Sequence[Order], marks: Sequence[float]) -> list[float]:
+    """Path parameter at which the parts begin, without the first; one that leads nowhere begins with the next."""
+    result, place = [], 0
+    for one in parts:
+        result.append(marks[place])
+        if place < len(kept) and kept[place] is one:
+            place += 1
+    return result[1:]
 
 
 def _segments(order: Order, origin: Pose) -> tuple[list[_Segment], Orientations]:
@@ -235,4 +247,4 @@ def plan_joint_spline(robot: RobotModel, order: Order, start: Array) -> Plan:
         Piece(Stretch(path, low, min(1.0, high)), length, bounds_of(one), (_UNBOUND, _UNBOUND), 33)
         for one, length, (low, high) in zip(orders, lengths, pairwise(marks), strict=True)
     ]
-    return timed(robot, order, start, Chain(pieces), [len(pieces) - 1], ())
+    return timed(robot, order, start, Chain(pieces), [len(pieces) - 1], _begins(order.parts, orders, marks))

@@ -4305,11 +4305,13 @@ class ItemReached:
 
 
 _TriggerFired_0 = Struct(">IHH")
+_TriggerFired_1 = Struct(">d")
+_TriggerFired_2 = Struct(">H")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TriggerFired:
-    """A trigger of an item has fired."""
+    """A trigger of an item has fired, and its action is done; an output that the cabinet did not write is told of by code and text."""
 
     TYPE: ClassVar[int] = 98
     KIND: ClassVar[str] = "event"
@@ -4320,10 +4322,22 @@ class TriggerFired:
     item: int
     trigger: int
     label: str = ""
+    time: float
+    joints: JointState | None = None
+    code: int
+    text: str = ""
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_TriggerFired_0.pack(self.id, self.item, self.trigger))
         out.append(codec.put_str(self.label))
+        out.append(_TriggerFired_1.pack(self.time))
+        if self.joints is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            self.joints._write(out)
+        out.append(_TriggerFired_2.pack(self.code))
+        out.append(codec.put_str(self.text))
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[TriggerFired, int]:
@@ -4333,10 +4347,23 @@ class TriggerFired:
         item = v[1]
         trigger = v[2]
         label, pos = codec.read_str(data, pos)
-        return cls(id=id, item=item, trigger=trigger, label=label), pos
+        v = codec.unpack(_TriggerFired_1, data, pos)
+        pos += _TriggerFired_1.size
+        time = v[0]
+        present, pos = codec.read_flag(data, pos)
+        joints: JointState | None = None
+        if present:
+            joints, pos = JointState._read(data, pos)
+        v = codec.unpack(_TriggerFired_2, data, pos)
+        pos += _TriggerFired_2.size
+        code = v[0]
+        text, pos = codec.read_str(data, pos)
+        return cls(id=id, item=item, trigger=trigger, label=label, time=time, joints=joints, code=code, text=text), pos
 
     def _check(self, path: str) -> None:
-        pass
+        codec.check(self.time, path + "time", -inf, inf, False, False)
+        if self.joints is not None:
+            self.joints._check(path + "joints.")
 
     def encode(self) -> bytes:
         """The body."""
@@ -4682,6 +4709,55 @@ class ConditionFired:
         self._check("")
 
 
+_SegmentReached_0 = Struct(">IHH")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SegmentReached:
+    """A segment of a spline has begun, as far as the robot tells; the one before it is done."""
+
+    TYPE: ClassVar[int] = 105
+    KIND: ClassVar[str] = "event"
+    SOURCE: ClassVar[str] = "cabinet"
+    ROLE: ClassVar[str] = "any"
+
+    id: int
+    item: int
+    segment: int
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_SegmentReached_0.pack(self.id, self.item, self.segment))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[SegmentReached, int]:
+        v = codec.unpack(_SegmentReached_0, data, pos)
+        pos += _SegmentReached_0.size
+        id = v[0]
+        item = v[1]
+        segment = v[2]
+        return cls(id=id, item=item, segment=segment), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> SegmentReached:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "SegmentReached")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -4806,7 +4882,7 @@ class State:
         self._check("")
 
 
-Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Accepted | Rejected | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | SetMode | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | State
+Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Accepted | Rejected | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | SetMode | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
 
 #: Message classes by id.
 MESSAGES: dict[int, type[Message]] = {
@@ -4859,5 +4935,6 @@ MESSAGES: dict[int, type[Message]] = {
     102: KeyPressed,
     103: Notice,
     104: ConditionFired,
+    105: SegmentReached,
     112: State,
 }

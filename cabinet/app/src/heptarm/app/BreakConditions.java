@@ -34,9 +34,10 @@ import heptarm.wire.ShearForceAbove;
 import heptarm.wire.SignalIs;
 import heptarm.wire.SignalOutside;
 import heptarm.wire.TorqueOutside;
+import heptarm.wire.Trigger;
 
 /**
- * Break conditions of a motion as those of Sunrise. Each alternative is one by itself, so that Sunrise can say which fired; a
+ * Break conditions and triggers of a motion as those of Sunrise. Each alternative is one by itself, so that Sunrise can say which fired; a
  * trigger on the same condition tells at once, while the motion still brakes.
  */
 final class BreakConditions {
@@ -83,6 +84,19 @@ final class BreakConditions {
                 listener.fired(trees[i].index);
                 return;
             }
+        }
+    }
+
+    /** Tells a listener when one of a motion's triggers fires. */
+    static void trigger(RobotMotion<?> motion, Trigger[] triggers, AbstractFrame moved, Tools tools, IoSignals signals,
+            final Job.Listener listener) throws Refusal {
+        for (int i = 0; i < triggers.length; i++) {
+            final int place = i;
+            motion.triggerWhen(make(Conditions.tree(triggers[i].condition), moved, tools, signals), new ICallbackAction() {
+                public void onTriggerFired(IFiredTriggerInfo info) {
+                    listener.triggered(place);
+                }
+            });
         }
     }
 

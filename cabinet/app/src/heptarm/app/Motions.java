@@ -7,6 +7,8 @@ import static com.kuka.roboticsAPI.motionModel.BasicMotions.positionHold;
 import static com.kuka.roboticsAPI.motionModel.BasicMotions.ptp;
 import static com.kuka.roboticsAPI.motionModel.BasicMotions.ptpHome;
 
+import java.util.ArrayList;
+import java.util.List;
 import java.util.concurrent.TimeUnit;
 
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
@@ -15,6 +17,7 @@ import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.Frame;
 import com.kuka.roboticsAPI.motionModel.CIRC;
+import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.LIN;
 import com.kuka.roboticsAPI.motionModel.MotionBatch;
 import com.kuka.roboticsAPI.motionModel.OrientationReferenceSystem;
@@ -51,7 +54,7 @@ import heptarm.wire.Spline;
 /** Turns items of a program into Sunrise motions. What cannot be carried out is refused, never ignored. */
 final class Motions {
     static final String[] CAPABILITIES = {"ptp", "ptp_pose", "ptp_home", "lin", "lin_rel", "circ", "spline", "spline_joints", "hold", "blending", "override", "pause",
-        "servo", "servo_direct", "servo_pose", "conditions", "io", "user_keys", "process_data", "joint_impedance", "cartesian_impedance", "sine_impedance",
+        "servo", "servo_direct", "servo_pose", "conditions", "triggers", "segments", "io", "user_keys", "process_data", "joint_impedance", "cartesian_impedance", "sine_impedance",
         "tools", "workpieces", "frames"};
 
     private static final int JOINTS = 7;
@@ -71,9 +74,6 @@ final class Motions {
     /** Refuses what this cabinet cannot carry out. */
     void check(Item item, String path) throws Refusal {
         modes.check(item.mode, tools.moved(item.frame), path + "mode.");
-        if (item.triggers.length > 0) {
-            throw unsupported(path + "triggers", "triggers");
-        }
         Motion motion = item.motion;
         String at = path + "motion.";
         if (motion instanceof PtpPose) {
@@ -125,9 +125,9 @@ final class Motions {
         }
     }
 
-    /** The Sunrise motion of a checked item. */
-    RobotMotion<?> motion(Item item, Mode mode) throws Refusal {
-        RobotMotion<?> motion = motion(item);
+    /** The Sunrise motion of a checked item; segments of a spline are added to a list. */
+    RobotMotion<?> motion(Item item, Mode mode, List<IMotion> segments) throws Refusal {
+        RobotMotion<?> motion = motion(item, segments);
         motion.setMode(modes.of(mode));
         return motion;
     }
@@ -136,7 +136,7 @@ final class Motions {
     RobotMotion<?>[] motions(Item[] items) throws Refusal {
         RobotMotion<?>[] result = new RobotMotion<?>[items.length];
         for (int i = 0; i < items.length; i++) {
-            result[i] = motion(items[i]);
+            result[i] = motion(items[i], new ArrayList<IMotion>());
         }
         return result;
     }
@@ -148,13 +148,13 @@ final class Motions {
         return batch;
     }
 
-    private RobotMotion<?> motion(Item item) throws Refusal {
+    private RobotMotion<?> motion(Item item, List<IMotion> segments) throws Refusal {
         Motion motion = item.motion;
         if (motion instanceof Spline) {
-            return splines.of((Spline) motion);
+            return splines.of((Spline) motion, segments);
         }
         if (motion instanceof JointSpline) {
-            return Splines.of((JointSpline) motion);
+            return Splines.of((JointSpline) motion, segments);
         }
         if (motion instanceof Ptp) {
             Ptp one = (Ptp) motion;

@@ -5,9 +5,12 @@ import static com.kuka.roboticsAPI.motionModel.BasicMotions.lin;
 import static com.kuka.roboticsAPI.motionModel.BasicMotions.ptp;
 import static com.kuka.roboticsAPI.motionModel.BasicMotions.spl;
 
+import java.util.List;
+
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.Frame;
+import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.PTP;
 import com.kuka.roboticsAPI.motionModel.SplineJP;
 import com.kuka.roboticsAPI.motionModel.SplineMotionCP;
@@ -39,12 +42,13 @@ final class Splines {
         }
     }
 
-    com.kuka.roboticsAPI.motionModel.Spline of(Spline spline) {
+    com.kuka.roboticsAPI.motionModel.Spline of(Spline spline, List<IMotion> listed) {
         SplineMotionCP<?>[] segments = new SplineMotionCP<?>[spline.segments.length];
         for (int i = 0; i < segments.length; i++) {
             segments[i] = of(spline.segments[i]);
             Motions.cartesian(segments[i], dynamics(spline.segments[i]));
             Motions.orientation(segments[i], orientation(spline.segments[i]));
+            listed.add(segments[i]);
         }
         com.kuka.roboticsAPI.motionModel.Spline block = new com.kuka.roboticsAPI.motionModel.Spline(segments);
         Motions.joints(block, spline.joints);
@@ -80,7 +84,7 @@ final class Splines {
         return segment instanceof LinSegment ? ((LinSegment) segment).orientation : ((CircSegment) segment).orientation;
     }
 
-    static SplineJP of(JointSpline spline) {
+    static SplineJP of(JointSpline spline, List<IMotion> listed) {
         PTP[] points = new PTP[spline.points.length];
         for (int i = 0; i < points.length; i++) {
             JointPoint point = spline.points[i];
@@ -88,6 +92,7 @@ final class Splines {
             Motions.joints(points[i], new JointDynamics(either(point.dynamics.velocity, spline.dynamics.velocity),
                     either(point.dynamics.acceleration, spline.dynamics.acceleration),
                     either(point.dynamics.jerk, spline.dynamics.jerk)));
+            listed.add(points[i]);
         }
         SplineJP block = new SplineJP(points);
         Motions.joints(block, spline.dynamics);

@@ -53,6 +53,14 @@ final class SunriseBatch extends SunriseJob {
             begin(0);
         }
 
+        public synchronized void reached(int segment) {
+            listeners[Math.max(at, 0)].reached(segment);
+        }
+
+        public synchronized void triggered(int trigger) {
+            listeners[Math.max(at, 0)].triggered(trigger);
+        }
+
         public synchronized void fired(int node) {
             listeners[Math.max(at, 0)].fired(node);
         }

@@ -1,5 +1,8 @@
 package heptarm.app;
 
+import java.util.ArrayList;
+import java.util.List;
+
 import com.kuka.roboticsAPI.executionModel.ExecutionState;
 import com.kuka.roboticsAPI.executionModel.IExecutionContainer;
 import com.kuka.roboticsAPI.motionModel.IMotion;
@@ -13,6 +16,8 @@ import heptarm.wire.Code;
 /** A motion container of Sunrise as a job of the core. It ends once, whoever hears of it first. */
 class SunriseJob implements Job, IMotionContainerListener {
     private final Job.Listener listener;
+    /** Segments of a spline, told of one by one where the cabinet does. */
+    final List<IMotion> segments = new ArrayList<IMotion>();
     private BreakConditions until;
     private IMotionContainer container;
     private boolean cancelled;
@@ -109,6 +114,12 @@ class SunriseJob implements Job, IMotionContainerListener {
     }
 
     public void motionStarted(IMotion motion) {
+        for (int i = 0; i < segments.size(); i++) {
+            if (segments.get(i) == motion) {
+                listener.reached(i);
+                return;
+            }
+        }
         listener.started();
     }
 }

@@ -259,8 +259,9 @@ final class SunriseRobot implements Robot, IErrorHandler {
         }
         SunriseJob job = new SunriseJob(listener);
         try {
-            RobotMotion<?> motion = motions.motion(item, mode);
+            RobotMotion<?> motion = motions.motion(item, mode, job.segments);
             job.guard(motion, BreakConditions.of(item.until, tools.moved(item.frame), tools, panel.signals));
+            BreakConditions.trigger(motion, item.triggers, tools.moved(item.frame), tools, panel.signals, listener);
             adopt(tools.moved(item.frame).moveAsync(motion, job), job);
         } catch (RuntimeException e) {
             log.warn("a motion was refused by the cabinet: " + e);
@@ -275,6 +276,9 @@ final class SunriseRobot implements Robot, IErrorHandler {
         try {
             RobotMotion<?> whole = motions.batch(members, mode);
             job.guard(whole, BreakConditions.of(batch[0].until, tools.moved(batch[0].frame), tools, panel.signals));
+            for (int i = 0; i < batch.length; i++) {
+                BreakConditions.trigger(members[i], batch[i].triggers, tools.moved(batch[i].frame), tools, panel.signals, listeners[i]);
+            }
             adopt(tools.moved(batch[0].frame).moveAsync(whole, job), job);
         } catch (RuntimeException e) {
             log.warn("a batch was refused by the cabinet: " + e);

@@ -58,7 +58,7 @@ final class Batches {
 
     /** A motion that another condition may end, that moves another frame or in another control mode begins and ends at rest. */
     private static boolean canBlend(Item one, Item next) {
-        return of(next.motion) != null && one.frame.equals(next.frame) && canEndTogether(one.until, next.until) && one.triggers.length == 0 && next.triggers.length == 0
+        return of(next.motion) != null && one.frame.equals(next.frame) && canEndTogether(one.until, next.until)
                 && Arrays.equals(octets(one.mode), octets(next.mode));
     }
 

@@ -72,7 +72,8 @@ public final class Conditions {
         return false;
     }
 
-    private static Tree tree(Condition condition) {
+    /** The whole of a condition that has nodes. */
+    public static Tree tree(Condition condition) {
         List<Tree> stack = new ArrayList<Tree>();
         for (int i = 0; i < condition.nodes.length; i++) {
             ConditionNode node = condition.nodes[i];

@@ -276,9 +276,7 @@ final class Dispatcher {
             }
             checkMode(item.mode, path + "mode.");
             checkCondition(item.until, path + "until");
-            for (int k = 0; k < item.triggers.length; k++) {
-                checkCondition(item.triggers[k].condition, path + "triggers[" + k + "].condition");
-            }
+            Triggers.check(server, item, path);
             if (item.motion instanceof Hold && Conditions.contains(item.until, PathReached.class)) {
                 throw new Refusal(Code.BAD_CONDITION, path + "until", "PathReached", "", "a hold has no path");
             }
@@ -288,7 +286,7 @@ final class Dispatcher {
         return server.executor.add(run);
     }
 
-    private void checkCondition(Condition condition, String path) throws Refusal {
+    void checkCondition(Condition condition, String path) throws Refusal {
         Conditions.check(condition, path, server.robot.signals());
         for (int i = 0; i < condition.nodes.length; i++) {
             server.rack.checkReference(Conditions.frame(condition.nodes[i]), path + ".nodes[" + i + "].frame");

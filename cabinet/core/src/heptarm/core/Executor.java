@@ -8,7 +8,6 @@ import heptarm.wire.Cause;
 import heptarm.wire.Code;
 import heptarm.wire.Condition;
 import heptarm.wire.HandGuide;
-import heptarm.wire.ItemReached;
 import heptarm.wire.Mode;
 import heptarm.wire.MotionFinished;
 import heptarm.wire.MotionStarted;
@@ -317,9 +316,7 @@ final class Executor {
             }
         }
         for (int i = 0; i < program.ended.length; i++) {
-            if (program.await(i) == Job.Ended.DONE && i + 1 < program.ended.length) {
-                server.broadcast(new ItemReached(program.id, i));
-            }
+            program.await(i);
             if (program.cause() != null) {
                 program.end(program.cause, program.why);
             }

@@ -9,6 +9,12 @@ public interface Job {
     interface Listener {
         void started();
 
+        /** A segment of a spline begins. */
+        void reached(int segment);
+
+        /** A trigger has fired, the one of that index; its action may take the time of some calls to the robot. */
+        void triggered(int trigger);
+
         /** One of the job's break conditions has fired: the node of that index. It may be told of twice, or once, at the end. */
         void fired(int node);
 

@@ -6,8 +6,10 @@ import java.util.List;
 import heptarm.wire.Cause;
 import heptarm.wire.Code;
 import heptarm.wire.ConditionFired;
+import heptarm.wire.ItemReached;
 import heptarm.wire.MotionStarted;
 import heptarm.wire.Run;
+import heptarm.wire.SegmentReached;
 
 /** A program, either a run of motions or an activity, and what becomes of it. Guarded by itself. */
 final class Program {
@@ -155,6 +157,14 @@ final class Program {
                 server.broadcast(new MotionStarted(id, index));
             }
 
+            public void reached(int segment) {
+                server.broadcast(new SegmentReached(id, index, segment));
+            }
+
+            public void triggered(int trigger) {
+                Triggers.act(server, Program.this, index, trigger);
+            }
+
             public void fired(int node) {
                 Program.this.fired(index, node);
             }
@@ -163,6 +173,9 @@ final class Program {
                 if (how == Job.Ended.FAILED) {
                     fail(index, failureCode, failure);
                 } else {
+                    if (how == Job.Ended.DONE && index + 1 < ended.length) {
+                        server.broadcast(new ItemReached(id, index));
+                    }
                     if (how == Job.Ended.CONDITION) {
                         end(Cause.CONDITION, ""); // what is behind it does not begin
                     }

@@ -57,6 +57,11 @@ final class Signals {
         robot.writeSignals(places, wanted);
     }
 
+    /** Writes one output. */
+    void write(SetSignal wish) throws Refusal {
+        robot.writeSignals(new int[] {check(wish, "")}, new double[] {wish.value});
+    }
+
     /** Place of an output that may have a value. */
     int check(SetSignal one, String path) throws Refusal {
         int place = of(one.signal, known, path + ".signal");

@@ -158,6 +158,9 @@ public final class Messages {
             case 104:
                 message = ConditionFired.read(in);
                 break;
+            case 105:
+                message = SegmentReached.read(in);
+                break;
             case 112:
                 message = State.read(in);
                 break;

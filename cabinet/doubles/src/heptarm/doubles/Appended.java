@@ -25,8 +25,8 @@ public final class Appended implements MotionListener {
     }
 
     @Override
-    public void fired(boolean breaks, int index) {
-        container.fired((RobotMotion<?>) motion, breaks, index);
+    public void fired(int part, boolean breaks, int index) {
+        container.fired(part < 0 ? (RobotMotion<?>) motion : Orders.parts(motion).get(part), breaks, index);
     }
 
     @Override

@@ -32,6 +32,7 @@ public final class Container implements IMotionContainer, MotionListener {
 
     final long id;
     private final IMotion motion;
+    private final List<? extends RobotMotion<?>> parts;
     private final Station station;
     private final IMotionContainerListener listener;
     private final Ending ending;
@@ -49,6 +50,7 @@ public final class Container implements IMotionContainer, MotionListener {
     public Container(long id, IMotion motion, Station station, IMotionContainerListener listener, Ending ending) {
         this.id = id;
         this.motion = motion;
+        this.parts = Orders.parts(motion);
         this.station = station;
         this.listener = listener;
         this.ending = ending;
@@ -81,12 +83,21 @@ public final class Container implements IMotionContainer, MotionListener {
 
     /** An appended motion begins. */
     void begins(Appended one) {
-        IMotion before = latest == null ? part(part) : latest;
-        latest = one.motion;
         if (listener != null) {
-            tell(() -> listener.motionFinished(before));
+            tellFinished();
             tell(() -> listener.motionStarted(one.motion));
         }
+        latest = one.motion;
+    }
+
+    /** The end of the motion that ran, before that the end of its last segment. */
+    private void tellFinished() {
+        if (latest == null && !isWhole()) {
+            IMotion segment = part(part);
+            tell(() -> listener.motionFinished(segment));
+        }
+        IMotion ended = getLastExecutedMotion();
+        tell(() -> listener.motionFinished(ended));
     }
 
     private void activate() {
@@ -107,6 +118,9 @@ public final class Container implements IMotionContainer, MotionListener {
         activate();
         if (listener != null) {
             tell(() -> listener.onStateChanged(this, ExecutionState.Executing));
+            if (!isWhole()) {
+                tell(() -> listener.motionStarted(motion));
+            }
             tell(() -> listener.motionStarted(part(0)));
         }
     }
@@ -125,9 +139,14 @@ public final class Container implements IMotionContainer, MotionListener {
         }
     }
 
-    /** A motion of the batch; a motion by itself is its only part. */
+    /** A motion of the batch or segment of the spline; a motion by itself is its only part. */
     private IMotion part(int index) {
-        return motion instanceof MotionBatch ? ((MotionBatch) motion).motions().get(index) : motion;
+        return parts.isEmpty() ? motion : parts.get(index);
+    }
+
+    /** Whether its parts are all that it is: a batch's are motions, those of a spline belong to one. */
+    private boolean isWhole() {
+        return parts.isEmpty() || motion instanceof MotionBatch;
     }
 
     @Override
@@ -147,8 +166,7 @@ public final class Container implements IMotionContainer, MotionListener {
         activate();
         tell(() -> ending.ended(this));
         if (listener != null) {
-            IMotion ended = getLastExecutedMotion();
-            tell(() -> listener.motionFinished(ended));
+            tellFinished();
             tell(() -> listener.onStateChanged(this, last));
             tell(() -> listener.containerFinished(this));
         }
@@ -254,23 +272,23 @@ public final class Container implements IMotionContainer, MotionListener {
 
     @Override
     public IMotion getLastExecutedMotion() {
-        return latest == null ? part(part) : latest;
+        return latest != null ? latest : isWhole() ? part(part) : motion;
     }
 
     @Override
-    public void fired(boolean breaks, int index) {
-        fired((RobotMotion<?>) motion, breaks, index);
+    public void fired(int of, boolean breaks, int index) {
+        fired(of < 0 ? (RobotMotion<?>) motion : parts.get(of), breaks, index);
     }
 
-    /** A condition of the motion, or of one that was appended, has fired. */
-    void fired(RobotMotion<?> whole, boolean breaks, int index) {
-        ICondition condition = breaks ? whole.breakConditions().get(index) : whole.triggerConditions().get(index);
+    /** A condition of the motion, of a part of it, or of one that was appended, has fired. */
+    void fired(RobotMotion<?> watched, boolean breaks, int index) {
+        ICondition condition = breaks ? watched.breakConditions().get(index) : watched.triggerConditions().get(index);
         synchronized (this) {
             fired.add(condition);
             broken = breaks && broken == null ? condition : broken;
         }
         if (!breaks) {
-            ITriggerAction action = whole.action(index);
+            ITriggerAction action = watched.action(index);
             if (action instanceof ICallbackAction) {
                 tell(() -> ((ICallbackAction) action).onTriggerFired(() -> this));
             }

@@ -7,8 +7,8 @@ public interface MotionListener {
     /** A part of it begins, another than the first. */
     void reached(int part);
 
-    /** A break condition or a trigger has fired, the one of that index. */
-    void fired(boolean breaks, int index);
+    /** A break condition or a trigger has fired, the one of that index; of a part, or, -1, of the whole. */
+    void fired(int part, boolean breaks, int index);
 
     /** The cause is done, cancelled, condition or error. */
     void finished(String cause, String text);

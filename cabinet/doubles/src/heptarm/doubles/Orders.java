@@ -53,8 +53,8 @@ public final class Orders {
         for (int i = 0; i < order.parts.length; i++) {
             order.parts[i] = of(id, parts.get(i), moved, robot);
             inherit(order.parts[i], motion);
-            if (order.parts[i].breaks.length + order.parts[i].triggers.length > 0) {
-                throw new IllegalArgumentException("the virtual cabinet watches conditions of a whole batch or spline only");
+            if (order.parts[i].breaks.length > 0) {
+                throw new IllegalArgumentException("the virtual cabinet watches break conditions of a whole batch or spline only");
             }
         }
         if (motion instanceof RelativeLIN) {
@@ -90,7 +90,8 @@ public final class Orders {
         return numbers;
     }
 
-    private static List<? extends RobotMotion<?>> parts(IMotion motion) {
+    /** Motions of a batch, segments of a spline; none of others. */
+    static List<? extends RobotMotion<?>> parts(IMotion motion) {
         if (motion instanceof MotionBatch) {
             return ((MotionBatch) motion).motions();
         }

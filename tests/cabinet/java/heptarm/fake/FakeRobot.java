@@ -1,7 +1,9 @@
 package heptarm.fake;
 
 import java.util.ArrayDeque;
+import java.util.ArrayList;
 import java.util.Arrays;
+import java.util.List;
 
 import heptarm.core.Clock;
 import heptarm.core.Conditions;
@@ -26,6 +28,8 @@ import heptarm.wire.IoType;
 import heptarm.wire.Item;
 import heptarm.wire.Mode;
 import heptarm.wire.OperationMode;
+import heptarm.wire.PathReached;
+import heptarm.wire.PathReference;
 import heptarm.wire.Pose;
 import heptarm.wire.PoseState;
 import heptarm.wire.Ptp;
@@ -40,6 +44,7 @@ import heptarm.wire.SetKey;
 import heptarm.wire.SignalInfo;
 import heptarm.wire.SignalOutside;
 import heptarm.wire.ToolInfo;
+import heptarm.wire.Trigger;
 import heptarm.wire.WrenchState;
 
 /**
@@ -48,7 +53,8 @@ import heptarm.wire.WrenchState;
  * <p>Errors to order: a PTP whose A7 is 1.25 rad fails when it is planned, one with 1.5 rad fails on the way, and one with
  * 1.0 rad is planned for half a second. One with 0.75 rad needs an option that
  * the cabinet lacks. A servo motion goes straight to its targets; one to more than 2 rad of A7 is refused by the robot,
- * and after 0.3 s without a target it ends by itself. Of poses it follows those of the engine lin only, and turns A7 by their x. After the message "blind" readings fail for a while, after "jammed" cancelling does.
+ * and after 0.3 s without a target it ends by itself. Of poses it follows those of the engine lin only, and turns A7 by their x.
+ * After the message "blind" readings fail for a while, after "jammed" cancelling and writing do.
  */
 final class FakeRobot implements Robot, Runnable {
     static final double SPEED = 1.0;
@@ -105,6 +111,9 @@ final class FakeRobot implements Robot, Runnable {
         final double seconds;
         final Job.Listener listener;
         Conditions.Tree[] until = new Conditions.Tree[0];
+        Trigger[] triggers = {};
+        boolean[] told = {};
+        double[] from;
         boolean follows;
         boolean straight;
         boolean started;
@@ -168,6 +177,7 @@ final class FakeRobot implements Robot, Runnable {
         boolean begins = false;
         int node = -1;
         Job.Ended ended = null;
+        List<Integer> triggered = new ArrayList<>();
         synchronized (jobs) {
             job = jobs.peek();
             if (job == null) {
@@ -180,9 +190,18 @@ final class FakeRobot implements Robot, Runnable {
             } else {
                 begins = !job.started;
                 job.started = true;
+                if (begins) {
+                    job.from = q.clone();
+                }
                 Conditions.Tree fired = new Readings(this, clock.nanos()).first(job.until);
                 ended = fired == null ? move(job, dt) : Job.Ended.CONDITION;
                 node = fired == null ? -1 : fired.index;
+                for (int i = 0; i < job.triggers.length; i++) {
+                    if (!job.told[i] && holds(job, job.triggers[i])) {
+                        job.told[i] = true;
+                        triggered.add(i);
+                    }
+                }
             }
             if (ended != null) {
                 jobs.poll();
@@ -190,6 +209,9 @@ final class FakeRobot implements Robot, Runnable {
         }
         if (begins) {
             job.listener.started();
+        }
+        for (int trigger : triggered) {
+            job.listener.triggered(trigger);
         }
         if (node >= 0) {
             job.listener.fired(node);
@@ -199,6 +221,22 @@ final class FakeRobot implements Robot, Runnable {
         } else if (ended != null) {
             job.listener.finished(ended, 0, "");
         }
+    }
+
+    /** Its metres are radians of the axis that has farthest to go. */
+    private boolean holds(FakeJob job, Trigger trigger) {
+        Conditions.Tree tree = Conditions.tree(trigger.condition);
+        if (!(tree.node instanceof PathReached)) {
+            return new Readings(this, clock.nanos()).first(new Conditions.Tree[] {tree}) != null;
+        }
+        double way = 0.0;
+        double all = 0.0;
+        for (int i = 0; i < 7; i++) {
+            way = Math.max(way, Math.abs(q[i] - job.from[i]));
+            all = Math.max(all, Math.abs(job.target[i] - job.from[i]));
+        }
+        PathReached point = (PathReached) tree.node;
+        return way >= (point.reference == PathReference.START ? 0.0 : all) + point.distance - 1e-9;
     }
 
     private Job.Ended move(FakeJob job, double dt) {
@@ -261,6 +299,8 @@ final class FakeRobot implements Robot, Runnable {
         }
         double seconds = item.motion instanceof Hold ? ((Hold) item.motion).duration : item.motion instanceof HandGuide ? 1e9 : 0.0;
         FakeJob job = new FakeJob(target, Double.isNaN(seconds) ? 1e9 : seconds, listener);
+        job.triggers = item.triggers;
+        job.told = new boolean[item.triggers.length];
         job.until = watches(item.until) && !(item.motion instanceof HandGuide) ? Conditions.alternatives(item.until) : new Conditions.Tree[0];
         synchronized (jobs) {
             jobs.add(job);
@@ -315,6 +355,16 @@ final class FakeRobot implements Robot, Runnable {
                     }
 
                     @Override
+                    public void reached(int segment) {
+                        jobListener.reached(segment);
+                    }
+
+                    @Override
+                    public void triggered(int trigger) {
+                        jobListener.triggered(trigger);
+                    }
+
+                    @Override
                     public void fired(int node) {
                         jobListener.fired(node);
                     }
@@ -355,9 +405,6 @@ final class FakeRobot implements Robot, Runnable {
 
     @Override
     public void check(Item item, String path) throws Refusal {
-        if (item.triggers.length > 0) {
-            throw new Refusal(Code.UNSUPPORTED, path + "triggers", "triggers", "", "not here");
-        }
         if (!(item.motion instanceof Ptp || item.motion instanceof PtpHome || item.motion instanceof Hold
                 || item.motion instanceof HandGuide)) {
             throw new Refusal(Code.UNSUPPORTED, path + "motion", item.motion.getClass().getSimpleName(), "Ptp, Hold, HandGuide",
@@ -406,6 +453,7 @@ final class FakeRobot implements Robot, Runnable {
 
     @Override
     public void writeSignals(int[] places, double[] values) {
+        fail(jammedUntil);
         synchronized (signals) {
             for (int i = 0; i < places.length; i++) {
                 signals[places[i]] = values[i];
