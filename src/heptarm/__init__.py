@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     )
     from heptarm.values.collision import Collision, CollisionGuard
     from heptarm.values.contact import Contact
+    from heptarm.values.event import MotionEvent
     from heptarm.values.motion import (
         arc,
         circ,
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
     from heptarm.values.state import State
     from heptarm.values.tool import Tool, Workpiece
     from heptarm.values.trajectory import Trajectory
+    from heptarm.values.trigger import Trigger
 
 __version__ = "0.1.0"
 
@@ -97,6 +99,7 @@ __all__ = [
     "ModeConflict",
     "MotionAborted",
     "MotionError",
+    "MotionEvent",
     "MotionHandle",
     "NeedsOperator",
     "NoContact",
@@ -122,6 +125,7 @@ __all__ = [
     "Timeout",
     "Tool",
     "Trajectory",
+    "Trigger",
     "Unreachable",
     "VersionMismatch",
     "Workpiece",
@@ -175,6 +179,8 @@ _HOMES = {
     "deg": "values.pose",
     "Recovery": "values.recovery",
     "Redundancy": "values.redundancy",
+    "MotionEvent": "values.event",
+    "Trigger": "values.trigger",
     "Cause": "values.result",
     "Result": "values.result",
     "State": "values.state",

@@ -27,6 +27,7 @@ from heptarm.arm.servo import JointServo, PoseServo
 from heptarm.arm.stopping import REST_TIMEOUT, Stopping
 from heptarm.arm.teaching import Teaching
 from heptarm.arm.tooling import Tooling
+from heptarm.arm.triggers import with_triggers
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, StaleState, Timeout
 from heptarm.values.arrays import within
 from heptarm.values.condition import Condition
@@ -428,8 +429,11 @@ class Arm(Equipment, Stopping, Touching, Guarding, Teaching):
         ends, parts = condition_message(self._guarded(until), self._connection.welcome.signals)
         self._tooling.check_until(parts)
         items = program.items(motions, self.robot, ceiling, mode=chosen, until=ends)
+        link = self._connection
+        items = with_triggers(items, motions, link.signals, link.welcome.signals, self._tooling)
         message = wire.Run(items=items, when=_WHEN[when])
-        return self._connection.run(message, len(motions), self._limit(motions, ceiling), until=parts)
+        triggers = tuple(motion.triggers for motion in motions)
+        return link.run(message, len(motions), self._limit(motions, ceiling), until=parts, triggers=triggers)
 
     def _limit(self, motions: tuple[Motion, ...], ceiling: float) -> float:
         """Time after which waiting for them makes no sense [s], with what is before them in the queue."""

@@ -27,6 +27,7 @@ from heptarm.values.io import Signal
 from heptarm.values.result import Result
 from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
+from heptarm.values.trigger import Trigger
 from heptarm.wire import messages as wire
 from heptarm.wire.messages import Message
 
@@ -266,12 +267,14 @@ class Connection:
         limit: float,
         *,
         until: tuple[Condition, ...] = (),
+        triggers: tuple[tuple[Trigger, ...], ...] = (),
     ) -> MotionHandle:
         """Send a program of `count` motions, a servo motion or an overlay.
 
-        The handle waits for up to `limit` seconds. `until` says which part of its break condition each node is.
+        The handle waits for up to `limit` seconds. `until` says which part of its break condition each node is,
+        `triggers` which each motion has.
         """
-        handle = MotionHandle(self, count, limit, until=until, guard=self.guard)
+        handle = MotionHandle(self, count, limit, until=until, guard=self.guard, triggers=triggers)
         handle.is_stiff = isinstance(message, wire.Run) and _ends_stiffly(message.items[-1])
 
         def claim(answer: Message) -> None:
@@ -383,8 +386,8 @@ class Connection:
         """The state of a sample."""
         return read_state(sample.body, self.link.offset, self.clock.nanos, self.signals)
 
-    def state_of(self, message: wire.ConditionFired) -> State:
-        """Where the robot was when a condition fired."""
+    def state_of(self, message: wire.ConditionFired | wire.TriggerFired) -> State | None:
+        """Where the robot was when a condition or a trigger fired; None if the cabinet did not tell."""
         return read_firing(message, self.link.offset, self.clock.nanos)
 
     def result_of(self, message: wire.MotionFinished) -> Result:
@@ -397,9 +400,7 @@ class Connection:
     # ---------------------------------------------------------------------------- from the link
 
     def _on_event(self, message: Message) -> None:
-        if isinstance(
-            message, wire.MotionStarted | wire.ItemReached | wire.ConditionFired | wire.MotionFinished
-        ):
+        if isinstance(message, _OF_PROGRAMS):
             handle = self._handles.get(message.id)
             if handle is None:
                 self._unclaimed.append(message)  # its Accepted may still be on its way
@@ -473,6 +474,17 @@ class Connection:
         while self._handles:
             with contextlib.suppress(KeyError):  # it has just ended by itself
                 self._handles.popitem()[1].lose(error)
+
+
+#: Events that tell what becomes of a program.
+_OF_PROGRAMS = (
+    wire.MotionStarted,
+    wire.SegmentReached,
+    wire.ItemReached,
+    wire.TriggerFired,
+    wire.ConditionFired,
+    wire.MotionFinished,
+)
 
 
 def _ends_stiffly(item: wire.Item) -> bool:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import threading
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout
 from dataclasses import replace
-from math import isnan
+from functools import partial
+from math import isnan, nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,13 +31,25 @@ from heptarm.errors import (
 )
 from heptarm.values.collision import Collision, CollisionGuard
 from heptarm.values.condition import Condition
+from heptarm.values.event import MotionEvent
 from heptarm.values.result import Cause, Result
 from heptarm.values.state import State
+from heptarm.values.trigger import Trigger
 from heptarm.wire.codes import MEANINGS
-from heptarm.wire.messages import ConditionFired, ItemReached, Message, MotionFinished, MotionStarted
+from heptarm.wire.messages import (
+    ConditionFired,
+    ItemReached,
+    Message,
+    MotionFinished,
+    MotionStarted,
+    SegmentReached,
+    TriggerFired,
+)
 
 if TYPE_CHECKING:
     from heptarm.arm.connection import Connection
+
+_log = logging.getLogger(__name__)
 
 #: Ends that are results; all others are errors.
 _GOOD = (Cause.FINISHED, Cause.CANCELLED, Cause.CONDITION, Cause.REPLACED)
@@ -57,12 +71,18 @@ class MotionHandle:
         *,
         until: tuple[Condition, ...] = (),
         guard: CollisionGuard | None = None,
+        triggers: tuple[tuple[Trigger, ...], ...] = (),
     ) -> None:
         self._connection = connection
         self._count = count
         self._limit = limit
         self._until = until
         self._guard = guard
+        self._triggers = triggers
+        self._told: list[MotionEvent] = []
+        self._listeners: list[Callable[[MotionEvent], None]] = []
+        self._news = threading.Condition()
+        self._segment = -1
         self._fired: State | None = None
         self._id = 0
         self._furthest = 0.0
@@ -121,6 +141,52 @@ class MotionHandle:
         told = seen is not None and seen.id == self._id and seen.item == item and not isnan(seen.progress)
         return (item + (seen.progress if told and seen is not None else 0.0)) / self._count
 
+    @property
+    def item(self) -> int:
+        """Index of the motion under way, or of the last one that was; -1 before the first."""
+        return self._item
+
+    @property
+    def segment(self) -> int:
+        """Index of the segment of a spline that is under way; -1: none, or the cabinet does not tell."""
+        return self._segment
+
+    @property
+    def remaining(self) -> float:
+        """Time to the end of the motion under way [s], as the newest state tells; NaN where it does not."""
+        state = None if self.done else self._connection.newest()
+        seen = None if state is None else state.motion
+        return seen.remaining if seen is not None and seen.id == self._id else nan
+
+    def events(self, *, timeout: float | None = None) -> Iterator[MotionEvent]:
+        """What becomes of it, from its beginning: motions and segments that begin and end, triggers that fire.
+
+        The iteration ends with the program, however that ends; `wait` then says how.
+
+        Args:
+            timeout: how long to wait for the next one [s]; None: as long as `wait` does.
+
+        Raises:
+            Timeout: nothing came and it has not ended; it goes on.
+        """
+        limit, seen = self._limit if timeout is None else timeout, 0
+        while True:
+            with self._connection.stopping_on_interrupt(), self._news:
+                if not self._news.wait_for(partial(self._has_news, seen), limit):
+                    raise Timeout(f"nothing was told of motion {self._id} within {limit:.1f} s")
+                told, ended = self._told[seen:], self.done
+            yield from told
+            seen += len(told)
+            if ended and seen == len(self._told):
+                return
+
+    def add_event_callback(self, callback: Callable[[MotionEvent], None]) -> None:
+        """Call `callback(event)` for each event, those before as well; from the link's thread, so it must not block."""
+        with self._news:
+            self._listeners.append(callback)
+            for event in self._told:
+                self._tell(callback, event)
+
     def wait(self, *, timeout: float | None = None) -> Result:
         """Wait until it has ended.
 
@@ -174,14 +240,24 @@ class MotionHandle:
     def on_event(self, message: Message) -> None:
         """An event of this program came."""
         if isinstance(message, MotionStarted):
-            self._item = message.item
+            self._item, self._segment = message.item, -1
             self._begun.set()
+            self._note(MotionEvent("begun", message.item))
+        elif isinstance(message, SegmentReached):
+            self._segment = message.segment
+            self._note(MotionEvent("segment", message.item, message.segment))
         elif isinstance(message, ItemReached):
             self._item = max(self._item, message.item)
+            self._note(MotionEvent("ended", message.item))
+        elif isinstance(message, TriggerFired):
+            self._note(self._fire(message))
         elif isinstance(message, ConditionFired):
             self._fired = self._connection.state_of(message)
         elif isinstance(message, MotionFinished):
+            if self.started:
+                self._note(MotionEvent("ended", message.item))
             self._finish(message)
+            self._wake()
 
     def lose(self, error: HeptarmError) -> None:
         """The link was lost."""
@@ -192,6 +268,43 @@ class MotionHandle:
                 hint="arm.reconnect(), then look where the arm is",
             )
         )
+
+        self._wake()
+
+    def _fire(self, message: TriggerFired) -> MotionEvent:
+        state = self._connection.state_of(message)
+        mine = self._triggers[message.item] if message.item < len(self._triggers) else ()
+        trigger = mine[message.trigger] if message.trigger < len(mine) else None
+        return MotionEvent(
+            "trigger",
+            message.item,
+            trigger=trigger,
+            time=message.time,
+            state=state,
+            code=message.code,
+            text=message.text,
+        )
+
+    def _has_news(self, seen: int) -> bool:
+        return len(self._told) > seen or self.done
+
+    def _note(self, event: MotionEvent) -> None:
+        with self._news:
+            self._told.append(event)
+            for listener in self._listeners:
+                self._tell(listener, event)
+            self._news.notify_all()
+
+    @staticmethod
+    def _tell(listener: Callable[[MotionEvent], None], event: MotionEvent) -> None:
+        try:
+            listener(event)
+        except Exception:  # the link's thread has others to serve
+            _log.exception("a callback for events ended with an error")
+
+    def _wake(self) -> None:
+        with self._news:
+            self._news.notify_all()
 
     def _finish(self, message: MotionFinished) -> None:
         result = self._connection.result_of(message)

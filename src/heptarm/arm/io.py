@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
@@ -10,6 +10,7 @@ from heptarm.values.arrays import scalar, within
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
+from heptarm.wire.codes import Code
 
 if TYPE_CHECKING:
     from heptarm.arm.connection import Connection
@@ -80,7 +81,7 @@ class Io(Mapping[str, SignalValue]):
         """
         if not values:
             raise ShapeError("no output is named", parameter="values", hint='arm.io.set({"LEDBlue": True})')
-        wishes = tuple(self._wish(name, value) for name, value in values.items())
+        wishes = tuple(output(name, value, self._connection.signals) for name, value in values.items())
         self._connection.request(wire.SetSignals(values=wishes))
 
     def wait(self, name: str, value: SignalValue = True, *, timeout: float = 30.0) -> State:
@@ -128,27 +129,6 @@ class Io(Mapping[str, SignalValue]):
     def _find(self, name: str) -> Signal:
         return self._connection.signals[find_name(name, tuple(self))]
 
-    def _wish(self, name: str, value: SignalValue) -> wire.SetSignal:
-        signal = self._find(name)
-        if not signal.is_output:
-            raise CommandRejected(
-                f"{signal.name} is an input of the cabinet",
-                parameter="signal",
-                value=name,
-                hint="outputs can be written",
-            )
-        number = float(value) if isinstance(value, bool) else scalar(value, signal.name)
-        if isinstance(value, bool) != (signal.kind == "boolean") and number not in (0.0, 1.0):
-            raise LimitError(
-                f"{signal.name} is {signal.kind}; it cannot be {value!r}",
-                code=2,
-                parameter=signal.name,
-                value=value,
-                allowed="True or False" if signal.kind == "boolean" else f"[{signal.low:g}, {signal.high:g}]",
-            )
-        within(number, signal.name, signal.low, signal.high)
-        return wire.SetSignal(signal=signal.name, value=number)
-
     def _wait(self, condition: object, timeout: float) -> State:
         connection = self._connection
         if _GROUP not in connection.options.groups:
@@ -157,3 +137,32 @@ class Io(Mapping[str, SignalValue]):
             lambda state: state.signals is not None and condition(state),  # type: ignore[operator]
             timeout,
         )
+
+
+def output(name: str, value: SignalValue, signals: Sequence[Signal]) -> wire.SetSignal:
+    """The wish that an output has a value.
+
+    Raises:
+        CommandRejected: no such output.
+        LimitError: a value that it cannot have.
+    """
+    signal = signals[find_name(name, tuple(one.name for one in signals))]
+    if not signal.is_output:
+        raise CommandRejected(
+            f"{signal.name} is an input of the cabinet",
+            code=Code.UNSUPPORTED,
+            parameter="signal",
+            value=name,
+            hint="outputs can be written",
+        )
+    number = float(value) if isinstance(value, bool) else scalar(value, signal.name)
+    if isinstance(value, bool) != (signal.kind == "boolean") and number not in (0.0, 1.0):
+        raise LimitError(
+            f"{signal.name} is {signal.kind}; it cannot be {value!r}",
+            code=2,
+            parameter=signal.name,
+            value=value,
+            allowed="True or False" if signal.kind == "boolean" else f"[{signal.low:g}, {signal.high:g}]",
+        )
+    within(number, signal.name, signal.low, signal.high)
+    return wire.SetSignal(signal=signal.name, value=number)

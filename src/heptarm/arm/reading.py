@@ -83,16 +83,18 @@ def _signals(told: wire.IoState, signals: Sequence[Signal]) -> SignalValues:
 
 
 def read_firing(
-    told: wire.ConditionFired, offset: ClockOffset, clock: Callable[[], int]
-) -> values.State:
-    """The state of the robot when a condition fired."""
-    return values.State(
-        joints=_joints(told.joints),
-        torques=_torques(told.torques),
-        cartesian=_cartesian(told.pose),
-        external=_wrench(told.wrench),
-        sampled=offset.to_ours(told.joints.stamp),
-        clock=clock,
+    told: wire.ConditionFired | wire.TriggerFired, offset: ClockOffset, clock: Callable[[], int]
+) -> values.State | None:
+    """The state of the robot when a condition or a trigger fired, as far as it was told."""
+    if told.joints is None:
+        return None
+    state = values.State(
+        joints=_joints(told.joints), sampled=offset.to_ours(told.joints.stamp), clock=clock
+    )
+    if isinstance(told, wire.TriggerFired):
+        return state
+    return replace(
+        state, torques=_torques(told.torques), cartesian=_cartesian(told.pose), external=_wrench(told.wrench)
     )
 
 

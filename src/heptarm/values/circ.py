@@ -22,11 +22,12 @@ from heptarm.values.arguments import (
     path_of,
     seven,
 )
-from heptarm.values.arrays import Array, Value, array, within
+from heptarm.values.arrays import Array, array, within
 from heptarm.values.limits import Blending, CartesianDynamics, JointDynamics
 from heptarm.values.orientation import VARIABLE, Orientation, orientation_of
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.redundancy import Redundancy
+from heptarm.values.trigger import Triggered
 
 #: Points nearer to each other than this make no circle [m].
 _TOO_NEAR = 1e-5
@@ -36,7 +37,7 @@ _PLANES = {"xy": (0.0, 0.0, 1.0), "yz": (1.0, 0.0, 0.0), "xz": (0.0, -1.0, 0.0)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Circ(Value):
+class Circ(Triggered):
     """Arc of a circle of the moved frame through a point to a pose.
 
     Attributes:

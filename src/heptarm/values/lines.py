@@ -20,15 +20,16 @@ from heptarm.values.arguments import (
     path_of,
     seven,
 )
-from heptarm.values.arrays import Array, Value, array
+from heptarm.values.arrays import Array, array
 from heptarm.values.limits import Blending, CartesianDynamics, JointDynamics
 from heptarm.values.orientation import VARIABLE, Orientation, orientation_of
 from heptarm.values.pose import Pose
 from heptarm.values.redundancy import Redundancy
+from heptarm.values.trigger import Triggered
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lin(Value):
+class Lin(Triggered):
     """Straight line of the moved frame to a pose, the orientation turning along.
 
     Attributes:
@@ -62,7 +63,7 @@ class Lin(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LinRel(Value):
+class LinRel(Triggered):
     """Straight line of the moved frame by an offset from where it is when the motion starts.
 
     Attributes:

@@ -11,12 +11,13 @@ from math import inf
 from typing import TypeAlias
 
 from heptarm.values.arguments import TOOL
-from heptarm.values.arrays import Value, within
+from heptarm.values.arrays import within
 from heptarm.values.circ import Circ, arc, circ
 from heptarm.values.guiding import HandGuide, hand_guide
 from heptarm.values.lines import Lin, LinRel, lin, lin_rel
 from heptarm.values.ptp import Ptp, PtpHome, PtpPose, ptp, ptp_home
 from heptarm.values.spline import JointSpline, Spl, Spline, ellipse, spl, spline, spline_joints
+from heptarm.values.trigger import Triggered
 
 __all__ = [
     "BASE",
@@ -54,7 +55,7 @@ _LONGEST_HOLD = 1e6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Hold(Value):
+class Hold(Triggered):
     """Holds the position.
 
     Attributes:

@@ -18,14 +18,15 @@ from heptarm.values.arguments import (
     near_of,
     seven,
 )
-from heptarm.values.arrays import Array, Value, array
+from heptarm.values.arrays import Array, array
 from heptarm.values.limits import Blending, JointDynamics
 from heptarm.values.pose import Pose
 from heptarm.values.redundancy import Redundancy
+from heptarm.values.trigger import Triggered
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ptp(Value):
+class Ptp(Triggered):
     """Point to point to joint positions; every axis starts and ends with the others.
 
     Attributes:
@@ -47,7 +48,7 @@ class Ptp(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PtpHome(Value):
+class PtpHome(Triggered):
     """Point to point to the home position that the cabinet's project has.
 
     Attributes:
@@ -64,7 +65,7 @@ class PtpHome(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PtpPose(Value):
+class PtpPose(Triggered):
     """Point to point to a pose of the moved frame.
 
     Attributes:

@@ -19,6 +19,7 @@ from heptarm.values.lines import Lin
 from heptarm.values.orientation import VARIABLE, Orientation, orientation_of
 from heptarm.values.pose import Pose
 from heptarm.values.ptp import Ptp
+from heptarm.values.trigger import Triggered
 
 #: As many segments as the protocol carries.
 _MOST = 1000
@@ -47,7 +48,7 @@ Segment: TypeAlias = Spl | Lin | Circ
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Spline(Value):
+class Spline(Triggered):
     """Spline in space.
 
     Attributes:
@@ -71,7 +72,7 @@ class Spline(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointSpline(Value):
+class JointSpline(Triggered):
     """Spline in joint space.
 
     Attributes:
@@ -207,6 +208,7 @@ def _segment(one: object, index: int) -> Segment:
         ("moving", one.moving != TOOL),
         ("blending", one.blending != EXACT),
         ("joint limits", one.joints != AXES),
+        ("triggers", bool(one.triggers)),
     ):
         if given:
             raise CommandRejected(
@@ -235,7 +237,7 @@ def spline_joints(
     Raises:
         ShapeError: a wrong shape, no points, or more than 1000.
         LimitError: a value outside its range.
-        CommandRejected: a point with blending.
+        CommandRejected: a point with blending or triggers.
     """
     made = []
     for index, one in enumerate(_listed(points, "points")):
@@ -245,6 +247,12 @@ def spline_joints(
                 f"points[{index}] has blending of its own, which a point of a spline cannot have",
                 parameter=f"points[{index}]",
                 hint="leave it out: a spline does not stop at its points",
+            )
+        if point.triggers:
+            raise CommandRejected(
+                f"points[{index}] has triggers of its own, which a point of a spline cannot have",
+                parameter=f"points[{index}]",
+                hint="give them to the spline; its path counts from its own start",
             )
         made.append(point)
     return JointSpline(tuple(made), joints_of(speed, acceleration, jerk))

@@ -1,0 +1,116 @@
+"""Triggers: what the cabinet does on the way, without stopping, when a condition of a motion comes true."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TypeAlias, TypeVar
+
+from heptarm.errors import ShapeError
+from heptarm.values.arguments import check_name
+from heptarm.values.arrays import Value, scalar
+from heptarm.values.condition import Condition, check_condition
+from heptarm.values.io import SignalValue
+
+_Motion = TypeVar("_Motion", bound="Triggered")
+
+#: Triggers of one motion that the cabinet takes.
+MOST = 16
+_LONGEST_LABEL = 128
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SetOutput(Value):
+    """The cabinet writes an output.
+
+    Attributes:
+        signal: its name, as `arm.io` lists it.
+        value: True or False, or a number.
+    """
+
+    signal: str
+    value: SignalValue
+
+    def __post_init__(self) -> None:
+        check_name(self.signal, "signal")
+        if not isinstance(self.value, bool):
+            scalar(self.value, "value")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Notify(Value):
+    """The cabinet tells of it.
+
+    Attributes:
+        label: what the event is called, up to 128 octets.
+    """
+
+    label: str = ""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.label, str) or len(self.label.encode()) > _LONGEST_LABEL:
+            raise ShapeError(
+                f"label is {self.label!r}; a text of at most {_LONGEST_LABEL} octets is wanted",
+                code=3,
+                parameter="label",
+                value=self.label,
+            )
+
+
+Action: TypeAlias = SetOutput | Notify
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trigger(Value):
+    """An action, and when it is done: when the condition holds for the first time while its motion runs.
+
+    Attributes:
+        condition: see heptarm.when.
+        action: see heptarm.do.
+
+    Raises:
+        ShapeError: it is no condition, or no action.
+    """
+
+    condition: Condition
+    action: Action
+
+    def __post_init__(self) -> None:
+        check_condition(self.condition, "condition")
+        if not isinstance(self.action, SetOutput | Notify):
+            raise ShapeError(
+                f"action is {self.action!r}; an action is wanted",
+                parameter="action",
+                value=self.action,
+                hint="make one with heptarm.do, such as notify('half way') or set_output('LEDBlue', True)",
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Triggered(Value):
+    """Base of motions: each may have triggers.
+
+    Attributes:
+        triggers: up to 16.
+    """
+
+    triggers: tuple[Trigger, ...] = field(default=(), kw_only=True)
+
+    def trigger(self: _Motion, condition: Condition, action: Action) -> _Motion:
+        """The same motion with one more trigger.
+
+        Args:
+            condition: when; see heptarm.when. Points of the path count from the ends of this motion.
+            action: what the cabinet does then; see heptarm.do.
+
+        Raises:
+            ShapeError: no condition, no action, or one trigger too many.
+        """
+        if len(self.triggers) >= MOST:
+            raise ShapeError(
+                f"a motion has at most {MOST} triggers",
+                code=3,
+                parameter="triggers",
+                allowed=f"[0, {MOST}]",
+                hint="spread them over several motions",
+            )
+        return replace(self, triggers=(*self.triggers, Trigger(condition, action)))
