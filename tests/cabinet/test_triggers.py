@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
+from math import nan
 
 import pytest
 
@@ -182,5 +183,8 @@ def test_a_hold_has_no_path_and_sixteen_are_enough(peer: Peer) -> None:
     one = trigger(wire.Notify(label="x"), at(0.1))
     answer = peer.ask(run(wire.Item(motion=wire.Hold(duration=1.0), triggers=(one,))))
     assert isinstance(answer, wire.Rejected) and answer.code == Code.BAD_CONDITION
+    guided = wire.HandGuide(q_min=(nan,) * 7, q_max=(nan,) * 7)
+    answer = peer.ask(run(wire.Item(motion=guided, triggers=(one,))))
+    assert isinstance(answer, wire.Rejected) and answer.code == Code.UNSUPPORTED
     answer = peer.ask(run(turn(0.5, *[one] * 17)))
     assert isinstance(answer, wire.Rejected) and answer.parameter == "items[0].triggers"

@@ -36,6 +36,7 @@ from heptarm.values.motion import TOOL, Motion
 from heptarm.values.result import Result
 from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
+from heptarm.values.trigger import triggers_of
 from heptarm.wire import messages as wire
 
 if TYPE_CHECKING:
@@ -432,7 +433,7 @@ class Arm(Equipment, Stopping, Touching, Guarding, Teaching):
         link = self._connection
         items = with_triggers(items, motions, link.signals, link.welcome.signals, self._tooling)
         message = wire.Run(items=items, when=_WHEN[when])
-        triggers = tuple(motion.triggers for motion in motions)
+        triggers = tuple(map(triggers_of, motions))
         return link.run(message, len(motions), self._limit(motions, ceiling), until=parts, triggers=triggers)
 
     def _limit(self, motions: tuple[Motion, ...], ceiling: float) -> float:

@@ -12,7 +12,7 @@ from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.values.condition import Condition, PathReached, SignalOutside
 from heptarm.values.io import Signal
 from heptarm.values.motion import Hold, Motion
-from heptarm.values.trigger import SetOutput, Trigger
+from heptarm.values.trigger import SetOutput, Trigger, triggers_of
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 
@@ -41,7 +41,7 @@ def with_triggers(
     result = []
     for index, (item, motion) in enumerate(zip(items, motions, strict=True)):
         made = []
-        for place, one in enumerate(motion.triggers):
+        for place, one in enumerate(triggers_of(motion)):
             try:
                 condition, parts = condition_message(one.condition, told)
                 _check(motion, parts)

@@ -114,3 +114,8 @@ class Triggered(Value):
                 hint="spread them over several motions",
             )
         return replace(self, triggers=(*self.triggers, Trigger(condition, action)))
+
+
+def triggers_of(motion: object) -> tuple[Trigger, ...]:
+    """Triggers of a motion; hand guiding has none."""
+    return motion.triggers if isinstance(motion, Triggered) else ()

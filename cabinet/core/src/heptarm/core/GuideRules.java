@@ -28,6 +28,10 @@ final class GuideRules {
             throw new Refusal(Code.MODE_CONFLICT, path + "mode", item.mode.getClass().getSimpleName(), "none",
                     "hand guiding is a control mode of its own; give it no other");
         }
+        if (item.triggers.length > 0) {
+            throw new Refusal(Code.UNSUPPORTED, path + "triggers", Integer.toString(item.triggers.length), "0",
+                    "hand guiding has no triggers");
+        }
         if (Conditions.contains(item.until, PathReached.class)) {
             throw new Refusal(Code.BAD_CONDITION, path + "until", "PathReached", "", "hand guiding has no path");
         }
