@@ -5,12 +5,13 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import pytest
 
 from heptarm.errors import CommandRejected
-from heptarm.virtual.application import compile_application, find
+from heptarm.virtual.application import background, compile_application, find
 
 ROOT = Path(__file__).parents[2]
 SAMPLES = ROOT / "cabinet" / "samples"
@@ -105,6 +106,40 @@ def test_applications_are_found_and_one_has_to_be_chosen(lab: Path) -> None:
         compile_application(SAMPLES, lab, main="Nothing")
     with pytest.raises(CommandRejected, match="no Java sources"):
         compile_application(ROOT / "docs", lab)
+
+
+@needs_javac
+def test_a_whole_project_runs_with_its_tools_frames_signals_and_background_task() -> None:
+    done = sim(ROOT / "examples" / "sunrise", "--app-data", "cell.parts=1", speed="3")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "1 parts are placed, the gripper closed 1 times" in done.stderr
+
+
+def test_what_a_project_holds_besides_its_applications(tmp_path: Path) -> None:
+    source = tmp_path / "src" / "tasks"
+    source.mkdir(parents=True)
+    (source / "Base.java").write_text("package tasks; abstract class Base extends RoboticsAPIBackgroundTask {}")
+    (source / "One.java").write_text("package tasks; public class One extends Base {}")
+    (source / "App.java").write_text("package tasks; class App extends Own {}")
+    (source / "Own.java").write_text("package tasks; class Own extends RoboticsAPIApplication {}")
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "Old.java").write_text("class Old extends RoboticsAPIApplication {}")
+    assert background(tmp_path) == ["tasks.One"]
+    assert find(tmp_path) == ["tasks.App", "tasks.Own"]
+
+
+@needs_javac
+def test_jars_of_a_project_count_unless_they_are_kukas(lab: Path) -> None:
+    for name, entry in (("own.jar", "lab/Thing.class"), ("api.jar", "com/kuka/roboticsAPI/Thing.class")):
+        with zipfile.ZipFile(lab / name, "w") as jar:
+            jar.writestr(entry, b"")
+    (lab / "bin").mkdir()
+    (lab / "bin" / "RoboticsAPI.data.xml").write_text("<old/>")
+    out = lab.parent / "out"
+    out.mkdir()
+    found = compile_application(lab, out)
+    assert found.jars == (lab / "own.jar",)
+    assert found.project == lab / "RoboticsAPI.data.xml"
 
 
 @needs_javac

@@ -42,6 +42,15 @@ def test_a_profile_on_the_edge_between_two_kinds_is_found() -> None:
         brake(profile.at(profile.duration / 3), Limits(1.48 / way, 10.0 / way, 100.0 / way))
 
 
+@pytest.mark.parametrize("way", [4.7e-9, 1.2e-8, 1.9e-8, 1e-6, 1e-3])
+def test_a_motion_of_next_to_no_length_can_be_braked_at_any_time(way: float) -> None:
+    limits = Limits(1.7 / way, 10.0 / way, 100.0 / way)
+    law = travel(limits)
+    for at in np.linspace(0.0, law.duration, 40):
+        stop = brake(law.at(float(at)), limits)
+        assert abs(stop.at(stop.duration)[1]) < 1e-3 * limits.velocity
+
+
 @pytest.mark.parametrize("way", [1e-9, 1e-6, 1e-3, 0.2])
 def test_a_ptp_of_any_length_ends(way: float) -> None:
     plant, ear = ready(), Ear()

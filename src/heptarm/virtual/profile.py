@@ -57,12 +57,21 @@ class Rest:
 _SHARES = (1.0, 0.9999, 0.999, 0.99)
 
 
+#: Numbers of a path of next to no length are huge; beyond this jerk Ruckig is asked in another unit of s.
+_COARSE = 1e6
+
+
+def _unit(limits: Limits) -> float:
+    return 1.0 if limits.jerk <= _COARSE else limits.jerk / _COARSE
+
+
 class Profile:
-    """s over time."""
+    """s over time; the parameters are in a unit of s."""
 
-    __slots__ = ("_trajectory", "duration")
+    __slots__ = ("_trajectory", "_unit", "duration")
 
-    def __init__(self, parameters: InputParameter) -> None:
+    def __init__(self, parameters: InputParameter, unit: float) -> None:
+        self._unit = unit
         acceleration = parameters.max_acceleration[0]
         for share in _SHARES:
             parameters.max_acceleration = [acceleration * share]
@@ -80,17 +89,19 @@ class Profile:
     def at(self, time: float) -> tuple[float, float, float]:
         """s, ds/dt, d²s/dt² at a time [s]; beyond the end it keeps its last values."""
         position, velocity, acceleration = self._trajectory.at_time(min(time, self.duration))
-        return position[0], velocity[0], acceleration[0]
+        unit = self._unit
+        return position[0] * unit, velocity[0] * unit, acceleration[0] * unit
 
 
 def _parameters(state: tuple[float, float, float], limits: Limits) -> InputParameter:
+    unit = _unit(limits)
     parameters = InputParameter(1)
-    parameters.current_position = [state[0]]
-    parameters.current_velocity = [state[1]]
-    parameters.current_acceleration = [state[2]]
-    parameters.max_velocity = [limits.velocity]
-    parameters.max_acceleration = [limits.acceleration]
-    parameters.max_jerk = [limits.jerk]
+    parameters.current_position = [state[0] / unit]
+    parameters.current_velocity = [state[1] / unit]
+    parameters.current_acceleration = [state[2] / unit]
+    parameters.max_velocity = [limits.velocity / unit]
+    parameters.max_acceleration = [limits.acceleration / unit]
+    parameters.max_jerk = [limits.jerk / unit]
     return parameters
 
 
@@ -102,10 +113,10 @@ def travel(limits: Limits) -> Profile:
 def change(state: tuple[float, float, float], goal: float, limits: Limits) -> Profile:
     """From a state (value, rate, its rate) to rest at a goal."""
     parameters = _parameters(state, limits)
-    parameters.target_position = [goal]
+    parameters.target_position = [goal / _unit(limits)]
     parameters.target_velocity = [0.0]
     parameters.target_acceleration = [0.0]
-    return Profile(parameters)
+    return Profile(parameters, _unit(limits))
 
 
 def brake(state: tuple[float, float, float], limits: Limits) -> Profile:
@@ -114,4 +125,4 @@ def brake(state: tuple[float, float, float], limits: Limits) -> Profile:
     parameters.control_interface = ControlInterface.Velocity
     parameters.target_velocity = [0.0]
     parameters.target_acceleration = [0.0]
-    return Profile(parameters)
+    return Profile(parameters, _unit(limits))

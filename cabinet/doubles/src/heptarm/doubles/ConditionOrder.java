@@ -79,7 +79,7 @@ public final class ConditionOrder {
         } else if (condition instanceof IORangeCondition) {
             put(OUTSIDE_RANGE);
             put(((IORangeCondition) condition).numbers());
-            put(COMBINED + Criterion.Kind.NOT.ordinal());
+            put(COMBINED + Criterion.Kind.NOT.ordinal(), 1);
         } else if (condition instanceof MotionPathCondition) {
             put(PATH);
             put(((MotionPathCondition) condition).numbers());

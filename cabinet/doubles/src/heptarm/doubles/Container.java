@@ -76,6 +76,11 @@ public final class Container implements IMotionContainer, MotionListener {
         return one;
     }
 
+    /** It could not be planned after all; for the robot. */
+    public void without(Appended one) {
+        appended.remove(one);
+    }
+
     @Override
     public void append(IMotion more) {
         appender.accept(more);
@@ -175,7 +180,9 @@ public final class Container implements IMotionContainer, MotionListener {
     /** An appended motion has ended. */
     void finished(Appended one, String cause, String text) {
         appended.remove(one);
-        finished(cause, text);
+        if (firstEnded) { // otherwise it was cancelled before its time, with all that is to come
+            finished(cause, text);
+        }
     }
 
     /** What was appended does not run after an end before its time. */
@@ -229,10 +236,10 @@ public final class Container implements IMotionContainer, MotionListener {
     @Override
     public void cancel() {
         if (!isFinished()) {
-            station.plant.cancel(id);
-            if (firstEnded) {
-                dropAppended();
+            for (Appended one : appended) { // before the first, so that none of them begins
+                station.plant.cancel(one.id);
             }
+            station.plant.cancel(id);
         }
     }
 

@@ -332,7 +332,8 @@ public abstract class LBR extends Robot {
         order.listener = appended;
         String error = station.plant.submit(order);
         if (error != null) {
-            appended.finished("error", error);
+            container.without(appended);
+            throw new CommandInvalidException(error);
         }
     }
 

@@ -1,0 +1,147 @@
+"""A tour through what the other samples leave out: tasks, recordings, brake tests, geometry, a stop gone through."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from heptarm import _resources
+from heptarm.virtual import templates
+from tests.doubles.test_doubles import HERE, _command
+
+SOURCES = ("Touring", "Counting", "Waiting", "ICounter", "Pen")
+
+SAID = (
+    "a marked method was called",
+    "one context, one robot",
+    "the project's own class of tools",
+    "a taught frame knows its arm",
+    "nothing to recover from",
+    "the cabinet runs applications",
+    "a matrix turns",
+    "a step in its own axes",
+    "a step in the world's axes",
+    "parts of a transformation",
+    "near is a matter of degree",
+    "one tree",
+    "gripped where it is meant to be",
+    "a frame is moved",
+    "the robot of a context",
+    "limits",
+    "a closed safeguard",
+    "mastered and referenced",
+    "a measurement of torque referencing",
+    "what there is not is refused",
+    "inverse kinematics with redundancy",
+    "out of reach",
+    "home",
+    "parameters can be printed",
+    "there and back",
+    "modes and servo motions",
+    "an appended motion is awaited",
+    "and was the last",
+    "both can be printed",
+    "cancelling takes the appended ones along",
+    "a condition that holds already ends a motion",
+    "blocked for a brake test",
+    "the shoulder carries most",
+    "a brake holds what the axis needs, but not anything",
+    "a recording is there",
+    "of every number",
+    "from the trigger on",
+    "every five milliseconds",
+    "the lamp of the flange",
+    "in a range",
+    "a falling edge",
+    "a background task counts beside us",
+    "another is started and stopped",
+    "its function goes with it",
+    "and calls fail",
+    "STOP ME",
+    "the stop and its end were told",
+    "and the motion went on by itself",
+    "ASK ME",
+    "a dialog",
+    "disposed",
+)
+
+PROJECT = """<?xml version="1.0" encoding="UTF-8" standalone="no"?>
+<RoboticsAPIData version="3">
+  <world>
+    <frame name="Table">
+      <transformation a="0.0" b="0.0" c="0.0" x="500.0" y="0.0" z="100.0"/>
+      <frame name="Corner">
+        <transformation x="10.0" y="20.0"/>
+        <redundancyData>
+          <redundancy type="com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy">
+            <info type="com.kuka.roboticsAPI.deviceModel.StatusTurnRedundancy$StatusParameter" value="2"/>
+            <info type="com.kuka.roboticsAPI.deviceModel.StatusTurnRedundancy$TurnParameter" value="28"/>
+            <info type="com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy$E1Parameter" value="0.25"/>
+          </redundancy>
+        </redundancyData>
+      </frame>
+    </frame>
+  </world>
+  <objectTemplates>
+    <toolTemplate class="sample.Pen" name="Gripper"><loadData mass="0.5"/></toolTemplate>
+  </objectTemplates>
+</RoboticsAPIData>
+"""
+
+
+@pytest.fixture
+def project(tmp_path: Path) -> Path:
+    file = tmp_path / "RoboticsAPI.data.xml"
+    file.write_text(PROJECT)
+    return file
+
+
+def _until(file: Path, line: str, process: subprocess.Popen[str]) -> None:
+    deadline = time.monotonic() + 100.0
+    while line not in (file.read_text() if file.exists() else ""):
+        assert process.poll() is None and time.monotonic() < deadline, f"{line!r} was not said"
+        time.sleep(0.05)
+
+
+def _do(words: str, process: subprocess.Popen[str]) -> str:
+    assert process.stdin is not None and process.stdout is not None
+    process.stdin.write(f"{words}\n")
+    process.stdin.flush()
+    return process.stdout.readline()
+
+
+def test_a_tour_through_sunrise(tmp_path: Path, project: Path) -> None:
+    if shutil.which("javac") is None:
+        pytest.skip("no javac here")
+    path = ":".join(str(jar) for jar in _resources.jars())
+    sources = [str(HERE / "java" / f"{name}.java") for name in SOURCES]
+    subprocess.run(
+        ["javac", "-proc:none", "--release", "17", "-cp", path, "-d", str(tmp_path), *sources], check=True
+    )
+    said = tmp_path / "said.txt"
+    command = _command("sample.Touring", tmp_path, f"sample.file={said}", f"recordings={tmp_path}")
+    command += ["--project", str(project), "--speed", "2", "--parent-pipe"]
+    command += ["--background", "sample.Counting", "--background", "sample.Waiting"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        _until(said, "STOP ME", process)
+        assert '"error": ""' in _do("protective_stop", process)
+        time.sleep(0.5)  # the arm stands for a while
+        assert '"error": ""' in _do("clear", process)
+        _until(said, "ASK ME", process)
+        for _ in range(200):  # the dialog comes a moment later
+            if '"error": ""' in _do("answer 1", process):
+                break
+            time.sleep(0.05)
+        assert process.wait(timeout=60) == 0
+    assert said.read_text().splitlines() == [f"{one} = true" for one in SAID]
+    assert (tmp_path / "touring.log").read_text().startswith("time jointPosition_A1 ")
+
+
+def test_a_project_file_tells_classes_of_tools_and_arms_of_frames(project: Path) -> None:
+    found = templates.read(project)
+    assert [one.type for one in found.templates] == ["sample.Pen"]
+    assert found.redundancies == (("Table/Corner", (0.25, 2, 28)),)
