@@ -42,6 +42,8 @@ SAID = (
     "parameters can be printed",
     "there and back",
     "modes and servo motions",
+    "hand guiding is no mode of a hold",
+    "its older name",
     "an appended motion is awaited",
     "and was the last",
     "both can be printed",

@@ -102,9 +102,12 @@ import com.kuka.roboticsAPI.ioModel.Output;
 import com.kuka.roboticsAPI.ioModel.OutputReservedException;
 import com.kuka.roboticsAPI.motionModel.BrakeTest;
 import com.kuka.roboticsAPI.motionModel.CartesianPTP;
+import com.kuka.roboticsAPI.motionModel.HRCMotions;
+import com.kuka.roboticsAPI.motionModel.HandGuidingMotion;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.IMotionOverlay;
+import com.kuka.roboticsAPI.motionModel.MMCMotions;
 import com.kuka.roboticsAPI.motionModel.Motion;
 import com.kuka.roboticsAPI.motionModel.PTP;
 import com.kuka.roboticsAPI.motionModel.PTPHome;
@@ -117,6 +120,7 @@ import com.kuka.roboticsAPI.motionModel.SplineMotionJP;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.AbstractMotionControlMode;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.CartesianSineImpedanceControlMode;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.CartesianSineImpedanceControlMode.CartSineImpBuilder;
+import com.kuka.roboticsAPI.motionModel.controlModeModel.HandGuidingControlMode;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.JointImpedanceControlMode;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.PositionControlMode;
@@ -330,6 +334,14 @@ public class Touring extends RoboticsAPIApplication implements ISunriseControlle
         ServoMotionJP<?> servo = new SmartServo(lbr.getCurrentJointPosition());
         say("modes and servo motions", none == null && stiff.toString().length() > 0 && servo.getMode() == null
                 && Math.abs(lbr.getCurrentCartesianPosition(lbr.getFlange()).distanceTo(here)) < 20);
+        try {
+            lbr.move(positionHold(new HandGuidingControlMode(), 1, TimeUnit.SECONDS));
+            say("hand guiding is no mode of a hold", false);
+        } catch (IllegalArgumentException e) {
+            say("hand guiding is no mode of a hold", true);
+        }
+        HandGuidingMotion guided = MMCMotions.handGuiding();
+        say("its older name", guided.getClass() == HRCMotions.handGuiding().getClass());
         lbr.move(lin(here).setCartVelocity(200));
     }
 
