@@ -108,6 +108,10 @@ public class Overlaying extends RoboticsAPIApplication implements IFRISessionLis
         container.cancel();
         ThreadUtil.milliSleep(700);
         say("cancelling the motion ends the overlay", container.isFinished() && !container.hasError());
+        for (int i = 0; i < 200
+                && session.getFRIChannelInformation().getFRISessionState() != FRISessionState.MONITORING_READY; i++) {
+            ThreadUtil.milliSleep(50);
+        }
         say("the session monitors on",
                 session.getFRIChannelInformation().getFRISessionState() == FRISessionState.MONITORING_READY);
         session.close();
