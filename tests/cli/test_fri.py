@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from heptarm.rt import Client
+from heptarm.values.pose import Pose
 from tests.cli.running import HEPTARM, run
 
 
@@ -23,15 +24,33 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
+class Told(list[Any]):
+    """What a controller has printed; and what is typed to it."""
+
+    def __init__(self, process: subprocess.Popen[str]) -> None:
+        super().__init__()
+        self._process = process
+
+    def say(self, line: str) -> None:
+        assert self._process.stdin is not None
+        self._process.stdin.write(f"{line}\n")
+        self._process.stdin.flush()
+
+
 @contextmanager
-def controller(port: int, *arguments: str, version: str = "1.15") -> Iterator[tuple[Any, list[Any]]]:
+def controller(
+    port: int, *arguments: str, version: str = "1.15", typed: bool = False
+) -> Iterator[tuple[Any, Told]]:
     """`heptarm sim --fri`; what it prints, at last also how it ended."""
     command = [*HEPTARM, "sim", "--json", "--fri", version, "--fri-client", f"127.0.0.1:{port}"]
-    told: list[Any] = []
     with subprocess.Popen(
-        [*command, "--fri-port", "0", *arguments], stdout=subprocess.PIPE, text=True
+        [*command, "--fri-port", "0", *arguments],
+        stdin=subprocess.PIPE if typed else None,
+        stdout=subprocess.PIPE,
+        text=True,
     ) as process:
         assert process.stdout is not None
+        told = Told(process)
         try:
             yield json.loads(process.stdout.readline()), told
         finally:
@@ -55,6 +74,31 @@ def test_a_bare_controller_serves_any_client_and_says_how_it_went() -> None:
     assert told[-1]["ended"] and told[-1]["answers"]["on_time"] > 10 and told[-1]["refused"] == 0
 
 
+def test_a_bare_controller_has_signals_and_asks_for_frames() -> None:
+    signals = ("--fri-io", "Cell.Door<bool", "--fri-io", "Cell.Part>u8", "--fri-io", "Cell.Level>analog")
+    with (
+        Client(0, realtime=False) as client,
+        controller(
+            client.port, "--fri-period", "10", *signals, "--fri-frame", "Part", version="2.7", typed=True
+        ) as (_, told),
+    ):
+        client.wait("COMMANDING_ACTIVE", timeout=60.0)
+        assert client.inputs == {"Cell.Door": False} and client.outputs == {"Cell.Part": 0, "Cell.Level": 0.0}
+        assert client.wanted_frames == ("Part",)
+        client.frame("Part", Pose.at(0.5, 0.0, 0.1))
+        client.output("part", 7)
+        client.output("Cell.Level", 0.5)
+        told.say("set Cell.Door true")
+        for s in client:
+            if s.io.door and s.io.part == 7 and s.io.level == 0.5:
+                break
+        told.say("set Cell.Door 3")
+        told.say("open the door")
+    texts = [one.get("text", "") for one in told]
+    for line in ("output Cell.Part = 7", "output Cell.Level = 0.5", "frame Part = 500, 0, 100, 1, 0, 0, 0"):
+        assert line in texts
+
+
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
@@ -62,6 +106,9 @@ def test_a_bare_controller_serves_any_client_and_says_how_it_went() -> None:
         (("--fri", "1.15", "--fri-command", "pose"), "it came with FRI 2.5"),
         (("--fri", "1.15", "--fri-command", "torque", "--fri-period", "10"), "every 10 ms"),
         (("--fri", "1.15", "--fri-period", "2.5"), "whole milliseconds"),
+        (("--fri", "1.15", "--fri-io", "Cell.Door"), "GROUP.NAME<bool is wanted"),
+        (("--fri", "1.11", "--fri-io", "Cell.Door<bool"), "they came with FRI 1.14"),
+        (("--fri", "1.15", "--fri-frame", "x" * 64), "63 octets"),
         (("--fri", "1.15", "--fri-client", "here"), "no IPv4 address"),
         (("--fri", "1.15", "--fri-client", "127.0.0.1:x"), "HOST:PORT"),
     ],

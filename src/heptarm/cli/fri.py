@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-import signal
+import contextlib
+import re
+import signal as system
 import sys
+import threading
 from collections.abc import Callable
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from heptarm.cli.output import emit
+from heptarm.cli.typed import is_silent, lines
 from heptarm.errors import CommandRejected, ConnectFailed, require
+from heptarm.fri.messages import IoDirection, IoType, IoValue
 from heptarm.fri.version import Version
 from heptarm.values.arrays import within
 from heptarm.values.pose import deg
 
 if TYPE_CHECKING:
     from heptarm.virtual.fri.events import Event
+    from heptarm.virtual.fri.server import Server
     from heptarm.virtual.fri.standalone import Standalone
 
+_SIGNAL = re.compile(r"(.+\.[^.<>]+)([<>])(bool|u[0-9]+|analog.*)")
+_WORDS = {"true": 1.0, "false": 0.0}
 #: Where the arm stands at first [deg]: bent, so that every direction is free.
 START = (0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0)
 
@@ -31,6 +39,8 @@ def run(
     period: float,
     multiplier: int,
     port: int | None,
+    signals: tuple[str, ...],
+    frames: tuple[str, ...],
     speed: float,
     verbose: bool,
     as_json: bool,
@@ -45,6 +55,8 @@ def run(
         period: between two messages [ms].
         multiplier: the client answers every n-th message.
         port: the controller's own; None: the client's, or a neighbour of it on the same machine.
+        signals: that the client sees, as `signal` reads them.
+        frames: names of frames that the client is asked for.
         speed: simulated seconds per second.
         verbose: also tell each change of quality.
         as_json: print objects.
@@ -61,11 +73,13 @@ def run(
         period=period,
         multiplier=multiplier,
         port=port,
+        signals=signals,
+        frames=frames,
         speed=speed,
         tell=_teller(verbose=verbose, as_json=as_json),
     )
-    for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, lambda *_: standalone.stop())
+    for number in (system.SIGTERM, system.SIGINT):
+        system.signal(number, lambda *_: standalone.stop())
     controller, own = standalone.server.controller, standalone.server.port
     ready = {"ready": True, "fri": version, "client": client, "port": own, "model": model, "command": command}
     if as_json:
@@ -76,6 +90,8 @@ def run(
             f"and offers a {command} overlay. Ctrl-C ends it."
         )
         sys.stdout.flush()
+    if signals and not is_silent():
+        threading.Thread(target=_careful, args=(standalone.server,), daemon=True).start()
     standalone.run()
     counts = asdict(controller.meter.counts)
     if as_json:
@@ -97,6 +113,8 @@ def made(
     period: float,
     multiplier: int,
     port: int | None,
+    signals: tuple[str, ...],
+    frames: tuple[str, ...],
     speed: float,
     tell: Callable[[Event], None],
 ) -> Standalone:
@@ -112,7 +130,9 @@ def made(
     except ValueError as error:
         raise CommandRejected(str(error), parameter="--fri", value=version) from None
     settings = Settings(
-        configuration=Configuration(spoken, whole(period), multiplier),
+        configuration=Configuration(
+            spoken, whole(period), multiplier, signals=tuple(map(signal, signals)), transformations=frames
+        ),
         client=address(client),
         port=port,
         command=command_mode(command),
@@ -132,6 +152,46 @@ def address(text: str) -> tuple[str, int]:
     if not host or (colon and not port.isdigit()):
         raise ConnectFailed(f"{text!r} is no address", hint="HOST:PORT is wanted, such as 127.0.0.1:30200")
     return host, int(port) if colon else 30200
+
+
+def signal(text: str) -> IoValue:
+    """The signal "Group.Name<type" (an input) or "Group.Name>type" (an output), at first 0.
+
+    Raises:
+        CommandRejected: it is none.
+    """
+    parts = _SIGNAL.fullmatch(text)
+    if parts is None:
+        raise CommandRejected(
+            f"{text!r} is no signal",
+            parameter="--fri-io",
+            value=text,
+            hint="GROUP.NAME<bool is wanted, or > for an output, and bool, u8 or analog",
+        )
+    name, direction, kind = parts[1], parts[2], parts[3]
+    types = {"b": IoType.BOOLEAN, "u": IoType.DIGITAL, "a": IoType.ANALOG}
+    return IoValue(name, types[kind[0]], IoDirection.INPUT if direction == "<" else IoDirection.OUTPUT, 0)
+
+
+def _careful(server: Server) -> None:
+    """Heed until standard input is closed."""
+    with contextlib.suppress(OSError):
+        _heed(server)
+
+
+def _heed(server: Server) -> None:
+    """Give signals the values that are typed: `set Group.Name 1`."""
+    for said in lines():
+        verb, name, value = (*said.split(), "", "", "")[:3]
+        try:
+            if verb != "set":
+                raise ValueError
+            number = _WORDS[value.lower()] if value.lower() in _WORDS else float(value)
+            server.set(name, int(number) if number == int(number) else number)
+        except CommandRejected as error:
+            print(error, file=sys.stderr, flush=True)
+        except (ValueError, OverflowError):
+            print(f"{said!r} is not understood; type `set GROUP.NAME VALUE`", file=sys.stderr, flush=True)
 
 
 def whole(period: float) -> int:

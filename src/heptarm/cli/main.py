@@ -103,6 +103,18 @@ def sim(
         int | None,
         Parameter(group=_FRI, help="UDP port to send from. Default: the client's or its neighbour."),
     ] = None,
+    fri_io: Annotated[
+        tuple[str, ...],
+        Parameter(
+            group=_FRI,
+            help="GROUP.NAME<TYPE is an input that the client reads, GROUP.NAME>TYPE an output that it writes, "
+            "TYPE bool, u8 (or other bits) or analog; may be given again. Type `set GROUP.NAME VALUE` while it runs.",
+        ),
+    ] = (),
+    fri_frame: Annotated[
+        tuple[str, ...],
+        Parameter(group=_FRI, help="Name of a frame that the client is asked for; may be given again."),
+    ] = (),
     json: Json = False,
 ) -> int:
     """Run a virtual cabinet until Ctrl-C; with --fri, a bare FRI controller; with --app, your own application."""
@@ -123,6 +135,8 @@ def sim(
             period=fri_period,
             multiplier=fri_multiplier,
             port=fri_port,
+            signals=fri_io,
+            frames=fri_frame,
             speed=speed,
             verbose=verbose,
             as_json=json,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -14,6 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from heptarm.cli import typed
 from heptarm.cli.output import emit
 from heptarm.errors import ConnectFailed
 from heptarm.virtual.operator import WORDS
@@ -139,31 +139,21 @@ def _failure(said: str) -> str:
 def _type(cabinet: subprocess.Popen[str], as_json: bool) -> None:
     """Hand on what is typed; the end of standard input ends nothing."""
     assert cabinet.stdin is not None
-    rest = b""
-    # read raw: a buffered read under way would keep the interpreter from ending
-    while octets := os.read(0, 4096):
-        *lines, rest = (rest + octets).split(b"\n")
-        for line in lines:
-            said = line.decode("utf-8", "replace").strip()
-            if said == "help":
-                for words, meaning in WORDS.items():
-                    about = json.dumps({"say": words, "to": meaning}) if as_json else f"{words:26} {meaning}"
-                    print(about, flush=True)
-                continue
-            cabinet.stdin.write(f"{said}\n")
-            cabinet.stdin.flush()
+    for said in typed.lines():
+        if said == "help":
+            for words, meaning in WORDS.items():
+                about = json.dumps({"say": words, "to": meaning}) if as_json else f"{words:26} {meaning}"
+                print(about, flush=True)
+            continue
+        cabinet.stdin.write(f"{said}\n")
+        cabinet.stdin.flush()
 
 
 def _converse(cabinet: subprocess.Popen[str], as_json: bool) -> None:
     """Let whoever sits before the terminal play the operator."""
     threading.Thread(target=_careful, args=(_answer, cabinet, as_json), daemon=True).start()
-    try:
-        # in the background a terminal must not be read: that would halt the whole process
-        if os.isatty(0) and os.tcgetpgrp(0) != os.getpgrp():
-            return
-    except (OSError, AttributeError):
-        return
-    threading.Thread(target=_careful, args=(_type, cabinet, as_json), daemon=True).start()
+    if not typed.is_silent():
+        threading.Thread(target=_careful, args=(_type, cabinet, as_json), daemon=True).start()
 
 
 def _careful(

@@ -125,6 +125,15 @@ class Server:
         with self._lock:
             self.controller.stop()
 
+    def set(self, name: str, value: float) -> None:
+        """Give a signal another value, as the cabinet's side.
+
+        Raises:
+            CommandRejected: it is not registered, or cannot have that value.
+        """
+        with self._lock:
+            self.controller.exchange.set(name, value)
+
     def close(self) -> None:
         """Close the session; the next tick sends its last message. `release` frees the port."""
         with self._lock:

@@ -16,7 +16,15 @@ from heptarm.fri import messages as m
 from heptarm.fri.version import Version
 from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, Position
 from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.events import Event, OverlayEnded, QualityChanged, Refused, StateChanged
+from heptarm.virtual.fri.events import (
+    Event,
+    FrameProvided,
+    OutputWritten,
+    OverlayEnded,
+    QualityChanged,
+    Refused,
+    StateChanged,
+)
 from heptarm.virtual.fri.faults import Scenario
 from heptarm.virtual.fri.overlay import HoldingTarget, MotionOverlay
 from heptarm.virtual.fri.server import PORT, Address, Server
@@ -197,4 +205,9 @@ def words(event: Event) -> str:
         )
     if isinstance(event, OverlayEnded):
         return f"overlay ended: {event.text or event.cause}"
+    if isinstance(event, OutputWritten):
+        return f"output {event.value.name} = {event.value.value:g}"
+    if isinstance(event, FrameProvided):
+        frame = event.transformation
+        return f"frame {frame.name} = {', '.join(f'{value:g}' for value in frame.values)}"
     return event.text if isinstance(event, Refused) else ""
