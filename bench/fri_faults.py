@@ -20,6 +20,7 @@ def fri_faults() -> Iterator[Figure]:
     runs: dict[str, Callable[[], int]] = {}
     for fault in scenarios.FAULTS:
         runs[fault.__name__] = lambda fault=fault: scenarios.again(fault, TIMES)  # type: ignore[misc]
+    runs["duplicates"] = lambda: scenarios.duplicates(TIMES)
     runs["garbage"] = lambda: scenarios.garbage(TIMES)
     runs["killed_client"] = lambda: kills.clients(TIMES)
     runs["killed_controller"] = lambda: kills.controllers(TIMES)

@@ -25,7 +25,7 @@ def verdicts(*arguments: str, fails: bool = False) -> dict[str, dict[str, Any]]:
 def test_a_cabinet_with_fri_is_looked_at_without_moving_anything(cabinet: RunningCabinet) -> None:
     found = verdicts("--target", cabinet.target, "--fri-period", "10", "--seconds", "2")
     assert found["FRI command"]["how"] == "ok"
-    assert "position, torque, wrench; not offered: pose" in found["FRI command"]["found"]
+    assert "position, torque, wrench; not offered: pose; signals" in found["FRI command"]["found"]
     assert "FRI 1.14-1.16, every 10 ms" in found["FRI messages"]["found"]
     assert "EXCELLENT" in found["FRI quality"]["found"]
     assert "ms median" in found["FRI answers"]["found"]
@@ -41,7 +41,8 @@ def test_somebody_elses_application_is_listened_to(tmp_path: Path) -> None:
         wrong = verdicts(
             "--listen", "--fri-port", str(port), "--seconds", "1", "--fri-version", "1.15", fails=True
         )
-        assert "1.x" in wrong["FRI messages"]["found"] or "2.5" in wrong["FRI messages"]["found"]
+        assert "speaks FRI 2.5" in wrong["FRI messages"]["found"]
+        assert "leave --fri-version" in wrong["FRI messages"]["remedy"]
         done = run(
             *("bench", "--fri", "--listen", "--fri-port", str(port), "--duration", "1", "--json"),
             *("--plot", str(picture)),
@@ -63,7 +64,7 @@ def test_an_application_that_starts_no_overlay_is_told_of() -> None:
 def test_nothing_arrives() -> None:
     port = free_port()
     found = verdicts("--listen", "--fri-port", str(port), "--seconds", "0.3", fails=True)
-    assert found["FRI messages"]["found"] == "nothing has arrived"
+    assert found["FRI messages"]["found"] == "nothing has arrived within 0.3 s"
     assert "firewall" in found["FRI messages"]["remedy"] and str(port) in found["FRI messages"]["remedy"]
 
 

@@ -70,13 +70,27 @@ def foreign(pair: Pair) -> str:
     return QUALITY
 
 
-FAULTS: tuple[Callable[[Pair], str], ...] = (lossy, bursts, silent, stopped, mute, jumping, foreign)
+def reordered(pair: Pair) -> str:
+    """A third of all datagrams is overtaken by the next one."""
+    _lines(pair, reorder=0.3)
+    return QUALITY
+
+
+def corrupt(pair: Pair) -> str:
+    """A fifth of all datagrams is damaged; their check sums tell it."""
+    _lines(pair, corrupt=0.2)
+    return QUALITY
+
+
+FAULTS: tuple[Callable[[Pair], str], ...] = (
+    *(lossy, bursts, silent, stopped, mute, jumping, foreign, reordered, corrupt),
+)
 
 
 def again(fault: Callable[[Pair], str], times: int) -> int:
     """Let it happen so many times in one session of the controller; returns how often all went as designed."""
     random.seed(7)
-    pair = Pair(Configuration(Version.V1_15))
+    pair = Pair(Configuration(Version.V2_7 if fault is corrupt else Version.V1_15))
     for turn in range(1, times + 1):
         pair.active(MotionOverlay())
         text = fault(pair)
@@ -89,6 +103,9 @@ def again(fault: Callable[[Pair], str], times: int) -> int:
         assert pair.controller.state in (State.MONITORING_WAIT, State.MONITORING_READY)
         if fault is foreign:
             assert "the other side speaks FRI 2.7" in pair.session.trouble
+        counts = pair.session.counters
+        assert fault is not reordered or counts.reordered >= turn
+        assert fault is not corrupt or counts.malformed >= turn
         pair.there, pair.back = Line(), Line()
         pair.arm.safety, pair.setpoint.q = m.Safety.NORMAL_OPERATION, None
         if not pair.alive or fault is foreign:
@@ -96,6 +113,19 @@ def again(fault: Callable[[Pair], str], times: int) -> int:
         pair.run(130)  # what was lost has left the window
     pair.active(MotionOverlay())
     return len(pair.ends)
+
+
+def duplicates(times: int) -> int:
+    """A third of all datagrams comes twice, in both directions; commanding goes on, and no second one counts."""
+    pair = Pair(Configuration(Version.V1_15))
+    pair.active(MotionOverlay())
+    for turn in range(1, times + 1):
+        _lines(pair, duplicate=0.3)
+        pair.run(20)
+        assert pair.controller.state is pair.session.state is State.COMMANDING_ACTIVE
+        assert pair.session.counters.duplicated >= turn and pair.controller.traffic.stale >= turn
+    assert pair.session.counters.lost == pair.controller.meter.counts.late == 0 and not pair.ends
+    return times
 
 
 def garbage(times: int) -> int:

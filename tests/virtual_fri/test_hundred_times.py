@@ -18,6 +18,10 @@ def test_again_and_again(fault: Callable[[Pair], str]) -> None:
     assert scenarios.again(fault, 10) == 10
 
 
+def test_duplicates_count_once() -> None:
+    assert scenarios.duplicates(30) == 30
+
+
 def test_garbage_between_the_datagrams() -> None:
     assert scenarios.garbage(50) == 50
 

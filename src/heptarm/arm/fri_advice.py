@@ -41,9 +41,10 @@ def silence(host: str, port: int) -> str:
         port: on which the client listens.
     """
     return (
-        f"no FRI message arrived on UDP port {port}: see that the cabinet can reach {host or 'this machine'} (address, "
-        "netmask, and the network card that FRI uses there, KONI or X66), that a firewall lets UDP in, and that the "
-        "cabinet's FRI application runs and sends to this address and port"
+        f"no FRI message arrived on UDP port {port}; look in this order: is the cabinet's FRI application started, and "
+        f"does it send to {host or 'an address of this machine'}, port {port} (KUKA's examples send to 127.0.0.1)? "
+        "Does `ping` reach the cabinet, with one netmask on both sides, on the network card that FRI uses there (KONI "
+        f"or X66)? Does the firewall here let UDP in (`sudo ufw allow {port}/udp`)?"
     )
 
 

@@ -21,6 +21,12 @@ from heptarm.rt import Client
 #: A share of lost messages or answers that is worth a word.
 _SHARE = 0.001
 _MOST = 3600.0
+_KINDS = ("position", "torque", "wrench", "pose")
+_VERSION = (
+    "leave --fri-version (version= in a program) out: heptarm takes it from the first message; a client that is built "
+    "with KUKA's SDK has to be built for the cabinet's version"
+)
+_UNKNOWN = "look at the messages on the smartPAD and at the log of the cabinet's application"
 
 
 def look(settings: Look, *, target: str | None) -> Iterator[Verdict]:
@@ -56,7 +62,7 @@ def _listening(settings: Look, port: int) -> Iterator[Verdict]:
         with contextlib.suppress(Timeout):
             client.next(timeout=settings.seconds)
         if not client.stats.received:
-            yield _nothing(client)
+            yield _nothing(client, settings.seconds)
             return
         state = client.state
         while time.monotonic() - began < settings.seconds:
@@ -78,11 +84,17 @@ def _listening(settings: Look, port: int) -> Iterator[Verdict]:
         yield from _quality(client)
 
 
-def _nothing(client: Client) -> Verdict:
+def _nothing(client: Client, seconds: float) -> Verdict:
     if client.stats.malformed:
         found, _, remedy = strangers(client).rpartition(": ")
-        return Verdict("FRI messages", "bad", found, remedy)
-    return Verdict("FRI messages", "bad", "nothing has arrived", silence("", client.port))
+        return Verdict("FRI messages", "bad", found, _VERSION if _names_version(found) else remedy)
+    advice = silence("", client.port).partition("; ")[2]
+    return Verdict("FRI messages", "bad", f"nothing has arrived within {seconds:g} s", advice)
+
+
+def _names_version(text: str) -> bool:
+    """Whether a trouble is that of two versions."""
+    return "speaks FRI" in text
 
 
 def _opened(settings: Look, target: str) -> Iterator[Verdict]:
@@ -95,7 +107,8 @@ def _opened(settings: Look, target: str) -> Iterator[Verdict]:
         )
         return
     with arm:
-        kinds = [name.removeprefix("fri_") for name in arm.capabilities if name.startswith("fri_")]
+        offered = [name.removeprefix("fri_") for name in arm.capabilities if name.startswith("fri_")]
+        kinds = [kind for kind in ("monitor", *_KINDS) if kind in offered]
         if not kinds:
             yield Verdict(
                 "FRI command",
@@ -104,11 +117,13 @@ def _opened(settings: Look, target: str) -> Iterator[Verdict]:
                 "install the option Sunrise.FRI on the cabinet",
             )
             return
-        missing = [kind for kind in ("position", "torque", "wrench", "pose") if kind not in kinds]
+        missing = [kind for kind in _KINDS if kind not in kinds]
         yield Verdict(
             "FRI command",
             "ok",
-            f"offered: {', '.join(kinds)}" + (f"; not offered: {', '.join(missing)}" if missing else ""),
+            f"offered: {', '.join(kinds)}"
+            + (f"; not offered: {', '.join(missing)}" if missing else "")
+            + ("; signals may go with them" if "io" in offered else "; without signals"),
             "pose needs Sunrise 2.x" if missing == ["pose"] else "",
         )
         session = arm.fri(
@@ -124,7 +139,10 @@ def _opened(settings: Look, target: str) -> Iterator[Verdict]:
                 yield _messages(rt.client, rt.events())
                 yield from _quality(rt.client)
         except HeptarmError as error:
-            yield Verdict("FRI session", "bad", error.text, error.hint)
+            if _names_version(error.hint):
+                yield Verdict("FRI session", "bad", error.hint.partition(": ")[0], _VERSION)
+            else:
+                yield Verdict("FRI session", "bad", error.text, error.hint or _UNKNOWN)
 
 
 def _messages(client: Client, events: list[Event]) -> Verdict:
