@@ -141,3 +141,34 @@ def test_whatever_is_asked_the_limits_are_kept(asked: list[tuple[object, int]], 
 def test_a_limit_that_is_none() -> None:
     with pytest.raises(LimitError, match=r"angular_velocity is 0; a positive number"):
         PoseLimits(angular_velocity=0.0)
+
+
+@given(
+    wishes=st.lists(st.floats(-3.0, 3.0) | st.just(NAN) | st.none(), min_size=1, max_size=20),
+    speed=st.floats(-0.9, 0.9),
+)
+@settings(max_examples=40, deadline=None)
+def test_the_elbow_keeps_its_limits_too(wishes: list[float | None], speed: float) -> None:
+    guard, begin = PoseGuard(LIMITS), 0.3
+    guard.start(START, period=1e-3, e1=begin, e1_speed=speed * LIMITS.elbow_velocity)
+    sent = [begin - speed * LIMITS.elbow_velocity * 1e-3, begin]
+    for wish in wishes:
+        for _ in range(40):
+            guard.pose(START)
+            sent.append(guard.elbow(wish))
+    speeds = np.diff(sent) / 1e-3
+    assert np.abs(speeds).max() <= LIMITS.elbow_velocity * 1.000001
+    assert np.abs(np.diff(speeds)).max() / 1e-3 <= LIMITS.elbow_acceleration * 1.000001 + 1e-6
+
+
+def test_an_elbow_reaches_its_wish_and_the_report_names_it() -> None:
+    guard = begun()
+    guard.start(START, period=1e-3, e1=0.0)
+    for _ in range(3000):
+        guard.pose(START)
+        guard.elbow(0.8)
+    assert guard.e1 == 0.8 and guard.is_still
+    guard.elbow(NAN)
+    assert guard.e1 == 0.8
+    assert any("elbow: velocity limited" in line for line in guard.report.lines)
+    assert any("elbow: asked for no finite number" in line for line in guard.report.lines)

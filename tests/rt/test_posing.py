@@ -151,6 +151,58 @@ def test_an_interpolator_in_motion_is_taken_over_and_lost_messages_are_caught_up
     assert sent(bench, 1)[0, 0] * 1e3 == pytest.approx(x[0] - 0.1)
 
 
+def test_the_elbow_is_commanded_with_a_pose() -> None:
+    bench = Bench(wire=Version.V2_5)
+    bench.controller.mode = CommandMode.CARTESIAN_POSE
+    bench.controller.redundancy = m.Redundancy(m.RedundancyStrategy.E1, 0.1)
+    bench.activate()
+    bench.run(3)
+    assert bench.sent[-1].redundancy == m.Redundancy(m.RedundancyStrategy.E1, 0.1), "mirrored until it is wished"
+    words = np.zeros(at.COMMAND_WORDS)
+    words[at.C_E1] = 0.4
+    words.view(np.int64)[at.C_AT : at.C_GIVEN + 1] = bench.now, at.GIVEN_E1
+    bench.layout.commands.write(words[1:])
+    bench.run(1500)
+    redundancy = bench.sent[-1].redundancy
+    assert redundancy is not None and redundancy.value == 0.4 and sent(bench, 1)[0] == pytest.approx(HOME)
+    last = bench.states[-1]
+    assert last.e1_sent == 0.4 and last.e1_ipo == 0.1
+    assert any("elbow: velocity limited" in line for line in bench.cycle.posing.guard.report.lines)
+    steps = np.diff([one.redundancy.value for one in bench.sent[-1500:] if one.redundancy is not None])
+    assert steps.max() <= 0.5e-3 * 1.000001
+
+
+def test_after_a_long_silence_a_flange_that_went_on_is_not_halted() -> None:
+    bench = posing()
+    original, measured = bench.controller.datagram, [100.0]
+
+    def named() -> bytes:
+        value = codec.decode_monitoring(original(), Version.V2_5)
+        assert value.monitor is not None
+        pose = m.Transformation("measured", (measured[0], 200.0, 300.0, 1.0, 0.0, 0.0, 0.0))
+        return codec.encode_monitoring(replace(value, monitor=replace(value.monitor, pose=pose)), Version.V2_5)
+
+    bench.controller.datagram = named  # type: ignore[method-assign]
+    command(bench, (0.9, *HOME[1:]))
+    for _ in range(600):
+        bench.run(1)
+        measured[0] = 1e3 * sent(bench, 1)[0, 0]
+    before = sent(bench, 2)[:, 0]
+    speed = before[1] - before[0]
+    assert speed == pytest.approx(0.25e-3)
+    for kept in (1.0, 0.0):  # it goes on; the next time it stands
+        last = sent(bench, 1)[0, 0]
+        bench.now += 60_000_000
+        bench.controller.sequence += 60
+        measured[0] += 1e3 * 60 * speed * kept
+        bench.run(1)
+        step = sent(bench, 1)[0, 0] - last
+        assert step == pytest.approx(speed * 61 * kept, abs=1.1 * speed)
+        bench.run(1)
+        after = sent(bench, 2)[:, 0]
+        assert after[1] - after[0] == pytest.approx(kept * speed, abs=5e-6)
+
+
 def with_pose(octets: bytes, pose: m.Transformation) -> bytes:
     """A datagram with another interpolator's pose."""
     value = codec.decode_monitoring(octets, Version.V2_5)

@@ -131,6 +131,19 @@ def test_a_law_moves_the_flange_5_cm_and_back() -> None:
         assert both.limited == [] and both.is_commanding
 
 
+def elbow(state: State, out: Output, params: Params) -> None:
+    out.e1 += 0.15 * (1.0 - math.cos(math.pi * min(state.t, 1.0)))
+
+
+def test_the_elbow_turns_about_a_flange_that_stays() -> None:
+    with session(elbow) as both:
+        start, before = both.flange, both.plant.snapshot.q.copy()
+        both.run(1.2)
+        assert both.flange == pytest.approx(start, abs=2e-3)
+        assert both.plant.snapshot.q[2] - before[2] == pytest.approx(0.3, abs=2e-3)
+        assert both.limited == [] and both.is_commanding
+
+
 def test_a_step_of_half_a_metre_and_numbers_that_are_none() -> None:
     with session() as both:
         start = Pose.from_matrix(both.flange)
