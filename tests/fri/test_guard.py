@@ -11,7 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from heptarm.errors import LimitError
-from heptarm.fri.guard import Guard, Limited, Limits, _brake, _overrun
+from heptarm.fri.guard import Guard, Limited, _brake, _overrun
+from heptarm.fri.limits import Limits
 from heptarm.values.robot import robot
 
 LIMITS = Limits.of(robot("iiwa14"))

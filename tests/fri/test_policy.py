@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from heptarm.errors import LimitError
-from heptarm.fri.guard import Guard, Limits
+from heptarm.fri.guard import Guard
+from heptarm.fri.limits import Limits
 from heptarm.fri.policy import Filler, Missing, Policy
 from heptarm.values.robot import robot
 

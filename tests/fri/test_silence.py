@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from heptarm.fri.guard import Guard, Limits
+from heptarm.fri.guard import Guard
+from heptarm.fri.limits import Limits
 from heptarm.fri.silence import carried_on, part_carried_on, speed_after
 from heptarm.values.robot import robot
 

@@ -12,7 +12,7 @@ import pytest
 from heptarm.errors import ShapeError
 from heptarm.fri import codec
 from heptarm.fri import messages as m
-from heptarm.fri.guard import Limits
+from heptarm.fri.limits import Limits
 from heptarm.fri.messages import CommandMode, SessionState
 from heptarm.fri.policy import Missing, Policy
 from heptarm.fri.version import Version

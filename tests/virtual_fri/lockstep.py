@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.fri.guard import Limits
+from heptarm.fri.limits import Limits
 from heptarm.fri.messages import CommandMode
 from heptarm.fri.policy import Missing, Policy
 from heptarm.fri.version import Version

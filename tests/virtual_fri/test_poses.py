@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from heptarm.fri.guard import Limits
+from heptarm.fri.limits import Limits
 from heptarm.fri.messages import CommandMode
 from heptarm.fri.policy import Missing, Policy
 from heptarm.fri.version import Version

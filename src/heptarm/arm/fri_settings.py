@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from heptarm.arm.modes import mode_message
 from heptarm.errors import CommandRejected, ConnectFailed, LimitError, ModeConflict, ShapeError
-from heptarm.fri.guard import Limits
+from heptarm.fri.limits import Limits
 from heptarm.fri.messages import MAX_IO, MAX_NAME
 from heptarm.fri.policy import Policy
 from heptarm.fri.pose_guard import PoseLimits

@@ -18,7 +18,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from heptarm.fri.guard import Limits
+    from heptarm.fri.limits import Limits
     from heptarm.fri.messages import CommandMode, Quality, SessionState
     from heptarm.fri.policy import Missing, Policy
     from heptarm.fri.pose_guard import PoseLimits
@@ -42,7 +42,7 @@ __all__ = [
 #: Where the names live. The client has a process and a socket, which nothing else in this package may know of, so that
 #: names are imported when they are used.
 _HOMES = {
-    "Limits": "fri.guard",
+    "Limits": "fri.limits",
     "CommandMode": "fri.messages",
     "Quality": "fri.messages",
     "SessionState": "fri.messages",

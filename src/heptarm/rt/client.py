@@ -18,7 +18,7 @@ from heptarm.errors import (
     ConnectFailed,
     ConnectionLost,
 )
-from heptarm.fri.guard import Limits
+from heptarm.fri.limits import Limits
 from heptarm.fri.policy import Policy
 from heptarm.fri.pose_guard import PoseLimits
 from heptarm.fri.version import Version

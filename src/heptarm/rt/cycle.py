@@ -9,7 +9,8 @@ from dataclasses import replace
 
 from heptarm.errors import CommandRejected
 from heptarm.fri import messages as m
-from heptarm.fri.guard import Guard, Limits
+from heptarm.fri.guard import Guard
+from heptarm.fri.limits import Limits
 from heptarm.fri.policy import Filler, Policy
 from heptarm.fri.pose_guard import PoseLimits
 from heptarm.fri.session import Session

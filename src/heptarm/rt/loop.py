@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from heptarm.errors import ConnectFailed, ConnectionLost
-from heptarm.fri.guard import Limits
+from heptarm.fri.limits import Limits
 from heptarm.fri.messages import SessionState
 from heptarm.fri.policy import Missing, Policy
 from heptarm.fri.pose_guard import PoseLimits
