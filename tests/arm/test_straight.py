@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from collections.abc import Iterator
 
@@ -63,6 +64,9 @@ def test_a_straight_servo_is_soft_and_renewed_after_its_time_out(arm: ha.Arm) ->
         ("lin", {"acceleration_mps2": float("nan")}, "acceleration_mps2"),
         ("pose", {"speed_mps": 0.1}, "speed_mps belongs"),
         ("joint", {"acceleration_radps2": 1.0}, "acceleration_radps2 belongs"),
+        ("joint", {"speed_timeout": 11.0}, "speed_timeout"),
+        ("joint", {"speed_timeout": 0.5, "engine": "direct"}, "speed_timeout belongs"),
+        ("pose", {"speed_timeout": 0.5}, "speed_timeout belongs"),
     ],
 )
 def test_limits_that_a_kind_does_not_heed_are_refused(arm: ha.Arm, kind: str, settings: dict, word: str) -> None:
@@ -84,3 +88,13 @@ def test_home_is_where_the_cabinet_says(arm: ha.Arm) -> None:
     assert arm.move(ha.ptp_home(speed=0.8)).arrived
     assert np.abs(arm.state.q).max() < 1e-3
     arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)))
+
+
+def test_the_velocity_of_a_target_is_kept_as_long_as_wanted(arm: ha.Arm) -> None:
+    velocity = np.array([0, 0, 0, 0, 0, 0, 0.1])
+    stream = arm.servo("joint", watchdog=2.0, speed=0.5, acceleration=1.0, speed_timeout=1.0)
+    with contextlib.suppress(ha.Starved), stream as sv:  # a machine that is busy may look at it for too long
+        goal = sv.start.q + 0.02 * np.sign(velocity)
+        sv.set(goal, velocity)
+        passed = arm.wait_until(lambda state: state.q[6] > goal[6] + 0.06, timeout=10.0)
+        assert passed.q[6] < goal[6] + 0.2

@@ -65,6 +65,7 @@ class _ServoSettings(TypedDict, total=False):
     acceleration_radps2: float | None
     min_trajectory_time: float | None
     goal_timeout: float
+    speed_timeout: float | None
     moving: str
     until: Condition | None
 
@@ -465,6 +466,7 @@ class Arm(Equipment, Stopping, Touching, Guarding, Teaching):
         acceleration_radps2: float | None = None,
         min_trajectory_time: float | None = None,
         goal_timeout: float = 300.0,
+        speed_timeout: float | None = None,
         moving: str = TOOL,
         until: Condition | None = None,
     ) -> JointServo | PoseServo:
@@ -490,6 +492,8 @@ class Arm(Equipment, Stopping, Touching, Guarding, Teaching):
             min_trajectory_time: no trajectory to a target is shorter [s]; None: a period and 5 ms.
             goal_timeout: after so long at its target without another one the cabinet's servo motion ends [s]; the
                 next target begins a new one.
+            speed_timeout: of joints with the engine "smart": how long the velocity of a target is kept after the target
+                was passed, before the arm brakes [s], 0.001 to 10; None: 0.1.
             moving: the moved frame: "tool" (the attached tool's, without one the flange), "flange" or a frame's name.
             until: condition that ends it when it holds; the cabinet's application looks 250 times a second, as far as
                 its robot answers that fast. See `move`.
@@ -512,6 +516,7 @@ class Arm(Equipment, Stopping, Touching, Guarding, Teaching):
             moving=moving,
             line=servo_settings.Line(speed_mps, acceleration_mps2, speed_radps, acceleration_radps2),
             ceiling=self._speed,
+            speed_timeout=speed_timeout,
         )
         self._tooling.check_moved(moving, "moving")
         self._tooling.check_mode(mode or self._mode)

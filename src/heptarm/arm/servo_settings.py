@@ -15,6 +15,8 @@ from heptarm.wire import messages as wire
 ENGINES = {"smart": wire.ServoEngine.SMART, "direct": wire.ServoEngine.DIRECT}
 #: Fraction of the axes' maxima that a servo motion of the joints uses without a word of the user.
 _GENTLE = 0.2
+#: How long the velocity of a target is kept after the target was passed [s].
+_KEPT = 0.1
 #: Without a word of the user the watchdog is so many periods long, but no shorter than this [s].
 _PERIODS, _SHORTEST = 5.0, 0.05
 _LONGEST = 2.0
@@ -99,6 +101,7 @@ def open_message(
     moving: str = TOOL,
     line: Line | None = None,
     ceiling: float = 1.0,
+    speed_timeout: float | None = None,
 ) -> tuple[wire.ServoOpen, float, float]:
     """The message that opens a servo motion, its rate [Hz] and its watchdog [s], all checked; see `Arm.servo`."""
     if engine not in ENGINES:
@@ -109,6 +112,12 @@ def open_message(
     if kind not in ("joint", "pose", "lin"):
         raise ShapeError(f"kind is {kind!r}; allowed are 'joint', 'pose', 'lin'", parameter="kind")
     limits = _limits(kind, engine, speed, acceleration, line or Line(), ceiling)
+    if speed_timeout is not None and (kind, engine) != ("joint", "smart"):
+        raise CommandRejected(
+            'speed_timeout belongs to targets with a velocity: arm.servo("joint") with the engine "smart"',
+            parameter="speed_timeout",
+            hint="leave it out",
+        )
     hertz = within(rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
     period = 1.0 / hertz
     seconds = min(max(_PERIODS * period, _SHORTEST), _LONGEST)
@@ -131,6 +140,9 @@ def open_message(
             mode=mode_message(mode),
             min_trajectory_time=within(shortest, "min_trajectory_time", 0.001, 1.0, unit="s"),
             goal_timeout=within(goal_timeout, "goal_timeout", 0.1, 3600.0, unit="s"),
+            speed_timeout=within(
+                _KEPT if speed_timeout is None else speed_timeout, "speed_timeout", 0.001, 10.0, unit="s"
+            ),
             watchdog=_FIRST,
         ),
         hertz,

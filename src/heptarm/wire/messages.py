@@ -3622,7 +3622,7 @@ class ProcessData:
 
 _ServoOpen_0 = Struct(">B")
 _ServoOpen_1 = Struct(">dd")
-_ServoOpen_2 = Struct(">ddd")
+_ServoOpen_2 = Struct(">dddd")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -3642,6 +3642,7 @@ class ServoOpen:
     linear: CartesianDynamics = CartesianDynamics()
     min_trajectory_time: float = 0.02
     goal_timeout: float = 300.0
+    speed_timeout: float = 0.1
     watchdog: float = 0.2
     until: Condition = Condition()
 
@@ -3655,7 +3656,7 @@ class ServoOpen:
             _write_Mode(self.mode, out)
         out.append(_ServoOpen_1.pack(self.velocity, self.acceleration))
         self.linear._write(out)
-        out.append(_ServoOpen_2.pack(self.min_trajectory_time, self.goal_timeout, self.watchdog))
+        out.append(_ServoOpen_2.pack(self.min_trajectory_time, self.goal_timeout, self.speed_timeout, self.watchdog))
         self.until._write(out)
 
     @classmethod
@@ -3677,9 +3678,10 @@ class ServoOpen:
         pos += _ServoOpen_2.size
         min_trajectory_time = v[0]
         goal_timeout = v[1]
-        watchdog = v[2]
+        speed_timeout = v[2]
+        watchdog = v[3]
         until, pos = Condition._read(data, pos)
-        return cls(engine=engine, frame=frame, mode=mode, velocity=velocity, acceleration=acceleration, linear=linear, min_trajectory_time=min_trajectory_time, goal_timeout=goal_timeout, watchdog=watchdog, until=until), pos
+        return cls(engine=engine, frame=frame, mode=mode, velocity=velocity, acceleration=acceleration, linear=linear, min_trajectory_time=min_trajectory_time, goal_timeout=goal_timeout, speed_timeout=speed_timeout, watchdog=watchdog, until=until), pos
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.frame.encode()), path + "frame", 0, 128)
@@ -3690,6 +3692,7 @@ class ServoOpen:
         self.linear._check(path + "linear.")
         codec.check(self.min_trajectory_time, path + "min_trajectory_time", 0.001, 1.0, False, False)
         codec.check(self.goal_timeout, path + "goal_timeout", 0.1, 3600.0, False, False)
+        codec.check(self.speed_timeout, path + "speed_timeout", 0.001, 10.0, False, False)
         codec.check(self.watchdog, path + "watchdog", 0.005, 2.0, False, False)
         self.until._check(path + "until.")
 

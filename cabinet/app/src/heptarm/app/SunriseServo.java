@@ -45,6 +45,9 @@ final class SunriseServo implements Servo {
         ServoMotion<?> motion = open.engine == ServoEngine.LIN ? SunriseLin.of(open, robot, tools) : joints(open, robot);
         motion.setMinimumTrajectoryExecutionTime(open.min_trajectory_time);
         motion.setTimeoutAfterGoalReach(open.goal_timeout);
+        if (open.engine == ServoEngine.SMART) {
+            motion.setSpeedTimeoutAfterGoalReach(open.speed_timeout);
+        }
         if (open.mode != null && !(open.mode instanceof PositionMode)) {
             if (!ServoMotion.validateForImpedanceMode(tools.carrier())) {
                 throw new Refusal(Code.NOT_READY, "impedance control cannot begin: the arm has to rest, away from a singularity,"

@@ -51,6 +51,8 @@ public final class Arm implements Server.Hearer {
     /** Time that a servo target is reached in at least, and without a target before the servo motion ends [s]. */
     private static final double SHORTEST = 0.02;
     private static final double PATIENCE = 300.0;
+    /** How long the velocity of a target is kept after the target was passed [s]. */
+    private static final double KEPT = 0.1;
 
     private final Server server;
     private final boolean isOwn;
@@ -115,7 +117,7 @@ public final class Arm implements Server.Hearer {
      * @param mode control mode; null: position control
      */
     public Steering servo(double speed, double acceleration, double watchdog, Mode mode) throws Refusal {
-        return servo(new ServoOpen(ServoEngine.SMART, "", mode, speed, acceleration, UNBOUNDED, SHORTEST, PATIENCE, watchdog, NEVER));
+        return servo(new ServoOpen(ServoEngine.SMART, "", mode, speed, acceleration, UNBOUNDED, SHORTEST, PATIENCE, KEPT, watchdog, NEVER));
     }
 
     /**
@@ -126,7 +128,7 @@ public final class Arm implements Server.Hearer {
      * @param mode likewise
      */
     public Steering servoLin(CartesianDynamics most, double watchdog, Mode mode) throws Refusal {
-        return servo(new ServoOpen(ServoEngine.LIN, "", mode, 1.0, 1.0, most, SHORTEST, PATIENCE, watchdog, NEVER));
+        return servo(new ServoOpen(ServoEngine.LIN, "", mode, 1.0, 1.0, most, SHORTEST, PATIENCE, KEPT, watchdog, NEVER));
     }
 
     /** The same with everything that can be said. */

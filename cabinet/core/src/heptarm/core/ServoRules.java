@@ -7,12 +7,18 @@ import heptarm.wire.ServoOpen;
 
 /** What has to hold between the fields of a servo motion and its targets; the ranges of single fields are checked before. */
 final class ServoRules {
+    private static final double USUAL_SPEED_TIMEOUT = 0.1;
+
     private ServoRules() {
     }
 
     /** Refuses limits that the engine does not have. */
     static void check(ServoOpen open) throws Refusal {
         CartesianDynamics line = open.linear;
+        if (open.engine != ServoEngine.SMART && open.speed_timeout != USUAL_SPEED_TIMEOUT) {
+            throw new Refusal(Code.UNSUPPORTED, "speed_timeout", Double.toString(open.speed_timeout),
+                    Double.toString(USUAL_SPEED_TIMEOUT), "only the engine smart follows targets with a velocity");
+        }
         if (open.engine == ServoEngine.LIN) {
             without(line.jerk, "linear.jerk", "the engine lin has no limit of the jerk");
             without(line.orientation_jerk, "linear.orientation_jerk", "the engine lin has no limit of the jerk");

@@ -15,11 +15,13 @@ public final class ServoOpen extends Message {
     public final double min_trajectory_time;
     /** [s] */
     public final double goal_timeout;
+    /** of the smart engine: how long a target's velocity is kept after the target was passed [s] */
+    public final double speed_timeout;
     /** until the first target [s] */
     public final double watchdog;
     public final Condition until;
 
-    public ServoOpen(ServoEngine engine, String frame, Mode mode, double velocity, double acceleration, CartesianDynamics linear, double min_trajectory_time, double goal_timeout, double watchdog, Condition until) {
+    public ServoOpen(ServoEngine engine, String frame, Mode mode, double velocity, double acceleration, CartesianDynamics linear, double min_trajectory_time, double goal_timeout, double speed_timeout, double watchdog, Condition until) {
         this.engine = engine;
         this.frame = frame;
         this.mode = mode;
@@ -28,6 +30,7 @@ public final class ServoOpen extends Message {
         this.linear = linear;
         this.min_trajectory_time = min_trajectory_time;
         this.goal_timeout = goal_timeout;
+        this.speed_timeout = speed_timeout;
         this.watchdog = watchdog;
         this.until = until;
     }
@@ -51,6 +54,7 @@ public final class ServoOpen extends Message {
         linear.write(out);
         out.putF64(min_trajectory_time);
         out.putF64(goal_timeout);
+        out.putF64(speed_timeout);
         out.putF64(watchdog);
         until.write(out);
     }
@@ -64,9 +68,10 @@ public final class ServoOpen extends Message {
         CartesianDynamics linear = CartesianDynamics.read(in);
         double min_trajectory_time = in.getF64();
         double goal_timeout = in.getF64();
+        double speed_timeout = in.getF64();
         double watchdog = in.getF64();
         Condition until = Condition.read(in);
-        return new ServoOpen(engine, frame, mode, velocity, acceleration, linear, min_trajectory_time, goal_timeout, watchdog, until);
+        return new ServoOpen(engine, frame, mode, velocity, acceleration, linear, min_trajectory_time, goal_timeout, speed_timeout, watchdog, until);
     }
 
     public void validate(String path) throws Violation {
@@ -79,6 +84,7 @@ public final class ServoOpen extends Message {
         linear.validate(path + "linear.");
         Check.number(min_trajectory_time, path + "min_trajectory_time", 0.001, 1.0, false, false);
         Check.number(goal_timeout, path + "goal_timeout", 0.1, 3600.0, false, false);
+        Check.number(speed_timeout, path + "speed_timeout", 0.001, 10.0, false, false);
         Check.number(watchdog, path + "watchdog", 0.005, 2.0, false, false);
         until.validate(path + "until.");
     }
