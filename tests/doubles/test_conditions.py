@@ -34,3 +34,21 @@ def test_conditions_of_a_sunrise_application(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert said.read_text().splitlines() == [f"{one} = true" for one in BREAKING]
+
+
+TRIGGERING = (
+    "triggers of a batch's motions go off in order",
+    "the container knows",
+    "a listener hears of segments",
+    "the motion is the spline",
+    "break conditions of a part are refused",
+)
+
+
+def test_triggers_of_motions_in_batches_and_of_segments(tmp_path: Path) -> None:
+    _compile(HERE / "java" / "Triggering.java", tmp_path)
+    said = tmp_path / "said.txt"
+    command = _command("sample.Triggering", tmp_path, f"sample.file={said}")
+    done = subprocess.run(command, capture_output=True, text=True, timeout=90, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert said.read_text().splitlines() == [f"{one} = true" for one in TRIGGERING]
