@@ -1,4 +1,4 @@
-"""A cabinet without the option Sunrise.FRI: everything else works, and FRI is refused in words."""
+"""A cabinet without the options for FRI and hand guiding: everything else works, and they are refused in words."""
 
 from __future__ import annotations
 
@@ -28,9 +28,16 @@ with ha.connect("sim://iiwa14") as arm:
             raise SystemExit("accepted")
         except ha.CommandRejected as error:
             assert error.code == 40 and "Sunrise.FRI" in str(error), error
+    assert "hand_guide" not in arm.capabilities
+    try:
+        arm.start(ha.hand_guide())
+        raise SystemExit("accepted")
+    except ha.CommandRejected as error:
+        assert error.code == 40 and "lacks hand guiding" in str(error), error
     arm.move(ha.hold(0.1))
 print("done")
 """
+OPTIONS = ("fastRobotInterface", "HandGuidingMotion")
 
 
 def test_a_cabinet_without_the_option_does_all_the_rest(tmp_path: Path) -> None:
@@ -38,7 +45,9 @@ def test_a_cabinet_without_the_option_does_all_the_rest(tmp_path: Path) -> None:
     shutil.copytree(Path(heptarm.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
     (jar,) = package.glob("virtual/jars/*doubles*.jar")
     with zipfile.ZipFile(jar) as old:
-        kept = {name: old.read(name) for name in old.namelist() if "fastRobotInterface" not in name}
+        kept = {
+            name: old.read(name) for name in old.namelist() if not any(option in name for option in OPTIONS)
+        }
         assert len(kept) < len(old.namelist())
     with zipfile.ZipFile(jar, "w") as new:
         for name, content in kept.items():

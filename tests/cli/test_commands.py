@@ -19,7 +19,7 @@ def target(cabinet) -> str:
 
 def test_help_names_every_command() -> None:
     text = run("--help").stdout
-    for command in ("sim", "state", "move", "servo", "stop", "doctor", "install-cabinet", "demo"):
+    for command in ("sim", "state", "move", "servo", "teach", "replay", "stop", "doctor", "install-cabinet", "demo"):
         assert command in text
 
 

@@ -278,6 +278,53 @@ def servo(
     )
 
 
+@app.command
+def teach(
+    out: Annotated[Path, Parameter(help="File to write, .npz.")],
+    /,
+    *,
+    free: Annotated[
+        str,
+        Parameter(
+            help="Give way in these directions of the base, such as z, xy or xyzabc (a b c: about z y x). "
+            "Default: hand guiding, while its switch is held."
+        ),
+    ] = "",
+    seconds: Annotated[float, Parameter(help="How long at most [s].")] = 60.0,
+    tolerance: Annotated[float, Parameter(help="How far the kept points may lead off the way [rad].")] = 2e-3,
+    yes: Yes = False,
+    target: Target = None,
+    json: Json = False,
+) -> int:
+    """Record the way while somebody leads the arm by hand."""
+    from heptarm.cli import teach as work
+
+    return work.teach(
+        out=out, free=free, seconds=seconds, tolerance=tolerance, yes=yes, target=target, as_json=json
+    )
+
+
+@app.command
+def replay(
+    file: Annotated[Path, Parameter(help="What heptarm teach wrote.")],
+    /,
+    *,
+    by: Annotated[
+        Literal["servo", "spline"], Parameter(help="As it was taught, or as one smooth motion of the cabinet.")
+    ] = "servo",
+    pace: Annotated[
+        float, Parameter(help="By servo: so many times as fast; by spline: fraction of the full speed.")
+    ] = 0.5,
+    yes: Yes = False,
+    target: Target = None,
+    json: Json = False,
+) -> int:
+    """Move to the start of what was taught and do it again."""
+    from heptarm.cli import teach as work
+
+    return work.replay(file=file, by=by, pace=pace, yes=yes, target=target, as_json=json)
+
+
 Seed = Annotated[int, Parameter(help="Of everything random.")]
 Randomisation = Annotated[
     Literal["none", "mild", "strong"], Parameter(help="How much simulated robots differ.")
