@@ -25,7 +25,7 @@ from bench import (  # noqa: F401  they register themselves
     paths,
     rl,
     rl_deploy,
-    ros2,
+    ros,
     round_trip,
     servo,
     state_push,

@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import os
-import socket
-import subprocess
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -51,34 +48,10 @@ def spare() -> Iterator[Stage]:
 @pytest.fixture(scope="session")
 def ros() -> Iterator[None]:
     """A roscore of one's own, and this process as a node of it."""
-    from tests.ros1.peer import sources, until
+    from tests.ros1.peer import Core
 
-    with socket.socket() as door:
-        door.bind(("127.0.0.1", 0))
-        port = door.getsockname()[1]
-    home = tempfile.TemporaryDirectory(prefix="ros1-home-", ignore_cleanup_errors=True)
-    os.environ.update(
-        ROS_MASTER_URI=f"http://127.0.0.1:{port}",
-        ROS_HOSTNAME="localhost",
-        ROS_HOME=home.name,
-        ROS_LOG_DIR=home.name,
-        **sources(),
-    )
-    import rosgraph
-    import rospy
-
-    core = subprocess.Popen(
-        ["roscore", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
-    try:
-        until(rosgraph.is_master_online, "there is no master")
-        rospy.init_node("tester", disable_signals=True)
+    with Core("tester"):
         yield
-        rospy.signal_shutdown("the tests are over")
-    finally:
-        core.terminate()
-        core.wait(20)
-        home.cleanup()
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import sysconfig
@@ -15,6 +16,7 @@ from typing import Any
 
 import actionlib
 import numpy as np
+import rosgraph
 import rospy
 from actionlib_msgs.msg import GoalStatus
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryGoal, JointTolerance
@@ -54,6 +56,49 @@ def until(what: Callable[[], Any], why: str, timeout: float = PATIENCE) -> Any:
             return value
         time.sleep(0.005)
     raise TimeoutError(why)
+
+
+class Core:
+    """A roscore of one's own, and this process as a node of it.
+
+    Args:
+        name: of the node.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._home = tempfile.TemporaryDirectory(prefix="ros1-home-", ignore_cleanup_errors=True)
+
+    def __enter__(self) -> Core:
+        with socket.socket() as door:
+            door.bind(("127.0.0.1", 0))
+            port = door.getsockname()[1]
+        os.environ.update(
+            ROS_MASTER_URI=f"http://127.0.0.1:{port}",
+            ROS_HOSTNAME="localhost",
+            ROS_HOME=self._home.name,
+            ROS_LOG_DIR=self._home.name,
+            **sources(),
+        )
+        self._process = subprocess.Popen(
+            ["roscore", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        try:
+            until(rosgraph.is_master_online, "there is no master")
+            rospy.init_node(self._name, disable_signals=True)
+        except BaseException:
+            self._end()
+            raise
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        rospy.signal_shutdown("it is over")
+        self._end()
+
+    def _end(self) -> None:
+        self._process.terminate()
+        self._process.wait(20)
+        self._home.cleanup()
 
 
 class NodeProcess:
@@ -153,7 +198,7 @@ class Client:
     preempted = (Outcome.PREEMPTED,)
     timely = False
 
-    def __init__(self, stage: Stage, name: str = "/heptarm", prefix: str = "") -> None:
+    def __init__(self, stage: Stage | None, name: str = "/heptarm", prefix: str = "") -> None:
         self.stage, self.name = stage, name
         self.joints = tuple(f"{prefix}A{i}" for i in range(1, 8))
         namespace = name.rpartition("/")[0]
@@ -162,7 +207,7 @@ class Client:
         self._action = actionlib.ActionClient(f"{name}/follow_joint_trajectory", FollowJointTrajectoryAction)
         self._topic = rospy.Publisher(f"{name}/joint_trajectory", JointTrajectory, queue_size=1)
         self._told: dict[int, list[Told]] = {}
-        self._changed: set[str] = set()
+        self._before: dict[str, object] = {}  # of parameters that were changed, by their paths
 
     def ready(self) -> None:
         """Wait until the node is active and everything has found each other."""
@@ -222,6 +267,7 @@ class Client:
         return list(self._told[id(sent.handle)])
 
     def behave(self, how: str) -> None:
+        assert self.stage is not None
         self.stage.do(how)
 
     def override(self, value: float) -> None:
@@ -229,15 +275,24 @@ class Client:
         assert answer.success, answer.message
 
     def set(self, **values: object) -> bool:
+        before = dict(self._before)
         for name, value in values.items():
-            rospy.set_param(f"{self.name}/{name.replace('__', '/')}", value)
-            self._changed.add(name)
+            path = f"{self.name}/{name.replace('__', '/')}"
+            self._before.setdefault(path, rospy.get_param(path, None))
+            rospy.set_param(path, value)
         if self.reload():
             return True
-        for name in values:
-            rospy.delete_param(f"{self.name}/{name.replace('__', '/')}")
-            self._changed.discard(name)
+        self._restore({path: value for path, value in self._before.items() if path not in before})
         return False
+
+    def _restore(self, values: dict[str, object]) -> None:
+        """Give parameters values they had; None: they were not there."""
+        for path, value in values.items():
+            if value is None:
+                rospy.delete_param(path)
+            else:
+                rospy.set_param(path, value)
+            del self._before[path]
 
     def reload(self) -> bool:
         """Let the node look at its parameters."""
@@ -245,8 +300,7 @@ class Client:
 
     def reset(self) -> bool:
         """All parameters as they were."""
-        while self._changed:
-            rospy.delete_param(f"{self.name}/{self._changed.pop().replace('__', '/')}")
+        self._restore(dict(self._before))
         return self.reload()
 
     def activate(self, *, on: bool) -> None:

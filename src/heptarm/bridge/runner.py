@@ -305,6 +305,8 @@ class Runner:
             text = f"not there {waited:.3f} s after the end: {broken}"
             self._end(Outcome.ABORTED, Code.GOAL_TOLERANCE_VIOLATED, text)
             self._brake = self._braking(now)
+        else:  # the end is waited for at rest, though the arm was to pass it
+            self._command = Sample.at_rest(run.trajectory.end.q)
 
     def _here(self, now: float, state: Measured) -> Sample:
         """Where a new trajectory begins: where the arm is told to be, or where it is if it is told nothing."""
