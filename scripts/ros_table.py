@@ -11,17 +11,28 @@ import argparse
 import ast
 import inspect
 import sys
+import types
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "src"))
+sys.path[:0] = [str(ROOT / "src"), str(ROOT)]
 
+import heptarm  # noqa: E402
+from heptarm import modes, when  # noqa: E402
 from heptarm.arm.arm import Arm  # noqa: E402
+from heptarm.arm.fri import Fri  # noqa: E402
+from heptarm.arm.handle import MotionHandle  # noqa: E402
+from heptarm.arm.io import Io  # noqa: E402
+from heptarm.arm.operator import Operator  # noqa: E402
+from heptarm.arm.pad import Pad  # noqa: E402
+from heptarm.arm.servo import JointServo, PoseServo  # noqa: E402
+from heptarm.bridge.moves import MOVES  # noqa: E402
 from heptarm.bridge.names import PRESETS  # noqa: E402
 from heptarm.bridge.parameters import PARAMETERS, Parameter, of_joints  # noqa: E402
 from heptarm.bridge.services import SERVICES  # noqa: E402
+from scripts.ros_api import API, LIFE  # noqa: E402
 
 PAGE = ROOT / "docs" / "reference" / "ros.md"
 SOURCES = {
@@ -32,53 +43,25 @@ SOURCES = {
 OTHERS = ("reach.py", "peers.py")
 KINDS = ("publishes", "subscribes", "service", "action")
 #: The life cycle of ROS 2 is rclpy's; in ROS 1 it is a handful of services.
-LIFE = {
+STEPS = {
     "~configure": "change_state",
     "~activate": "change_state",
     "~deactivate": "change_state",
     "~cleanup": "change_state",
     "~reload": "set_parameters",
 }
-#: Members of `heptarm.Arm` and what they are in ROS, by the names of ROS 2.
-API = {
-    "state": ("~/state", "joint_states", "~/external_torques", "~/pose", "~/wrench", "~/status"),
-    "states": ("~/state", "joint_states"),
-    "wait_until": ("~/state", "~/status"),
-    "subscribe": ("parameter `state_rate`",),
-    "move": ("~/move_joints", "~/move_pose", "~/command/joint", "~/command/pose", "~/command/lin"),
-    "start": ("~/command/joint", "~/command/pose", "~/command/lin"),
-    "servo": ("~/servo/joint", "~/servo/velocity", "~/servo/pose", "~/follow_joint_trajectory"),
-    "stop": ("~/stop", "~/stop_as"),
-    "set_override": ("~/set_override",),
-    "speed": ("parameter `speed`", "~/set_speed"),
-    "reconnect": ("happens by itself", "~/recover"),
-    "take_control": ("~/take_control", "~/recover"),
-    "resume": ("~/resume", "~/recover"),
-    "pause": ("~/pause",),
-    "connected": ("~/status",),
-    "in_control": ("~/status",),
-    "cabinet": ("/diagnostics",),
-    "open": ("~/change_state",),
-    "close": ("~/change_state",),
-    "release_control": ("~/release_control", "~/change_state"),
-    "using": (
-        "~/mode/position",
-        "~/mode/joint_impedance",
-        "~/mode/cartesian_impedance",
-        "~/mode/sine_impedance",
-    ),
-    "attach_tool": ("~/attach_tool",),
-    "detach_tool": ("~/detach_tool",),
-    "tool": ("~/attach_tool", "~/detach_tool"),
-    "attach_workpiece": ("~/attach_workpiece",),
-    "detach_workpiece": ("~/detach_workpiece",),
-    "attached": ("~/attach_workpiece", "~/detach_workpiece"),
-    "tools": ("~/tools",),
-    "frames": ("~/frames",),
-    "capabilities": ("~/capabilities",),
-    "wait_for_rest": ("~/state",),
-    "pose": ("~/pose", "~/state"),
-    "wrench": ("~/wrench", "~/state"),
+#: Where the members of a part of the API are looked up.
+PARTS: dict[str, tuple[object, ...]] = {
+    "arm": (Arm,),
+    "arm.io": (Io,),
+    "arm.pad": (Pad,),
+    "arm.operator": (Operator,),
+    "arm.fri(...)": (Fri,),
+    "arm.servo(...)": (JointServo, PoseServo),
+    "arm.start(...)": (MotionHandle,),
+    "heptarm": (heptarm,),
+    "heptarm.modes": (modes,),
+    "heptarm.when": (when,),
 }
 
 
@@ -114,6 +97,10 @@ def _of(tree: ast.Module) -> Iterator[Declared]:
             if node.module == "heptarm.bridge.services":
                 for row in SERVICES:
                     yield Declared(row.name, "service", row.type)
+            for imported in node.names if node.module == "heptarm.bridge.moves" else ():
+                if imported.name == "MOVES":
+                    for move in MOVES:
+                        yield Declared(move.name, "action", move.type)
             package, _, kind = node.module.partition(".")
             if kind in ("msg", "srv", "action"):
                 for name in node.names:
@@ -164,20 +151,41 @@ def ros1(name: str) -> str:
     return f"~{name[2:]}" if name.startswith("~/") else name
 
 
-def api() -> Iterator[tuple[str, str]]:
-    """The public members of `heptarm.Arm` and what they are in ROS; empty: nothing."""
-    both = {name for tables in (declared(folder) for folder in SOURCES.values()) for _, name in tables}
-    for name, member in inspect.getmembers(Arm):
-        if name.startswith("_"):
-            continue
-        parts = []
-        for one in API.get(name, ()):
-            if one == "~/change_state":
-                parts.append("the life cycle")
-            elif not one.startswith("~/") or one in both:
-                parts.append(one if " " in one else f"`{one}`")
-        call = f"{name}()" if inspect.isfunction(member) else name
-        yield call, ", ".join(parts)
+def members(part: str) -> list[str]:
+    """Public members of a part of the API; of a module those that one calls or compares."""
+    found: set[str] = set()
+    for owner in PARTS[part]:
+        if inspect.ismodule(owner):
+            every = {name: getattr(owner, name) for name in owner.__all__}
+            plain = part != "heptarm"  # there, classes are values and errors
+            found |= {name for name, one in every.items() if not name.startswith("_") and _counts(one, plain)}
+        else:
+            found |= {name for name, _ in inspect.getmembers(owner) if not name.startswith("_")}
+    return sorted(found)
+
+
+def _counts(one: object, plain: bool) -> bool:
+    if plain:  # a union of types, and the base of conditions, are no things of their own
+        return not isinstance(one, types.UnionType) and one is not when.Condition
+    return inspect.isfunction(one)
+
+
+def in_ros(entry: tuple[str, ...], ros: str) -> str:
+    """What a member is in one of both, in words."""
+    return ", ".join(_words(one, ros) for one in entry)
+
+
+def _words(one: str, ros: str) -> str:
+    if one == LIFE:
+        return "`~/change_state`" if ros == "ROS 2" else "`~configure` to `~cleanup`"
+    if " " in one:
+        return one
+    return f"`{one if ros == 'ROS 2' else ros1(one)}`"
+
+
+def names_of(entry: tuple[str, ...]) -> list[str]:
+    """The names of the nodes in an entry."""
+    return [one for one in entry if " " not in one]
 
 
 def _range(one: Parameter) -> str:
@@ -212,18 +220,22 @@ def page() -> str:
         two, one = (tables[ros].get(key) for ros in ("ROS 2", "ROS 1"))
         any_one = two or one
         assert any_one is not None
-        life = LIFE.get(ros1(key[1])) if two is None else None
+        life = STEPS.get(ros1(key[1])) if two is None else None
         there = "yes" if two else f"`~/{life}`" if life else "no"
         lines.append(f"| `{key[1]}` | {key[0]} | `{any_one.type}` | {there} | {'yes' if one else 'no'} |")
     lines += [
         "",
         "## From Python to ROS",
         "",
-        "What members of `heptarm.Arm` are in ROS. Where there is nothing, it is for Python alone so far.",
+        "What the public members of the Python API are in ROS. Where there is nothing, the table says why.",
         "",
-        "| Python | ROS |",
-        "|---|---|",
-        *(f"| `{name}` | {what or '-'} |" for name, what in api()),
+        "| Python | ROS 2 | ROS 1 |",
+        "|---|---|---|",
+        *(
+            f"| `{part}.{name}` | {in_ros(API[part][name], 'ROS 2')} | {in_ros(API[part][name], 'ROS 1')} |"
+            for part in PARTS
+            for name in members(part)
+        ),
         "",
         "## Parameters",
         "",

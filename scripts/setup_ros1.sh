@@ -40,6 +40,6 @@ fi
 .venv/bin/python -m pip --python $venv/bin/python install -q --disable-pip-version-check "numpy>=1.22,<3" "pytest>=8" "pytest-timeout>=2.3" "hypothesis>=6.100" ||
     failed "numpy, pytest and hypothesis cannot be installed for $($venv/bin/python -V)"
 site=$($venv/bin/python -c 'import sysconfig; print(sysconfig.get_paths()["purelib"])')
-$venv/bin/python scripts/ros1_interfaces.py "$site" ros1/interfaces/control_msgs ros1/heptarm_msgs
+$venv/bin/python scripts/ros1_interfaces.py "$site" ros1/interfaces/control_msgs ros1/interfaces/tf2_msgs ros1/heptarm_msgs
 printf '%s\n' "$PWD/src" "$PWD/ros1/heptarm_ros1/src" >"$site/heptarm_sources.pth"
 echo "$venv/bin/python has ROS 1 and heptarm_ros1"

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from heptarm.arm.arm import Arm
 from heptarm.bridge.names import PRESETS
 from heptarm.bridge.parameters import PARAMETERS, Configuration
 
@@ -35,8 +34,28 @@ def test_everything_a_node_declares_is_on_the_page(table, ros: str) -> None:
     assert not missing, "run .venv/bin/python scripts/ros_table.py"
 
 
-def test_the_table_knows_only_members_that_there_are(table) -> None:
-    assert set(table.API) <= set(dir(Arm))
+def test_every_public_member_of_the_api_has_a_row_and_every_row_a_member(table) -> None:
+    assert set(table.API) == set(table.PARTS)
+    for part in table.PARTS:
+        there, told = set(table.members(part)), set(table.API[part])
+        assert there, part
+        assert not there - told, f"{part}: say in scripts/ros_api.py what these are in ROS, or why not"
+        assert not told - there, f"{part}: scripts/ros_api.py tells of members that there are not"
+
+
+@pytest.mark.parametrize("ros", ["ROS 1", "ROS 2"])
+def test_what_the_rows_name_is_declared_by_both_nodes(table, ros: str) -> None:
+    declared = {name for _, name in table.declared(table.SOURCES[ros])}
+    for part, rows in table.API.items():
+        for member, entry in rows.items():
+            assert entry, f"{part}.{member} has neither a name nor a reason"
+            assert set(table.names_of(entry)) <= declared, f"{part}.{member}"
+
+
+def test_every_service_topic_and_action_of_ours_is_told_in_a_row(table) -> None:
+    told = {name for rows in table.API.values() for entry in rows.values() for name in table.names_of(entry)}
+    ours = {name for _, name in table.declared(table.SOURCES["ROS 2"])}
+    assert ours - told <= {"~/joint_trajectory", "/tf"}  # a topic of ROS' own, and what Python needs not
 
 
 def test_other_drivers_names_stand_for_ours(table) -> None:

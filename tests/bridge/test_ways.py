@@ -36,6 +36,9 @@ class Ears:
     def on_link(self, trouble: str) -> None:
         pass
 
+    def on_key(self, slot: int, down: bool) -> None:
+        pass
+
     def on_feedback(self, feedback: Feedback) -> None:
         with self._changed:
             self.told.append(feedback)

@@ -3,6 +3,7 @@
     .venv/bin/python tests/conformance/faulty.py [options of heptarm.virtual.cabinet]
 
 follows, frozen, lags: how the arm does what its set-points say, whoever makes them. press, release: the emergency stop.
+Everything else is what the operator does, as in `heptarm sim`.
 Every line is answered by itself on standard output.
 """
 
@@ -75,6 +76,8 @@ def _listen() -> None:
             _cabinets[0].plant.safety.demand(Demand.EMERGENCY_STOP)
         elif word == "release":
             _cabinets[0].plant.safety.withdraw()
+        else:
+            _cabinets[0].operator.do(word)
         print(word, flush=True)
     os.kill(os.getpid(), signal.SIGTERM)
 

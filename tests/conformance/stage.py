@@ -50,7 +50,7 @@ class Stage:
         return f"sim://127.0.0.1:{self.port}"
 
     def do(self, word: str) -> None:
-        """follows, frozen, lags, press, release: see `faulty`."""
+        """follows, frozen, lags, press, release, or what an operator does: see `faulty`."""
         assert self.process.stdin is not None and self.process.stdout is not None
         self.process.stdin.write(word + "\n")
         self.process.stdin.flush()

@@ -6,18 +6,21 @@ import importlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from geometry_msgs.msg import Pose, PoseStamped
+from geometry_msgs.msg import Pose, PoseStamped, WrenchStamped
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 from trajectory_msgs.msg import JointTrajectory
 
 from heptarm.bridge.driver import Answer, Driver
+from heptarm.bridge.fri_services import fri_joint, fri_pose, fri_wrench
 from heptarm.bridge.messages import trajectory_goal
+from heptarm.bridge.motions import stamped_pose
 from heptarm.bridge.names import Meaning
-from heptarm.bridge.services import SERVICES, Names, Service, Services
+from heptarm.bridge.service import Service, fill
+from heptarm.bridge.services import SERVICES, Services
 from heptarm.errors import HeptarmError, NotReady
-from heptarm_ros2 import convert, peers
+from heptarm_ros2 import peers
 
 if TYPE_CHECKING:
     from heptarm_ros2.node import HeptarmNode
@@ -36,7 +39,11 @@ class Commands:
             (JointState, "~/servo/joint", self._servo_joint),
             (JointState, "~/servo/velocity", self._servo_velocity),
             (PoseStamped, "~/servo/pose", self._servo_pose),
+            (PoseStamped, "~/servo/lin", self._servo_lin),
             (JointTrajectory, "~/joint_trajectory", self._joint_trajectory),
+            (JointState, "~/fri/joint", fri_joint),
+            (WrenchStamped, "~/fri/wrench", fri_wrench),
+            (PoseStamped, "~/fri/pose", fri_pose),
         )
         theirs: dict[Meaning, tuple[type, Callable[[Driver, Any], None]]] = {
             Meaning.JOINT: (JointState, peers.joint),
@@ -92,10 +99,7 @@ class Commands:
                 if self._offered is None or self._offered[0] is not driver:
                     self._offered = driver, Services(driver)
                 answer = self._offered[1].answer(row, request)
-            response.success, response.message = answer.success, answer.message
-            if isinstance(answer, Names):
-                response.names = list(answer.names)
-            return response
+            return fill(response, answer)
 
         return callback
 
@@ -110,10 +114,10 @@ class Commands:
         driver.move(driver.positions(message.name, message.position))
 
     def _command_pose(self, driver: Driver, message: PoseStamped) -> None:
-        driver.move(convert.pose_value(message, driver.configuration.frame("base")))
+        driver.move(stamped_pose(message, driver.configuration.frame("base")))
 
     def _command_lin(self, driver: Driver, message: PoseStamped) -> None:
-        driver.move(convert.pose_value(message, driver.configuration.frame("base")), straight=True)
+        driver.move(stamped_pose(message, driver.configuration.frame("base")), straight=True)
 
     @staticmethod
     def _servo_joint(driver: Driver, message: JointState) -> None:
@@ -126,7 +130,11 @@ class Commands:
 
     @staticmethod
     def _servo_pose(driver: Driver, message: PoseStamped) -> None:
-        driver.follow(convert.pose_value(message, driver.configuration.frame("base")))
+        driver.follow(stamped_pose(message, driver.configuration.frame("base")))
+
+    @staticmethod
+    def _servo_lin(driver: Driver, message: PoseStamped) -> None:
+        driver.follow(stamped_pose(message, driver.configuration.frame("base")), straight=True)
 
     def _joint_trajectory(self, driver: Driver, message: JointTrajectory) -> None:
         if not message.points and not message.joint_names:  # as in ROS 1: an empty one stops

@@ -1,34 +1,20 @@
-"""Single motions as actions, with feedback and a way to cancel them."""
+"""Motions as actions, with feedback and a way to cancel them; `heptarm.bridge.moves` has their table."""
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from heptarm_msgs.action import MoveJoints, MovePose
 from rclpy.action import ActionServer, CancelResponse
 
 from heptarm.bridge import moves
-from heptarm.bridge.driver import Driver
 from heptarm.bridge.goal import Outcome
+from heptarm.bridge.moves import MOVES, Move
 from heptarm.errors import HeptarmError, NotReady
-from heptarm.values.motion import Motion
-from heptarm_ros2 import convert
 
 if TYPE_CHECKING:
     from heptarm_ros2.node import HeptarmNode
-
-#: Actions and their names.
-ACTIONS = ((MoveJoints, "~/move_joints"), (MovePose, "~/move_pose"))
-
-
-def _motion(driver: Driver, goal: Any) -> Motion:
-    if hasattr(goal, "joint_names"):
-        return moves.to_joints(driver, goal.joint_names, goal.position)
-    base = driver.configuration.frame("base")
-    pose = convert.pose_value(goal.pose, base)
-    via = convert.pose_value(goal.via, base) if goal.path == moves.CIRC else pose
-    return moves.to_pose(goal.path, pose, via)
 
 
 class MoveActions:
@@ -39,30 +25,32 @@ class MoveActions:
 
     def __init__(self, node: HeptarmNode, group: Any) -> None:
         self._node = node
-        self._servers = [
-            ActionServer(
-                node,
-                kind,
-                name,
-                self._executor(kind),
-                callback_group=group,
-                cancel_callback=lambda _: CancelResponse.ACCEPT,
-            )
-            for kind, name in ACTIONS
-        ]
+        self._servers = [self._server(row, group) for row in MOVES]
 
     def destroy(self) -> None:
         """End them."""
         for server in self._servers:
             server.destroy()
 
-    def _executor(self, kind: Any) -> Callable[[Any], Any]:
+    def _server(self, row: Move, group: Any) -> ActionServer:
+        package, _, name = row.type.partition("/")
+        kind = getattr(importlib.import_module(f"{package}.action"), name)
+        return ActionServer(
+            self._node,
+            kind,
+            row.name,
+            self._executor(row, kind),
+            callback_group=group,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+        )
+
+    def _executor(self, row: Move, kind: Any) -> Callable[[Any], Any]:
         def execute(handle: Any) -> Any:
             driver = self._node.driver
             try:
                 if driver is None:
                     raise NotReady("the node is not configured")
-                motion = moves.start(driver, _motion(driver, handle.request), handle.request.speed)
+                motion = moves.start(driver, row, handle.request)
             except HeptarmError as error:
                 self._node.get_logger().warning(f"motion refused: {error}")
                 handle.abort()
@@ -78,7 +66,6 @@ class MoveActions:
                 handle.canceled()
             else:
                 handle.abort()
-            success = moved.outcome is Outcome.SUCCEEDED
-            return kind.Result(success=success, message=moved.text, residual=moved.residual)
+            return moved.fill(kind.Result())
 
         return execute

@@ -24,6 +24,7 @@ from heptarm.errors import HeptarmError
 from heptarm.values.state import State
 from heptarm_ros2 import convert, peers
 from heptarm_ros2.commands import Commands
+from heptarm_ros2.events import Events
 from heptarm_ros2.moves import MoveActions
 from heptarm_ros2.peers import Peers
 from heptarm_ros2.publishers import Publishers
@@ -45,6 +46,7 @@ class HeptarmNode(LifecycleNode):
         self._goals: TrajectoryAction | None = None
         self._moves: MoveActions | None = None
         self._peers: Peers | None = None
+        self._events: Events | None = None
         self._ending = threading.Event()
         for one in sorted(parameters.PARAMETERS, key=lambda one: one.name != "names"):
             self._declare(one)  # the first says whose names the others have
@@ -119,7 +121,7 @@ class HeptarmNode(LifecycleNode):
         try:
             self.configuration = Configuration.of(self._values())
             self._outputs = Publishers(self)
-            self._peers = Peers(self)
+            self._peers, self._events = Peers(self), Events(self)
             self.driver = Driver(self.configuration, self)
         except HeptarmError as error:
             log.error(f"not configured: {error}")
@@ -181,16 +183,18 @@ class HeptarmNode(LifecycleNode):
         if driver is not None:
             driver.close()
             self.destroy_timer(self._report_timer)
-        for one in (self._goals, self._moves, self._inputs, self._outputs, self._peers):
+        sides = (self._goals, self._moves, self._inputs, self._outputs)
+        for one in (*sides, self._peers, self._events):
             if one is not None:
                 one.destroy()
-        self._goals = self._moves = self._inputs = self._outputs = self._peers = None
+        self._goals = self._moves = self._inputs = self._outputs = None
+        self._peers = self._events = None
 
     # -------------------------------------------------------------------------- from the driver
 
     def on_state(self, state: State) -> None:
         """A state came."""
-        for outputs in (self._outputs, self._peers):
+        for outputs in (self._outputs, self._peers, self._events):
             if outputs is not None and self._lives:
                 outputs.state(state)
 
@@ -210,6 +214,11 @@ class HeptarmNode(LifecycleNode):
             self.get_logger().error(f"the connection is lost: {trouble}")
         elif not self._ending.is_set():
             self.get_logger().info("connected")
+
+    def on_key(self, slot: int, down: bool) -> None:
+        """A user key of the smartPAD was pressed or released."""
+        if self._events is not None and self._lives:
+            self._events.key(slot, down)
 
     # ------------------------------------------------------------------------------------ others
 
@@ -232,6 +241,8 @@ class HeptarmNode(LifecycleNode):
                 state = None
         publishers.status(report, state, connected=not driver.trouble, active=driver.active)
         publishers.diagnostics(report, driver.arm.cabinet)
+        if self._events is not None:
+            self._events.fri(driver.fri.status())
 
 
 def _version() -> str:

@@ -11,15 +11,17 @@ import socket
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.arm.connect import connect
+from heptarm.arm.connection import GROUPS
 from heptarm.arm.handle import MotionHandle
 from heptarm.bridge.execution import Execution, Listener
 from heptarm.bridge.fri_execution import FriExecution
+from heptarm.bridge.fri_session import FriSession
 from heptarm.bridge.goal import End, Goal, GoalRefused
 from heptarm.bridge.parameters import Configuration
 from heptarm.bridge.report import Report, report
@@ -30,6 +32,7 @@ from heptarm.bridge.stream import Stream
 from heptarm.errors import HeptarmError, NotReady, ShapeError
 from heptarm.io.clock import RealClock
 from heptarm.values.arrays import Array
+from heptarm.values.condition import Condition
 from heptarm.values.motion import Motion, lin, ptp
 from heptarm.values.pose import Pose
 from heptarm.values.state import State
@@ -53,6 +56,10 @@ class DriverListener(Listener, Protocol):
         """The connection came (empty) or went (why)."""
         ...
 
+    def on_key(self, slot: int, down: bool) -> None:
+        """A user key of the smartPAD was pressed or released."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class Answer:
@@ -74,6 +81,10 @@ class Driver:
         configuration: what the node's parameters say.
         listener: hears of everything.
 
+    Attributes:
+        configuration: what the node's parameters say now.
+        fri: the session that services open.
+
     Raises:
         ConnectFailed: nobody answers.
         NotInControl: another client controls the robot.
@@ -93,8 +104,11 @@ class Driver:
             key=values["key"] or None,
             state_rate=values["state_rate"],
             name=_name(),
+            groups=(*GROUPS, "io") if values["publish_signals"] else GROUPS,
             watchdog=values["watchdog"],
         )
+        self._arm.pad.on_key(listener.on_key)
+        self.fri = FriSession(self._arm)
         self._told = (0, 0.0)  # the last feedback: of which goal, and when
         self._execution = self._way()
         self._stream = Stream(self._arm, timeout=values["command_timeout"], options=configuration.servo)
@@ -138,6 +152,7 @@ class Driver:
         self._active = False
         self._execution.abort("the node was deactivated")
         self._stream.close()
+        self.fri.close()
         if self._handle is not None and not self._handle.done:
             try:
                 self._arm.stop()
@@ -285,6 +300,10 @@ class Driver:
         """
         return self._ordered(names, values, self._arm.state.q_cmd)
 
+    def wishes(self, names: Sequence[str], values: Sequence[float]) -> Array:
+        """Likewise numbers of joints; those of joints left out are NaN."""
+        return self._ordered(names, values, np.full(7, np.nan))
+
     def velocities(self, names: Sequence[str], values: Sequence[float]) -> Array:
         """Likewise joint velocities [rad/s]; joints left out have none."""
         return self._ordered(names, values, np.zeros(7))
@@ -318,36 +337,51 @@ class Driver:
             motion = ptp(target)
         return self.start(motion)
 
-    def start(self, motion: Motion, *, speed: float | None = None) -> MotionHandle:
-        """Start any motion; it takes the place of whatever runs.
+    def start(
+        self,
+        motion: Motion | Sequence[Motion],
+        *,
+        speed: float | None = None,
+        until: Condition | None = None,
+        when: Literal["queue", "replace", "reject"] = "replace",
+    ) -> MotionHandle:
+        """Start any motion, or several as one program.
 
         Args:
             motion: what to do.
             speed: ceiling for this one, (0, 1]; None: that of the parameter `speed`.
+            until: condition that ends it; None: that of `guard`.
+            when: while something runs: "replace" it, "queue" behind it, or "reject" this one.
 
         Raises:
             HeptarmError: refused; the text says why.
         """
         self._check_active()
-        self._execution.abort("a command took the place of this goal")
-        self._stream.close()
+        if when == "replace":
+            self._execution.abort("a command took the place of this goal")
+            self._stream.close()
         ceiling = self.configuration.values["speed"] if speed is None else speed
-        self._handle = self._arm.start(motion, speed=ceiling, when="replace")
+        self._handle = self._arm.start(
+            motion, speed=ceiling, until=self.guard if until is None else until, when=when
+        )
         return self._handle
 
-    def follow(self, target: Array | Pose, dq: Array | None = None) -> None:
+    def follow(
+        self, target: Array | Pose, dq: Array | None = None, *, straight: bool = False
+    ) -> None:
         """Follow a target of a servo topic until none comes for `command_timeout`.
 
         Args:
             target: joint positions, shape (7,) [rad], or a pose of the flange in the base.
             dq: velocity to pass the joint positions at, shape (7,) [rad/s].
+            straight: to a pose on straight lines.
 
         Raises:
             HeptarmError: refused; the text says why.
         """
         self._prepare_stream()
         if isinstance(target, Pose):
-            self._stream.pose(target)
+            self._stream.pose(target, straight=straight)
         else:
             self._stream.joints(target, dq)
 
@@ -374,26 +408,26 @@ class Driver:
 
     # --------------------------------------------------------------------------------- services
 
+    @property
+    def guard(self) -> Condition | None:
+        """Condition that ends motions that bring none, and servo topics; None: there is none."""
+        return self._stream.guard
+
+    @guard.setter
+    def guard(self, value: Condition | None) -> None:
+        self._stream.guard = value
+
     def stop(self) -> Answer:
         """Stop whatever runs."""
         return self._answer(self._arm.stop, "stopped")
 
     def recover(self) -> Answer:
-        """Come back after trouble as far as a program may: connection, control, pause; and say what is left."""
-
-        def work() -> None:
-            if not self._arm.connected:
-                self._arm.reconnect()
-            if not self._arm.in_control:
-                self._arm.take_control()
-            state = self._arm.wait_until(lambda state: True, timeout=2.0)
-            if state.status is not None and state.status.paused:
-                self._arm.resume()
-            now = report(state, active=self._active)
-            if now.level >= 2:
-                raise NotReady(now.text)
-
-        return self._answer(work, "connected, in control, nothing in the way")
+        """Come back after trouble as far as a program may, see `Arm.recover`; says what is left to a person."""
+        try:
+            done = self._arm.recover()
+        except HeptarmError as error:
+            return Answer(False, str(error))
+        return Answer(done.done, str(done))
 
     def set_override(self, value: float) -> Answer:
         """Set the cabinet's application override, [0, 1]."""

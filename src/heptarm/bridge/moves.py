@@ -1,25 +1,47 @@
-"""Single motions as actions: what a goal asks for, and how far it is until it ends; free of ROS."""
+"""Motions as actions: one table for both nodes, what a goal asks for, and how far it is until it ends; free of ROS.
+
+A node makes an action of every row of `MOVES`::
+
+    handle = start(driver, row, goal)              # raises HeptarmError: refused
+    moved = follow(handle, on_progress=..., is_cancelled=...)
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import isnan
+from typing import Any
 
 from heptarm.arm.handle import MotionHandle
+from heptarm.bridge import motions
+from heptarm.bridge.conditions import condition_of
 from heptarm.bridge.driver import Driver
 from heptarm.bridge.goal import Outcome
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.values.circ import circ
-from heptarm.values.motion import Motion, lin, ptp
-from heptarm.values.pose import Pose
+from heptarm.values.motion import TOOL, Motion, lin, ptp
 from heptarm.values.result import Cause
+from heptarm.values.spline import spline, spline_joints
 
-#: Paths to a pose, as heptarm_msgs/MovePose numbers them.
-PTP, LIN, CIRC = range(3)
 #: How often progress is told [s].
 _PERIOD = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """An action that moves the arm.
+
+    Attributes:
+        name: as in ROS 2, "~/" for the node's own.
+        type: "package/Type".
+        motions: what a goal of that type asks for.
+    """
+
+    name: str
+    type: str
+    motions: Callable[[Driver, Any], tuple[Motion, ...]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,56 +52,102 @@ class Moved:
         outcome: in what state.
         text: what happened, in words.
         residual: largest joint distance from the commanded position [rad]; 0: it never moved.
+        stopped_by: the part of the condition that ended it, in words; empty: none.
+        item: number of the motion of the program that ran last.
     """
 
     outcome: Outcome
     text: str
     residual: float = 0.0
+    stopped_by: str = ""
+    item: int = 0
+
+    def fill(self, result: Any) -> Any:
+        """The result of an action with what it has fields for."""
+        told = {
+            "success": self.outcome is Outcome.SUCCEEDED,
+            "message": self.text,
+            "residual": self.residual,
+            "stopped_by": self.stopped_by,
+            "item": self.item,
+        }
+        for name, value in told.items():
+            if hasattr(result, name):
+                setattr(result, name, value)
+        return result
 
 
-def to_joints(driver: Driver, names: Sequence[str], values: Sequence[float]) -> Motion:
-    """To joint positions; joints left out stay. See `Driver.positions`.
-
-    Raises:
-        HeptarmError: the names, the numbers, or a number outside the joint's range.
-    """
-    return ptp(driver.positions(names, values))
+def _to_joints(driver: Driver, goal: Any) -> tuple[Motion, ...]:
+    return (ptp(driver.positions(goal.joint_names, goal.position)),)
 
 
-def to_pose(path: int, pose: Pose, via: Pose) -> Motion:
-    """To a pose of the moved frame in the base.
-
-    Args:
-        path: PTP, LIN or CIRC.
-        pose: where to.
-        via: a point of the arc, for CIRC.
-
-    Raises:
-        CommandRejected: there is no such path, or no such arc.
-    """
-    if path == PTP:
-        return ptp(pose)
-    if path == LIN:
-        return lin(pose)
-    if path == CIRC:
-        return circ(via, pose)
+def _to_pose(driver: Driver, goal: Any) -> tuple[Motion, ...]:
+    base = driver.configuration.frame("base")
+    moving = goal.moving or TOOL
+    how: dict[str, Any] = {"moving": moving}
+    if goal.speed_mps:
+        how["speed_mps"] = goal.speed_mps
+    if goal.path == motions.LIN_REL:
+        return (motions.offset(goal.pose, how),)
+    pose = motions.stamped_pose(goal.pose, base)
+    if goal.path == motions.PTP:
+        return (ptp(pose, moving=moving),)
+    if goal.path == motions.LIN:
+        return (lin(pose, **how),)
+    if goal.path == motions.CIRC:
+        return (circ(motions.stamped_pose(goal.via, base), pose, **how),)
     raise CommandRejected(
-        f"path is {path}; 0 (PTP), 1 (LIN) or 2 (CIRC) is wanted", parameter="path", value=path
+        f"path is {goal.path}; 0 (PTP), 1 (LIN), 2 (CIRC) or 3 (LIN_REL) is wanted",
+        parameter="path",
+        value=goal.path,
     )
 
 
-def start(driver: Driver, motion: Motion, speed: float) -> MotionHandle:
-    """Start it; it takes the place of whatever runs.
+def _along_spline(driver: Driver, goal: Any) -> tuple[Motion, ...]:
+    if len(goal.segments) and len(goal.position):
+        raise CommandRejected(
+            "a spline goes through segments or through joint positions", parameter="segments", hint="give one"
+        )
+    if len(goal.position):
+        return (spline_joints(motions.joint_points(driver, goal.joint_names, goal.position)),)
+    how: dict[str, Any] = {
+        name: getattr(goal, name) for name in ("speed_mps", "acceleration_mps2") if getattr(goal, name)
+    }
+    segments = [motions.segment_of(one) for one in goal.segments]
+    return (spline(segments, moving=goal.moving or TOOL, **how),)
+
+
+def _program(driver: Driver, goal: Any) -> tuple[Motion, ...]:
+    return motions.program_of(driver, goal.motions)
+
+
+#: All of them.
+MOVES = (
+    Move("~/move_joints", "heptarm_msgs/MoveJoints", _to_joints),
+    Move("~/move_pose", "heptarm_msgs/MovePose", _to_pose),
+    Move("~/move_spline", "heptarm_msgs/MoveSpline", _along_spline),
+    Move("~/run_program", "heptarm_msgs/RunProgram", _program),
+)
+
+
+def start(driver: Driver, row: Move, goal: Any) -> MotionHandle:
+    """Start what a goal asks for; unless it says another it takes the place of whatever runs.
 
     Args:
         driver: whose arm it is.
-        motion: what to do.
-        speed: ceiling, (0, 1]; 0: the node's.
+        row: which action.
+        goal: of its type.
 
     Raises:
         HeptarmError: refused; the text says why.
     """
-    return driver.start(motion, speed=None if speed == 0.0 else speed)
+    when: Any = getattr(goal, "when", "") or "replace"
+    return driver.start(
+        row.motions(driver, goal),
+        speed=None if goal.speed == 0.0 else goal.speed,
+        until=condition_of(goal.until),
+        when=when,
+    )
 
 
 def follow(
@@ -106,9 +174,14 @@ def follow(
     residual = 0.0 if isnan(result.residual) else result.residual
     if result.cause is Cause.FINISHED:
         on_progress(1.0)
-        return Moved(Outcome.SUCCEEDED, "the arm has arrived", residual)
+        return Moved(Outcome.SUCCEEDED, "the arm has arrived", residual, item=result.item)
+    if result.cause is Cause.CONDITION:
+        fired = "the condition" if result.stopped_by is None else str(result.stopped_by)
+        return Moved(Outcome.SUCCEEDED, f"ended by {fired}", residual, fired, result.item)
     if result.cause is Cause.CANCELLED:
         # whoever cancels it here, by a stop or by the goal of a trajectory, is not the action's client
         outcome = Outcome.CANCELED if cancelled else Outcome.ABORTED
-        return Moved(outcome, "cancelled; the arm braked on its path", residual)
-    return Moved(Outcome.PREEMPTED, "another motion took the place of this one", residual)
+        return Moved(outcome, "cancelled; the arm braked on its path", residual, item=result.item)
+    return Moved(
+        Outcome.PREEMPTED, "another motion took the place of this one", residual, item=result.item
+    )

@@ -86,6 +86,9 @@ PARAMETERS = (
         "names", "heptarm", "names of topics and services", choices=("heptarm", "libiiwa", "iiwa_stack")
     ),
     Parameter("state_rate", 100.0, "states published per second [Hz]", 1.0, 500.0),
+    Parameter("publish_signals", False, "have the cabinet send its signals, and publish them"),
+    Parameter("publish_tf", False, "publish flange and tool on /tf; leave that to robot_state_publisher if it runs"),
+    Parameter("tool_frame", "tool", "name of the frame that motions move, for /tf, without prefix"),
     Parameter("diagnostics_rate", 1.0, "diagnostics published per second [Hz]", 0.1, 10.0),
     Parameter("action_monitor_rate", 20.0, "feedback of a trajectory per second [Hz]", 1.0, 500.0),
     Parameter("execution", "servo", "how trajectories are executed", choices=("servo", "spline", "fri")),
@@ -189,7 +192,7 @@ class Configuration:
         return Configuration(known, tuple(f"{known['prefix']}{name}" for name in names))
 
     def frame(self, which: str) -> str:
-        """A frame's name with prefix: "base" or "flange"."""
+        """A frame's name with prefix: "base", "flange" or "tool"."""
         return f"{self.values['prefix']}{self.values[f'{which}_frame']}"
 
     @property

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import logging
 import threading
+from typing import Any, Literal
 
 import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.arm.servo import JointServo, PoseServo
 from heptarm.bridge.servo_execution import ServoOptions
-from heptarm.errors import HeptarmError
+from heptarm.errors import HeptarmError, NotReady
 from heptarm.io.clock import RealClock
 from heptarm.values.arrays import Array, array
+from heptarm.values.condition import Condition
 from heptarm.values.pose import Pose
+from heptarm.values.result import Cause
 
 _log = logging.getLogger("heptarm.bridge")
 
@@ -39,6 +42,19 @@ class Stream:
         self._servo: JointServo | PoseServo | None = None
         self._q = np.zeros(7)
         self._last = 0
+        self._guard: Condition | None = None
+        self._fired = ""
+        self._kind = ""  # of poses
+
+    @property
+    def guard(self) -> Condition | None:
+        """Condition that ends what comes next; setting one lets the arm follow again after it has fired."""
+        return self._guard
+
+    @guard.setter
+    def guard(self, value: Condition | None) -> None:
+        with self._lock:
+            self._guard, self._fired = value, ""
 
     @property
     def active(self) -> bool:
@@ -67,22 +83,15 @@ class Stream:
             self._q = np.clip(self._q + wanted * passed, robot.q_min, robot.q_max)
             servo.set(self._q + wanted * _AHEAD, wanted)
 
-    def pose(self, pose: Pose) -> None:
-        """Follow a pose of the flange in the base."""
+    def pose(self, pose: Pose, *, straight: bool = False) -> None:
+        """Follow a pose of the flange in the base, on straight lines or as the joints go."""
+        kind: Literal["pose", "lin"] = "lin" if straight else "pose"
         with self._lock:
             servo = self._servo
-            if not isinstance(servo, PoseServo) or not servo.active:
-                self.close()
-                options = self._options
-                servo = self._servo = self._arm.servo(
-                    "pose",
-                    rate=self._rate,
-                    watchdog=self._timeout,
-                    engine="smart",
-                    speed=options.speed,
-                    acceleration=options.acceleration,
-                    mode=options.mode,
-                ).__enter__()
+            if not isinstance(servo, PoseServo) or not servo.active or self._kind != kind:
+                self._prepare()
+                servo = self._servo = self._arm.servo(kind, **self._settings).__enter__()
+                self._kind = kind
             servo.set(pose)
 
     def close(self) -> None:
@@ -94,23 +103,36 @@ class Stream:
                     servo.close()
                 except HeptarmError as error:
                     _log.info("the stream of targets ended: %s", error)
+                result = servo.result
+                if result is not None and result.cause is Cause.CONDITION:
+                    self._fired = "the guard" if result.stopped_by is None else str(result.stopped_by)
 
     def _joint_servo(self) -> JointServo:
         servo = self._servo
         if not isinstance(servo, JointServo) or not servo.active:
-            self.close()
-            options = self._options
-            servo = self._servo = self._arm.servo(
-                "joint",
-                rate=self._rate,
-                watchdog=self._timeout,
-                engine="smart",
-                speed=options.speed,
-                acceleration=options.acceleration,
-                mode=options.mode,
-            ).__enter__()
+            self._prepare()
+            servo = self._servo = self._arm.servo("joint", **self._settings).__enter__()
         return servo
 
+    def _prepare(self) -> None:
+        """End the last one; after the guard has fired the arm follows no more, until somebody sets a guard anew.
+
+        Raises:
+            NotReady: the guard has fired.
+        """
+        self.close()
+        if self._fired:
+            raise NotReady(f"ended by {self._fired}", hint="set the guard anew, or none")
+
     @property
-    def _rate(self) -> float:
-        return max(self._options.rate, 1.0 / self._timeout)
+    def _settings(self) -> dict[str, Any]:
+        options = self._options
+        return {
+            "rate": max(options.rate, 1.0 / self._timeout),
+            "watchdog": self._timeout,
+            "engine": "smart",
+            "speed": options.speed,
+            "acceleration": options.acceleration,
+            "mode": options.mode,
+            "until": self._guard,
+        }

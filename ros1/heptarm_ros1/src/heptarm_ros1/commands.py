@@ -9,14 +9,17 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import rospy
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, WrenchStamped
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 from trajectory_msgs.msg import JointTrajectory
 
 from heptarm.bridge.driver import Driver
+from heptarm.bridge.fri_services import fri_joint, fri_pose, fri_wrench
 from heptarm.bridge.messages import trajectory_goal
-from heptarm.bridge.services import SERVICES, Names, Service, Services
+from heptarm.bridge.motions import stamped_pose
+from heptarm.bridge.service import Service, fill
+from heptarm.bridge.services import SERVICES, Services
 from heptarm.errors import HeptarmError, NotReady
 from heptarm_ros1 import convert
 
@@ -31,11 +34,11 @@ def _command_joint(driver: Driver, message: JointState) -> None:
 
 
 def _command_pose(driver: Driver, message: PoseStamped) -> None:
-    driver.move(convert.pose_value(message, driver.configuration.frame("base")))
+    driver.move(stamped_pose(message, driver.configuration.frame("base")))
 
 
 def _command_lin(driver: Driver, message: PoseStamped) -> None:
-    driver.move(convert.pose_value(message, driver.configuration.frame("base")), straight=True)
+    driver.move(stamped_pose(message, driver.configuration.frame("base")), straight=True)
 
 
 def _servo_joint(driver: Driver, message: JointState) -> None:
@@ -48,7 +51,11 @@ def _servo_velocity(driver: Driver, message: JointState) -> None:
 
 
 def _servo_pose(driver: Driver, message: PoseStamped) -> None:
-    driver.follow(convert.pose_value(message, driver.configuration.frame("base")))
+    driver.follow(stamped_pose(message, driver.configuration.frame("base")))
+
+
+def _servo_lin(driver: Driver, message: PoseStamped) -> None:
+    driver.follow(stamped_pose(message, driver.configuration.frame("base")), straight=True)
 
 
 def joint_trajectory(driver: Driver, message: JointTrajectory) -> None:
@@ -74,7 +81,11 @@ TOPICS: tuple[tuple[type, str, Work], ...] = (
     (JointState, "~servo/joint", _servo_joint),
     (JointState, "~servo/velocity", _servo_velocity),
     (PoseStamped, "~servo/pose", _servo_pose),
+    (PoseStamped, "~servo/lin", _servo_lin),
     (JointTrajectory, "~joint_trajectory", joint_trajectory),
+    (JointState, "~fri/joint", fri_joint),
+    (WrenchStamped, "~fri/wrench", fri_wrench),
+    (PoseStamped, "~fri/pose", fri_pose),
     (Empty, "~stop", stop),
 )
 
@@ -127,10 +138,6 @@ def _service(offered: Services, row: Service) -> rospy.Service:
     kind = getattr(importlib.import_module(f"{package}.srv"), name)
 
     def callback(request: Any) -> Any:
-        answer = offered.answer(row, request)
-        response = kind._response_class(success=answer.success, message=answer.message)
-        if isinstance(answer, Names):
-            response.names = list(answer.names)
-        return response
+        return fill(kind._response_class(), offered.answer(row, request))
 
     return rospy.Service(f"~{row.name[2:]}", kind, callback)

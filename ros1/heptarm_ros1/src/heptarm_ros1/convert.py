@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import rospy
 from control_msgs.msg import FollowJointTrajectoryFeedback
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
@@ -13,8 +11,6 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
 from heptarm.bridge.messages import Ros
-from heptarm.errors import ShapeError
-from heptarm.values.pose import Pose
 
 #: Types and time of ROS.
 ROS = Ros(
@@ -31,16 +27,3 @@ ROS = Ros(
     duration=rospy.Duration.from_sec,
     level=int,
 )
-
-
-def pose_value(message: Any, base: str) -> Pose:
-    """The pose of a PoseStamped.
-
-    Raises:
-        ShapeError: it is given in another frame than the base, or its quaternion is none.
-    """
-    frame = message.header.frame_id.lstrip("/")
-    if frame not in ("", base):
-        raise ShapeError(f"the pose is given in {frame!r}", hint=f"give it in {base!r}")
-    place, turn = message.pose.position, message.pose.orientation
-    return Pose.of([place.x, place.y, place.z], [turn.x, turn.y, turn.z, turn.w])

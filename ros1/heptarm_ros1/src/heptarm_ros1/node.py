@@ -22,6 +22,7 @@ from heptarm.errors import HeptarmError, NotReady
 from heptarm.values.state import State
 from heptarm_ros1 import peers, settings
 from heptarm_ros1.commands import Commands
+from heptarm_ros1.events import Events
 from heptarm_ros1.moves import MoveActions
 from heptarm_ros1.peers import Peers
 from heptarm_ros1.publishers import Publishers
@@ -41,6 +42,7 @@ class HeptarmNode:
         self._outputs: Publishers | None = None
         self._inputs: Commands | None = None
         self._peers: Peers | None = None
+        self._events: Events | None = None
         self._lock = threading.RLock()
         self._ending = threading.Event()
         self._wake = threading.Event()
@@ -89,7 +91,7 @@ class HeptarmNode:
                 rospy.logwarn(f"unknown parameters: {', '.join(strange)}")
             self.configuration = Configuration.of(self._given)
             self._outputs = Publishers(self.configuration)
-            self._peers = Peers(self)
+            self._peers, self._events = Peers(self), Events(self)
             try:
                 self.driver = Driver(self.configuration, self)
             except HeptarmError:
@@ -177,16 +179,16 @@ class HeptarmNode:
         driver, self.driver = self.driver, None
         if driver is not None:
             driver.close()
-        for one in (self._inputs, self._outputs, self._peers):
+        for one in (self._inputs, self._outputs, self._peers, self._events):
             if one is not None:
                 one.destroy()
-        self._inputs = self._outputs = self._peers = None
+        self._inputs = self._outputs = self._peers = self._events = None
 
     # -------------------------------------------------------------------------- from the driver
 
     def on_state(self, state: State) -> None:
         """A state came."""
-        for outputs in (self._outputs, self._peers):
+        for outputs in (self._outputs, self._peers, self._events):
             if outputs is not None and not rospy.is_shutdown():
                 outputs.state(state)
 
@@ -205,6 +207,11 @@ class HeptarmNode:
         else:
             rospy.loginfo("connected")
         self._wake.set()
+
+    def on_key(self, slot: int, down: bool) -> None:
+        """A user key of the smartPAD was pressed or released."""
+        if self._events is not None and not rospy.is_shutdown():
+            self._events.key(slot, down)
 
     # -------------------------------------------------------------------------- now and then
 
@@ -242,6 +249,8 @@ class HeptarmNode:
                 state = None
         outputs.status(report, state, connected=not driver.trouble, active=driver.active)
         outputs.diagnostics(report, driver.arm.cabinet)
+        if self._events is not None:
+            self._events.fri(driver.fri.status())
 
 
 def _answered(step: Callable[[], str]) -> Callable[[Any], TriggerResponse]:

@@ -1,0 +1,119 @@
+"""Conditions as texts, in the words of heptarm.when: `(force.along('z') > 15) | io.user_button`.
+
+A text is read, never run: the signals, their comparisons and & | ^ ~ are all there is.
+"""
+
+from __future__ import annotations
+
+import ast
+import operator
+from collections.abc import Callable
+from typing import Any
+
+from heptarm.errors import CommandRejected, HeptarmError
+from heptarm.values.condition import Condition, SignalIs, check_condition
+from heptarm.values.signals import Component, Force, Io, Path, Torque, force, io, path, torque
+
+#: Longest text.
+_LONGEST = 2000
+_SIGNALS: dict[str, object] = {"force": force, "torque": torque, "io": io, "path": path}
+_METHODS: dict[type, tuple[str, ...]] = {
+    Force: ("along", "normal", "shear"),
+    Torque: ("about",),
+    Component: ("outside", "inside"),
+    SignalIs: ("outside",),
+    Path: ("after", "before_end"),
+}
+_BINARY: dict[type, Callable[[Any, Any], Any]] = {
+    ast.BitAnd: operator.and_,
+    ast.BitOr: operator.or_,
+    ast.BitXor: operator.xor,
+}
+_COMPARE: dict[type, Callable[[Any, Any], Any]] = {ast.Gt: operator.gt, ast.Lt: operator.lt}
+
+
+def condition_of(text: str, parameter: str = "until") -> Condition | None:
+    """The condition that a text says; None: it is empty.
+
+    Args:
+        text: such as "force > 10", or "(abs(torque[3]) > 8) | io['MediaFlange.UserButton']".
+        parameter: what the text was given as.
+
+    Raises:
+        CommandRejected: it is none; a number outside its range raises as in heptarm.when.
+    """
+    if not text.strip():
+        return None
+    try:
+        if len(text) > _LONGEST:
+            raise ValueError(f"it has {len(text)} characters; allowed are {_LONGEST}")
+        value = _value(ast.parse(text.strip(), mode="eval").body)
+        if isinstance(value, Condition):
+            return check_condition(value, parameter)
+        raise ValueError("it is a signal or a number, not yet compared to anything")
+    except HeptarmError:
+        raise  # a number outside its range: its own words tell more
+    except (SyntaxError, ValueError, TypeError, RecursionError, MemoryError) as error:
+        raise CommandRejected(
+            f"{parameter} is {text[:80]!r}, which is no condition: {getattr(error, 'msg', None) or error}",
+            parameter=parameter,
+            value=text,
+            hint="for example (force.along('z') > 15) | (abs(torque[3]) > 8) | io.user_button",
+        ) from error
+
+
+def _value(node: ast.expr) -> Any:
+    """What a part of the text stands for.
+
+    Raises:
+        ValueError: nothing that belongs into a condition.
+        TypeError: two things that do not go together.
+    """
+    if isinstance(node, ast.Constant) and isinstance(node.value, int | float | str):
+        return node.value
+    if isinstance(node, ast.Name) and node.id in _SIGNALS:
+        return _SIGNALS[node.id]
+    if isinstance(node, ast.UnaryOp):
+        inner = _value(node.operand)
+        if isinstance(node.op, ast.USub) and isinstance(inner, int | float):
+            return -inner
+        if isinstance(node.op, ast.Invert) and isinstance(inner, Condition):
+            return ~inner
+    if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
+        return _BINARY[type(node.op)](_condition(node.left), _condition(node.right))
+    if isinstance(node, ast.Compare) and len(node.ops) == 1 and type(node.ops[0]) in _COMPARE:
+        return _COMPARE[type(node.ops[0])](_value(node.left), _value(node.comparators[0]))
+    if isinstance(node, ast.Subscript):
+        whole = _value(node.value)
+        if isinstance(whole, Torque | Io):
+            return whole[_value(node.slice)]
+    if isinstance(node, ast.Attribute) and not node.attr.startswith("_") and _value(node.value) is io:
+        return getattr(io, node.attr)
+    if isinstance(node, ast.Call):
+        return _call(node)
+    raise ValueError(f"{ast.unparse(node)!r} does not belong into one")
+
+
+def _condition(node: ast.expr) -> Condition:
+    value = _value(node)
+    if not isinstance(value, Condition):
+        raise ValueError(f"{ast.unparse(node)!r} is no condition; put comparisons in brackets")
+    return value
+
+
+def _call(node: ast.Call) -> Any:
+    given = [_value(one) for one in node.args]
+    named = {one.arg: _value(one.value) for one in node.keywords if one.arg is not None}
+    if len(named) != len(node.keywords):
+        raise ValueError("** does not belong into one")
+    called = node.func
+    if isinstance(called, ast.Name) and called.id == "abs" and len(given) == 1 and not named:
+        if isinstance(given[0], Component):
+            return abs(given[0])
+    elif isinstance(called, ast.Name) and called.id in ("force", "torque"):
+        return (force if called.id == "force" else torque)(*given, **named)
+    elif isinstance(called, ast.Attribute):
+        whole = _value(called.value)
+        if called.attr in _METHODS.get(type(whole), ()):
+            return getattr(whole, called.attr)(*given, **named)
+    raise ValueError(f"{ast.unparse(node)!r} does not belong into one")

@@ -1,0 +1,331 @@
+"""What a node has beside trajectories, tried through its services, actions and topics; the same for both ROS.
+
+A case takes a probe: a client of one node, whose arm is on a stage with the project `PROJECT`.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from heptarm.model.kinematics import forward
+from heptarm.values.robot import robot
+from tests.conformance.stage import Stage
+
+WORLD = "MediaFlange.UserButton&lt;bool MediaFlange.LEDBlue&gt;bool MediaFlange.LEDRed&gt;bool Cell.Offset&gt;i16"
+PROJECT = f"""<persistence><processDataContainer>
+<processData dataType="java.lang.String" id="heptarm.io" value="{WORLD}"/>
+<processData dataType="java.lang.Integer" id="cell.count" value="3"/>
+</processDataContainer></persistence>"""
+#: Parameters of the node.
+PARAMETERS: dict[str, object] = {"publish_signals": True, "publish_tf": True, "speed": 0.6}
+HOME = np.radians([0, 30, 0, -90, 0, 60, 0]).tolist()
+#: A busy machine may need long for what is quick [s].
+PATIENCE = 60.0
+
+
+class Probe(Protocol):
+    """A client of one node; names are relative to the node's, those with a slash before them are not."""
+
+    def call(self, name: str, kind: str, /, **request: Any) -> Any:
+        """The answer of a service."""
+        ...
+
+    def act(self, name: str, kind: str, /, **goal: Any) -> Any:
+        """The result of a goal of an action, when it has ended; refused goals have one, too."""
+        ...
+
+    def start(self, name: str, kind: str, /, **goal: Any) -> Callable[[], Any]:
+        """Likewise, but at once: what waits for the result."""
+        ...
+
+    def listen(self, name: str, kind: str, /, *, latched: bool = False) -> list[Any]:
+        """A list that fills with a topic's messages."""
+        ...
+
+    def tell(self, name: str, kind: str, /, **message: Any) -> Callable[[], None]:
+        """What publishes a message, once somebody listens."""
+        ...
+
+    def make(self, kind: str, /, **fields: Any) -> Any:
+        """A message."""
+        ...
+
+
+def stage(folder: Path) -> Stage:
+    """A cabinet with signals and process data."""
+    project = folder / "RoboticsAPI.data.xml"
+    project.write_text(PROJECT)
+    return Stage("--project", str(project))
+
+
+def until(what: Callable[[], Any], why: str) -> Any:
+    """Wait until something is true; returns it."""
+    deadline = time.monotonic() + PATIENCE
+    while time.monotonic() < deadline:
+        if value := what():
+            return value
+        time.sleep(0.01)
+    raise TimeoutError(why)
+
+
+def done(answer: Any) -> Any:
+    """An answer or a result that is a success."""
+    assert answer.success, answer.message
+    return answer
+
+
+def refused(answer: Any, *words: str) -> None:
+    """An answer or a result that is none, and says why."""
+    assert not answer.success and all(word in answer.message for word in words), answer.message
+
+
+def home(probe: Probe) -> None:
+    done(probe.act("move_joints", "MoveJoints", position=HOME, speed=0.6))
+
+
+def case_signals_are_listed_written_and_published(probe: Probe, stage: Stage) -> None:
+    seen = probe.listen("signals", "heptarm_msgs/Signals", latched=True)
+    told = done(probe.call("signals", "GetSignals"))
+    assert list(told.names) == [word.partition("&")[0] for word in WORLD.split()]
+    assert list(told.outputs) == [False, True, True, True] and told.kinds[3] == "integer"
+    done(probe.call("set_signals", "SetSignals", names=["offset", "LEDRed"], values=[-30.0, 1.0]))
+    until(lambda: seen and dict(zip(seen[-1].names, seen[-1].values))["Cell.Offset"] == -30.0, "no signal")
+    done(probe.call("set_led", "SetText", value="blue"))
+    until(lambda: dict(zip(seen[-1].names, seen[-1].values))["MediaFlange.LEDBlue"] == 1.0, "no blue")
+    stage.do("set UserButton true")
+    until(lambda: dict(zip(seen[-1].names, seen[-1].values))["MediaFlange.UserButton"] == 1.0, "no button")
+    stage.do("set UserButton false")
+    refused(probe.call("set_signals", "SetSignals", names=["UserButton"], values=[1.0]), "input")
+    refused(probe.call("set_signals", "SetSignals", names=["offset"], values=[]), "0 values for 1")
+    refused(probe.call("set_led", "SetText", value="pink"), "pink", "blue")
+
+
+def case_keys_messages_and_process_data(probe: Probe, stage: Stage) -> None:
+    keys = probe.listen("keys", "heptarm_msgs/KeyEvent")
+    done(probe.call("set_key", "SetKey", slot=2, text="go", led="green"))
+
+    def pressed() -> bool:
+        stage.do("press 2 client")  # what is not kept for late subscribers may be missed once
+        return any(key.slot == 2 and key.down for key in list(keys))
+
+    until(pressed, "no key")
+    refused(probe.call("set_key", "SetKey", slot=9, text="go"), "slot")
+    done(probe.call("show", "ShowMessage", text="hello"))
+    refused(probe.call("show", "ShowMessage", text="hello", severity="loud"), "loud")
+    assert done(probe.call("process_data", "GetText", name="cell.count")).value == "3"
+    done(probe.call("set_process_data", "SetEntry", name="cell.count", value="4"))
+    assert done(probe.call("process_data", "GetText", name="cell.count")).value == "4"
+    refused(probe.call("process_data", "GetText", name="cell.sum"), "cell.sum")
+
+
+def case_a_condition_ends_a_motion(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    states = probe.listen("state", "heptarm_msgs/RobotState")
+    until(lambda: states, "no states")
+    ended = probe.start("move_joints", "MoveJoints", joint_names=["A1"], position=[2.0], until="io.user_button")
+    until(lambda: states[-1].position[0] > 0.05, "the arm does not set out")
+    stage.do("set UserButton true")
+    result = done(ended())
+    assert "UserButton" in result.stopped_by or "user_button" in result.stopped_by, result.stopped_by
+    assert states[-1].position[0] < 1.9
+    stage.do("set UserButton false")
+    result = done(probe.act("move_joints", "MoveJoints", position=HOME, until="~io.user_button | (force > 900)"))
+    assert "user_button" in result.stopped_by.casefold().replace("userbutton", "user_button")
+    bad = "__import__('os').system('true')"
+    refused(probe.act("move_joints", "MoveJoints", position=HOME, until=bad), "no condition", "force.along")
+    refused(probe.act("move_joints", "MoveJoints", position=HOME, until="force > 9999"), "9999")
+    home(probe)
+
+
+def case_a_guard_ends_commands_and_servo_topics(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    states = probe.listen("state", "heptarm_msgs/RobotState")
+    until(lambda: states, "no states")
+    done(probe.call("set_guard", "SetText", value="io.user_button"))
+    turn = probe.tell("servo/velocity", "sensor_msgs/JointState", name=["A7"], velocity=[0.2])
+
+    def turned() -> bool:
+        turn()
+        return states[-1].position[6] > 0.1
+
+    until(turned, "the arm does not follow")
+    stage.do("set UserButton true")
+
+    def stands() -> bool:
+        turn()
+        return all(abs(one.velocity[6]) < 1e-3 for one in states[-30:])
+
+    until(stands, "the guard does not stop the arm")
+    stage.do("set UserButton false")
+    there = states[-1].position[6]
+    for _ in range(20):
+        turn()
+        time.sleep(0.01)
+    assert abs(states[-1].position[6] - there) < 1e-3, "it does not go on by itself"
+    refused(probe.call("set_guard", "SetText", value="force"), "compared")
+    done(probe.call("set_guard", "SetText", value=""))
+    until(lambda: turn() or states[-1].position[6] > there + 0.05, "the arm does not follow again")
+    until(lambda: not states[-1].motion, "the servo motion does not end")
+
+
+def case_a_servo_topic_follows_lines(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    here = done(probe.call("get_pose", "GetPose", frame="flange")).pose
+    there = probe.make("geometry_msgs/PoseStamped", pose=here)
+    there.pose.position.y += 0.05
+    follow = probe.tell("servo/lin", "geometry_msgs/PoseStamped", pose=there.pose)
+
+    def arrived() -> bool:
+        follow()
+        now = done(probe.call("get_pose", "GetPose", frame="flange")).pose
+        return abs(now.position.y - there.pose.position.y) < 2e-3
+
+    until(arrived, "the flange does not follow")
+    time.sleep(0.3)  # the topic has fallen silent
+
+
+def case_splines_and_programs(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    points = [0.1, 0.2, 0.2, 0.0]
+    done(probe.act("move_spline", "MoveSpline", joint_names=["A1", "A7"], position=points, speed=0.6))
+    here = done(probe.call("get_pose", "GetPose", frame="flange")).pose
+    assert abs(math.atan2(here.position.y, here.position.x) - 0.2) < 0.02
+
+    def at(dy: float, dz: float) -> Any:
+        place = here.position
+        point = probe.make("geometry_msgs/Point", x=place.x, y=place.y + dy, z=place.z + dz)
+        return probe.make("geometry_msgs/Pose", position=point, orientation=here.orientation)
+
+    curve = [
+        probe.make("heptarm_msgs/Segment", pose=at(0.03, -0.03)),
+        probe.make("heptarm_msgs/Segment", kind=1, pose=at(0.06, -0.03), speed_mps=0.1),
+        probe.make("heptarm_msgs/Segment", kind=2, via=at(0.08, -0.02), pose=at(0.06, 0.0)),
+    ]
+    done(probe.act("move_spline", "MoveSpline", segments=curve, speed_mps=0.2))
+    there = done(probe.call("get_pose", "GetPose", frame="flange")).pose
+    assert abs(there.position.y - here.position.y - 0.06) < 2e-3
+    refused(probe.act("move_spline", "MoveSpline", position=[0.1]), "position")
+    back = probe.make("geometry_msgs/PoseStamped")
+    back.pose.position.y, back.header.frame_id = -0.06, "base"
+    program = [
+        probe.make("heptarm_msgs/Motion", kind=3, pose=back, speed_mps=0.2, blend_rel=0.2),
+        probe.make("heptarm_msgs/Motion", kind=0, position=HOME, joint_speed=[0.5]),
+        probe.make("heptarm_msgs/Motion", kind=7, joint_speed=[0.5]),
+        probe.make("heptarm_msgs/Motion", kind=6, duration=0.1),
+    ]
+    result = done(probe.act("run_program", "RunProgram", motions=program, when="queue", speed=0.6))
+    assert result.item == 3 and not result.stopped_by and result.residual < 1e-3
+    refused(probe.act("run_program", "RunProgram", motions=[]), "no motions")
+    odd = probe.make("heptarm_msgs/Motion", kind=9)
+    refused(probe.act("run_program", "RunProgram", motions=[odd]), "motions[0]", "9")
+    refused(probe.act("run_program", "RunProgram", motions=program, when="later"), "later")
+
+
+def case_modes_with_all_their_parameters(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    six = [0.0] * 6
+    sine = {
+        "amplitude": [0.0, 0.0, 5.0, 0.0, 0.0, 0.0],
+        "frequency": [0.0, 0.0, 2.0, 0.0, 0.0, 0.0],
+        "bias": six,
+        "total_time": [0.5],
+        "stay_active": True,
+        "stiffness": [3000.0] * 3 + [200.0] * 3,
+        "damping": [0.8],
+        "nullspace": [50.0, 0.5],
+        "max_deviation": [0.2] * 3 + [1.0] * 3,
+        "frame": "base",
+    }
+    done(probe.call("mode/sine_impedance", "SetSineImpedance", **sine))
+    done(probe.act("run_program", "RunProgram", motions=[probe.make("heptarm_msgs/Motion", kind=6, duration=0.6)]))
+    for pattern in (
+        {"pattern": "force", "force": [0.0, 0.0, 5.0, 0.0, 0.0, 0.0], "total_time": [1.0]},
+        {"pattern": "sine", "direction": "z", "frequency": 2.0, "amplitude": 5.0},
+        {"pattern": "lissajous", "plane": "xy", "frequency": 2.0, "amplitude": 5.0, "stiffness": [500.0]},
+        {"pattern": "spiral", "plane": "xz", "frequency": 2.0, "amplitude": 5.0, "total_time": [1.0]},
+    ):
+        done(probe.call("mode/force_pattern", "SetForcePattern", **pattern))
+    refused(probe.call("mode/force_pattern", "SetForcePattern", pattern="star"), "star", "lissajous")
+    refused(probe.call("mode/force_pattern", "SetForcePattern", pattern="force", force=[1.0]), "6 are wanted")
+    refused(probe.call("mode/sine_impedance", "SetSineImpedance", **{**sine, "nullspace": six}), "nullspace")
+    done(probe.call("mode/position", "std_srvs/Trigger"))
+
+
+def case_tools_with_frames_and_what_the_arm_is(probe: Probe, stage: Stage) -> None:
+    info = done(probe.call("info", "GetInfo"))
+    assert info.model == "iiwa14" and info.is_virtual and info.pace == 1.0 and info.controller
+    np.testing.assert_allclose(info.q_max, robot("iiwa14").q_max)
+    tip = probe.make("geometry_msgs/Pose")
+    tip.position.z, tip.orientation.w = 0.2, 1.0
+    done(
+        probe.call(
+            "attach_tool",
+            "AttachTool",
+            name="probe",
+            mass=1.0,
+            inertia=[0.01, 0.01, 0.01, 0.0, 0.0, 0.0],
+            frames=[probe.make("heptarm_msgs/Frame", name="tip", pose=tip)],
+            frame="tip",
+        )
+    )
+
+    def distance() -> float:
+        pose = done(probe.call("get_pose", "GetPose", reference="flange")).pose
+        return float(pose.position.z)
+
+    until(lambda: abs(distance() - 0.2) < 1e-6, "the tool's frame is not what moves")
+    wrench = done(probe.call("get_wrench", "GetWrench", frame="flange", axes="flange"))
+    assert math.isfinite(wrench.wrench.force.x) and len(wrench.inaccuracy) == 6
+    refused(probe.call("get_pose", "GetPose", frame="elbow"), "elbow")
+    done(probe.call("detach_tool", "std_srvs/Trigger"))
+    refused(probe.call("operate", "SetText", value="start"), "simulator")
+
+
+def case_the_flange_is_on_tf(probe: Probe, stage: Stage) -> None:
+    states = probe.listen("/joint_states", "sensor_msgs/JointState")
+    frames = probe.listen("/tf", "tf2_msgs/TFMessage")
+    until(lambda: frames and states, "no transforms")
+    found = {one.child_frame_id: one for one in frames[-1].transforms}
+    assert set(found) == {"flange", "tool"} and {one.header.frame_id for one in found.values()} == {"link_0"}
+    place = found["flange"].transform.translation
+    np.testing.assert_allclose(
+        [place.x, place.y, place.z], forward(robot("iiwa14"), states[-1].position)[:3, 3], atol=2e-3
+    )
+
+
+def case_an_fri_session_is_opened_commanded_and_closed(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    status = probe.listen("fri/status", "heptarm_msgs/FriStatus", latched=True)
+    states = probe.listen("state", "heptarm_msgs/RobotState")
+    refused(probe.call("fri/open", "OpenFri", kind="dance"), "dance", "monitor")
+    done(probe.call("fri/open", "OpenFri", kind="monitor", period_ms=10))
+    until(lambda: status and status[-1].kind == "monitor" and status[-1].received > 10, "no status")
+    refused(probe.call("fri/open", "OpenFri", kind="position"), "close it first")
+    done(probe.call("fri/close", "std_srvs/Trigger"))
+    until(lambda: not status[-1].kind, "the status does not tell of the end")
+    wish = states[-1].position[6] - 0.1
+    turn = probe.tell("fri/joint", "sensor_msgs/JointState", name=["A7"], position=[wish])
+
+    def arrived() -> bool:
+        if not status[-1].kind:  # a busy machine may lose a session
+            probe.call("fri/open", "OpenFri", kind="position", period_ms=10)
+            until(lambda: status[-1].kind or status[-1].text, "no status")
+        turn()
+        return abs(states[-1].position[6] - wish) < 2e-3
+
+    until(arrived, "the arm does not follow FRI")
+    done(probe.call("fri/close", "std_srvs/Trigger"))
+    home(probe)
+
+
+#: All cases by name.
+CASES = {
+    name.removeprefix("case_"): case for name, case in list(globals().items()) if name.startswith("case_")
+}
+
