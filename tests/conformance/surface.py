@@ -176,18 +176,19 @@ def case_a_guard_ends_commands_and_servo_topics(probe: Probe, stage: Stage) -> N
 
 def case_a_servo_topic_follows_lines(probe: Probe, stage: Stage) -> None:
     home(probe)
-    here = done(probe.call("get_pose", "GetPose", frame="flange")).pose
-    there = probe.make("geometry_msgs/PoseStamped", pose=here)
-    there.pose.position.y += 0.05
-    follow = probe.tell("servo/lin", "geometry_msgs/PoseStamped", pose=there.pose)
+    seen = probe.listen("pose", "geometry_msgs/PoseStamped")
+    until(lambda: seen, "no poses")
+    target = done(probe.call("get_pose", "GetPose")).pose
+    target.position.y += 0.05
+    follow = probe.tell("servo/lin", "geometry_msgs/PoseStamped", pose=target)
 
     def arrived() -> bool:
         follow()
-        now = done(probe.call("get_pose", "GetPose", frame="flange")).pose
-        return abs(now.position.y - there.pose.position.y) < 2e-3
+        return abs(seen[-1].pose.position.y - target.position.y) < 2e-3
 
     until(arrived, "the flange does not follow")
-    time.sleep(0.3)  # the topic has fallen silent
+    states = probe.listen("state", "heptarm_msgs/RobotState")
+    until(lambda: states and not states[-1].motion, "the servo motion does not end")
 
 
 def case_splines_and_programs(probe: Probe, stage: Stage) -> None:
