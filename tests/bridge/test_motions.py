@@ -19,12 +19,12 @@ EMPTY: dict[str, Any] = {
     name: 0.0
     for name in (
         *("speed_mps", "acceleration_mps2", "jerk_mps3", "speed_radps", "acceleration_radps2", "jerk_radps3"),
-        *("blend_rel", "blend_m", "blend_rad", "duration"),
+        *("blend_rel", "blend_m", "blend_rad", "duration", "joint_velocity", "cartesian_velocity"),
     )
 } | {
     name: []
     for name in (
-        *("joint_names", "position", "segments", "near", "redundancy"),
+        *("joint_names", "position", "segments", "near", "redundancy", "q_min", "q_max"),
         *("joint_speed", "joint_acceleration", "joint_jerk"),
     )
 }
@@ -55,7 +55,8 @@ def stamped(frame: str = "", *numbers: float) -> SimpleNamespace:
 
 
 def message(kind: int, **fields: Any) -> SimpleNamespace:
-    plain = {"moving": "", "orientation": "", "pose": stamped(), "via": pose(0.5, 0.0, 0.5)}
+    plain: dict[str, Any] = {name: "" for name in ("moving", "orientation", "at_limit", "outside")}
+    plain |= {"pose": stamped(), "via": pose(0.5, 0.0, 0.5)}
     return SimpleNamespace(kind=kind, **(EMPTY | plain | fields))
 
 
@@ -108,6 +109,11 @@ TARGET, VIA = ha.Pose.at(0.5, 0.1, 0.4), ha.Pose.at(0.5, 0.0, 0.5)
         (
             message(5, joint_names=["A1", "A2"], position=[0.0, 0.1, 0.0, 0.2]),
             ha.spline_joints([HERE, [0, 0.2, *HERE[2:]]]),
+        ),
+        (message(8), ha.hand_guide()),
+        (
+            message(8, q_min=[-1.0] * 7, joint_velocity=0.5, outside="pull"),
+            ha.hand_guide(q_min=[-1.0] * 7, joint_velocity=0.5, outside="pull"),
         ),
         (message(6), ha.hold()),
         (message(7, joint_speed=[0.2]), ha.ptp_home(speed=0.2)),

@@ -56,6 +56,14 @@ class Probe(Protocol):
         """A message."""
         ...
 
+    def point(self, positions: list[float], seconds: float) -> Any:
+        """A point of a trajectory."""
+        ...
+
+    def query(self) -> Any:
+        """What the trajectory under way wants now; None: there is none."""
+        ...
+
 
 def stage(folder: Path) -> Stage:
     """A cabinet with signals and process data."""
@@ -83,6 +91,12 @@ def done(answer: Any) -> Any:
 def refused(answer: Any, *words: str) -> None:
     """An answer or a result that is none, and says why."""
     assert not answer.success and all(word in answer.message for word in words), answer.message
+
+
+def ready(probe: Probe) -> None:
+    """Wait until the node is active."""
+    status = probe.listen("status", "heptarm_msgs/Status", latched=True)
+    until(lambda: status and status[-1].active, "the node is not active")
 
 
 def home(probe: Probe) -> None:
@@ -305,9 +319,10 @@ def case_an_fri_session_is_opened_commanded_and_closed(probe: Probe, stage: Stag
     status = probe.listen("fri/status", "heptarm_msgs/FriStatus", latched=True)
     states = probe.listen("state", "heptarm_msgs/RobotState")
     refused(probe.call("fri/open", "OpenFri", kind="dance"), "dance", "monitor")
-    done(probe.call("fri/open", "OpenFri", kind="monitor", period_ms=10))
+    done(probe.call("fri/open", "OpenFri", kind="monitor", period_ms=10, io=["LEDRed"]))
     until(lambda: status and status[-1].kind == "monitor" and status[-1].received > 10, "no status")
     refused(probe.call("fri/open", "OpenFri", kind="position"), "close it first")
+    done(probe.call("fri/set_outputs", "SetSignals", names=["LEDRed"], values=[1.0]))
     done(probe.call("fri/close", "std_srvs/Trigger"))
     until(lambda: not status[-1].kind, "the status does not tell of the end")
     wish = states[-1].position[6] - 0.1
@@ -323,6 +338,25 @@ def case_an_fri_session_is_opened_commanded_and_closed(probe: Probe, stage: Stag
     until(arrived, "the arm does not follow FRI")
     done(probe.call("fri/close", "std_srvs/Trigger"))
     home(probe)
+
+
+def case_where_a_trajectory_wants_the_arm(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    assert probe.query() is None
+    path = {"joint_names": [f"A{i}" for i in range(1, 8)], "points": [probe.point([*HOME[:6], 0.5], 3.0)]}
+    probe.tell("joint_trajectory", "trajectory_msgs/JointTrajectory", **path)()
+    seen: list[float] = []
+
+    def halfway() -> bool:
+        wanted = probe.query()
+        if wanted is not None:
+            assert list(wanted.name) == path["joint_names"]
+            seen.append(wanted.position[6])
+        return bool(seen) and seen[-1] > 0.2
+
+    until(halfway, "nothing is wanted")
+    assert seen == sorted(seen)
+    until(lambda: probe.query() is None, "the trajectory does not end")
 
 
 #: All cases by name.

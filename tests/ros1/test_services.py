@@ -40,6 +40,8 @@ def as_it_was(client: Client):
 def test_every_service_answers_success_and_message() -> None:
     for row in SERVICES:
         package, _, name = row.type.partition("/")
+        if package == "control_msgs":  # of ROS 1's own, and without these
+            continue
         response = getattr(importlib.import_module(f"{package}.srv"), name)._response_class
         assert {"success", "message"} <= set(response.__slots__), row.name
 

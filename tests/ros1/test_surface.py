@@ -52,6 +52,18 @@ class Client:
     def make(self, kind: str, /, **fields: Any) -> Any:
         return found(kind, "msg")(**fields)
 
+    def point(self, positions: list[float], seconds: float) -> Any:
+        duration = rospy.Duration.from_sec(seconds)
+        return self.make(
+            "trajectory_msgs/JointTrajectoryPoint", positions=positions, time_from_start=duration
+        )
+
+    def query(self) -> Any:
+        try:
+            return self.call("query_state", "control_msgs/QueryTrajectoryState")
+        except rospy.ServiceException:  # the type has no field for that
+            return None
+
 
 def full(name: str) -> str:
     return name if name.startswith("/") else f"{NAME}/{name}"
@@ -72,7 +84,9 @@ def arena(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
 @pytest.fixture(scope="module")
 def probe(ros: None, arena: Stage) -> Iterator[Client]:
     node = NodeProcess(arena.target, ns="/surface", **surface.PARAMETERS)
-    yield Client()
+    client = Client()
+    surface.ready(client)
+    yield client
     assert node.end() == 0, node.said
 
 

@@ -12,7 +12,7 @@ from rclpy.action import ActionClient
 from tests.conformance import surface
 from tests.conformance.stage import Stage
 from tests.ros2.conftest import PATIENT
-from tests.ros2.peer import NodeProcess, Ros, until
+from tests.ros2.peer import NodeProcess, Ros, to_duration, until
 
 NAME = "/surface/heptarm"
 
@@ -57,6 +57,15 @@ class Client:
     def make(self, kind: str, /, **fields: Any) -> Any:
         return found(kind, "msg")(**fields)
 
+    def point(self, positions: list[float], seconds: float) -> Any:
+        return self.make(
+            "trajectory_msgs/JointTrajectoryPoint", positions=positions, time_from_start=to_duration(seconds)
+        )
+
+    def query(self) -> Any:
+        answer = self.call("query_state", "control_msgs/QueryTrajectoryState")
+        return answer if answer.success else None
+
 
 def full(name: str) -> str:
     return name if name.startswith("/") else f"{NAME}/{name}"
@@ -77,8 +86,9 @@ def arena(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
 @pytest.fixture(scope="module")
 def probe(ros: Ros, arena: Stage) -> Iterator[Client]:
     node = NodeProcess(arena.target, space="/surface", **(PATIENT | surface.PARAMETERS))
-    node.waits_for("LBR iiwa")
-    yield Client(ros)
+    client = Client(ros)
+    surface.ready(client)
+    yield client
     node.finish()
 
 

@@ -20,7 +20,7 @@ from heptarm.bridge.names import Meaning
 from heptarm.bridge.service import Service, fill
 from heptarm.bridge.services import SERVICES, Services
 from heptarm.errors import HeptarmError, NotReady
-from heptarm_ros2 import peers
+from heptarm_ros2 import convert, peers
 
 if TYPE_CHECKING:
     from heptarm_ros2.node import HeptarmNode
@@ -97,7 +97,7 @@ class Commands:
                 answer = Answer(False, "the node is not configured")
             else:
                 if self._offered is None or self._offered[0] is not driver:
-                    self._offered = driver, Services(driver)
+                    self._offered = driver, Services(driver, convert.ros(self._node))
                 answer = self._offered[1].answer(row, request)
             return fill(response, answer)
 

@@ -29,6 +29,7 @@ from heptarm.bridge.runner import Feedback
 from heptarm.bridge.servo_execution import ServoExecution
 from heptarm.bridge.spline_execution import SplineExecution
 from heptarm.bridge.stream import Stream
+from heptarm.bridge.trajectory import Sample
 from heptarm.errors import HeptarmError, NotReady, ShapeError
 from heptarm.io.clock import RealClock
 from heptarm.values.arrays import Array
@@ -111,7 +112,12 @@ class Driver:
         self.fri = FriSession(self._arm)
         self._told = (0, 0.0)  # the last feedback: of which goal, and when
         self._execution = self._way()
-        self._stream = Stream(self._arm, timeout=values["command_timeout"], options=configuration.servo)
+        self._stream = Stream(
+            self._arm,
+            timeout=values["command_timeout"],
+            options=configuration.servo,
+            line_speed=values["servo.line_speed"],
+        )
         self._pump = threading.Thread(target=self._run, name="heptarm-states")
         self._pump.start()
         listener.on_link("")
@@ -256,6 +262,10 @@ class Driver:
         except HeptarmError as error:
             raise GoalRefused(str(error)) from error
         return self._execution.accept(goal)
+
+    def at(self, time: float) -> Sample | None:
+        """What the goal under way wants at a time on the clock of `now` [s]; None: nothing."""
+        return self._execution.at(time)
 
     def cancel(self, number: int) -> bool:
         """End a goal early; the arm brakes. False: it is not under way."""

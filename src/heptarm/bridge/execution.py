@@ -6,6 +6,7 @@ from typing import Protocol
 
 from heptarm.bridge.goal import End, Goal
 from heptarm.bridge.runner import Feedback, Measured, Settings
+from heptarm.bridge.trajectory import Sample
 from heptarm.values.state import State
 
 
@@ -54,6 +55,10 @@ class Execution(Protocol):
         Raises:
             GoalRefused: it makes no sense, or the arm cannot follow now.
         """
+        ...
+
+    def at(self, time: float) -> Sample | None:
+        """What the goal under way wants at a time [s]; None: there is none, or it has not begun or is over then."""
         ...
 
     def cancel(self, number: int) -> bool:

@@ -13,6 +13,7 @@ from heptarm.arm.arm import Arm
 from heptarm.bridge.execution import Listener, measured
 from heptarm.bridge.goal import End, Goal, GoalRefused
 from heptarm.bridge.runner import Feedback, Runner, Settings, Step
+from heptarm.bridge.trajectory import Sample
 from heptarm.errors import HeptarmError
 from heptarm.io.clock import Clock, RealClock
 
@@ -114,6 +115,11 @@ class Following(ABC):
                 _log.warning("goal %d: all default tolerances count: %s", number, self._runner.warning)
             self._changed.notify_all()
             return number
+
+    def at(self, time: float) -> Sample | None:
+        """What the goal under way wants at a time; see `Execution`."""
+        with self._changed:
+            return self._runner.at(time)
 
     def cancel(self, number: int) -> bool:
         """End a goal early; the arm brakes. False: it is not under way."""

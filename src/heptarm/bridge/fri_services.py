@@ -21,8 +21,9 @@ class FriServices(Offer):
             self._check_active()
         else:
             self._rest()
-        settings = {
+        settings: dict[str, Any] = {
             "multiplier": request.multiplier or 1,
+            "io": tuple(request.io),
             "host": request.host or self._driver.configuration.values["fri.host"],
         }
         if request.period_ms:

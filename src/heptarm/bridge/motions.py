@@ -13,6 +13,7 @@ from heptarm.bridge.driver import Driver
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.values.arrays import Array
 from heptarm.values.circ import circ
+from heptarm.values.guiding import hand_guide
 from heptarm.values.lines import LinRel, lin, lin_rel
 from heptarm.values.motion import TOOL, Motion, hold, ptp, ptp_home
 from heptarm.values.pose import Pose
@@ -20,7 +21,7 @@ from heptarm.values.redundancy import Redundancy
 from heptarm.values.spline import Segment, spl, spline, spline_joints
 
 #: Kinds of motions, as heptarm_msgs/Motion numbers them; heptarm_msgs/MovePose has the first four.
-PTP, LIN, CIRC, LIN_REL, SPLINE, JOINT_SPLINE, HOLD, HOME = range(8)
+PTP, LIN, CIRC, LIN_REL, SPLINE, JOINT_SPLINE, HOLD, HOME, GUIDE = range(9)
 #: Kinds of a spline's segments, as heptarm_msgs/Segment numbers them.
 _SPL, _LIN, _CIRC = range(3)
 _PATH = (
@@ -108,6 +109,8 @@ def motion_of(driver: Driver, message: Any, name: str = "motion") -> Motion:
         return hold(message.duration or inf)
     if kind == HOME:
         return ptp_home(**plain, **blending)
+    if kind == GUIDE:
+        return _guiding(message)
     if kind == JOINT_SPLINE:
         return spline_joints(joint_points(driver, message.joint_names, message.position), **plain)
     if kind == PTP and len(message.position):
@@ -131,7 +134,7 @@ def motion_of(driver: Driver, message: Any, name: str = "motion") -> Motion:
         return circ(pose_of(message.via), _pose(driver, message.pose), **near, **how)
     if kind == LIN_REL:
         return offset(message.pose, how)
-    raise CommandRejected(f"{name} is of kind {kind}; 0 to {HOME} are known", parameter="kind", value=kind)
+    raise CommandRejected(f"{name} is of kind {kind}; 0 to {GUIDE} are known", parameter="kind", value=kind)
 
 
 def offset(message: Any, how: dict[str, Any] | None = None) -> LinRel:
@@ -171,6 +174,13 @@ def segment_of(message: Any) -> Segment:
 
 def _pose(driver: Driver, message: Any) -> Pose:
     return stamped_pose(message, driver.configuration.frame("base"))
+
+
+def _guiding(message: Any) -> Motion:
+    limits = {name: list(getattr(message, name)) for name in ("q_min", "q_max") if len(getattr(message, name))}
+    words = {name: getattr(message, name) for name in ("at_limit", "outside") if getattr(message, name)}
+    how: dict[str, Any] = limits | words
+    return hand_guide(**how, **_given(message, ("joint_velocity", "cartesian_velocity")))
 
 
 def _redundancy(values: Sequence[float]) -> Redundancy:

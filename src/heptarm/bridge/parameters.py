@@ -103,6 +103,7 @@ PARAMETERS = (
     Parameter("servo.horizon", 0.1, "so far ahead on the tangent lies a target of direct [s]", 0.02, 1.0),
     Parameter("servo.speed", 1.0, "ceiling of the speed, a fraction of each axis' maximum", 0.01, 1.0),
     Parameter("servo.acceleration", 1.0, "ceiling of the acceleration, likewise", 0.01, 1.0),
+    Parameter("servo.line_speed", 0.25, "largest speed of servo/lin along each axis of the base [m/s]", 0.001, 10.0),
     Parameter("servo.linger", 0.5, "how long the servo motion stays open after a goal [s]", 0.0, 60.0),
     Parameter("servo.lookahead", 0.004, "how long a target takes to become motion [s]", 0.0, 0.5),
     Parameter("fri.period", 5.0, "time between two messages of FRI, whole milliseconds [ms]", 1.0, 10.0),

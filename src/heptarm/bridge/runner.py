@@ -180,6 +180,15 @@ class Runner:
         self._running = _Running(self._number, goal, trajectory, tolerances, begin, offset=offset, late=late)
         return self._number
 
+    def at(self, time: float) -> Sample | None:
+        """What the goal under way wants at a time [s]; None: there is none, or it has not begun or is over then."""
+        run = self._running
+        if run is None or run.begin is None or time < run.begin:
+            return None
+        looked = run.begin if self._now is None else max(self._now, run.begin)
+        tau = run.tau + time - looked
+        return run.trajectory.sample(tau) if 0.0 <= tau <= run.trajectory.duration else None
+
     def cancel(self, number: int, now: float) -> bool:
         """End a goal early; the arm brakes. False: it is not under way."""
         if self._running is None or self._running.number != number:

@@ -72,8 +72,12 @@ class Offer:
 
 
 def fill(response: Any, answer: Answer) -> Any:
-    """A response with what an answer says."""
+    """A response with what an answer says; None: no success, and nowhere to say so, as in a type of ROS 1's own."""
     fields: dict[str, Any] = {"success": answer.success, "message": answer.message}
+    if not hasattr(response, "success"):
+        if not answer.success:
+            return None
+        fields = {}
     if isinstance(answer, Told):
         fields.update(answer.fields)
     _put(response, fields)

@@ -2,7 +2,7 @@
 
 A node makes a service of every row of `SERVICES`; the fields of a request are those of the row's type::
 
-    services = Services(driver)
+    services = Services(driver, ros)
     for row in SERVICES:
         ...                # of row.type, under row.name: fill(response, services.answer(row, request))
 """
@@ -17,6 +17,7 @@ from heptarm.bridge.conditions import condition_of
 from heptarm.bridge.driver import Answer, Driver
 from heptarm.bridge.fri_services import FRI, FriServices
 from heptarm.bridge.io_services import SIGNALS, Signals
+from heptarm.bridge.messages import Ros
 from heptarm.bridge.mode_services import MODES, Modes
 from heptarm.bridge.service import Service, Told, names
 from heptarm.bridge.tool_services import TOOLS, Tools
@@ -31,10 +32,12 @@ class Services(Modes, Tools, Signals, FriServices):
 
     Args:
         driver: whose arm it is.
+        ros: of which ROS the requests are.
     """
 
-    def __init__(self, driver: Driver) -> None:
+    def __init__(self, driver: Driver, ros: Ros) -> None:
         super().__init__(driver)
+        self._ros = ros
         self._lock = threading.Lock()
 
     def answer(self, row: Service, request: Any) -> Answer:
@@ -94,6 +97,21 @@ class Services(Modes, Tools, Signals, FriServices):
         self._arm.operator.do(request.value)
         return f"done: {request.value}"
 
+    def query(self, request: Any) -> Answer:
+        """What the trajectory under way wants at a time of ROS; 0: now."""
+        seconds = self._ros.seconds(request.time)
+        ahead = seconds - 1e-9 * self._ros.now() if seconds else 0.0
+        wanted = self._driver.at(self._driver.now + ahead)
+        if wanted is None:
+            return Answer(False, "no trajectory is under way at that time")
+        fields = {
+            "name": list(self._driver.configuration.joints),
+            "position": wanted.q.tolist(),
+            "velocity": wanted.dq.tolist(),
+            "acceleration": wanted.ddq.tolist(),
+        }
+        return Told(True, "where the arm should be then", fields)
+
     # ------------------------------------------------------------------------------------ limits
 
     def set_override(self, request: Any) -> Answer:
@@ -143,6 +161,7 @@ SERVICES = (
     Service("~/recover", _TRIGGER, Services.recover),
     Service("~/take_control", _TRIGGER, Services.take_control),
     Service("~/release_control", _TRIGGER, Services.release_control),
+    Service("~/query_state", "control_msgs/QueryTrajectoryState", Services.query, at_once=True),
     Service("~/operate", _TEXT, Services.operate, at_once=True),
     Service("~/set_override", _NUMBER, Services.set_override, at_once=True),
     Service("~/set_speed", _NUMBER, Services.set_speed, at_once=True),

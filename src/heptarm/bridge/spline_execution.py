@@ -165,6 +165,14 @@ class SplineExecution:
             self._changed.notify_all()
             return self._number
 
+    def at(self, time: float) -> Sample | None:
+        """What the goal under way wants at a time; see `Execution`."""
+        run = self._running
+        if run is None or run.handle is None or time < run.begin:
+            return None
+        tau = run.tau + time - self.now
+        return run.trajectory.sample(tau) if 0.0 <= tau <= run.trajectory.duration else None
+
     def cancel(self, number: int) -> bool:
         """End a goal early; the arm brakes. False: it is not under way."""
         with self._changed:

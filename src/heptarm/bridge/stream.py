@@ -31,12 +31,16 @@ class Stream:
         arm: in control.
         timeout: within this time after a target the next one has to come [s].
         options: ceilings.
+        line_speed: along each axis of the base, of straight lines [m/s].
     """
 
-    def __init__(self, arm: Arm, *, timeout: float, options: ServoOptions) -> None:
+    def __init__(
+        self, arm: Arm, *, timeout: float, options: ServoOptions, line_speed: float = 0.25
+    ) -> None:
         self._arm = arm
         self._timeout = timeout
         self._options = options
+        self._line_speed = line_speed
         self._clock = RealClock()
         self._lock = threading.RLock()
         self._servo: JointServo | PoseServo | None = None
@@ -90,7 +94,7 @@ class Stream:
             servo = self._servo
             if not isinstance(servo, PoseServo) or not servo.active or self._kind != kind:
                 self._prepare()
-                servo = self._servo = self._arm.servo(kind, **self._settings).__enter__()
+                servo = self._servo = self._arm.servo(kind, **self._of(kind)).__enter__()
                 self._kind = kind
             servo.set(pose)
 
@@ -123,6 +127,15 @@ class Stream:
         self.close()
         if self._fired:
             raise NotReady(f"ended by {self._fired}", hint="set the guard anew, or none")
+
+    def _of(self, kind: str) -> dict[str, Any]:
+        """Settings of a servo motion of poses: a straight one has limits along its path."""
+        settings = self._settings
+        if kind == "lin":
+            for name in ("speed", "acceleration", "engine"):
+                del settings[name]
+            settings["speed_mps"] = self._line_speed
+        return settings
 
     @property
     def _settings(self) -> dict[str, Any]:

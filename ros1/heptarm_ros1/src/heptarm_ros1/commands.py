@@ -122,7 +122,7 @@ class Commands:
     def __init__(self, node: HeptarmNode, driver: Driver) -> None:
         one_by_one = threading.Lock()
         self._subscribers = [subscriber(node, one_by_one, *topic) for topic in TOPICS]
-        offered = Services(driver)
+        offered = Services(driver, convert.ROS)
         self._services = [_service(offered, row) for row in SERVICES]
 
     def destroy(self) -> None:
