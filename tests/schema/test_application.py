@@ -24,6 +24,7 @@ RUBBISH = b"\xff\xff\xff\xff\xff"
 
 @pytest.fixture(scope="module")
 def cabinet() -> Iterator[PrivateCabinet]:
+    cases()  # takes a while, in which nobody would answer the cabinet
     running = PrivateCabinet.start(Target(model="iiwa14", options=(("speed", "3"),)))
     yield running
     running.close()

@@ -19,6 +19,8 @@ from heptarm.values.arrays import within
 
 _log = logging.getLogger("heptarm.arm")
 
+_LONGEST_NAME = 64
+
 
 def connect(
     target: str | None = None,
@@ -37,7 +39,7 @@ def connect(
     Args:
         target: "ADDRESS[:PORT]" of a cabinet; "sim://iiwa14" or "sim://iiwa7?speed=5" for a private simulator that
             ends with the arm; "sim://HOST:PORT" for a running one. None: the environment variable HEPTARM_TARGET.
-        name: who is calling, shown to other clients; None: user, host and process.
+        name: who is calling, shown to other clients, up to 64 octets; None: user, host and process.
         key: pre-shared key of the cabinet, if it has one.
         control: take control; otherwise observe (and stop). One client at a time controls.
         timeout: how long to wait for the connection and for the answer to each request [s].
@@ -57,6 +59,10 @@ def connect(
     if on_disconnect not in ("stop", "finish"):
         raise ShapeError(
             f'on_disconnect is {on_disconnect!r}; "stop" or "finish" is wanted', parameter="on_disconnect"
+        )
+    if name is not None and len(name.encode()) > _LONGEST_NAME:
+        raise ShapeError(
+            f"name is {name!r}; at most {_LONGEST_NAME} octets are allowed", code=3, parameter="name", value=name
         )
     options = Options(
         name=name or f"{os.environ.get('USER', 'python')}@{socket.gethostname()}:{os.getpid()}",

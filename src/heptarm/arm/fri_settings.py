@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import TYPE_CHECKING, TypedDict
 
 import numpy.typing as npt
@@ -227,10 +228,10 @@ def _signals(names: Sequence[str], connection: Connection) -> tuple[str, ...]:
 
 
 def _check_pace(kind: str, period: float, multiplier: int) -> None:
-    if period != round(period) or not 1 <= period <= 100:
+    if not isfinite(period) or period != round(period) or not 1 <= period <= 100:
         raise LimitError(
             f"period_ms is {period:g}; FRI sends every whole number of milliseconds from 1 to 100",
-            code=int(Code.OUT_OF_RANGE),
+            code=int(Code.OUT_OF_RANGE if isfinite(period) else Code.NOT_FINITE),
             parameter="period_ms",
             value=period,
             allowed="1, 2, ... 100 ms",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from math import isfinite
 from typing import TYPE_CHECKING
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
@@ -80,7 +81,7 @@ class Io(Mapping[str, SignalValue]):
             LimitError: a value that it cannot have.
         """
         if not values:
-            raise ShapeError("no output is named", parameter="values", hint='arm.io.set({"LEDBlue": True})')
+            raise ShapeError("no output is named", code=3, parameter="values", hint='arm.io.set({"LEDBlue": True})')
         wishes = tuple(output(name, value, self._connection.signals) for name, value in values.items())
         self._connection.request(wire.SetSignals(values=wishes))
 
@@ -156,6 +157,8 @@ def output(name: str, value: SignalValue, signals: Sequence[Signal]) -> wire.Set
             hint="outputs can be written",
         )
     number = float(value) if isinstance(value, bool) else scalar(value, signal.name)
+    if not isfinite(number):
+        within(number, signal.name, signal.low, signal.high)
     if isinstance(value, bool) != (signal.kind == "boolean") and number not in (0.0, 1.0):
         raise LimitError(
             f"{signal.name} is {signal.kind}; it cannot be {value!r}",

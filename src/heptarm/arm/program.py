@@ -51,6 +51,7 @@ def listed(motion: Motion | Sequence[Motion]) -> tuple[Motion, ...]:
     if not isinstance(motions, Sequence) or isinstance(motions, str) or not 1 <= len(motions) <= 1000:
         raise ShapeError(
             f"{type(motion).__name__} given where a motion or a list of 1 to 1000 motions is wanted",
+            code=3,
             parameter="motion",
             hint="make motions with ptp, lin, lin_rel, circ, spline and hold",
         )

@@ -6,7 +6,10 @@ from dataclasses import dataclass
 from math import isnan, nan
 
 from heptarm.errors import LimitError
-from heptarm.values.arrays import Value, scalar
+from heptarm.values.arrays import Value, scalar, within
+
+#: Larger arm angles are mistakes [rad].
+_LARGEST = 1000.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,10 +32,8 @@ class Redundancy(Value):
 
     def __post_init__(self) -> None:
         e1 = scalar(self.e1, "e1")
-        if not isnan(e1) and abs(e1) > 1e3:
-            raise LimitError(
-                f"e1 is {e1:g} rad; an angle in [-pi, pi] is wanted", code=2, parameter="e1", value=e1
-            )
+        if not isnan(e1):
+            within(e1, "e1", -_LARGEST, _LARGEST, unit="rad")
         for name, value, last in (("status", self.status, 7), ("turn", self.turn, 127)):
             if not (isinstance(value, int) and -1 <= value <= last):
                 raise LimitError(

@@ -272,7 +272,7 @@ class Redundancy:
         return cls(e1=e1, status=status, turn=turn), pos
 
     def _check(self, path: str) -> None:
-        codec.check(self.e1, path + "e1", -inf, inf, False, True)
+        codec.check(self.e1, path + "e1", -1000.0, 1000.0, False, True)
         codec.check(self.status, path + "status", -1.0, 7.0, False, False)
         codec.check(self.turn, path + "turn", -1.0, 127.0, False, False)
 

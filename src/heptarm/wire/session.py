@@ -157,8 +157,9 @@ class Session:
         return data
 
     def hello(self, *, name: str, version: str = "") -> Hello:
-        """The client's first message."""
-        return Hello(major=MAJOR, minor=MINOR, name=name[:64], version=version[:32], nonce=self._nonce)
+        """The client's first message; of a longer name its first 64 octets."""
+        short = name.encode()[:64].decode(errors="ignore")
+        return Hello(major=MAJOR, minor=MINOR, name=short, version=version[:32], nonce=self._nonce)
 
     def challenge(self) -> Challenge:
         """The cabinet's demand for a proof of the key."""

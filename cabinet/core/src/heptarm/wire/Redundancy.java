@@ -30,7 +30,7 @@ public final class Redundancy {
     }
 
     public void validate(String path) throws Violation {
-        Check.number(e1, path + "e1", Double.NEGATIVE_INFINITY, Double.POSITIVE_INFINITY, false, true);
+        Check.number(e1, path + "e1", -1000.0, 1000.0, false, true);
         Check.number(status, path + "status", -1.0, 7.0, false, false);
         Check.number(turn, path + "turn", -1.0, 127.0, false, false);
     }
