@@ -14,6 +14,7 @@ from typing import Any
 
 import heptarm as ha
 from heptarm import Arm, Pose, Redundancy, Tool
+from heptarm.do import notify, set_output
 from heptarm.modes import CartesianImpedance, JointImpedance, SineImpedance
 from heptarm.values.guiding import hand_guide
 from heptarm.values.signals import Force, force, io, path, torque
@@ -216,6 +217,11 @@ CALLS: dict[str, Call] = {
         "values",
         but=("too long",),  # no cabinet has so many outputs
     ),
+    "Item.triggers": Call(
+        _moving(lambda v: reduce(lambda m, _: m.trigger(force > 5, notify()), v, ha.ptp(HOME))), "triggers"
+    ),
+    "Notify.label": Call(_moving(lambda v: ha.ptp(HOME).trigger(force > 5, notify(v))), "label"),
+    "SetSignal.signal": Call(_moving(lambda v: ha.ptp(HOME).trigger(force > 5, set_output(v))), "signal"),
     "SetSignal.value": Call(lambda arm, v: arm.io.set({"MediaFlange.LEDBlue": v}), "MediaFlange.LEDBlue"),
     "SetOverride.value": Call(lambda arm, v: arm.set_override(v), "override"),
     "ToolInfo.name": Call(lambda arm, v: arm.attach_tool(Tool(v)), "name"),
@@ -270,7 +276,4 @@ FIXED = {
     "AnyOf.n": "counted by |",
     "ServoOpen.watchdog": "for the first target always the longest one",
     "FriOpen.port": "of the socket that was opened",
-    "Item.triggers": "made by the program's own functions",
-    "Notify.label": "made by the program's own functions",
-    "SetSignal.signal": "the full name of a signal that was found",
 }

@@ -243,6 +243,7 @@ WRONG = {
         "values[0].signal",
         lambda arm: arm.io.set({BUTTON: True}),
         "signal",
+        UNSUPPORTED,
     ),
     "process data": Wrong(
         wire.GetProcessData(name="cell.no"),
