@@ -26,6 +26,7 @@ import heptarm.wire.OrientationReference;
 import heptarm.wire.OrientationType;
 import heptarm.wire.Pose;
 import heptarm.wire.SafetyBits;
+import heptarm.wire.SetSignal;
 import heptarm.wire.ToolInfo;
 
 /** An application on heptarm's core without any network; each step leaves a line that the test reads. */
@@ -108,6 +109,10 @@ public class Alone extends RoboticsAPIApplication {
         say("and, not", end.cause == Cause.CONDITION && end.fired == 3);
         end = arm.move(down.until(Until.joint(4, -500, 500).or(Until.torque(Axis.X, -900, 900)).or(Until.left(0.1))));
         say("the leaf that fires is named", end.cause == Cause.CONDITION && end.fired == 3);
+        arm.write("MediaFlange.LEDBlue", 0);
+        end = arm.move(down.trigger(Until.travelled(0.02), new SetSignal("MediaFlange.LEDBlue", 1)).until(Until.travelled(0.06)));
+        say("a trigger on the way switches a lamp", end.cause == Cause.CONDITION && arm.read("MediaFlange.LEDBlue") == 1.0);
+        arm.write("MediaFlange.LEDBlue", 0);
         say("a signal that is none", code(() -> arm.move(down.until(Until.signal("No.Such", true)))) == Code.UNKNOWN_NAME);
         arm.move(HOME);
     }
