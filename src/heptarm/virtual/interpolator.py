@@ -26,10 +26,10 @@ from heptarm.virtual.law import Sensed
 from heptarm.virtual.load import Load
 from heptarm.virtual.order import Order
 from heptarm.virtual.pace import TICK, Pace
-from heptarm.virtual.path import JointLine, JointPath
-from heptarm.virtual.planner import Plan
-from heptarm.virtual.profile import Limits, TimeLaw, brake
+from heptarm.virtual.path import JointLine
+from heptarm.virtual.profile import Limits, brake
 from heptarm.virtual.queue import Cancellation, Queue
+from heptarm.virtual.run import Run
 from heptarm.virtual.safety import Mode, Safety
 from heptarm.virtual.servo import Follower, SmartFollower, follower
 
@@ -48,53 +48,6 @@ FAST_JERK = 20.0
 ON_LIMIT = 1e-9
 #: A set-point that asks for more than this many times an axis' speed is not followed.
 OVERSPEED = 1.2
-
-
-class Run:
-    """An order under way.
-
-    Args:
-        planned: its plan.
-        serial: its number among all accepted orders.
-        watches: its conditions.
-    """
-
-    __slots__ = (
-        "braking",
-        "broken",
-        "cancelled",
-        "ended",
-        "failure",
-        "follower",
-        "guidance",
-        "part",
-        "path",
-        "plan",
-        "profile",
-        "serial",
-        "settling",
-        "started",
-        "time",
-        "watches",
-    )
-
-    def __init__(self, planned: Plan, serial: int, watches: tuple[Watching, ...]) -> None:
-        self.plan = planned
-        self.serial = serial
-        self.watches = watches
-        self.path: JointPath | None = planned.path
-        self.profile: TimeLaw | None = planned.profile
-        self.failure = ""
-        self.part = 0
-        self.time = 0.0
-        self.braking = False
-        self.cancelled = False
-        self.ended = False
-        self.settling = 0
-        self.started = False
-        self.follower: Follower | None = None
-        self.guidance: Guidance | None = None
-        self.broken = False
 
 
 class Interpolator:
