@@ -9,10 +9,10 @@ from tests.cli.running import objects, run, sim
 
 def test_taught_and_replayed(tmp_path: Path) -> None:
     file = tmp_path / "way.npz"
-    hand = [word for second in range(3, 40, 4) for word in ("--fault", f"push 0 4 4 0.5@{second}")]
+    hand = [word for second in range(2, 40, 2) for word in ("--fault", f"push 0 4 4 0.3@{second}")]
     with sim(*hand) as ready:
         target = ("--target", ready["target"])
-        (taught,) = objects("teach", str(file), "--free", "xyz", "--seconds", "5", *target)
+        (taught,) = objects("teach", str(file), "--free", "xyz", "--seconds", "3", *target)
         assert taught["recorded"] > taught["points"] >= 2 and file.exists()
         (done,) = objects("replay", str(file), "--by", "spline", "--pace", "0.3", *target)
         assert done["cause"] == "finished" and done["deviation_rad"] < 0.2
