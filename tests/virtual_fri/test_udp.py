@@ -369,4 +369,4 @@ def test_events_have_words() -> None:
         "quality FAIR -> GOOD (latency 0.25 ms, jitter 0.10 ms)"
     )
     assert words(OverlayEnded("cancelled", "")) == "overlay ended: cancelled"
-    assert words(Refused("no")) == "no" and words(OutputWritten(io)) == ""
+    assert words(Refused("no")) == "no" and words(OutputWritten(io)) == "output A.B = 1"
