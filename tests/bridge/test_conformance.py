@@ -12,6 +12,7 @@ from heptarm.bridge.parameters import Configuration
 from heptarm.bridge.runner import Feedback, Measured, Runner
 from heptarm.bridge.trajectory import Sample
 from heptarm.errors import HeptarmError
+from heptarm.values.arrays import Array
 from heptarm.values.robot import robot
 from tests.conformance.cases import CASES, HOME
 from tests.conformance.client import Ended, Sent, Told
@@ -35,6 +36,7 @@ class Bare:
         self._late: deque[Sample] = deque()
         self._ends: dict[int, End] = {}
         self._told: dict[int, list[Feedback]] = {}
+        self._track: list[tuple[float, Array]] = []
 
     def now(self) -> float:
         return self._time
@@ -45,6 +47,9 @@ class Bare:
 
     def place(self) -> Sample:
         return Sample(self._q.copy(), self._dq.copy(), np.zeros(7))
+
+    def track(self) -> list[tuple[float, Array]]:
+        return self._track
 
     def send(self, goal: Goal) -> Sent:
         try:
@@ -132,6 +137,7 @@ class Bare:
             command = self._late.popleft()
         self._dq = (command.q - self._q) / PERIOD
         self._q = command.q + 1e-6  # no arm is exact
+        self._track.append((self._time, self._q))
 
     def _collect(self, ends: tuple[End, ...]) -> None:
         self._ends.update({end.number: end for end in ends})

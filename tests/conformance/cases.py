@@ -18,10 +18,12 @@ from tests.conformance.client import Client, Ended, Sent
 Case = Callable[[Client], None]
 CASES: dict[str, Case] = {}
 
+_OWN_BRAKES = "a motion of the cabinet brakes by the cabinet's own limits"
 #: What a way of execution cannot be asked, and why.
 UNFIT: dict[str, dict[str, str]] = {
     "spline": {
-        "the_deceleration_is_a_parameter": "a motion of the cabinet brakes by the cabinet's own limits",
+        "the_deceleration_is_a_parameter": _OWN_BRAKES,
+        "cancelling_brakes_as_the_parameter_says": _OWN_BRAKES,
         "an_end_that_moves_where_it_is_allowed": "a spline of the cabinet ends at rest, so such a goal is refused",
     }
 }
@@ -478,6 +480,43 @@ def cancelling_goes_straight_on_while_it_brakes(client: Client) -> None:
     assert np.abs(np.delete(rest - here, joint)).max() < 5e-3
 
 
+def _brakes(client: Client) -> tuple[Array, Array]:
+    """Cancel A7 in mid-air at 0.4 rad/s: times [s] and places [rad] of every joint state from then on."""
+    here = client.place().q
+    sign = -1.0 if here[6] > 0 else 1.0
+    sent = client.send(goal(client, point(2.0, here + sign * 0.8 * (np.arange(7) == 6))))
+    assert sent.accepted
+    under_way(client, here, 0.2)
+    count = len(client.track())
+    client.cancel(sent)
+    assert client.result(sent).outcome is Outcome.CANCELED
+    rests(client)
+    track = client.track()[count - 2 :]
+    return np.array([time for time, _ in track]), np.array([sign * q[6] for _, q in track])
+
+
+@case
+def cancelling_makes_no_jump(client: Client) -> None:
+    times, way = _brakes(client)
+    # a spline may go faster between two points than the trajectory does, and a stream falters on a busy machine
+    speeds = np.diff(way) / np.diff(times)
+    assert way[-1] - way[0] > 5e-3, "it was under way"
+    assert speeds.max() < 1.2, speeds
+    assert speeds.min() > -0.1, "straight on, and not back"
+
+
+@case
+def cancelling_brakes_as_the_parameter_says(client: Client) -> None:
+    assert client.set(max_deceleration_on_cancel=0.5)
+    times, way = _brakes(client)
+    left = way[-1] - way
+    # with constant deceleration the square root of the way that is left falls evenly
+    inside = (left > 0.01) & (left < 0.1)
+    assert inside.sum() > 5, left
+    slope, _ = np.polyfit(times[inside], np.sqrt(left[inside]), 1)
+    assert 0.3 < 2.0 * slope**2 < 0.8, f"the arm has braked with {2.0 * slope**2:.2f} rad/s²"
+
+
 @case
 def a_goal_right_after_a_cancellation_is_accepted(client: Client) -> None:
     here = client.place().q
@@ -773,7 +812,9 @@ def _scaled(client: Client, factor: float) -> None:
         told = client.feedback(sent)
         late = [one for one in told if one.elapsed > 0.3]
         for one in late:
-            assert abs(one.time - factor * one.elapsed) < (0.02 if client.timely else 0.25)
+            late = one.time - factor * one.elapsed
+            # a spline of the cabinet takes less time than a trajectory that is slower than it need be
+            assert abs(late) < (0.02 if client.timely else 0.4), (one.time, one.elapsed)
         assert np.abs(client.place().q - last(wanted, client)).max() < TOUCH
         wanted = goal(client, point(0.8, here, dq=REST))
 

@@ -66,6 +66,10 @@ class Client(Protocol):
         """Where the arm is, from the newest joint state."""
         ...
 
+    def track(self) -> list[tuple[float, Array]]:
+        """Where the arm was, shape (7,) [rad], in every joint state so far, with its time stamp [s]."""
+        ...
+
     def send(self, goal: Goal) -> Sent:
         """Send a goal and wait until it is accepted or rejected."""
         ...

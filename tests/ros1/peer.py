@@ -227,6 +227,9 @@ class Client:
         assert tuple(message.name) == self.joints
         return Sample(np.array(message.position), np.array(message.velocity), np.zeros(7))
 
+    def track(self) -> list[tuple[float, Any]]:
+        return [(one.header.stamp.to_sec(), np.array(one.position)) for one in list(self.states)]
+
     def send(self, goal: Goal) -> Sent:
         told: list[Told] = []
         handle = self._action.send_goal(

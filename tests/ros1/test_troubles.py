@@ -53,13 +53,19 @@ def test_a_killed_client_leaves_a_node_that_lives(client: Client) -> None:
 
 
 @pytest.fixture
-def other(ros: None, spare: Stage) -> Client:
-    """A client of another arm's node, which may come to harm."""
+def spare_node(ros: None, spare: Stage) -> NodeProcess:
+    """Another arm's node, which may come to harm."""
     node = NodeProcess(spare.target, ns="/other", prefix="other_")
+    yield node
+    assert node.end(signal.SIGTERM) == 0, node.said
+
+
+@pytest.fixture
+def other(spare: Stage, spare_node: NodeProcess) -> Client:
+    """A client of it."""
     client = Client(spare, name="/other/heptarm", prefix="other_")
     client.ready()
-    yield client
-    assert node.end(signal.SIGTERM) == 0, node.said
+    return client
 
 
 def test_an_emergency_stop_ends_the_goal(other: Client) -> None:
@@ -97,6 +103,19 @@ def test_a_cabinet_without_power_and_back(other: Client) -> None:
     rests(other)
     times = [message.header.stamp.to_nsec() for message in other.states]
     assert len(set(times)) == len(times)
+    assert other.result(other.send(step(other))).code is Code.SUCCESSFUL
+
+
+def test_a_node_that_the_system_stops_for_a_while(other: Client, spare_node: NodeProcess) -> None:
+    """The cabinet brakes the arm, the goal ends, and the node goes on."""
+    sent = other.send(step(other, time=6.0, size=3.0))
+    until(lambda: other.feedback(sent), "the goal does not begin")
+    spare_node.process.send_signal(signal.SIGSTOP)
+    time.sleep(2.0)
+    spare_node.process.send_signal(signal.SIGCONT)
+    ended = other.result(sent)
+    assert (ended.outcome, ended.code) == (Outcome.ABORTED, Code.INVALID_GOAL), ended
+    rests(other)
     assert other.result(other.send(step(other))).code is Code.SUCCESSFUL
 
 

@@ -270,6 +270,9 @@ class Client:
         assert tuple(message.name) == self.joints
         return Sample(np.array(message.position), np.array(message.velocity), np.zeros(7))
 
+    def track(self) -> list[tuple[float, Any]]:
+        return [(stamp(message), np.array(message.position)) for message in list(self.states)]
+
     def send(self, goal: Goal) -> Sent:
         told: list[Told] = []
         future = self._action.send_goal_async(
