@@ -10,7 +10,9 @@ import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.arm.handle import MotionHandle
+from heptarm.do import notify
 from heptarm.errors import HeptarmError, ModeConflict, MotionAborted
+from heptarm.model.kinematics import forward
 from heptarm.testing.measure import above, below, fresh, holds, near, note, record, watch
 from heptarm.testing.scenario import scenario
 from heptarm.testing.stage import HOME
@@ -19,6 +21,7 @@ from heptarm.values.mode import JointImpedance
 from heptarm.values.motion import Motion, hold, lin, lin_rel, ptp
 from heptarm.values.pose import Pose, deg
 from heptarm.values.result import Cause
+from heptarm.when import path
 
 
 def _turned(degrees: float) -> Motion:
@@ -158,6 +161,24 @@ def progress(arm: Arm) -> None:
     holds((np.diff([one[1] for one in seen]) >= 0).all(), "progress never goes back")
     ends = told[:, 0] + told[:, 2]
     below(float(np.ptp(ends[2:])), 0.05, "the end that they foretell moves by", unit="s")
+
+
+@scenario(line=2, space=0.2, needs=("lin_rel", "blending", "triggers"))
+def triggers(arm: Arm) -> None:
+    """Triggers of blended motions fire at their points of the path, the motions go on, and the handle hears of all."""
+    start = arm.wait_for_rest().pose.xyz
+    there = lin_rel(y=0.08, frame="base", speed_mps=0.05, blend_m=0.01).trigger(path.after(0.04), notify("half"))
+    back = lin_rel(z=0.04, frame="base", speed_mps=0.05).trigger(path.before_end(), notify("end"))
+    handle = arm.start([there, back])
+    events = list(handle.events())
+    holds(handle.wait().arrived, "the program arrives")
+    told = [(event.kind, event.item, event.label) for event in events]
+    wanted = [("begun", 0, ""), ("trigger", 0, "half"), ("ended", 0, ""), ("begun", 1, "")]
+    holds(told[:4] == wanted and ("trigger", 1, "end") in told, f"events in their order: {told}")
+    half = next(event.state for event in events if event.label == "half")
+    assert half is not None and half.joints is not None
+    moved = Pose.from_matrix(forward(arm.robot, half.joints.q_cmd)).xyz - start
+    above(float(moved[1]), 0.039, "heard of behind the point, at", unit="m")
 
 
 @scenario(line=2, rows="B12", space=0.1, needs=("ptp", "hold"))
