@@ -153,7 +153,7 @@ class MotionHandle:
 
     @property
     def remaining(self) -> float:
-        """Time to the end of the motion, or of those that blend with it [s], at full override; NaN where it is not told."""
+        """Time to the end of the motion, or of those blended with it [s], at full override; NaN if it is not told."""
         state = None if self.done else self._connection.newest()
         seen = None if state is None else state.motion
         return seen.remaining if seen is not None and seen.id == self._id else nan
