@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import ast
 import importlib.util
+import os
 import re
+import shutil
+import signal
+import subprocess
 import sys
 import types
 import xml.etree.ElementTree as ET
@@ -15,10 +19,13 @@ import numpy as np
 import pytest
 import xacro
 import yaml
+from sensor_msgs.msg import JointState
 
 from heptarm.bridge.parameters import PARAMETERS, Configuration, of_joints
 from heptarm.model.kinematics import forward
 from heptarm.values.robot import ROBOTS
+from tests.conformance.stage import Stage
+from tests.ros2.peer import Ros, until
 
 ROOT = Path(__file__).parents[2]
 ROS2 = ROOT / "ros2"
@@ -299,3 +306,21 @@ def test_upstreams_launch_reads_them(path: Path) -> None:
 
     root, parser = Parser.load(str(path))
     assert parser.parse_description(root).entities
+
+
+@pytest.mark.skipif(
+    shutil.which("ros2") is None, reason="upstream's launch is in no wheel: this needs an installation of ROS 2"
+)
+def test_upstreams_launch_starts_the_node(stage: Stage, ros: Ros) -> None:
+    if subprocess.run(["ros2", "pkg", "prefix", "heptarm_bringup"], check=False).returncode:
+        pytest.skip("heptarm_bringup is in no workspace that is sourced")
+    command = ["ros2", "launch", "heptarm_bringup", "heptarm.launch.xml", f"target:={stage.target}"]
+    command += ["namespace:=launched", "prefix:=l_", "description:=false"]
+    process = subprocess.Popen(command, start_new_session=True)
+    try:
+        states = ros.collect(JointState, "/launched/joint_states")
+        until(lambda: states, "the node does not start")
+        assert list(states[-1].name) == [f"l_A{i}" for i in range(1, 8)]
+    finally:
+        os.killpg(process.pid, signal.SIGINT)  # its children outlive it otherwise
+        process.wait(60)
