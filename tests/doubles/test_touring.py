@@ -66,6 +66,8 @@ SAID = (
     "STOP ME",
     "the stop and its end were told",
     "and the motion went on by itself",
+    "PRESS ME",
+    "the second half of a double key",
     "ASK ME",
     "a dialog",
     "disposed",
@@ -133,6 +135,8 @@ def test_a_tour_through_sunrise(tmp_path: Path, project: Path) -> None:
         assert '"error": ""' in _do("protective_stop", process)
         time.sleep(0.5)  # the arm stands for a while
         assert '"error": ""' in _do("clear", process)
+        _until(said, "PRESS ME", process)
+        assert '"error": ""' in _do("press 2 tour second", process)
         _until(said, "ASK ME", process)
         for _ in range(200):  # the dialog comes a moment later
             if '"error": ""' in _do("answer 1", process):

@@ -43,6 +43,7 @@ def test_every_word_of_the_help_is_understood(words: str) -> None:
         ("set Cell.Door ajar", "true or false"),
         ("set Cell.Door 1", "no signal 'Cell.Door'"),
         ("press 4", "slots"),
+        ("press 1 heptarm third", "the second"),
         ("press 1", "no user key 1"),
         ("answer 0", "no dialog"),
     ],
@@ -136,5 +137,6 @@ def test_signals_are_set_and_keys_pressed_also_at_a_time() -> None:
         operator.do("set Door 0")
     operator.do("press 2")
     operator.do("press 0 heptarm")
-    assert pressed == [("client", 2), ("heptarm", 0)]
+    operator.do("press 1 heptarm second")
+    assert pressed == [("client", 2), ("heptarm", 0), ("heptarm", 5)]
     assert plant.signals.names == ("Cell.Door", "Flange.Door")

@@ -43,7 +43,7 @@ WORDS = {
     "push FX FY FZ [SECONDS]": "push the flange, base axes [N]",
     "set SIGNAL VALUE": "give a signal of the cabinet a value: a number, true or false",
     "answer BUTTON": "press a button of the dialog that is shown, from 0",
-    "press SLOT [BAR]": "press and release a user key, 0 to 3; of the bar for clients, or another",
+    "press SLOT [BAR [second]]": "press and release a user key, 0 to 3, or its second half; of another bar",
 }
 _ALSO = {
     "estop": "emergency_stop",
@@ -74,9 +74,11 @@ _COUNTS = {
     "override": (1, 1),
     "push": (3, 4),
     "set": (2, 2),
-    "press": (1, 2),
+    "press": (1, 3),
     "answer": (1, 1),
 }
+#: User keys of a bar; numbers from here on mean their second halves.
+SLOTS = 4
 _TRUTH = {"true": 1.0, "false": 0.0}
 _TIMED = re.compile(r"(.+?)\s*@\s*([0-9.]+)\s*s?\s*")
 
@@ -131,6 +133,8 @@ def _named(words: str, name: str) -> list[float | str]:
     if name == "press":
         if first not in ("0", "1", "2", "3"):
             raise ValueError(f"{words!r}: slots are 0 to 3")
+        if rest[1:] not in ([], ["second"]):
+            raise ValueError(f"{words!r}: of a double key there is the first half, or the second")
         return [float(first), *rest]
     value = rest[0].lower()
     try:
@@ -224,8 +228,8 @@ class Operator:
         if not self.answer(int(button)):
             raise ValueError(f"no dialog with a button {int(button)} is shown")
 
-    def _press(self, slot: float, bar: str = "client") -> None:
-        if not self.press(bar, int(slot)):
+    def _press(self, slot: float, bar: str = "client", half: str = "") -> None:
+        if not self.press(bar, int(slot) + (SLOTS if half else 0)):
             raise ValueError(f"there is no user key {int(slot)} in a bar {bar!r}, or it is disabled")
 
     def _push(self, x: float, y: float, z: float, seconds: float = float("inf")) -> None:

@@ -134,6 +134,11 @@ import com.kuka.roboticsAPI.sensorModel.TorqueSensorData;
 import com.kuka.roboticsAPI.sensorModel.TorqueStatistic;
 import com.kuka.roboticsAPI.uiModel.ApplicationDialogType;
 import com.kuka.roboticsAPI.uiModel.IApplicationUI;
+import com.kuka.roboticsAPI.uiModel.userKeys.IUserKey;
+import com.kuka.roboticsAPI.uiModel.userKeys.IUserKeyBar;
+import com.kuka.roboticsAPI.uiModel.userKeys.IUserKeyListener;
+import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyAlignment;
+import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyEvent;
 import com.kuka.task.ITask;
 import com.kuka.task.ITaskFunctionMonitor;
 import com.kuka.task.ITaskInstance;
@@ -143,7 +148,7 @@ import com.kuka.task.TaskFunctionMonitor;
 
 /** What of Sunrise the other samples leave out, each with a line that the test reads. */
 @ResumeAfterPauseEvent(delay = 20, afterRepositioning = true)
-public class Touring extends RoboticsAPIApplication implements ISunriseControllerStateListener {
+public class Touring extends RoboticsAPIApplication implements ISunriseControllerStateListener, IUserKeyListener {
     private static final JointPosition BENT = new JointPosition(0.1, 0.5, 0.0, -1.2, 0.0, 0.9, 0.0);
 
     @Inject
@@ -495,10 +500,25 @@ public class Touring extends RoboticsAPIApplication implements ISunriseControlle
         say("the stop and its end were told", heard.contains("ready false") && heard.contains("ready true")
                 && heard.contains("safety STOP1") && heard.contains("safety NOSTOP"));
         say("and the motion went on by itself", !container.hasError());
+        IUserKeyBar bar = pad.createUserKeyBar("tour");
+        IUserKey key = bar.addDoubleUserKey(2, this, true);
+        key.setText(UserKeyAlignment.TopMiddle, "on");
+        key.setText(UserKeyAlignment.BottomMiddle, "off");
+        bar.publish();
+        say("PRESS ME", true);
+        for (int i = 0; i < 2000 && !heard.contains("SecondKeyUp"); i++) {
+            ThreadUtil.milliSleep(10);
+        }
+        say("the second half of a double key", heard.contains("SecondKeyDown") && !heard.contains("FirstKeyDown"));
         say("ASK ME", true);
         int answer = pad.displayModalDialog(ApplicationDialogType.QUESTION, "Has it been a good tour?", "no", "yes");
         say("a dialog", answer == 1);
         log.info("toured");
+    }
+
+    @Override
+    public void onKeyEvent(IUserKey key, UserKeyEvent event) {
+        heard.add(event.toString());
     }
 
     // ------------------------------------------------------------------------------ the controller's listener

@@ -17,6 +17,9 @@ import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyLEDSize;
 /** The smartPAD's user keys, pressed by whoever plays the operator. */
 public final class Pad implements IApplicationUI {
     private static final int SLOTS = 4;
+    private static final UserKeyEvent[] SINGLE = {UserKeyEvent.KeyDown, UserKeyEvent.KeyUp};
+    private static final UserKeyEvent[] FIRST = {UserKeyEvent.FirstKeyDown, UserKeyEvent.FirstKeyUp};
+    private static final UserKeyEvent[] SECOND = {UserKeyEvent.SecondKeyDown, UserKeyEvent.SecondKeyUp};
 
     private final List<Bar> bars = new CopyOnWriteArrayList<>();
 
@@ -32,7 +35,7 @@ public final class Pad implements IApplicationUI {
         return new Bar(name);
     }
 
-    /** Presses and releases a key of a published bar; false if there is none, or it is disabled. */
+    /** Presses and releases a key of a published bar, from 4 on its second half; false if there is none, or it is disabled. */
     public boolean press(String bar, int slot) {
         for (Bar one : bars) {
             if (one.name.equals(bar)) {
@@ -99,10 +102,12 @@ public final class Pad implements IApplicationUI {
         }
 
         boolean press(int slot) {
+            boolean second = slot >= SLOTS;
             for (Key key : keys) {
-                if (key.slot == slot && key.enabled) {
-                    key.listener.onKeyEvent(key, key.isDouble ? UserKeyEvent.FirstKeyDown : UserKeyEvent.KeyDown);
-                    key.listener.onKeyEvent(key, key.isDouble ? UserKeyEvent.FirstKeyUp : UserKeyEvent.KeyUp);
+                if (key.slot == slot % SLOTS && key.enabled && (key.isDouble || !second)) {
+                    UserKeyEvent[] events = second ? SECOND : key.isDouble ? FIRST : SINGLE;
+                    key.listener.onKeyEvent(key, events[0]);
+                    key.listener.onKeyEvent(key, events[1]);
                     return true;
                 }
             }
