@@ -136,7 +136,7 @@ def tidy(arm: Arm, *, home: bool) -> None:
         HeptarmError: that cannot be done.
     """
     if has_operator(arm):
-        for words in ("clear", "release", "aut", "override 1", "push 0 0 0 0"):
+        for words in ("clear", "release", "let_go", "aut", "override 1", "push 0 0 0 0"):
             arm.operator.do(words)
     if not arm.connected:
         arm.reconnect()

@@ -24,6 +24,7 @@ GROUPS = (
     "tools",
     "signals",
     "contact",
+    "guiding",
     "safety",
     "applications",
 )

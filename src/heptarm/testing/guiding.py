@@ -1,0 +1,152 @@
+"""Scenarios: people who lead the arm, tap it, teach it; contacts that are sought, and those that are not wanted."""
+
+from __future__ import annotations
+
+from threading import Event, Thread
+
+import numpy as np
+
+from heptarm.arm.arm import Arm
+from heptarm.errors import CollisionDetected, NoContact
+from heptarm.testing.measure import Unfit, above, below, fresh, holds, near
+from heptarm.testing.modes import let_go
+from heptarm.testing.scenario import Risk, scenario
+from heptarm.testing.stage import DEEPEST, HOME
+from heptarm.values.arrays import Array
+from heptarm.values.guiding import hand_guide
+from heptarm.values.motion import hold, lin_rel, ptp
+from heptarm.values.pose import deg
+from heptarm.values.yielding import yielding
+
+_LONG = 120.0
+
+
+def _lead(arm: Arm, push: tuple[float, float, float], way: float) -> None:
+    """Push until a joint has turned so far [rad]."""
+    before = arm.state.q
+    arm.operator.push(push, duration=_LONG)
+    arm.wait_until(lambda s: np.abs(s.q - before).max() > way, timeout=60.0)
+    arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+    arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 1.0, timeout=20.0)
+
+
+@scenario(line=8, rows="H9", risk=Risk.CONTACT, operator=True, space=0.6, needs=("hand_guide",))
+def by_hand(arm: Arm) -> None:
+    """KUKA's hand guiding: while the device's switch is held the arm is led; let go, it rests where it is."""
+    handle = arm.start(hand_guide(cartesian_velocity=0.3))
+    handle.wait_started(20.0)
+    arm.operator.guide()
+    arm.wait_until(lambda s: s.safety.hand_guiding_switch, timeout=20.0)
+    _lead(arm, (0.0, 15.0, 15.0), 0.2)
+    holds(not handle.done, "it goes on while the switch is held")
+    arm.operator.let_go()
+    holds(handle.wait(timeout=30.0).arrived, "it ends when the switch is let go")
+    rests = arm.wait_for_rest()
+    above(float(np.abs(rests.q - HOME).max()), 0.05, "a joint was led by", unit="rad")
+    near(fresh(arm, after=0.2).q, rests.q, 1e-3, "and it stays there", unit="rad")
+
+
+@scenario(line=8, rows="H10", risk=Risk.CONTACT, operator=True, space=0.3, needs=("cartesian_impedance",))
+def precise(arm: Arm) -> None:
+    """Led along one axis only, all other directions held, without any device."""
+    start = arm.wait_for_rest().pose
+    handle = arm.start(hold(_LONG), mode=yielding("y", frame="base"))
+    handle.wait_started(20.0)
+    _lead(arm, (10.0, 10.0, 10.0), 0.1)
+    let_go(arm, handle)
+    end = arm.wait_for_rest().pose
+    above(float(end.xyz[1] - start.xyz[1]), 0.01, "led by", unit="m")
+    below(float(np.abs((end.xyz - start.xyz)[[0, 2]]).max()), 5e-3, "across by", unit="m")
+    below(end.angle_to(start), 0.02, "turned by", unit="rad")
+
+
+@scenario(line=8, rows="H3 H4 H14", risk=Risk.CONTACT, space=0.3, needs=("conditions", "lin_rel"))
+def touched(arm: Arm) -> None:
+    """Touch and retreat; a second, slow touch says where the table is within a millimetre."""
+    way = DEEPEST - 0.05
+    try:
+        rough = arm.touch("-z", frame="base", distance=way, force=10.0, speed_mps=0.08, retreat=0.02)
+    except NoContact as error:
+        raise Unfit(f"there is no table within {way:g} m below the flange") from error
+    above(float(rough.force[2]), 8.0, "force at the contact", unit="N")
+    near(arm.wait_for_rest().pose.xyz[2] - rough.pose.xyz[2], 0.02, 2e-3, "retreated by", unit="m")
+    fine = arm.touch_twice("-z", frame="base", distance=0.05, force=8.0, retreat=0.02)
+    below(fine.spread, 0.01, "its two contacts are apart by", unit="m")
+    again = arm.touch_twice("-z", frame="base", distance=0.05, force=8.0, retreat=0.05)
+    near(again.pose.xyz[2], fine.pose.xyz[2], 1e-3, "found once more at", unit="m")
+
+
+@scenario(line=8, rows="H12 H13", risk=Risk.CONTACT, operator=True, space=0.1, needs=("ptp",))
+def taps(arm: Arm) -> None:
+    """A motion is interrupted by a tap and goes on after two more."""
+    from heptarm.values.signals import force
+
+    target = ptp(HOME + deg(0, 0, 0, 0, 0, 0, 60), speed=0.2)
+    handle = arm.start(target, until=force > 15)
+    arm.wait_until(lambda s: s.q[6] > 0.1 or handle.done, timeout=20.0)
+    arm.operator.push((0.0, 0.0, 30.0), duration=0.15)
+    holds(handle.wait().stopped_by == (force > 15), "the first tap ends the motion")
+    arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 1.0, timeout=20.0)
+    done = Event()
+
+    def tap() -> None:
+        while not done.wait(0.4 / max(arm.pace, 1.0)):
+            arm.operator.push((0.0, 0.0, 30.0), duration=0.1)
+
+    hand = Thread(target=tap)
+    hand.start()
+    try:
+        arm.wait_for_taps(2, force=8.0, gap=10.0, timeout=60.0)
+    finally:
+        done.set()
+        hand.join()
+    holds(True, "two taps were felt")
+    arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
+    arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 1.0, timeout=20.0)
+    holds(arm.move(target).arrived, "then it goes on to its end")
+
+
+@scenario(line=8, rows="H6 G18", risk=Risk.CONTACT, space=0.3, virtual=True, needs=("conditions",))
+def guard(arm: Arm) -> None:
+    """A guard round the torques at rest lets free motions through and ends one that hits the table, by joint."""
+    with arm.guarded(arm.collision_guard(12.0)):
+        holds(arm.move(lin_rel(z=0.03, frame="base", speed_mps=0.15)).arrived, "a free motion arrives")
+        try:
+            arm.move(lin_rel(z=-DEEPEST, frame="base", speed_mps=0.08))
+            raise Unfit("there is no table below the flange")
+        except CollisionDetected as error:
+            found = error.collision
+    holds(found is not None, f"{found}")
+    above(abs(found.torque), 12.0, "external torque then", unit="Nm")
+    holds(arm.move(lin_rel(z=0.08, frame="base", speed_mps=0.2)).arrived, "up it goes")
+
+
+@scenario(
+    line=8,
+    rows="H16 H17",
+    risk=Risk.CONTACT,
+    operator=True,
+    space=0.4,
+    needs=("cartesian_impedance", "servo"),
+)
+def taught(arm: Arm) -> None:
+    """Led by hand, recorded with its times, and done again on the same way."""
+
+    def person() -> None:
+        arm.operator.guide()
+        arm.wait_until(lambda s: s.motion is not None and s.motion.active, timeout=30.0)
+        _lead(arm, (0.0, 8.0, 8.0), 0.1)
+        arm.operator.let_go()
+
+    hand = Thread(target=person)
+    hand.start()
+    whole = arm.teach(hand_guide(joint_velocity=0.5), timeout=60.0)
+    hand.join()
+    way: Array = np.ptp(whole.q, axis=0)
+    above(float(way.max()), 0.05, "taught: a joint was led by", unit="rad")
+    trajectory = whole.trimmed().thinned()
+    above(float(len(trajectory)), 1.5, "positions kept, each with its time")
+    replay = arm.replay(trajectory, by="spline", pace=0.5)
+    holds(replay.result.arrived, "it was done again")
+    below(replay.deviation, 0.05, "farthest from what was taught", unit="rad")
+    near(arm.wait_for_rest().q, trajectory.q[-1], 2e-3, "its end", unit="rad")
