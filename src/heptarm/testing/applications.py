@@ -60,7 +60,7 @@ public class Own extends RoboticsAPIApplication {
 
     @Override
     public void run() throws Exception {
-        Arm arm = CabinetArm.of(lbr, getApplicationControl(), getLogger());
+        Arm arm = CabinetArm.of(lbr, this);
         try {
             arm.move(Move.ptp(0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0).speed(0.8));
             double before = arm.pose().xyz[2];

@@ -43,10 +43,12 @@ def queue(arm: Arm) -> None:
         lambda s: s.motion is not None and (s.motion.id, s.motion.queued) == (first.id, 1), timeout=10.0
     )
     note("the cabinet says that one runs and one waits")
-    farthest = 0.0
+    farthest, end = 0.0, None
     for state in arm.states():
         farthest = max(farthest, state.q[6])
-        if first.done:
+        if end is None and first.done:
+            end = arm.state.stamp  # a slow machine has not seen all of them yet
+        if end is not None and state.stamp >= end:
             break
     near(farthest, np.radians(20), 0.02, "seen while it ran: A7 got to", unit="rad")
     ended: list[int] = []
