@@ -21,7 +21,7 @@ from heptarm.values.mode import JointImpedance
 from heptarm.values.motion import Motion, hold, lin, lin_rel, ptp
 from heptarm.values.pose import Pose, deg
 from heptarm.values.result import Cause
-from heptarm.when import force, path
+from heptarm.when import path
 
 
 def _turned(degrees: float) -> Motion:
@@ -165,7 +165,7 @@ def progress(arm: Arm) -> None:
     below(float(np.ptp(ends[2:])), 0.05, "the end that they foretell moves by", unit="s")
 
 
-@scenario(line=2, space=0.2, needs=("lin_rel", "blending", "triggers"))
+@scenario(line=2, rows="B7", space=0.2, needs=("lin_rel", "blending", "triggers"))
 def triggers(arm: Arm) -> None:
     """Triggers of blended motions fire at their points of the path, the motions go on, and the handle hears of all."""
     start = arm.wait_for_rest().pose.xyz
@@ -216,28 +216,3 @@ def ceiling(arm: Arm) -> None:
         arm.speed = before
     top = float(np.abs(course.rates[:, 6]).max() / arm.robot.dq_max[6])
     near(top, limit, 0.03 * limit, "fraction of A7's maximum")
-
-
-@scenario(line=2, rows="B7", space=0.15, needs=("lin_rel", "triggers"))
-def triggers(arm: Arm) -> None:
-    """On the way, without a halt, the cabinet tells of points of the path, by distance and by time."""
-    start = arm.wait_for_rest().pose
-    motion = (
-        lin_rel(y=0.09, frame="base", speed_mps=0.06)
-        .trigger(path.after(0.03), notify("a third"))
-        .trigger(path.before_end(0.02), notify("near the end"))
-        .trigger(force > 900, notify("never"))
-    )
-    handle = arm.start(motion)
-    fired = {event.label: event for event in handle.events(timeout=60.0) if event.trigger is not None}
-    holds(
-        handle.wait().arrived and list(fired) == ["a third", "near the end"], f"told of: {', '.join(fired)}"
-    )
-    for label, way in (("a third", 0.03), ("near the end", 0.07)):
-        state = fired[label].state
-        holds(state is not None and state.joints is not None, f"with the state then, {label}")
-        assert state is not None
-        place = forward(arm.robot, state.q_cmd)[:3, 3]
-        near(float(np.linalg.norm(place - start.xyz)), way, 8e-3, f"way, {label}", unit="m")
-    gap = fired["near the end"].time - fired["a third"].time
-    near(gap, 0.04 / 0.06, 0.25, "time between them", unit="s")
