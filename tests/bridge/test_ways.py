@@ -91,7 +91,7 @@ def test_goals_arrive_one_after_the_other(driver: Driver, ears: Ears) -> None:
         assert (ears.ends[-1].outcome, ears.ends[-1].code) == (Outcome.SUCCEEDED, Code.SUCCESSFUL)
         ears.ends.clear()
     assert np.abs(driver.arm.state.q - HOME).max() < 0.01
-    assert max(feedback.time for feedback in ears.told) >= 2.0
+    assert max(feedback.time for feedback in ears.told) > 1.5  # told now and then, not at the very end
 
 
 def test_a_goal_takes_the_place_of_another_and_is_cancelled(driver: Driver, ears: Ears) -> None:
