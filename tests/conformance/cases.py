@@ -492,7 +492,9 @@ def _brakes(client: Client) -> tuple[Array, Array]:
     assert client.result(sent).outcome is Outcome.CANCELED
     rests(client)
     track = client.track()[count - 2 :]
-    return np.array([time for time, _ in track]), np.array([sign * q[6] for _, q in track])
+    times, way = np.array([time for time, _ in track]), np.array([sign * q[6] for _, q in track])
+    apart = np.diff(times, prepend=-1.0) > 2e-3  # stamps may be nearer where the clocks' difference was corrected
+    return times[apart], way[apart]
 
 
 @case
@@ -502,7 +504,7 @@ def cancelling_makes_no_jump(client: Client) -> None:
     speeds = np.diff(way) / np.diff(times)
     assert way[-1] - way[0] > 5e-3, "it was under way"
     assert speeds.max() < 1.2, speeds
-    assert speeds.min() > -0.1, "straight on, and not back"
+    assert speeds.min() > -0.1, speeds
 
 
 @case
