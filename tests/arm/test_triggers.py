@@ -34,7 +34,7 @@ SLOWLY = ha.lin_rel(y=0.1, frame="base", speed_mps=0.01)
 def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ha.Arm]:
     project = tmp_path_factory.mktemp("project") / "RoboticsAPI.data.xml"
     project.write_text(PROJECT)
-    with ha.connect(f"sim://iiwa14?project={project}") as arm:
+    with ha.connect(f"sim://iiwa14?project={project}", watchdog=10.0, timeout=20.0) as arm:
         yield arm
 
 
