@@ -8,7 +8,7 @@ import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.errors import CollisionDetected, NoContact
-from heptarm.testing.measure import Unfit, above, below, fresh, holds, near
+from heptarm.testing.measure import Unfit, above, below, fresh, holds, near, note
 from heptarm.testing.modes import let_go
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import DEEPEST, HOME
@@ -100,7 +100,7 @@ def taps(arm: Arm) -> None:
     finally:
         done.set()
         hand.join()
-    holds(True, "two taps were felt")
+    note("two taps were felt")
     arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
     arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 1.0, timeout=20.0)
     holds(arm.move(target).arrived, "then it goes on to its end")

@@ -169,7 +169,9 @@ def progress(arm: Arm) -> None:
 def triggers(arm: Arm) -> None:
     """Triggers of blended motions fire at their points of the path, the motions go on, and the handle hears of all."""
     start = arm.wait_for_rest().pose.xyz
-    there = lin_rel(y=0.08, frame="base", speed_mps=0.05, blend_m=0.01).trigger(path.after(0.04), notify("half"))
+    there = lin_rel(y=0.08, frame="base", speed_mps=0.05, blend_m=0.01).trigger(
+        path.after(0.04), notify("half")
+    )
     back = lin_rel(z=0.04, frame="base", speed_mps=0.05).trigger(path.before_end(), notify("end"))
     handle = arm.start([there, back])
     events = list(handle.events())

@@ -89,4 +89,3 @@ def mode(arm: Arm) -> None:
     holds(
         (robot.q_min < 0).all() and (robot.dq_max > 0.5).all(), "limits of position and speed, joint by joint"
     )
-    near(arm.speed, min(arm.speed, 1.0), 0.0, "ceiling of the speed")
