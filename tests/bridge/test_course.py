@@ -222,3 +222,23 @@ def test_over_fri_a_cancellation_takes_effect_ahead_of_what_is_commanded(session
     assert np.abs(speeds[99]).max() > 0.4, "it was under way"
     assert np.abs(slowing).max() < 2.7, "straight from the trajectory into the brake"
     assert np.abs(speeds[-1]).max() < 1e-9
+
+
+def test_over_fri_clocks_that_part_bend_the_way_of_no_axis(session: Session, monkeypatch) -> None:
+    """The controller loses 20 ms at once: what is commanded follows by and by, without a step."""
+    runner = Runner(NAMES, robot("iiwa14"), Settings())
+    runner.accept(goal(), now=100.0, state=Measured(100.0, HOME, np.zeros(7)))
+    overlay = _Overlay(session, PERIOD)  # type: ignore[arg-type]
+    lost = 0.0
+    monkeypatch.setattr(overlay, "_between", lambda state: 100.0 + lost)
+    done = []
+    for k in range(200):
+        session.t = k * PERIOD
+        lost = 0.02 if k >= 60 else 0.0
+        now = overlay.tick()
+        assert now is not None
+        overlay.follow(runner.advance(now, Measured(now, HOME, np.zeros(7))))
+        done.append(session.commanded())
+    jerk = np.diff(np.array(done), n=3, axis=0)[40:180] / PERIOD**3
+    assert np.abs(jerk).max() < 60.0, "the goal's own, and a little"
+    assert overlay._ours(session.t) - session.t > 100.0

@@ -10,6 +10,7 @@ import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -30,8 +31,8 @@ _log = logging.getLogger("heptarm.bridge")
 _AHEAD = 0.5
 #: What changes the course does so after this time, at least: it has to reach the loop's process before [s].
 _LEAD = 0.015
-#: Messages that tell how the clocks go, and by how much at once the difference of the clocks may be corrected [s].
-_RECENT, _DRIFT = 400, 2e-4
+#: Messages that tell how the clocks go, and how fast their difference may be corrected [s/s].
+_RECENT, _DRIFT = 400, 5e-4
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +102,8 @@ class _Overlay:
         self._newest = 0.0  # the controller's time
         self._until = -1.0  # and that of the last set-point
         self._now = 0.0
-        self._offset = self._between(session.start)  # the execution's clock minus the controller's time
+        # the execution's clock minus the controller's time: at a time of the controller, and how it changes
+        self._offset, self._at, self._drift = self._between(session.start), 0.0, 0.0
         self._course: Course | None = None
         self._before: Course | None = None
         self._since = 0.0
@@ -112,7 +114,7 @@ class _Overlay:
         if state is None:
             return None
         self._newest = state.t
-        self._now = max(self._now, self._offset + state.t + self._lead)
+        self._now = max(self._now, float(self._ours(state.t)) + self._lead)
         return self._now
 
     def follow(self, step: Step) -> None:
@@ -125,21 +127,26 @@ class _Overlay:
             self._before, self._since = last, self._now
         self._course = course
         params = self._session.params
+        self._adjust()
         times: Array = self._newest + self._period * np.arange(float(len(params.q)))
         # a command is reached one period after it was asked for
-        ours = self._offset + times + self._period
+        ours = self._ours(times) + self._period
         q = course.positions(ours)
         if self._before is not None:
             early = ours < self._since
             q[early] = self._before.positions(ours[early])
         params.set(begin=self._newest, q=q)
         self._until = float(times[-1])
-        self._adjust()
+
+    def _ours(self, t: Any) -> Any:
+        """The execution's clock at a time of the controller, or at many [s]."""
+        return t + self._offset + self._drift * (t - self._at)
 
     def _adjust(self) -> None:
-        """Let the offset follow the clocks, so slowly that nobody sees it in the motion."""
-        wanted = self._between(self._session.state) - self._offset
-        self._offset += min(max(wanted, -_DRIFT), _DRIFT)
+        """Let the offset follow the clocks evenly, so slowly that no axis' limit is met by that."""
+        self._offset, self._at = self._ours(self._newest) - self._newest, self._newest
+        away = self._between(self._session.state) - self._offset
+        self._drift = min(max(away / _AHEAD, -_DRIFT), _DRIFT)
 
     def _between(self, state: State) -> float:
         """The execution's clock minus the controller's time, by the messages that came fastest [s]."""
