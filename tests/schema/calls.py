@@ -250,6 +250,7 @@ CALLS: dict[str, Call] = {
     "ServoOpen.acceleration": Call(_servo(acceleration=...), "acceleration"),
     "ServoOpen.min_trajectory_time": Call(_servo(min_trajectory_time=...), "min_trajectory_time"),
     "ServoOpen.goal_timeout": Call(_servo(goal_timeout=...), "goal_timeout"),
+    "ServoOpen.speed_timeout": Call(_servo(speed_timeout=...), "speed_timeout"),
     "ServoJoints.watchdog": Call(_servo(watchdog=...), "watchdog"),
     "ServoJoints.q": Call(_within(lambda servo, v: servo.set(v)), "q", 7),
     "ServoJointsVelocity.watchdog": Call(_servo(watchdog=...), "watchdog"),
