@@ -44,7 +44,7 @@ def test_an_fri_application_and_its_client(tmp_path: Path) -> None:
     )
     command = _command("sample.Overlaying", tmp_path, f"sample.file={said}")
     with (
-        Client(port, realtime=False) as client,
+        Client(port) as client,
         subprocess.Popen(
             [*command, "--project", str(project)], stdout=subprocess.PIPE, text=True, env=os.environ
         ) as application,

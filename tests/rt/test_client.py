@@ -238,7 +238,10 @@ def test_a_frame_that_is_asked_for_is_told(client: Client) -> None:
             client.frame("PBase", np.eye(4))
         client.frame("PBase", Pose.at(0.0, 0.0, 0.3))
         deadline = time.monotonic() + 20.0
-        while not controller.answers[-1].transformations and time.monotonic() < deadline:
+        while (
+            not (controller.answers and controller.answers[-1].transformations)
+            and time.monotonic() < deadline
+        ):
             controller.settle()
         (frame,) = controller.answers[-1].transformations
         assert frame.name == "PBase" and frame.values == (0.0, 0.0, 300.0, 1.0, 0.0, 0.0, 0.0)

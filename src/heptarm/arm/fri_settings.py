@@ -188,7 +188,9 @@ def _check_kind(kind: str, capabilities: tuple[str, ...]) -> None:
 def _signals(names: Sequence[str], connection: Connection) -> tuple[str, ...]:
     """Full names of the signals that the session shall carry, checked as the cabinet does."""
     if isinstance(names, str):
-        raise ShapeError(f"io is {names!r}; a list of names is wanted", parameter="io", hint=f'io=["{names}"]')
+        raise ShapeError(
+            f"io is {names!r}; a list of names is wanted", parameter="io", hint=f'io=["{names}"]'
+        )
     if not names:
         return ()
     if "fri_io" not in connection.welcome.capabilities:
@@ -306,13 +308,23 @@ def _listening(port: int | None, make: Callable[[int], Client]) -> Client:
     if port is not None:
         return make(port)
     for candidate in PORTS:
-        try:
-            UdpSocket(candidate).close()
-        except ConnectFailed:
+        if not _is_free(candidate):
             continue
-        return make(candidate)
+        try:
+            return make(candidate)
+        except ConnectFailed:
+            if _is_free(candidate):  # else somebody was quicker
+                raise
     raise ConnectFailed(
         f"none of FRI's ports {PORTS[0]} to {PORTS[-1]} is free on this machine",
         parameter="port",
         hint="end another FRI client (`ss -ulpn` names them), or give a port, as in arm.fri(..., port=30300)",
     )
+
+
+def _is_free(port: int) -> bool:
+    try:
+        UdpSocket(port).close()
+    except ConnectFailed:
+        return False
+    return True

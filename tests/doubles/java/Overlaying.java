@@ -74,7 +74,7 @@ public class Overlaying extends RoboticsAPIApplication implements IFRISessionLis
         int port = getApplicationData().getProcessData("sample.port").getValue();
         lbr.move(ptp(0, 0.5, 0, -1.3, 0, 0.9, 0));
         FRIConfiguration configuration = FRIConfiguration.createRemoteConfiguration(lbr, "127.0.0.1");
-        configuration.setSendPeriodMilliSec(5);
+        configuration.setSendPeriodMilliSec(20); // a busy machine answers in time, too
         configuration.setReceiveMultiplier(1);
         configuration.setPortOnRemote(port);
         Signals signals = new Signals(lbr.getController());

@@ -149,8 +149,8 @@ final class FriRun implements Activity, Fri.Listener {
             stood |= newState == FriSessionState.MONITORING_READY;
             state = newState;
             quality = newQuality;
+            server.broadcast(new FriChanged(id, newState, newQuality, 0, "")); // before anybody acts on it: in order
             notifyAll();
         }
-        server.broadcast(new FriChanged(id, newState, newQuality, 0, ""));
     }
 }
