@@ -7,16 +7,26 @@ from collections.abc import Iterator
 import numpy as np
 
 from bench.registry import Figure, benchmark
-from heptarm.virtual.plant import Plant
+from heptarm.model.kinematics import forward
+from heptarm.values.guiding import hand_guide
+from heptarm.values.pose import Pose
+from heptarm.virtual.order import Order
+from heptarm.virtual.planner import CARTESIAN_DEFAULT
+from heptarm.virtual.plant import TICK, Plant
 from heptarm.virtual.safety import Demand
 from tests.virtual.driving import READY
-from tests.virtual.ideal import KINDS, stopping_time
+from tests.virtual.ideal import KINDS, braking, stopping_time
 
 INSTANTS = 200
 #: Every stop gets this much beyond its deceleration limit's time for the joints to settle behind their set-points [s].
 SETTLING = 0.1
 #: How far a servo motion is sent from its start [rad]; farther, the arm runs into the floor or itself at times.
 REACH = 0.4
+#: Kinds of motion in which the arm is led; how fast on lines [m/s, rad/s, ...], how far [m], and by what force [N].
+LED = ("straight", "guiding")
+QUICK = (0.5,) * 3 + (1.0,) * 3 + (2.0,) * 3 + (4.0,) * 3
+WAY = 0.1
+PUSH = 60.0
 #: At rest [rad/s].
 REST = 0.01
 
@@ -25,11 +35,11 @@ REST = 0.01
 def stopping() -> Iterator[Figure]:
     """200 stops of each kind at random instants of each kind of motion: the share that rest in time, and the times."""
     for how in ("path", "fast", "emergency"):
-        for kind in KINDS:
+        for kind in (*KINDS, *LED):
             random = np.random.default_rng(19)
             times, in_time = [], 0
             for _ in range(INSTANTS):
-                time, allowed = _stop(kind, how, random)
+                time, allowed = (_stop_led if kind in LED else _stop)(kind, how, random)
                 times.append(time)
                 in_time += time <= allowed
             detail = {
@@ -49,6 +59,45 @@ def _stop(kind: str, how: str, random: np.random.Generator) -> tuple[float, floa
         plant.ring.post(order.id, np.array(READY) + random.uniform(-REACH, REACH, 7))
     plant.step(int(random.integers(1, 700)))
     allowed = stopping_time(plant, how) + SETTLING
+    return _rest(plant, how), allowed
+
+
+def _stop_led(kind: str, how: str, random: np.random.Generator) -> tuple[float, float]:
+    """The same of an arm that is led on lines, or by a hand that keeps on pushing."""
+    plant = Plant("iiwa14", q=READY)
+    if kind == "guiding":
+        plant.submit(Order(1, "guide", guide=hand_guide()))
+        plant.safety.guide()
+        plant.step(50)
+        plant.apply_wrench(tuple(random.uniform(-PUSH, PUSH, 3)))
+        plant.step(int(random.integers(1, 700)))
+        robot = plant.robot
+        fastest = float(np.abs(plant.snapshot.dq).max())
+        allowed = braking(fastest, 0.0, float(robot.ddq_max.min()), float(robot.dddq_max.min())) + SETTLING
+        return _rest(plant, how), allowed
+    plant.submit(Order(1, "straight", straight=QUICK))
+    plant.tick()
+    here = _tip(plant)
+    plant.ring.post(1, Pose.of(here.xyz + random.uniform(-WAY, WAY, 3), here.quat).array)
+    plant.step(int(random.integers(3, 700)))
+    if how != "path":
+        allowed = stopping_time(plant, how)
+    else:
+        before, now, after = (
+            Pose.from_matrix(forward(plant.robot, q)).xyz for q in plant.interpolator.command
+        )
+        speed, change = np.linalg.norm(after - now) / TICK, np.linalg.norm(after - 2 * now + before) / TICK**2
+        allowed = braking(float(speed), float(change), *CARTESIAN_DEFAULT[1:])
+    allowed += SETTLING
+    return _rest(plant, how), allowed
+
+
+def _tip(plant: Plant) -> Pose:
+    return Pose.from_matrix(forward(plant.robot, plant.snapshot.q_cmd))
+
+
+def _rest(plant: Plant, how: str) -> float:
+    """Stop the arm; how long it takes to rest [s]."""
     if how == "emergency":
         plant.safety.demand(Demand.EMERGENCY_STOP)
     else:
@@ -59,4 +108,4 @@ def _stop(kind: str, how: str, random: np.random.Generator) -> tuple[float, floa
         ticks += 1
         if float(np.abs(plant.snapshot.dq).max()) > REST:
             last = ticks
-    return last * 1e-3, allowed
+    return last * TICK

@@ -100,7 +100,7 @@ def stopping_time(plant: Plant, how: str) -> float:
         return 1.5 * fastest / hardest + (hardest / jerk / FAST_JERK if how == "fast" else 0.0)
     if run.follower is not None:
         steepest = float(np.abs(after - 2 * now + before).max()) / TICK**2
-        return _braking(fastest, steepest, hardest, jerk)
+        return braking(fastest, steepest, hardest, jerk)
     if run.profile is None:
         return 0.0
     place, speed, acceleration = run.profile.at(run.time)
@@ -108,10 +108,10 @@ def stopping_time(plant: Plant, how: str) -> float:
     if halts is not None:
         leg = next(i for i, mark in enumerate(halts.marks) if place < mark or mark == halts.marks[-1])
         limits = halts.courses[leg].brakes(place, speed)
-    return _braking(speed, abs(acceleration), limits.acceleration, limits.jerk)
+    return braking(speed, abs(acceleration), limits.acceleration, limits.jerk)
 
 
-def _braking(speed: float, acceleration: float, most: float, jerk: float) -> float:
+def braking(speed: float, acceleration: float, most: float, jerk: float) -> float:
     """Time to rest from a speed while still accelerating, with limited deceleration and jerk [s]."""
     peak = speed + acceleration**2 / (2 * jerk)
     return acceleration / jerk + peak / most + most / jerk

@@ -287,3 +287,16 @@ def test_a_stop_at_any_instant_ends_in_time(kind: str, how: str) -> None:
             assert ticks * 1e-3 <= allowed, f"instant {instant}: speed {np.abs(plant.speed).max():.3f} rad/s"
         # a direct servo motion changes its acceleration at once: there a tick may see both
         assert steepest <= plant.robot.ddq_max.min() * (2.0 if kind == "direct" else 1.06)
+
+
+def test_brakes_close_without_a_jolt_under_a_load() -> None:
+    plant = ready()
+    plant.apply_wrench((60.0, 60.0, 25.0))
+    plant.step(1000)
+    plant.safety.demand(Demand.EMERGENCY_STOP)
+    fastest = 0.0
+    for _ in range(600):
+        plant.tick()
+        fastest = max(fastest, float(np.abs(plant.snapshot.dq).max()))
+    assert not plant.snapshot.tau_cmd.any()  # they are closed
+    assert fastest < 1e-3

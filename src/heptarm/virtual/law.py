@@ -71,14 +71,24 @@ class Law(Protocol):
 
 
 class PositionLaw:
-    """Stiff position control."""
+    """Stiff position control.
+
+    Args:
+        lasting: what its integral action begins with, shape (7,) [rad]; None: nothing.
+    """
 
     is_stiff = True
     stays = False
     violation = ""
 
-    def __init__(self) -> None:
-        self._lasting = np.zeros(7)
+    def __init__(self, lasting: Array | None = None) -> None:
+        self._lasting = np.zeros(7) if lasting is None else lasting
+
+    @classmethod
+    def that_goes_on(cls, torque: Array, sensed: Sensed) -> PositionLaw:
+        """The law that gives the torques [Nm] which another gives now, with the arm at rest at its set-point."""
+        wanted = np.linalg.solve(sensed.mass, torque - sensed.bias + sensed.passive)
+        return cls(wanted / BANDWIDTH**2)
 
     def torque(self, sensed: Sensed) -> Array:
         """Torques of the motors, shape (7,) [Nm]."""

@@ -111,7 +111,9 @@ class Plant:
             self._q, self._dq, self._mass[:7, :7], self._bias, self._passive, self._q, self._q, self._q
         )
         self.safety = Safety()
-        self.on_safety: Callable[[int, int], None] | None = None  # called with flags and mode that have changed
+        self.on_safety: Callable[[int, int], None] | None = (
+            None  # called with flags and mode that have changed
+        )
         self._flags = 0
         self._brakes: PositionLaw | None = None  # closed
         self._braked = self._sensed
@@ -130,6 +132,7 @@ class Plant:
         self._armature = self.model.dof_armature[:7].copy()
         self._limit, self._least = self.robot.tau_max, -self.robot.tau_max
         self._mass = np.zeros((self.model.nv, self.model.nv))
+        mujoco.mj_fullM(self.model, d, self._mass)
         self._tau = np.zeros(7)
         self._tau_cmd = np.zeros(7)
 
@@ -292,7 +295,7 @@ class Plant:
         if self._halted > BRAKE_TICKS or float(np.abs(self._dq).max()) < BRAKE_SPEED:
             here = self._q.copy()
             self._braked = replace(self._sensed, before=here, now=here, after=here, is_overlaid=False)
-            self._brakes = PositionLaw()
+            self._brakes = PositionLaw.that_goes_on(self._tau_cmd, self._braked)
 
     # ------------------------------------------------------------------------------ state
 
