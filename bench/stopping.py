@@ -25,7 +25,7 @@ REACH = 0.4
 #: Kinds of motion in which the arm is led; how fast on lines [m/s, rad/s, ...], how far [m], and by what force [N].
 LED = ("straight", "guiding")
 QUICK = (0.5,) * 3 + (1.0,) * 3 + (2.0,) * 3 + (4.0,) * 3
-WAY = 0.1
+WAY = 0.06
 PUSH = 60.0
 #: At rest [rad/s].
 REST = 0.01
