@@ -87,7 +87,7 @@ class PositionLaw:
     @classmethod
     def that_goes_on(cls, torque: Array, sensed: Sensed) -> PositionLaw:
         """The law that gives the torques [Nm] which another gives now, with the arm at rest at its set-point."""
-        wanted = np.linalg.solve(sensed.mass, torque - sensed.bias + sensed.passive)
+        wanted: Array = np.linalg.solve(sensed.mass, torque - sensed.bias + sensed.passive)
         return cls(wanted / BANDWIDTH**2)
 
     def torque(self, sensed: Sensed) -> Array:
