@@ -87,8 +87,8 @@ class PositionLaw:
     @classmethod
     def that_goes_on(cls, torque: Array, sensed: Sensed) -> PositionLaw:
         """The law that gives the torques [Nm] which another gives now, with the arm at rest at its set-point."""
-        wanted: Array = np.linalg.solve(sensed.mass, torque - sensed.bias + sensed.passive)
-        return cls(wanted / BANDWIDTH**2)
+        wanted = np.linalg.solve(sensed.mass, torque - sensed.bias + sensed.passive)
+        return cls(np.asarray(wanted / BANDWIDTH**2, dtype=np.float64))
 
     def torque(self, sensed: Sensed) -> Array:
         """Torques of the motors, shape (7,) [Nm]."""
