@@ -9,6 +9,7 @@ from heptarm.model.kinematics import jacobian
 from heptarm.values.guiding import HandGuide, hand_guide
 from heptarm.virtual.order import Order
 from heptarm.virtual.plant import Plant
+from heptarm.virtual.safety import Demand
 from tests.virtual.driving import Ear, ready, run
 
 NAN = np.nan
@@ -201,3 +202,21 @@ def test_what_comes_behind_it_begins_where_it_was_led_to() -> None:
     assert np.abs(np.diff(track.q_cmd, axis=0)).max() < 3e-3
     assert ear.causes[-1] == "done" and after.causes == ["started", "done"]
     assert np.abs(plant.snapshot.q - [0.0, 0.5, 0.0, -1.3, 0.0, 0.9, 0.0]).max() < 1e-3
+
+
+def test_cancelling_while_a_stop_brakes_it_brakes_it_no_other_way() -> None:
+    ways = []
+    for cancels in (False, True):
+        plant, _ = begun()
+        plant.apply_wrench(SIDEWAYS)
+        plant.step(400)
+        plant.safety.demand(Demand.EMERGENCY_STOP)
+        plant.step(5)
+        if cancels:
+            plant.stop()
+        way = []
+        for _ in range(300):
+            plant.tick()
+            way.append(plant.snapshot.q)
+        ways.append(np.array(way))
+    assert np.abs(ways[0] - ways[1]).max() < 1e-9

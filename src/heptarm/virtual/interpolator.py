@@ -311,7 +311,8 @@ class Interpolator:
         if run.cancelled or run.failure:
             return
         run.cancelled = True
-        if not self._safety.latched:  # else the stop in force brings it to rest, sooner
+        # a stop in force brings a motion to rest sooner, but its pace is not that of a hand
+        if run.guidance is not None or not self._safety.latched:
             self._brake_on_path(run)
 
     def _brake_on_path(self, run: Run) -> None:
