@@ -32,6 +32,7 @@ from heptarm.bridge.moves import MOVES  # noqa: E402
 from heptarm.bridge.names import PRESETS  # noqa: E402
 from heptarm.bridge.parameters import PARAMETERS, Parameter, of_joints  # noqa: E402
 from heptarm.bridge.services import SERVICES  # noqa: E402
+from heptarm.bridge.topics import TOPICS  # noqa: E402
 from scripts.ros_api import API, LIFE  # noqa: E402
 
 PAGE = ROOT / "docs" / "reference" / "ros.md"
@@ -97,6 +98,9 @@ def _of(tree: ast.Module) -> Iterator[Declared]:
             if node.module == "heptarm.bridge.services":
                 for row in SERVICES:
                     yield Declared(row.name, "service", row.type)
+            if node.module == "heptarm.bridge.topics":
+                for topic in TOPICS:
+                    yield Declared(topic.name, "subscribes", topic.type)
             for imported in node.names if node.module == "heptarm.bridge.moves" else ():
                 if imported.name == "MOVES":
                     for move in MOVES:

@@ -34,15 +34,7 @@ class FakeDriver:
     """A driver of an arm that stands still."""
 
     configuration = Configuration.of({})
-
-    def positions(self, names, values):
-        order = list(names) or [f"A{i}" for i in range(1, 8)]
-        if len(order) != len(values):
-            raise ShapeError("one number for each joint is wanted")
-        result = HERE.copy()
-        for name, value in zip(order, values):
-            result[int(name[1]) - 1] = value
-        return result
+    arm = SimpleNamespace(state=SimpleNamespace(q_cmd=HERE))
 
 
 def pose(x: float, y: float, z: float, turn: tuple[float, ...] = (0.0, 0.0, 0.0, 1.0)) -> SimpleNamespace:
@@ -128,7 +120,7 @@ def test_a_message_is_the_motion_that_python_makes(given: SimpleNamespace, wante
     ("given", "error", "words"),
     [
         (message(9), CommandRejected, "kind 9"),
-        (message(0, position=[0.0]), ShapeError, "one number"),
+        (message(0, position=[0.0]), ShapeError, "one for each"),
         (message(1, pose=stamped("table")), ShapeError, "table"),
         (message(1, speed_mps=-1.0), LimitError, "speed_mps"),
         (message(4), ShapeError, "segments"),

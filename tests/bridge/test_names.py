@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from heptarm.bridge.names import PRESETS, joint_target, pose_target
+from heptarm.bridge.parameters import Configuration
 from heptarm.errors import ShapeError
 from heptarm.values.pose import Pose
 
@@ -21,10 +22,7 @@ class FakeDriver:
     """A driver of an arm that stands still."""
 
     arm = SimpleNamespace(state=SimpleNamespace(q_cmd=HERE, pose_cmd=POSE))
-
-    def positions(self, names, values):
-        assert not names
-        return np.array(values)
+    configuration = Configuration.of({})
 
 
 def test_nan_keeps_a_joint() -> None:

@@ -1,4 +1,4 @@
-"""What of ROS 2 the bridge makes messages of, and poses that come."""
+"""What of ROS 2 the bridge makes messages of."""
 
 from __future__ import annotations
 

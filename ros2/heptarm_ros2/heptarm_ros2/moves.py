@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ from rclpy.action import ActionServer, CancelResponse
 
 from heptarm.bridge import moves
 from heptarm.bridge.goal import Outcome
+from heptarm.bridge.messages import class_of
 from heptarm.bridge.moves import MOVES, Move
 from heptarm.errors import HeptarmError, NotReady
 
@@ -33,8 +33,7 @@ class MoveActions:
             server.destroy()
 
     def _server(self, row: Move, group: Any) -> ActionServer:
-        package, _, name = row.type.partition("/")
-        kind = getattr(importlib.import_module(f"{package}.action"), name)
+        kind = class_of(row.type, "action")
         return ActionServer(
             self._node,
             kind,

@@ -132,7 +132,7 @@ class HeptarmNode(LifecycleNode):
         group = ReentrantCallbackGroup()
         self._goals = TrajectoryAction(self, ("~/follow_joint_trajectory", *actions), group)
         self._moves = MoveActions(self, group)
-        self._inputs = Commands(self)
+        self._inputs = Commands(self, self.driver)
         period = 1.0 / self.value("diagnostics_rate")
         self._report_timer = self.create_timer(
             period, self._tell, callback_group=MutuallyExclusiveCallbackGroup()

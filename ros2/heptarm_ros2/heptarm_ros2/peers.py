@@ -1,4 +1,4 @@
-"""Topics under the names of other drivers; see `heptarm.bridge.names`."""
+"""States under the names of other drivers; see `heptarm.bridge.names`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 from geometry_msgs.msg import Pose, Wrench
 from sensor_msgs.msg import JointState
 
-from heptarm.bridge import names
-from heptarm.bridge.driver import Driver
 from heptarm.bridge.names import PRESETS, Entry, Meaning
 from heptarm.bridge.outputs import theirs
 from heptarm.values.state import State
@@ -44,14 +42,3 @@ class Peers:
         """End them."""
         for _, one in self._publishers:
             self._node.destroy_publisher(one)
-
-
-def joint(driver: Driver, message: JointState) -> None:
-    """A command for joints as libiiwa takes it."""
-    driver.move(names.joint_target(driver, message.name, message.position))
-
-
-def cartesian(driver: Driver, message: Pose) -> None:
-    """A command for a pose as libiiwa takes it."""
-    place, turn = message.position, message.orientation
-    driver.move(names.pose_target(driver, (place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)))

@@ -1,4 +1,4 @@
-"""One arm behind a node: connection and reconnection, states, goals, commands, services; free of ROS.
+"""One arm behind a node: its life, goals, commands, services; free of ROS.
 
 A node makes one, converts messages for it, and is told of states and goals from the driver's own threads.
 """
@@ -8,7 +8,6 @@ from __future__ import annotations
 import logging
 import os
 import socket
-import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
@@ -20,6 +19,7 @@ from heptarm.arm.connect import connect
 from heptarm.arm.connection import GROUPS
 from heptarm.arm.handle import MotionHandle
 from heptarm.bridge.execution import Execution, Listener
+from heptarm.bridge.feed import Feed
 from heptarm.bridge.fri_execution import FriExecution
 from heptarm.bridge.fri_session import FriSession
 from heptarm.bridge.goal import End, Goal, GoalRefused
@@ -30,8 +30,7 @@ from heptarm.bridge.servo_execution import ServoExecution
 from heptarm.bridge.spline_execution import SplineExecution
 from heptarm.bridge.stream import Stream
 from heptarm.bridge.trajectory import Sample
-from heptarm.errors import HeptarmError, NotReady, ShapeError
-from heptarm.io.clock import RealClock
+from heptarm.errors import HeptarmError, NotReady
 from heptarm.values.arrays import Array
 from heptarm.values.condition import Condition
 from heptarm.values.motion import Motion, lin, ptp
@@ -40,8 +39,6 @@ from heptarm.values.state import State
 
 _log = logging.getLogger("heptarm.bridge")
 
-#: Pauses between attempts to reconnect [s].
-_BACK_OFF, _LONGEST_BACK_OFF = 0.2, 2.0
 #: How long a motion may take to come to rest before a goal [s].
 _REST = 5.0
 
@@ -95,11 +92,8 @@ class Driver:
         values = configuration.values
         self.configuration = configuration
         self._listener = listener
-        self._clock = RealClock()
         self._active = False
-        self._closed = threading.Event()
         self._handle: MotionHandle | None = None
-        self._trouble = ""
         self._arm = connect(
             values["target"] or None,
             key=values["key"] or None,
@@ -118,9 +112,7 @@ class Driver:
             options=configuration.servo,
             line_speed=values["servo.line_speed"],
         )
-        self._pump = threading.Thread(target=self._run, name="heptarm-states")
-        self._pump.start()
-        listener.on_link("")
+        self._feed = Feed(self._arm, on_state=self._on_state, on_link=listener.on_link)
 
     def _way(self) -> Execution:
         """The way of execution that the parameters choose."""
@@ -142,7 +134,7 @@ class Driver:
     @property
     def trouble(self) -> str:
         """Why there is no connection; empty: there is one."""
-        return self._trouble
+        return self._feed.trouble
 
     @property
     def active(self) -> bool:
@@ -168,13 +160,13 @@ class Driver:
 
     def close(self) -> None:
         """Leave the arm at rest and disconnect. Closing twice is legal."""
-        if self._closed.is_set():
+        if self._feed.ended:
             return
         self.deactivate()
-        self._closed.set()
+        self._feed.end()
         self._execution.close()
         self._arm.close()
-        self._pump.join(_REST)
+        self._feed.join()
 
     def configure(self, configuration: Configuration) -> None:
         """Take other values of those parameters that count at once."""
@@ -187,49 +179,15 @@ class Driver:
         try:
             state = self._arm.state
         except HeptarmError as error:
-            return report(None, trouble=self._trouble or str(error), active=self._active)
-        return report(state, trouble=self._trouble, active=self._active, age=state.age)
+            return report(None, trouble=self.trouble or str(error), active=self._active)
+        return report(state, trouble=self.trouble, active=self._active, age=state.age)
 
-    def _run(self) -> None:
-        """States from one connection after the other."""
-        while not self._closed.is_set():
-            try:
-                for state in self._arm.states(size=16):
-                    self._guard(state)
-                    self._listener.on_state(state)
-            except HeptarmError as error:
-                if self._closed.is_set():
-                    return
-                self._lost(str(error))
-            except Exception:
-                _log.exception("publishing a state")
-            if not self._closed.is_set():
-                self._reconnect()
-
-    def _guard(self, state: State) -> None:
+    def _on_state(self, state: State) -> None:
         """A stop of the safety controller ends the goal: its time would stand still, and it would go on by surprise."""
         safety = state.status
         if safety is not None and (safety.emergency_stop or safety.protective_stop) and self._execution.goal:
             self._execution.drop(report(state).text)
-
-    def _lost(self, why: str) -> None:
-        self._trouble = why
-        _log.error("the connection is lost: %s", why)
-        self._listener.on_link(why)
-
-    def _reconnect(self) -> None:
-        pause = _BACK_OFF
-        while not self._closed.is_set() and not self._arm.connected:
-            try:
-                self._arm.reconnect()
-                _log.warning("reconnected; nothing moves until it is told to")
-            except HeptarmError as error:
-                self._trouble = str(error)
-                self._closed.wait(pause)
-                pause = min(2 * pause, _LONGEST_BACK_OFF)
-        if self._arm.connected and self._trouble:
-            self._trouble = ""
-            self._listener.on_link("")
+        self._listener.on_state(state)
 
     # ------------------------------------------------------------------------------------ goals
 
@@ -249,8 +207,8 @@ class Driver:
         """
         if not self._active:
             raise GoalRefused("the node is not active", hint="activate it")
-        if self._trouble:
-            raise GoalRefused(f"no connection: {self._trouble}")
+        if self.trouble:
+            raise GoalRefused(f"no connection: {self.trouble}")
         handle = self._handle
         try:
             self._check_ready()
@@ -297,38 +255,6 @@ class Driver:
             _log.warning("took control again")
 
     # --------------------------------------------------------------------------------- commands
-
-    def positions(self, names: Sequence[str], values: Sequence[float]) -> Array:
-        """Joint positions of a message in the arm's order, shape (7,) [rad]; joints left out stay where they are.
-
-        Args:
-            names: of the joints, in any order; empty: all, in the arm's order.
-            values: positions [rad].
-
-        Raises:
-            ShapeError: an unknown name, a name twice, or not as many numbers as names.
-        """
-        return self._ordered(names, values, self._arm.state.q_cmd)
-
-    def wishes(self, names: Sequence[str], values: Sequence[float]) -> Array:
-        """Likewise numbers of joints; those of joints left out are NaN."""
-        return self._ordered(names, values, np.full(7, np.nan))
-
-    def velocities(self, names: Sequence[str], values: Sequence[float]) -> Array:
-        """Likewise joint velocities [rad/s]; joints left out have none."""
-        return self._ordered(names, values, np.zeros(7))
-
-    def _ordered(self, names: Sequence[str], values: Sequence[float], others: Array) -> Array:
-        joints = self.configuration.joints
-        order = list(names) or list(joints)
-        if len(order) != len(values) or len(set(order)) != len(order):
-            raise ShapeError(f"{len(values)} numbers for the joints {order}; one for each is wanted")
-        result = others.copy()
-        for name, value in zip(order, values):
-            if name not in joints:
-                raise ShapeError(f"unknown joint {name!r}", hint=f"the joints are {', '.join(joints)}")
-            result[joints.index(name)] = value
-        return result
 
     def move(self, target: Array | Pose, *, straight: bool = False) -> MotionHandle:
         """Start a motion to joint positions or a pose; it takes the place of whatever runs.

@@ -1,13 +1,9 @@
-"""Services that open and close an FRI session, and the topics that command in it."""
+"""Services that open and close an FRI session."""
 
 from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
-from heptarm.bridge.driver import Driver
-from heptarm.bridge.motions import stamped_pose
 from heptarm.bridge.service import Offer, Service
 from heptarm.errors import ShapeError
 
@@ -46,24 +42,6 @@ class FriServices(Offer):
         for name, value in zip(given, request.values):
             self._driver.fri.output(name, value)
         return f"{', '.join(given)} set"
-
-
-def fri_joint(driver: Driver, message: Any) -> None:
-    """Positions and torques of a sensor_msgs/JointState; joints left out keep their last wish."""
-    q = driver.wishes(message.name, message.position) if len(message.position) else None
-    tau = driver.wishes(message.name, message.effort) if len(message.effort) else None
-    driver.fri.command(q=q, tau=tau)
-
-
-def fri_wrench(driver: Driver, message: Any) -> None:
-    """Force and torque of a geometry_msgs/WrenchStamped."""
-    f, t = message.wrench.force, message.wrench.torque
-    driver.fri.command(wrench=np.array([f.x, f.y, f.z, t.x, t.y, t.z]))
-
-
-def fri_pose(driver: Driver, message: Any) -> None:
-    """The flange's pose in the base, of a geometry_msgs/PoseStamped."""
-    driver.fri.command(pose=stamped_pose(message, driver.configuration.frame("base")))
 
 
 #: All of them.

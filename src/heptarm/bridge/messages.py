@@ -8,9 +8,10 @@ A node says once what it has, and its modules only publish and subscribe::
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -56,6 +57,17 @@ class Ros:
     seconds: Callable[[Any], float]
     duration: Callable[[float], Any]
     level: Callable[[int], Any]
+
+
+def class_of(kind: str, part: Literal["msg", "srv", "action"]) -> Any:
+    """The class that ROS' generators made of a "package/Type".
+
+    Args:
+        kind: the type.
+        part: in which module of the package it is.
+    """
+    package, _, name = kind.partition("/")
+    return getattr(importlib.import_module(f"{package}.{part}"), name)
 
 
 # -------------------------------------------------------------------------------------- trajectories

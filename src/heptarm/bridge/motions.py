@@ -10,6 +10,7 @@ from math import inf
 from typing import Any
 
 from heptarm.bridge.driver import Driver
+from heptarm.bridge.order import positions
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.values.arrays import Array
 from heptarm.values.circ import circ
@@ -76,7 +77,7 @@ def joint_points(driver: Driver, names: Sequence[str], values: Sequence[float]) 
             f"position has {len(values)} numbers; {width} for each point are wanted", parameter="position"
         )
     rows = range(0, len(values), width)
-    return [driver.positions(names, list(values)[start : start + width]) for start in rows]
+    return [positions(driver, names, list(values)[start : start + width]) for start in rows]
 
 
 def program_of(driver: Driver, messages: Sequence[Any]) -> tuple[Motion, ...]:
@@ -114,7 +115,7 @@ def motion_of(driver: Driver, message: Any, name: str = "motion") -> Motion:
     if kind == JOINT_SPLINE:
         return spline_joints(joint_points(driver, message.joint_names, message.position), **plain)
     if kind == PTP and len(message.position):
-        return ptp(driver.positions(message.joint_names, message.position), **plain, **blending)
+        return ptp(positions(driver, message.joint_names, message.position), **plain, **blending)
     moving = message.moving or TOOL
     if kind == SPLINE:
         segments = [segment_of(one) for one in message.segments]

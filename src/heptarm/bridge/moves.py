@@ -19,6 +19,7 @@ from heptarm.bridge import motions
 from heptarm.bridge.conditions import condition_of
 from heptarm.bridge.driver import Driver
 from heptarm.bridge.goal import Outcome
+from heptarm.bridge.order import positions
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.values.circ import circ
 from heptarm.values.motion import TOOL, Motion, lin, ptp
@@ -78,7 +79,7 @@ class Moved:
 
 
 def _to_joints(driver: Driver, goal: Any) -> tuple[Motion, ...]:
-    return (ptp(driver.positions(goal.joint_names, goal.position)),)
+    return (ptp(positions(driver, goal.joint_names, goal.position)),)
 
 
 def _to_pose(driver: Driver, goal: Any) -> tuple[Motion, ...]:

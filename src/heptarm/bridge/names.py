@@ -19,6 +19,7 @@ from types import MappingProxyType
 import numpy as np
 
 from heptarm.bridge.driver import Driver
+from heptarm.bridge.order import positions
 from heptarm.errors import ShapeError
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
@@ -142,7 +143,7 @@ def joint_target(driver: Driver, names: Sequence[str], values: Sequence[float]) 
     Raises:
         ShapeError: an unknown name, a name twice, or not as many numbers as names.
     """
-    wanted = driver.positions(names, values)
+    wanted = positions(driver, names, values)
     return np.where(np.isnan(wanted), driver.arm.state.q_cmd, wanted)
 
 

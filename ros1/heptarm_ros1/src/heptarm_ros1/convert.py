@@ -1,4 +1,4 @@
-"""What of ROS 1 the bridge makes messages of, and poses that come."""
+"""What of ROS 1 the bridge makes messages of, and names as ROS 1 writes them."""
 
 from __future__ import annotations
 
@@ -27,3 +27,8 @@ ROS = Ros(
     duration=rospy.Duration.from_sec,
     level=int,
 )
+
+
+def name(ours: str) -> str:
+    """A name as in ROS 2; ROS 1 writes the node's own without the slash."""
+    return f"~{ours[2:]}" if ours.startswith("~/") else ours

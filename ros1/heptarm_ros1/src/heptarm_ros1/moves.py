@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import threading
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +12,10 @@ from actionlib_msgs.msg import GoalStatus
 from heptarm.arm.handle import MotionHandle
 from heptarm.bridge import moves
 from heptarm.bridge.goal import Outcome
+from heptarm.bridge.messages import class_of
 from heptarm.bridge.moves import MOVES, Move
 from heptarm.errors import HeptarmError, NotReady
+from heptarm_ros1 import convert
 
 if TYPE_CHECKING:
     from heptarm_ros1.node import HeptarmNode
@@ -30,13 +31,11 @@ class MoveActions:
             server.start()
 
     def _server(self, row: Move) -> ActionServer:
-        package, _, name = row.type.partition("/")
-        messages = importlib.import_module(f"{package}.msg")
         action, feedback, result = (
-            getattr(messages, name + part) for part in ("Action", "Feedback", "Result")
+            class_of(row.type + part, "msg") for part in ("Action", "Feedback", "Result")
         )
         take = self._taker(row, feedback, result)
-        return ActionServer(f"~{row.name[2:]}", action, take, auto_start=False)
+        return ActionServer(convert.name(row.name), action, take, auto_start=False)
 
     def _taker(self, row: Move, feedback: Any, result: Any) -> Any:
         def take(handle: Any) -> None:

@@ -97,7 +97,7 @@ class HeptarmNode:
             except HeptarmError:
                 self._destroy()
                 raise
-            self._inputs = Commands(self, self.driver)
+            self._inputs = Commands(self.driver)
             arm = self.driver.arm
             text = f"heptarm {_version()}, {arm.robot.title}, cabinet {arm.cabinet!r} with software {arm.software}"
             rospy.loginfo(text)

@@ -1,22 +1,16 @@
-"""Topics under the names of other drivers; see `heptarm.bridge.names`."""
+"""States under the names of other drivers; see `heptarm.bridge.names`."""
 
 from __future__ import annotations
 
-import threading
 from typing import TYPE_CHECKING
 
 import rospy
 from geometry_msgs.msg import Pose, Wrench
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Empty
-from trajectory_msgs.msg import JointTrajectory
 
-from heptarm.bridge import names
-from heptarm.bridge.driver import Driver
 from heptarm.bridge.names import PRESETS, Meaning
 from heptarm.bridge.outputs import theirs
 from heptarm.values.state import State
-from heptarm_ros1 import commands
 from heptarm_ros1.convert import ROS
 from heptarm_ros1.publishers import publisher
 
@@ -32,7 +26,7 @@ def actions() -> tuple[str, ...]:
 
 
 class Peers:
-    """Publishes and takes what the parameter `names` asks for."""
+    """Publishes states as the parameter `names` asks for."""
 
     def __init__(self, node: HeptarmNode) -> None:
         self._joints = node.configuration.joints
@@ -40,20 +34,6 @@ class Peers:
         kinds = {Meaning.JOINT_STATES: JointState, Meaning.POSE: Pose, Meaning.WRENCH: Wrench}
         self._publishers = [
             (entry, publisher(kinds[entry.meaning], entry.name)) for entry in entries if entry.is_published
-        ]
-        works: dict[Meaning, tuple[type, commands.Work]] = {
-            Meaning.STOP: (Empty, commands.stop),
-            Meaning.JOINT: (JointState, _joint),
-            Meaning.CARTESIAN: (Pose, _cartesian),
-            Meaning.TRAJECTORY: (JointTrajectory, commands.joint_trajectory),
-        }
-        one_by_one = threading.Lock()
-        self._subscribers = [
-            commands.subscriber(
-                node, one_by_one, works[entry.meaning][0], entry.name, works[entry.meaning][1]
-            )
-            for entry in entries
-            if entry.meaning in works
         ]
 
     def state(self, state: State) -> None:
@@ -67,14 +47,3 @@ class Peers:
         """End them."""
         for _, one in self._publishers:
             one.unregister()
-        for subscriber in self._subscribers:
-            subscriber.unregister()
-
-
-def _joint(driver: Driver, message: JointState) -> None:
-    driver.move(names.joint_target(driver, message.name, message.position))
-
-
-def _cartesian(driver: Driver, message: Pose) -> None:
-    place, turn = message.position, message.orientation
-    driver.move(names.pose_target(driver, (place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)))
