@@ -80,6 +80,11 @@ class Body:
         for one in fields:
             self._validate(one)
 
+    @property
+    def is_run(self) -> bool:
+        """Whether the body is one struct.Struct and nothing else."""
+        return len(self.layouts) == len(self.write) == 1
+
     def _code(self, t: Type) -> str:
         if t.kind == "prim":
             return PRIMITIVES[t.name]
@@ -324,16 +329,23 @@ def messages(spec: Spec) -> str:
         lines += [
             f'    SOURCE: ClassVar[str] = "{message.source}"',
             f'    ROLE: ClassVar[str] = "{message.role}"',
-            "",
         ]
+        if message.kind == "oneway":
+            if not body.is_run:
+                raise ValueError(f"{message.name}: a one-way message is one run of numbers")
+            lines += [f"    LAYOUT: ClassVar[Struct] = _{message.name}_0"]
+        lines += [""]
         if message.groups:
             lines += _state(message)
         else:
             lines += _fields(spec, message.fields) + _methods(message.name, body, message.fields)
         lines += _message_methods(message.name) + [""]
-    lines += ["", f"Message: TypeAlias = {' | '.join(spec.messages)}", ""]
+    lines += ["", f"Message: TypeAlias = {' | '.join(spec.messages)}"]
+    one_way = [name for name, message in spec.messages.items() if message.kind == "oneway"]
+    lines += [f"OneWay: TypeAlias = {' | '.join(one_way)}", ""]
     lines += ["#: Message classes by id.", "MESSAGES: dict[int, type[Message]] = {"]
-    lines += [f"    {message.id}: {name}," for name, message in spec.messages.items()] + ["}", ""]
+    lines += [f"    {message.id}: {name}," for name, message in spec.messages.items()] + ["}"]
+    lines += [f"ONE_WAY: tuple[type[OneWay], ...] = ({', '.join(one_way)},)", ""]
     return "\n".join(lines)
 
 

@@ -72,9 +72,26 @@ def test_a_target_behind_a_limit_is_brought_back_to_it(arm: ha.Arm) -> None:
         sent = sv.set(sv.start.q + 9.0 * A7)
         assert sent[6] == arm.robot.q_max[6]
         np.testing.assert_array_equal(sent[:6], sv.start.q[:6])
+        for far in (np.full(7, 1e308), [1e308] * 7, np.full(7, 1e30, dtype=np.float32)):
+            np.testing.assert_array_equal(sv.set(far), arm.robot.q_max)
+        sv.set(sv.start.q)
 
 
-@pytest.mark.parametrize("bad", [[0.0] * 6, [np.nan] * 7, [np.inf] + [0.0] * 6, "joints", None])
+@pytest.mark.parametrize(
+    "bad",
+    [
+        [0.0] * 6,
+        [np.nan] * 7,
+        [np.inf] + [0.0] * 6,
+        "joints",
+        None,
+        np.zeros(8),
+        np.zeros((1, 7)),
+        np.array([np.inf, -np.inf, *[0.0] * 5]),
+        np.array([*[0.0] * 6, -np.inf]),
+        np.array([*[0.0] * 6, np.nan]),
+    ],
+)
 def test_bad_targets_are_refused_here(arm: ha.Arm, bad: object) -> None:
     with arm.servo("joint", watchdog=1.0) as sv, pytest.raises(ha.CommandRejected):
         sv.set(bad)  # type: ignore[arg-type]

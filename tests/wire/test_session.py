@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from itertools import pairwise
 
 import pytest
@@ -16,13 +17,16 @@ from heptarm.wire.messages import (
     MAGIC,
     MAX_BODY,
     MESSAGES,
+    ONE_WAY,
     Accepted,
     Goodbye,
     Groups,
     Hello,
     JointState,
+    OneWay,
     Ping,
     Refusal,
+    ServoJoints,
     State,
     Stop,
     Subscribe,
@@ -159,6 +163,34 @@ def test_what_a_side_may_not_send() -> None:
     with pytest.raises(LocalProtocolError, match="in use"):
         client.send(Stop(), request=4)
     assert client._sent == before + 1  # nothing illegal has left a trace
+
+
+@pytest.mark.parametrize("kind", ONE_WAY, ids=lambda kind: kind.__name__)
+def test_numbers_become_the_octets_of_the_message_that_they_are(kind: type[OneWay]) -> None:
+    body = kind.LAYOUT.pack(*range(1, 1 + len(kind.LAYOUT.unpack(bytes(kind.LAYOUT.size)))))
+    message, numbers = kind.decode(body), kind.LAYOUT.unpack(body)
+    (by_message, _), (by_numbers, cabinet) = open_pair(), open_pair()
+    for time in (5, 6):
+        data = by_numbers.send_numbers(kind, numbers, time=time)
+        assert data == by_message.send(message, time=time)
+        assert pour(data, cabinet) == [Received(message, 0, time)]
+    assert pour(by_numbers.send(Ping(sent=1)), cabinet)  # both count the frames of one stream
+
+
+def test_numbers_that_may_not_be_sent_leave_no_trace() -> None:
+    client, cabinet = open_pair()
+    target = (1, 0.1, *[0.5] * 7)
+    with pytest.raises(LocalProtocolError, match="the cabinet may not send a ServoJoints"):
+        cabinet.send_numbers(ServoJoints, target, time=0)
+    with pytest.raises(LocalProtocolError, match="in state 'start'"):
+        Session(Side.CLIENT).send_numbers(ServoJoints, target, time=0)
+    for wrong in (target[:-1], (*target, 0.5), (*target[:-1], "0.5")):
+        with pytest.raises(struct.error):
+            client.send_numbers(ServoJoints, wrong, time=0)  # type: ignore[arg-type]
+    assert pour(client.send_numbers(ServoJoints, target, time=0), cabinet)
+    client.send(Goodbye(code=0, text=""))
+    with pytest.raises(LocalProtocolError, match="in state 'closed'"):
+        client.send_numbers(ServoJoints, target, time=0)
 
 
 def test_nothing_is_sent_before_hello_and_after_goodbye() -> None:

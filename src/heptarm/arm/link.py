@@ -12,11 +12,13 @@ from __future__ import annotations
 
 import logging
 import threading
-from _thread import LockType, allocate_lock, get_ident
-from collections.abc import Callable
+from _thread import get_ident
+from collections.abc import Callable, Iterable
 
+from heptarm.arm.heartbeat import Heartbeat
 from heptarm.arm.refusals import farewell, refusal, rejection
 from heptarm.arm.shield import Shield
+from heptarm.arm.slot import Slot
 from heptarm.errors import ConnectFailed, ConnectionLost, HeptarmError, RemoteProtocolError, Timeout
 from heptarm.io.clock import Clock
 from heptarm.io.transport import Transport
@@ -29,6 +31,7 @@ from heptarm.wire.messages import (
     Challenge,
     Goodbye,
     Message,
+    OneWay,
     Ping,
     Pong,
     Refusal,
@@ -49,18 +52,6 @@ _TURN = 0.0002
 _ASIDE, _STEP = 30_000_000, 0.0005
 #: Pings at the start, and the pause between them [s]: enough to see a virtual clock's rate.
 _PROBES, _PROBE_PAUSE = 6, 0.003
-
-
-class _Slot:
-    """Where an answer is put down."""
-
-    __slots__ = ("answer", "lock", "on_answer")
-
-    def __init__(self, on_answer: Callable[[Message], None] | None) -> None:
-        self.lock: LockType = allocate_lock()
-        self.lock.acquire()
-        self.answer: Message | None = None
-        self.on_answer = on_answer
 
 
 class Link:
@@ -99,13 +90,12 @@ class Link:
         self._token = threading.Lock()
         self._leading = False
         self._holder = 0
-        self._slots: dict[int, _Slot] = {}
+        self._slots: dict[int, Slot] = {}
         self._welcome: Welcome | None = None
         self._error: HeptarmError | None = None
         self._closing = False
-        self._heartbeat = 1.0
-        self._watchdog = float("inf")
-        self._heard = self._requested = clock.nanos()
+        self._requested = clock.nanos()
+        self._heartbeat = Heartbeat(self._requested)
         self._aside = _ASIDE
         self._thread = threading.Thread(target=self._run, name="heptarm-link", daemon=True)
 
@@ -137,7 +127,7 @@ class Link:
         except BaseException:
             self._lose(ConnectionLost("interrupted while connecting"))
             raise
-        self._heartbeat = self._welcome.heartbeat
+        self._heartbeat.tolerated = self._welcome.heartbeat
         self._thread.start()
         return self._welcome
 
@@ -175,7 +165,7 @@ class Link:
 
     def expect_watchdog(self, seconds: float) -> None:
         """Ping often enough for a watchdog of that length at the cabinet."""
-        self._watchdog = seconds
+        self._heartbeat.watchdog = seconds
 
     def expect_states(self, rate: float) -> None:
         """Know how many states come per second: from a few hundred on, they must be taken at once."""
@@ -196,7 +186,7 @@ class Link:
             ConnectionLost: the link has ended.
             Timeout: no answer in time.
         """
-        slot = _Slot(on_answer)
+        slot = Slot(on_answer)
         deadline = self._clock.nanos() + round(timeout * 1e9)
         shield = Shield()
         try:
@@ -216,7 +206,7 @@ class Link:
         finally:
             shield.down()
         if slot.answer is None and self._error is None:
-            slot.lock.acquire(timeout=max(0.0, (deadline - self._clock.nanos()) * 1e-9))
+            slot.wait((deadline - self._clock.nanos()) * 1e-9)
         answer = slot.answer
         if answer is None:
             if self._error is not None:
@@ -237,21 +227,26 @@ class Link:
 
     def post(self, message: Message) -> None:
         """Send a request without waiting for its answer; callable from the callbacks."""
-        self._say(message, _Slot(None))
+        self._say(message, Slot())
 
-    def tell(self, message: Message) -> None:
-        """Send a message that nobody answers, stamped with the cabinet's clock as far as it is known."""
+    def tell(self, kind: type[OneWay], numbers: Iterable[float]) -> None:
+        """Send a message that nobody answers, stamped with the cabinet's clock as far as it is known.
+
+        Args:
+            kind: what to say.
+            numbers: its fields, one after the other.
+        """
         with self._sending:
             if self._error is not None:
                 raise self._lost()
-            data = self._session.send(message, time=self.offset.to_cabinet(self._clock.nanos()))
-            self._transmit(data)
+            now = self.offset.to_cabinet(self._clock.nanos())
+            self._transmit(self._session.send_numbers(kind, numbers, time=now))
 
     def ping(self) -> None:
         """Probe the cabinet's clock; the answer goes into `offset`."""
         self._say(Ping(sent=self._clock.nanos()))
 
-    def _say(self, message: Message, slot: _Slot | None = None) -> None:
+    def _say(self, message: Message, slot: Slot | None = None) -> None:
         with self._sending:
             if self._error is not None:
                 raise self._lost()
@@ -276,7 +271,7 @@ class Link:
 
     # ------------------------------------------------------------------------------------ reading
 
-    def _read_until(self, slot: _Slot, deadline: int, shield: Shield) -> None:
+    def _read_until(self, slot: Slot, deadline: int, shield: Shield) -> None:
         while slot.answer is None and self._error is None and not shield.pending:
             if self._clock.nanos() > deadline:
                 return
@@ -301,7 +296,7 @@ class Link:
             size = self._transport.receive_into(view, wait=wait)
             if size == 0:
                 return
-            now = self._heard = self._clock.nanos()
+            now = self._heartbeat.heard = self._clock.nanos()
             session = self._session
             session.receive_data(view[:size])
             for event in session.events():
@@ -322,10 +317,7 @@ class Link:
         if kind == "answer":
             slot = self._slots.pop(event.request, None)
             if slot is not None:
-                if slot.on_answer is not None:
-                    slot.on_answer(message)
-                slot.answer = message
-                slot.lock.release()
+                slot.put(message)
         elif isinstance(message, Ping):
             self._say(Pong(sent=message.sent, received=now))
         elif isinstance(message, Pong):
@@ -345,7 +337,7 @@ class Link:
                 now = clock.nanos()
                 if now >= due:
                     self.ping()
-                    due = now + self._interval()
+                    due = now + self._heartbeat.interval
                 rest = max(0.0, (due - now) * 1e-9)
                 if self._leading:
                     # a caller reads; most are done within a fraction of a millisecond
@@ -358,14 +350,8 @@ class Link:
                     self._read_now()
                 elif transport.wait_readable(rest):
                     self._read_now()
-                elif now - self._heard > self._silence():
-                    self._lose(
-                        ConnectionLost(
-                            f"nothing heard from {self.peer} for {(now - self._heard) * 1e-9:.1f} s",
-                            code=int(Code.SILENT),
-                            hint="check the network and the load of both machines",
-                        )
-                    )
+                else:
+                    self._heartbeat.check(now, self.peer)
             except HeptarmError as error:
                 self._lose(error)
             except Exception as error:
@@ -374,13 +360,6 @@ class Link:
         if not self._closing:
             _log.info("link to %s ended: %s", self.peer, self._error)
             self._on_lost(self._error)
-
-    def _interval(self) -> int:
-        """Pause between pings [ns]: a quarter of what the cabinet tolerates."""
-        return round(min(self._heartbeat, self._watchdog) / 4 * 1e9)
-
-    def _silence(self) -> int:
-        return round(max(2 * self._heartbeat, 1.0) * 1e9)
 
     # ------------------------------------------------------------------------------------- ending
 
@@ -403,7 +382,7 @@ class Link:
         for request in list(self._slots):
             slot = self._slots.pop(request, None)
             if slot is not None:
-                slot.lock.release()
+                slot.give_up()
 
     def _lost(self) -> HeptarmError:
         """A fresh error for each who asks: one exception raised in two threads mixes up their tracebacks."""

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from math import inf, nan
-from typing import TYPE_CHECKING
+from math import inf, isfinite, nan
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 _PATIENCE = 5.0
 #: Calls of `set` whose cost is remembered.
 _REMEMBERED = 4096
+_DOUBLES = np.dtype(np.float64)
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,23 +194,22 @@ class Servo(Block):
         self._last = now
         return passed if self.active else None
 
-    def _tell(self, message: wire.ServoJoints | wire.ServoJointsVelocity | wire.ServoPose) -> None:
-        if not self.active:
+    def _tell(self, began: int, kind: type[wire.OneWay], target: list[float]) -> None:
+        handle = self._running
+        if handle.done:
             return
-        began = self._clock.nanos()
-        self._link.tell(message)
-        now = self._clock.nanos()
-        if self._sent == 0:
-            self._first_sent = now
-        self._last_sent = now
+        self._link.tell(kind, (handle.id, self.watchdog, *target))
         self._sent += 1
+        self._last_sent = now = self._clock.nanos()
         self._costs.append(now - began)
+        if self._sent == 1:
+            self._first_sent = now
 
     @property
-    def _number(self) -> int:
+    def _running(self) -> MotionHandle:
         if self._handle is None:
             raise LocalProtocolError("the servo motion has not begun; use it in a with block")
-        return self._handle.id
+        return self._handle
 
     def change(self, mode: Mode) -> None:
         """Change the parameters of the control mode while the arm follows.
@@ -219,7 +219,7 @@ class Servo(Block):
         """
         message = mode_message(mode)
         assert message is not None
-        self._connection.request(wire.ServoSettings(servo=self._number, mode=message))
+        self._connection.request(wire.ServoSettings(servo=self._running.id, mode=message))
 
     @property
     def stats(self) -> ServoStats:
@@ -247,6 +247,10 @@ def _seen(told: wire.ServoStatus) -> dict[str, object]:
 class JointServo(Servo):
     """A stream of joint positions."""
 
+    def __init__(self, connection: Connection, message: wire.ServoOpen, **settings: Any) -> None:
+        super().__init__(connection, message, **settings)
+        self._low, self._high = connection.robot.q_min, connection.robot.q_max
+
     def __enter__(self) -> JointServo:
         """Begin; see `Servo`."""
         super().__enter__()
@@ -267,24 +271,18 @@ class JointServo(Servo):
             LimitError: one is not finite.
             CommandRejected: a velocity for the engine "direct", which would not heed it.
         """
+        began = self._clock.nanos()
         if dq is not None and self._message.engine is wire.ServoEngine.DIRECT:
             raise CommandRejected(
                 'the engine "direct" passes its targets at the speed that the next ones make; it takes no velocity',
                 parameter="dq",
                 hint='leave dq out, or use engine="smart"',
             )
-        robot = self._connection.robot
-        wanted = _joints(q, "q")
-        sent = np.minimum(np.maximum(wanted, robot.q_min), robot.q_max)
+        sent = np.minimum(np.maximum(_joints(q, "q"), self._low), self._high)
         if dq is None:
-            self._tell(wire.ServoJoints(servo=self._number, watchdog=self.watchdog, q=tuple(sent.tolist())))
+            self._tell(began, wire.ServoJoints, sent.tolist())
         else:
-            speed = tuple(_joints(dq, "dq").tolist())
-            self._tell(
-                wire.ServoJointsVelocity(
-                    servo=self._number, watchdog=self.watchdog, q=tuple(sent.tolist()), dq=speed
-                )
-            )
+            self._tell(began, wire.ServoJointsVelocity, sent.tolist() + _joints(dq, "dq").tolist())
         return sent
 
 
@@ -308,18 +306,12 @@ class PoseServo(Servo):
         Raises:
             ShapeError: it is no Pose.
         """
+        began = self._clock.nanos()
         if not isinstance(pose, Pose):
             raise ShapeError(
                 f"pose is {pose!r}; a Pose is wanted", parameter="pose", value=pose, hint="Pose.of(xyz, quat)"
             )
-        self._tell(
-            wire.ServoPose(
-                servo=self._number,
-                watchdog=self.watchdog,
-                xyz=tuple(pose.xyz.tolist()),
-                quat=tuple(pose.quat.tolist()),
-            )
-        )
+        self._tell(began, wire.ServoPose, pose.xyz.tolist() + pose.quat.tolist())
         return pose
 
 
@@ -327,9 +319,9 @@ def _joints(value: npt.ArrayLike, name: str) -> Array:
     """Seven finite numbers; a shorter way than `array`, since it runs at every tick."""
     if (
         type(value) is np.ndarray
-        and value.dtype == np.float64
+        and value.dtype is _DOUBLES
         and value.shape == (7,)
-        and np.isfinite(value).all()
+        and isfinite(sum(value.tolist()))  # of finite numbers the sum may overflow: `array` tells
     ):
         return value
     return array(value, 7, name)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from struct import Struct
 from typing import NamedTuple
 
 from heptarm.errors import LocalProtocolError, RemoteProtocolError
 from heptarm.wire.codes import Code
-from heptarm.wire.messages import HEADER, MAGIC, MAJOR, MAX_BODY
+from heptarm.wire.messages import HEADER, MAGIC, MAJOR, MAX_BODY, OneWay
 
 #: Octets that may wait unread before feeding more counts as a bug of the caller.
 MAX_WAITING = 2 * MAX_BODY
@@ -43,6 +46,13 @@ def pack(type: int, body: bytes, *, seq: int, request: int = 0, time: int = 0) -
     if len(body) > MAX_BODY:
         raise LocalProtocolError(f"a body of {len(body)} octets; the protocol carries {MAX_BODY}")
     return HEADER.pack(MAGIC, MAJOR, 0, type, len(body), seq, request, time) + body
+
+
+def packer(kind: type[OneWay]) -> Callable[..., bytes]:
+    """Packs whole frames of a one-way message at once: called with seq, 0, time [ns] and the numbers of its body."""
+    body = kind.LAYOUT
+    frame = Struct(HEADER.format + body.format.removeprefix(">"))
+    return partial(frame.pack, MAGIC, MAJOR, 0, kind.TYPE, body.size)
 
 
 class FrameReader:

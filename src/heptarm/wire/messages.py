@@ -3725,6 +3725,7 @@ class ServoJoints:
     KIND: ClassVar[str] = "oneway"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
+    LAYOUT: ClassVar[Struct] = _ServoJoints_0
 
     servo: int
     watchdog: float
@@ -3775,6 +3776,7 @@ class ServoJointsVelocity:
     KIND: ClassVar[str] = "oneway"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
+    LAYOUT: ClassVar[Struct] = _ServoJointsVelocity_0
 
     servo: int
     watchdog: float
@@ -3828,6 +3830,7 @@ class ServoPose:
     KIND: ClassVar[str] = "oneway"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
+    LAYOUT: ClassVar[Struct] = _ServoPose_0
 
     servo: int
     watchdog: float
@@ -4886,6 +4889,7 @@ class State:
 
 
 Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Accepted | Rejected | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | SetMode | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
+OneWay: TypeAlias = ServoJoints | ServoJointsVelocity | ServoPose
 
 #: Message classes by id.
 MESSAGES: dict[int, type[Message]] = {
@@ -4941,3 +4945,4 @@ MESSAGES: dict[int, type[Message]] = {
     105: SegmentReached,
     112: State,
 }
+ONE_WAY: tuple[type[OneWay], ...] = (ServoJoints, ServoJointsVelocity, ServoPose,)
