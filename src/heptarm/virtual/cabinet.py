@@ -121,7 +121,7 @@ class VirtualCabinet:
 
     def __init__(self, options: argparse.Namespace, data: dict[str, processdata.Value]) -> None:
         # the JVM is started by the main thread before anything else wakes up
-        from heptarm.virtual import jvm
+        from heptarm.virtual import jvm, station
 
         self._options = options
         self.plant = Plant(options.model, boxes=[Box.of(text) for text in options.box])
@@ -136,11 +136,11 @@ class VirtualCabinet:
         self._system = jpype.JClass("java.lang.System")
         if not options.verbose:
             jpype.JClass("java.util.logging.LogManager").getLogManager().reset()
-        self._station = jvm.open_station(self.plant, self.sessions)
+        self._station = station.open_station(self.plant, self.sessions)
         for name, value in data.items():
-            self._station.setProcessData(name, jvm.boxed(value))
+            self._station.setProcessData(name, station.boxed(value))
         if options.project is not None:
-            jvm.furnish(self._station, templates.read(options.project))
+            station.furnish(self._station, templates.read(options.project))
         if options.payload is not None:
             self.plant.hang(hanging(options.payload))
         pad = jpype.JClass("heptarm.doubles.Desk")
