@@ -11,19 +11,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
+from ruckig import Synchronization
 
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 from heptarm.virtual.order import Order
+from heptarm.virtual.otg import Otg, State
 from heptarm.virtual.straight import StraightFollower
 
 #: The last approach of a direct follower is an exponential one with this time constant [s].
 APPROACH = 0.01
 #: A target's velocity may not use all of the axis' speed: Ruckig needs a little room to come to it.
 ROOM = 0.999
-
-State = tuple[Array, Array, Array]
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,13 +75,8 @@ class SmartFollower:
 
     def __init__(self, terms: ServoTerms, here: Array) -> None:
         self._terms = terms
-        self._otg = Ruckig(7)
-        self._input = InputParameter(7)
-        self._input.max_velocity = terms.velocity.tolist()
-        self._input.max_acceleration = terms.acceleration.tolist()
-        self._input.max_jerk = terms.jerk.tolist()
-        self._plan: Trajectory | None = None
-        self._time = 0.0
+        self._otg = Otg(7, synchronization=Synchronization.Time, halting=Synchronization.No)
+        self._otg.limit(terms.acceleration, terms.jerk, velocity=terms.velocity)
         self._still = here.copy()
         self._passes = False
         self._stopping = False
@@ -91,34 +85,28 @@ class SmartFollower:
     @property
     def remaining(self) -> float:
         """Time until the target is reached [s]; NaN without a target."""
-        return float("nan") if self._plan is None else max(0.0, self._plan.duration - self._time)
+        return self._otg.remaining
 
     def aim(self, q: Array, dq: Array | None = None) -> None:
         """Take a target, shape (7,) [rad], and the velocity to pass it at [rad/s]."""
         if self._stopping:
             return
-        want = self._input
-        want.control_interface = ControlInterface.Position
-        want.synchronization = Synchronization.Time
-        want.target_position = q.tolist()
         pass_at = (
             np.zeros(7)
             if dq is None
             else np.clip(dq, -ROOM * self._terms.velocity, ROOM * self._terms.velocity)
         )
-        want.target_velocity = pass_at.tolist()
-        want.minimum_duration = self._terms.minimum_time
-        if self._replan(self._state()):
+        if self._otg.aim(self._state(), q, speed=pass_at, minimum=self._terms.minimum_time):
             self._passes = bool(pass_at.any())
             self.resting = 0.0
 
     def advance(self, dt: float) -> Array:
         """The set-point after `dt` seconds of the motion's own time, shape (7,) [rad]."""
-        if self._plan is None:
+        if not self._otg.has_begun:
             self.resting += dt
             return self._still
-        self._time += dt
-        over = self._time - self._plan.duration
+        self._otg.time += dt
+        over = self._otg.over
         if over >= 0.0:
             if self._passes and over > self._terms.speed_timeout:
                 self._halt(self._state())
@@ -146,36 +134,16 @@ class SmartFollower:
     @property
     def is_still(self) -> bool:
         """Whether a braked motion has come to rest."""
-        return self._stopping and (self._plan is None or self._time >= self._plan.duration)
+        return self._stopping and self._otg.over >= 0.0
 
     def _halt(self, state: State) -> None:
         self._passes = False
-        want = self._input
-        want.control_interface = ControlInterface.Velocity
-        want.synchronization = Synchronization.No
-        want.target_velocity = [0.0] * 7
-        want.minimum_duration = None
-        self._replan(state)
+        self._otg.halt(state)
 
     def _state(self) -> State:
-        if self._plan is None:
-            return self._still, np.zeros(7), np.zeros(7)
-        q, dq, ddq = self._plan.at_time(self._time)
-        return np.array(q), np.array(dq), np.array(ddq)
-
-    def _replan(self, state: State) -> bool:
-        """False: this target cannot be planned from here (the last plan goes on)."""
-        want = self._input
-        want.current_position, want.current_velocity, want.current_acceleration = (v.tolist() for v in state)
-        plan = Trajectory(7)
-        try:
-            result = self._otg.calculate(want, plan)
-        except RuckigError:
-            return False
-        if result not in (Result.Working, Result.Finished):
-            return False
-        self._plan, self._time = plan, 0.0
-        return True
+        if self._otg.has_begun:
+            return self._otg.at(self._otg.time)
+        return self._still, np.zeros(7), np.zeros(7)
 
 
 class DirectFollower:

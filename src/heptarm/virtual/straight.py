@@ -14,13 +14,14 @@ from dataclasses import dataclass
 from math import atan2, cos, sin, sqrt
 
 import numpy as np
-from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
+from ruckig import Synchronization
 
 from heptarm.model.kinematics import forward
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.robot import RobotModel
 from heptarm.virtual.order import Order
+from heptarm.virtual.otg import Otg
 from heptarm.virtual.path import Tip
 from heptarm.virtual.planner import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT
 
@@ -85,11 +86,7 @@ class StraightFollower:
         terms = self._terms = StraightTerms.of(order)
         self._tip = Tip(robot, here, tcp)
         self._q = here.copy()
-        self._otg = Ruckig(6)
-        self._input = InputParameter(6)
-        self._input.synchronization = Synchronization.Phase
-        self._plan: Trajectory | None = None
-        self._time = 0.0
+        self._otg = Otg(6, synchronization=Synchronization.Phase, halting=Synchronization.Phase)
         self._place = terms.axes.T @ origin.xyz  # at rest, along the axes of the limits
         self._centre = origin.quat  # orientation that rotations are counted from
         self._stopping = False
@@ -98,7 +95,7 @@ class StraightFollower:
     @property
     def remaining(self) -> float:
         """Time until the target is reached [s]; NaN without a target."""
-        return float("nan") if self._plan is None else max(0.0, self._plan.duration - self._time)
+        return self._otg.remaining
 
     def aim(self, goal: Array, dq: Array | None = None) -> None:
         """Take a pose of the moved frame in the base: x y z [m], quaternion x y z w; shape (7,)."""
@@ -106,17 +103,14 @@ class StraightFollower:
             return
         place, turn, speed, change = self._state()
         centre = self._turned(turn)
-        want, inward = self._input, self._terms.axes.T
+        inward = self._terms.axes.T
         target = np.concatenate([inward @ goal[:3], inward @ _between(centre, goal[3:])])
-        want.control_interface = ControlInterface.Position
-        want.target_position = target.tolist()
-        want.target_velocity = [0.0] * 6
-        want.minimum_duration = self._terms.minimum_time
-        way = target - [*place, 0.0, 0.0, 0.0]
+        way = target - _uncounted(place)
         free = (self._terms.velocity, self._terms.acceleration, self._terms.jerk)
-        limits, speed, change = _along(way, free, speed, change)
-        want.max_velocity, want.max_acceleration, want.max_jerk = (values.tolist() for values in limits)
-        if self._replan(place, speed, change):
+        (velocity, acceleration, jerk), speed, change = _along(way, free, speed, change)
+        self._otg.limit(acceleration, jerk, velocity=velocity)
+        start = (_uncounted(place), speed, change)
+        if self._otg.aim(start, target, speed=np.zeros(6), minimum=self._terms.minimum_time):
             self._centre, self.resting = centre, 0.0
 
     def advance(self, dt: float) -> Array:
@@ -125,11 +119,11 @@ class StraightFollower:
         Raises:
             Unreachable: the line leaves the workspace.
         """
-        if self._plan is None:
+        if not self._otg.has_begun:
             self.resting += dt
             return self._q
-        self._time += dt
-        self.resting = max(0.0, self._time - self._plan.duration)
+        self._otg.time += dt
+        self.resting = max(0.0, self._otg.over)
         place, turn, _, _ = self._state()
         x, y, z = (self._terms.axes @ place).tolist()
         i, j, k, w = self._turned(turn).tolist()
@@ -146,24 +140,20 @@ class StraightFollower:
         if self._stopping:
             return
         self._stopping = True
-        if self._plan is None:
+        if not self._otg.has_begun:
             return
         place, turn, speed, change = self._state()
         speed, change = speed * scale, change * scale * scale + speed * rate
-        limits, speed, change = _along(speed, self._terms.hardest, speed, change)
-        want = self._input
-        want.max_acceleration, want.max_jerk = (values.tolist() for values in limits)
-        want.control_interface = ControlInterface.Velocity
-        want.target_velocity = [0.0] * 6
-        want.minimum_duration = None
+        (acceleration, jerk), speed, change = _along(speed, self._terms.hardest, speed, change)
+        self._otg.limit(acceleration, jerk)
         centre = self._turned(turn)
-        if self._replan(place, speed, change):
+        if self._otg.halt((_uncounted(place), speed, change)):
             self._centre = centre
 
     @property
     def is_still(self) -> bool:
         """Whether a braked motion has come to rest."""
-        return self._stopping and (self._plan is None or self._time >= self._plan.duration)
+        return self._stopping and self._otg.over >= 0.0
 
     def _turned(self, turn: Array) -> Array:
         """Orientation that lies a rotation away from the centre, quaternion."""
@@ -175,23 +165,23 @@ class StraightFollower:
 
     def _state(self) -> tuple[Array, Array, Array, Array]:
         """Place and rotation from the centre, shape (3,) each; speed and acceleration, shape (6,)."""
-        if self._plan is None:
+        if not self._otg.has_begun:
             return self._place, np.zeros(3), np.zeros(6), np.zeros(6)
-        x, v, a = (np.array(values) for values in self._plan.at_time(self._time))
-        low, high = max(0.0, self._time - _STEP), self._time + _STEP
+        time = self._otg.time
+        x, v, a = self._otg.at(time)
+        low, high = max(0.0, time - _STEP), time + _STEP
         change = (self._spin(high) - self._spin(low)) / (high - low)
         return (
             x[:3],
             x[3:],
-            np.concatenate([v[:3], self._spin(self._time)]),
+            np.concatenate([v[:3], self._spin(time)]),
             np.concatenate([a[:3], change]),
         )
 
     def _spin(self, time: float) -> Array:
         """Angular velocity at a time of the plan, shape (3,) [rad/s]."""
-        assert self._plan is not None
-        x, v, _ = self._plan.at_time(time)
-        turn, speed = np.array(x[3:]), np.array(v[3:])
+        x, v, _ = self._otg.at(time)
+        turn, speed = x[3:], v[3:]
         angle = sqrt(float(turn @ turn))
         if angle < 1e-6:
             almost: Array = speed + 0.5 * np.cross(turn, speed)
@@ -202,20 +192,10 @@ class StraightFollower:
         spin: Array = speed + (1.0 - cos(angle)) / angle**2 * once + (angle - sin(angle)) / angle**3 * twice
         return spin
 
-    def _replan(self, place: Array, speed: Array, change: Array) -> bool:
-        """Plan from a state, rotations counted from here; False: it cannot be planned (the last plan goes on)."""
-        want = self._input
-        want.current_position = [*place.tolist(), 0.0, 0.0, 0.0]
-        want.current_velocity, want.current_acceleration = speed.tolist(), change.tolist()
-        plan = Trajectory(6)
-        try:
-            result = self._otg.calculate(want, plan)
-        except RuckigError:
-            return False
-        if result not in (Result.Working, Result.Finished):
-            return False
-        self._plan, self._time = plan, 0.0
-        return True
+
+def _uncounted(place: Array) -> Array:
+    """The coordinates of a place where the rotation is counted from, shape (6,)."""
+    return np.concatenate([place, np.zeros(3)])
 
 
 def _between(start: Array, end: Array) -> Array:
