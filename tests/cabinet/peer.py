@@ -58,6 +58,13 @@ class Peer:
         self.send(message, self._request)
         return self.answer(self._request)
 
+    def take_control(self, *, watchdog: float = 10.0) -> None:
+        """Takes control; who had it may have left so lately that the cabinet does not know yet."""
+        deadline = time.monotonic() + 5.0
+        while not isinstance(answer := self.ask(wire.TakeControl(watchdog=watchdog)), wire.Accepted):
+            assert time.monotonic() < deadline, answer
+            time.sleep(0.01)
+
     def answer(self, request: int) -> Any:
         wanted = request
         return self.wait(lambda frame, _: frame.request == wanted, since=0)

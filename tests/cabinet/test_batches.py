@@ -21,7 +21,7 @@ OPEN = wire.JointDynamics(velocity=(math.nan,) * 7, acceleration=(math.nan,) * 7
 @pytest.fixture
 def peer(connect: Connect) -> Iterator[Peer]:
     peer = connect()
-    peer.ask(wire.TakeControl(watchdog=10.0))
+    peer.take_control()
     peer.ask(wire.SetOverride(value=1.0))
     finished(peer, peer.ask(run(ptp())))
     yield peer

@@ -20,7 +20,7 @@ CAUSE = wire.Cause
 
 def controller(port: int) -> Peer:
     peer = Peer(port)
-    peer.ask(wire.TakeControl(watchdog=5.0))
+    peer.take_control(watchdog=5.0)
     finish(peer, started(peer, turn(0.0)))
     return peer
 

@@ -22,7 +22,7 @@ Connect = Callable[..., Peer]
 @pytest.fixture
 def controller(connect: Connect) -> Iterator[Peer]:
     peer = connect(name="first")
-    assert isinstance(peer.ask(wire.TakeControl(watchdog=10.0)), wire.Accepted)
+    peer.take_control()
     yield peer
     peer.ask(wire.Stop())
     peer.ask(wire.ReleaseControl())
@@ -83,7 +83,7 @@ def test_an_observer_may_stop(connect: Connect, controller: Peer) -> None:
 
 def test_release_stops_what_runs_and_what_waits(connect: Connect) -> None:
     peer = connect()
-    peer.ask(wire.TakeControl(watchdog=10.0))
+    peer.take_control()
     ids = [peer.ask(run(ptp(q))).id for q in (2.0, -2.0)]
     peer.wait_for(wire.MotionStarted)
     peer.ask(wire.ReleaseControl())
@@ -115,6 +115,19 @@ def test_a_silent_controller_loses_control_in_its_watchdog_time(
         assert isinstance(silent.ask(wire.TakeControl()), wire.Accepted)
 
 
+def test_words_that_came_while_the_cabinet_was_held_up_count(make: Callable[..., FakeCabinet]) -> None:
+    """A machine that stands still for longer than the watchdog time has heard nobody, and blames nobody."""
+    cabinet = make()
+    with Peer(cabinet.port) as peer:
+        for _ in range(2):
+            peer.take_control(watchdog=1.0)
+            cabinet.process.send_signal(signal.SIGSTOP)
+            time.sleep(1.1)
+            peer.send(wire.Pong(sent=0, received=0))
+            cabinet.process.send_signal(signal.SIGCONT)
+            assert isinstance(peer.ask(run(ptp(0.0))), wire.Accepted)
+
+
 def test_finish_on_loss_lets_the_program_end(connect: Connect) -> None:
     observer = connect(name="observer")
     with Peer(observer.socket.getpeername()[1], name="leaver") as leaver:
@@ -132,7 +145,7 @@ import sys, time
 from heptarm.wire import messages as wire
 from tests.cabinet.peer import Peer, ptp, run
 peer = Peer(int(sys.argv[1]), name="victim")
-peer.ask(wire.TakeControl(watchdog=5.0))
+peer.take_control(watchdog=5.0)
 peer.ask(run(ptp(2.5)))
 peer.wait_for(wire.MotionStarted)
 print("moving", flush=True)

@@ -16,7 +16,7 @@ States = wire.FriSessionState
 
 def controller(port: int) -> Peer:
     peer = Peer(port)
-    peer.ask(wire.TakeControl(watchdog=5.0))
+    peer.take_control(watchdog=5.0)
     return peer
 
 

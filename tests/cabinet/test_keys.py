@@ -46,7 +46,7 @@ def virtual(tmp_path: Path) -> Iterator[tuple[int, Path]]:
 def test_a_person_at_the_smartpad_stops_and_takes_control_away(virtual: tuple[int, Path]) -> None:
     port, keys = virtual
     with Peer(port, name="first") as peer:
-        peer.ask(wire.TakeControl(watchdog=10.0))
+        peer.take_control()
         accepted = peer.ask(run(ptp(1.5)))
         peer.wait_for(wire.MotionStarted, lambda e: e.id == accepted.id)
         keys.write_text(f"{STOP}\n")

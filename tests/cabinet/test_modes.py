@@ -66,7 +66,7 @@ GOOD = (
 @pytest.fixture
 def peer(cabinet: FakeCabinet) -> Iterator[Peer]:
     with Peer(cabinet.port) as peer:
-        peer.ask(wire.TakeControl(watchdog=10.0))
+        peer.take_control()
         yield peer
         peer.ask(wire.Stop())
 

@@ -23,7 +23,7 @@ PLANNING, ON_THE_WAY, SLOWLY, LACKING = 1.25, 1.5, 1.0, 0.75
 @pytest.fixture
 def peer(connect: Connect) -> Iterator[Peer]:
     peer = connect()
-    peer.ask(wire.TakeControl(watchdog=10.0))
+    peer.take_control()
     peer.ask(wire.SetOverride(value=1.0))
     accepted = peer.ask(run(ptp()))
     peer.wait_for(wire.MotionFinished, lambda e: e.id == accepted.id)
@@ -226,7 +226,7 @@ def test_so_many_motions_may_wait_and_no_more(peer: Peer) -> None:
 def test_an_exception_of_the_robot_is_an_answer(make: Callable[..., FakeCabinet]) -> None:
     cabinet = make()
     with Peer(cabinet.port) as peer:
-        peer.ask(wire.TakeControl(watchdog=10.0))
+        peer.take_control()
         rejected = peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="crash"))
         assert rejected.code == Code.INTERNAL
         assert "an error of the cabinet's API" in rejected.text
@@ -242,7 +242,7 @@ def test_an_exception_of_the_robot_is_an_answer(make: Callable[..., FakeCabinet]
 def test_readings_that_fail_for_a_while_end_nothing(make: Callable[..., FakeCabinet]) -> None:
     cabinet = make()
     with Peer(cabinet.port) as peer:
-        peer.ask(wire.TakeControl(watchdog=10.0))
+        peer.take_control()
         peer.ask(wire.Subscribe(groups=wire.Groups(63), rate=100.0))
         peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="blind"))
         end = finished(peer, peer.ask(run(ptp(0.05))))
@@ -261,7 +261,7 @@ def test_control_becomes_free_even_if_the_robot_cannot_be_stopped(make: Callable
     cabinet = make()
     with Peer(cabinet.port, name="next") as after:
         with Peer(cabinet.port, name="first") as peer:
-            peer.ask(wire.TakeControl(watchdog=10.0))
+            peer.take_control()
             accepted = peer.ask(run(ptp(2.0)))
             peer.wait_for(wire.MotionStarted)
             peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="jammed"))
@@ -279,7 +279,7 @@ def test_the_end_of_the_server_stops_motion_tells_all_and_leaves_no_thread(
 ) -> None:
     cabinet = make()
     with Peer(cabinet.port, name="controller") as peer, Peer(cabinet.port, name="observer") as observer:
-        peer.ask(wire.TakeControl(watchdog=10.0))
+        peer.take_control()
         observer.ask(wire.Subscribe(groups=wire.Groups(63), rate=1000.0))
         accepted = peer.ask(run(ptp(2.0)))
         peer.wait_for(wire.MotionStarted)

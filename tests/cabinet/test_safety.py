@@ -18,7 +18,7 @@ Bits = wire.SafetyBits
 @pytest.fixture
 def peer(connect: Connect) -> Iterator[Peer]:
     peer = connect()
-    peer.ask(wire.TakeControl(watchdog=10.0))
+    peer.take_control()
     tidy(peer)
     end(peer, peer.ask(run(ptp())))
     yield peer

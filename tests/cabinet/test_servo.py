@@ -16,7 +16,7 @@ from tests.cabinet.peer import Peer, ptp, run
 
 def controller(port: int) -> Peer:
     peer = Peer(port)
-    peer.ask(wire.TakeControl(watchdog=5.0))
+    peer.take_control(watchdog=5.0)
     return peer
 
 

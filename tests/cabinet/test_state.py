@@ -94,7 +94,7 @@ def test_two_clients_with_two_rates(connect: Connect) -> None:
 
 def test_velocity_follows_the_motion(connect: Connect) -> None:
     peer = connect()
-    peer.ask(wire.TakeControl(watchdog=10.0))
+    peer.take_control()
     peer.ask(wire.Subscribe(groups=G.JOINTS | G.MOTION, rate=200.0))
     begin = peer.ask(run(ptp(0.0)))  # wherever other tests left it
     peer.wait_for(wire.MotionFinished, lambda e: e.id == begin.id)

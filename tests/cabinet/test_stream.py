@@ -85,7 +85,7 @@ def test_requests_without_reading_the_answers_end_that_client_only(make: Callabl
 
 def test_a_program_of_a_thousand_items_in_one_frame(connect: Connect) -> None:
     peer = connect()
-    peer.ask(wire.TakeControl(watchdog=10.0))
+    peer.take_control()
     accepted = peer.ask(run(*[ptp(0.0001 * (k % 2)) for k in range(1000)]))
     assert isinstance(accepted, wire.Accepted)
     finished = peer.wait_for(wire.MotionFinished, timeout=20)

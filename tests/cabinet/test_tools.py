@@ -41,7 +41,7 @@ def frames(*names: str) -> tuple[wire.FrameInfo, ...]:
 @pytest.fixture
 def peer(cabinet: FakeCabinet) -> Iterator[Peer]:
     with Peer(cabinet.port) as peer:
-        peer.ask(wire.TakeControl(watchdog=10.0))
+        peer.take_control()
         peer.ask(wire.AttachTool(name="", frame=""))
         yield peer
         peer.ask(wire.Stop())

@@ -37,7 +37,7 @@ def turn(a7: float, *triggers: wire.Trigger, blend: float = 0.0) -> wire.Item:
 @contextlib.contextmanager
 def controlling(port: int) -> Iterator[Peer]:
     with Peer(port) as peer:
-        peer.ask(wire.TakeControl(watchdog=10.0))
+        peer.take_control()
         finish(peer, started(peer, turn(0.0)))
         yield peer
         peer.ask(wire.ReleaseControl())

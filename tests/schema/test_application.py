@@ -34,7 +34,7 @@ def cabinet() -> Iterator[PrivateCabinet]:
 def peer(cabinet: PrivateCabinet) -> Iterator[Peer]:
     """In control; what runs, hangs and glows is afterwards as it was before, and the cabinet works."""
     with Peer(cabinet.port, name="bypass") as peer:
-        assert isinstance(peer.ask(wire.TakeControl(watchdog=10.0)), wire.Accepted)
+        peer.take_control()
         before = picture(cabinet)
         yield peer
         assert picture(cabinet) == before
@@ -113,7 +113,7 @@ def wire_code(name: str) -> int:
 @pytest.mark.parametrize("kind", [wire.ServoJoints, wire.ServoJointsVelocity, wire.ServoPose])
 def test_each_bad_target_is_counted_and_told_of(cabinet: PrivateCabinet, kind: type[Message]) -> None:
     with Peer(cabinet.port, name="bypass") as peer:
-        peer.ask(wire.TakeControl(watchdog=10.0))
+        peer.take_control()
         for case in requests("oneway"):
             if not isinstance(case.message, kind):
                 continue

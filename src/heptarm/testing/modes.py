@@ -215,7 +215,8 @@ def online(arm: Arm) -> None:
 def validation(arm: Arm) -> None:
     """Impedance does not begin while the joints feel more than the declared load explains."""
     arm.operator.push((0.0, 0.0, -40.0), duration=_LONG)
-    arm.wait_until(lambda s: s.wrench.force[2] < -35.0, timeout=20.0)
+    # Force and torques are read one after the other: wait for both, lest what follows sees torques of before.
+    arm.wait_until(lambda s: s.wrench.force[2] < -35.0 and np.abs(s.tau_ext).max() > 12.0, timeout=20.0)
     try:
         with arm.servo("joint", mode=JointImpedance(500.0), watchdog=2.0):
             holds(False, "a servo motion under impedance is refused")

@@ -43,6 +43,7 @@ final class Client {
     private final long born;
     private volatile boolean gone;
     private volatile long heard;
+    private long silenceBefore;
     private volatile long sent;
     private volatile long writeBegan;
 
@@ -100,6 +101,23 @@ final class Client {
     /** Cabinet time of the last octets from the client. */
     long heard() {
         return heard;
+    }
+
+    /**
+     * For how long the client has said nothing [ns]. On a machine that was held up its words may wait unread, or just be
+     * read: so silence is what two looks in succession found. For the watchdog alone.
+     */
+    long silence() {
+        boolean waits;
+        try {
+            waits = in.available() > 0;
+        } catch (IOException e) {
+            waits = false; // the reader finds out why
+        }
+        long silence = waits ? 0 : server.clock.nanos() - heard;
+        long found = Math.min(silence, silenceBefore);
+        silenceBefore = silence;
+        return found;
     }
 
     /** Cabinet time of the last frame to the client. */

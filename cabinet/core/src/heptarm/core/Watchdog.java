@@ -35,13 +35,11 @@ final class Watchdog {
     }
 
     private void work() {
-        long next = server.clock.nanos();
         int round = 0;
         boolean failing = false;
         try {
             while (!closed) {
-                next = Math.max(next + PERIOD_NS, server.clock.nanos());
-                server.clock.sleepUntil(next);
+                server.clock.sleepUntil(server.clock.nanos() + PERIOD_NS); // a true pause, also after a hold-up
                 try {
                     look();
                     server.monitors.look();
@@ -65,7 +63,7 @@ final class Watchdog {
         long now = server.clock.nanos();
         double scale = 1e-9 / server.clock.rate(); // time-outs of the link count the client's seconds
         for (Client client : server.clients()) {
-            double silence = (now - client.heard()) * scale;
+            double silence = client.silence() * scale;
             long began = client.writeBegan();
             if (began != 0 && (now - began) * scale > STUCK) {
                 client.leave("it does not read what it asked for");
