@@ -25,7 +25,7 @@ from heptarm.fri.version import Version
 from heptarm.virtual import processdata, templates
 from heptarm.virtual.fri.sessions import Sessions
 from heptarm.virtual.operator import Operator, timed
-from heptarm.virtual.pacer import ANSWERED, CATCH_UP, Pacer
+from heptarm.virtual.pacer import ROOM, Pacer
 from heptarm.virtual.payload import hanging
 from heptarm.virtual.plant import Plant
 from heptarm.virtual.world import Box
@@ -163,7 +163,7 @@ class VirtualCabinet:
         """One millisecond of operator, FRI and plant."""
         self.operator.tick()
         self.sessions.tick()
-        self.pacer.catch_up = ANSWERED if self.sessions.any else CATCH_UP
+        self.pacer.room = ROOM if self.sessions.any else 0.0
         self.plant.tick()
 
     @property

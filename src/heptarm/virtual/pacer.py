@@ -2,9 +2,10 @@
 
 The loop sleeps to shortly before a tick is due and spins the rest; when it wakes late it catches up, since a
 tick costs a tenth of a millisecond; beyond 20 missed ticks it re-bases and counts that. Beside an FRI session it
-re-bases at once: no client could answer ticks that follow each other without a pause. Real-time priority
-and a short timer slack are asked for and, where refused, named in the report. Memory is not locked: that would
-make all that the JVM has only reserved real.
+leaves `room` between two ticks, however late they are, and re-bases after one: no client could answer ticks that
+follow each other without a pause, and a machine that stood still kept its client from answering, too.
+Real-time priority and a short timer slack are asked for and, where refused, named in the report. Memory is not
+locked: that would make all that the JVM has only reserved real.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ from heptarm.virtual.ring import ANCHOR, NEWEST, RATE, Ring
 #: Ticks that are caught up in one go; beyond them time is given up.
 CATCH_UP = 20
 #: The same while somebody has to answer each tick.
-ANSWERED = 1
+CATCH_UP_ANSWERED = 1
+#: What is then left between two ticks for the answer, as a share of a period.
+ROOM = 0.4
 #: Wake this long before a tick is due and spin [ns]; small, since a spinning real-time thread starves the machine.
 SPIN_NS = 60_000
 #: At most this share of a period is spun.
@@ -75,7 +78,8 @@ class Pacer:
         speed: plant seconds per second; 0: as fast as it goes.
 
     Attributes:
-        catch_up: ticks that are caught up in one go; may be set at any time.
+        room: pause between two ticks, as a share of a period: `ROOM` while somebody has to answer each of them, else 0;
+            may be set at any time.
     """
 
     def __init__(self, ring: Ring, tick: Callable[[], None], *, speed: float = 1.0) -> None:
@@ -83,7 +87,7 @@ class Pacer:
         self._tick = tick
         self._period = int(TICK_NS / speed) if speed > 0 else 0
         self._speed = speed
-        self.catch_up = CATCH_UP
+        self.room = 0.0
         self._stop = False
         self._cost = np.zeros(_HISTORY, dtype=np.int64)
         self._late = np.zeros(_HISTORY, dtype=np.int64)
@@ -115,21 +119,26 @@ class Pacer:
         done = int(header[NEWEST])  # ticks of plant time that have passed before the loop
         due = now_ns() + period
         header[ANCHOR] = due - (done + 1) * period
+        end, is_second = now_ns(), False
         while not self._stop:
-            now = now_ns()
+            now, room = now_ns(), int(self.room * period)
             if period == 0:
                 due = now
-            elif now < due:
-                if due - now > spin:
-                    time.sleep((due - now - spin) * 1e-9)
-                while now_ns() < due:
-                    pass
-            elif now - due > self.catch_up * period:
+            elif now - due > (CATCH_UP_ANSWERED if room else CATCH_UP) * period:
                 self._rebased += 1
                 time.sleep(BREATH)
-                due = now_ns()
+                due = now = now_ns()
                 header[ANCHOR] = due - (int(header[NEWEST]) + 1) * period
-            begin = now_ns()
+            start = max(due, end + room)
+            if now < start:
+                if start - now > spin:
+                    time.sleep((start - now - spin) * 1e-9)
+                while (now := now_ns()) < start:
+                    pass
+                if now - start > room > 0 and not is_second:  # the machine stood still: leave the room once more
+                    end, is_second = now, True
+                    continue
+            begin, is_second = now_ns(), False
             self._tick()
             end = now_ns()
             at = self._count % _HISTORY

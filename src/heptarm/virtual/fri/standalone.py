@@ -28,7 +28,7 @@ from heptarm.virtual.fri.events import (
 from heptarm.virtual.fri.faults import Scenario
 from heptarm.virtual.fri.overlay import HoldingTarget, MotionOverlay
 from heptarm.virtual.fri.server import PORT, Address, Server
-from heptarm.virtual.pacer import ANSWERED, Pacer
+from heptarm.virtual.pacer import ROOM, Pacer
 from heptarm.virtual.ring import Ring
 
 #: After an overlay has ended by an error, the next one begins so many ticks later at the earliest.
@@ -150,7 +150,7 @@ class Standalone:
             listener=self._hear,
         )
         self.pacer = Pacer(arm.ring, self.tick, speed=settings.speed)
-        self.pacer.catch_up = ANSWERED
+        self.pacer.room = ROOM
 
     def tick(self) -> None:
         """One millisecond of session and arm."""
