@@ -161,6 +161,10 @@ def test_nothing_else_may_run_and_a_servo_is_used_once(arm: ha.Arm) -> None:
         pass
     with pytest.raises(ha.LocalProtocolError, match="with block"):
         _ = arm.servo("joint").start
+    with pytest.raises(ha.LocalProtocolError, match="with block"):
+        arm.servo("joint").set(np.zeros(7))
+    with pytest.raises(ha.LocalProtocolError, match="with block"):
+        arm.servo("joint").change(JointImpedance(300.0))
 
 
 def test_the_cabinets_own_time_out_is_renewed_with_the_next_target(arm: ha.Arm) -> None:

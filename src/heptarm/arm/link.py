@@ -229,18 +229,23 @@ class Link:
         """Send a request without waiting for its answer; callable from the callbacks."""
         self._say(message, Slot())
 
-    def tell(self, kind: type[OneWay], numbers: Iterable[float]) -> None:
+    def tell(self, kind: type[OneWay], numbers: Iterable[float], *, now: int) -> None:
         """Send a message that nobody answers, stamped with the cabinet's clock as far as it is known.
 
         Args:
             kind: what to say.
             numbers: its fields, one after the other.
+            now: our clock [ns].
         """
         with self._sending:
             if self._error is not None:
                 raise self._lost()
-            now = self.offset.to_cabinet(self._clock.nanos())
-            self._transmit(self._session.send_numbers(kind, numbers, time=now))
+            data = self._session.send_numbers(kind, numbers, time=self.offset.to_cabinet(now))
+            try:
+                self._transport.send(data)
+            except BaseException as error:
+                self._spoil(error)
+                raise
 
     def ping(self) -> None:
         """Probe the cabinet's clock; the answer goes into `offset`."""
@@ -255,19 +260,17 @@ class Link:
                 request = self._session.next_request()
                 self._slots[request] = slot
             data = self._session.send(message, request=request, time=self._clock.nanos())
-            self._transmit(data)
+            try:
+                self._transport.send(data)
+            except BaseException as error:
+                self._spoil(error)
+                raise
 
-    def _transmit(self, data: bytes) -> None:
-        """Send octets; the caller holds the lock."""
-        try:
-            self._transport.send(data)
-        except HeptarmError as error:
-            self._lose(error)
-            raise
-        except BaseException:
-            # a part of the frame may have left: nothing can follow it
-            self._lose(ConnectionLost("interrupted while sending"))
-            raise
+    def _spoil(self, error: BaseException) -> None:
+        """A part of a frame may have left: nothing can follow it."""
+        if not isinstance(error, HeptarmError):
+            error = ConnectionLost("interrupted while sending")
+        self._lose(error)
 
     # ------------------------------------------------------------------------------------ reading
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass
-from math import inf, isfinite, nan
+from math import inf, nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -103,6 +103,8 @@ class Servo(Block):
         self._message = message
         self._until = until
         self._handle: MotionHandle | None = None
+        self._number = 0
+        self._active = False
         self._start: State | None = None
         self._result: Result | None = None
         self._began = self._due = self._last = 0
@@ -136,6 +138,8 @@ class Servo(Block):
             lambda state: state.joints is not None and state.joints.stamp > before, _PATIENCE
         )
         self._began = self._due = self._last = self._clock.nanos()
+        self._number, self._active = handle.id, True
+        handle.add_done_callback(self._on_end)
         return self
 
     def close(self) -> None:
@@ -145,12 +149,16 @@ class Servo(Block):
             return
         if not handle.done:
             self._connection.cancel(handle)
+        self._active = False
         self._result = handle.wait(timeout=_PATIENCE)
+
+    def _on_end(self, _: MotionHandle) -> None:
+        self._active = False
 
     @property
     def active(self) -> bool:
         """Whether the arm follows."""
-        return self._handle is not None and not self._handle.done
+        return self._active
 
     @property
     def start(self) -> State:
@@ -177,7 +185,7 @@ class Servo(Block):
         Returns:
             Time since the last tick [s]; None when the arm follows no more (why rises at the end of the block).
         """
-        if not self.active:
+        if not self._active:
             return None
         clock = self._clock
         self._due += round(self.period * 1e9)
@@ -192,24 +200,18 @@ class Servo(Block):
                 self._due = now  # what was missed is not caught up in a burst
         passed = (now - self._last) * 1e-9
         self._last = now
-        return passed if self.active else None
+        return passed if self._active else None
 
     def _tell(self, began: int, kind: type[wire.OneWay], target: list[float]) -> None:
-        handle = self._running
-        if handle.done:
+        if not self._active:
+            _ = self.start  # raises unless it has begun
             return
-        self._link.tell(kind, (handle.id, self.watchdog, *target))
+        self._link.tell(kind, (self._number, self.watchdog, *target), now=began)
         self._sent += 1
         self._last_sent = now = self._clock.nanos()
         self._costs.append(now - began)
         if self._sent == 1:
             self._first_sent = now
-
-    @property
-    def _running(self) -> MotionHandle:
-        if self._handle is None:
-            raise LocalProtocolError("the servo motion has not begun; use it in a with block")
-        return self._handle
 
     def change(self, mode: Mode) -> None:
         """Change the parameters of the control mode while the arm follows.
@@ -219,7 +221,8 @@ class Servo(Block):
         """
         message = mode_message(mode)
         assert message is not None
-        self._connection.request(wire.ServoSettings(servo=self._running.id, mode=message))
+        _ = self.start  # raises unless it has begun
+        self._connection.request(wire.ServoSettings(servo=self._number, mode=message))
 
     @property
     def stats(self) -> ServoStats:
@@ -249,7 +252,8 @@ class JointServo(Servo):
 
     def __init__(self, connection: Connection, message: wire.ServoOpen, **settings: Any) -> None:
         super().__init__(connection, message, **settings)
-        self._low, self._high = connection.robot.q_min, connection.robot.q_max
+        robot = connection.robot
+        self._limits = tuple(zip(robot.q_min.tolist(), robot.q_max.tolist(), strict=True))
 
     def __enter__(self) -> JointServo:
         """Begin; see `Servo`."""
@@ -278,11 +282,21 @@ class JointServo(Servo):
                 parameter="dq",
                 hint='leave dq out, or use engine="smart"',
             )
-        sent = np.minimum(np.maximum(_joints(q, "q"), self._low), self._high)
-        if dq is None:
-            self._tell(began, wire.ServoJoints, sent.tolist())
+        if type(q) is np.ndarray and q.dtype is _DOUBLES and q.shape == (7,):
+            sent = q.copy()
         else:
-            self._tell(began, wire.ServoJointsVelocity, sent.tolist() + _joints(dq, "dq").tolist())
+            sent = array(q, 7, "q").copy()
+        target = sent.tolist()
+        for value, (low, high) in zip(target, self._limits, strict=True):
+            if not low <= value <= high:
+                robot = self._connection.robot
+                sent = array(sent, 7, "q").clip(robot.q_min, robot.q_max)
+                target = sent.tolist()
+                break
+        if dq is None:
+            self._tell(began, wire.ServoJoints, target)
+        else:
+            self._tell(began, wire.ServoJointsVelocity, target + array(dq, 7, "dq").tolist())
         return sent
 
 
@@ -313,15 +327,3 @@ class PoseServo(Servo):
             )
         self._tell(began, wire.ServoPose, pose.xyz.tolist() + pose.quat.tolist())
         return pose
-
-
-def _joints(value: npt.ArrayLike, name: str) -> Array:
-    """Seven finite numbers; a shorter way than `array`, since it runs at every tick."""
-    if (
-        type(value) is np.ndarray
-        and value.dtype is _DOUBLES
-        and value.shape == (7,)
-        and isfinite(sum(value.tolist()))  # of finite numbers the sum may overflow: `array` tells
-    ):
-        return value
-    return array(value, 7, name)

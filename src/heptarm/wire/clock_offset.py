@@ -38,6 +38,7 @@ class ClockOffset:
         self._span = span * 1e9
         self._anchor = _Sample(0.0, 0.0, float("inf"))
         self._rate = 1.0
+        self._shift = 0
         self._count = 0
 
     def feed(self, sent: int, received: int, returned: int) -> None:
@@ -60,6 +61,7 @@ class ClockOffset:
             samples.popleft()
         self._rate = self._fit()
         self._anchor = min(samples, key=lambda s: s.slack + DRIFT * (sample.ours - s.ours))
+        self._shift = round(self._anchor.theirs - self._anchor.ours)
 
     def _is_step(self, sample: _Sample) -> bool:
         since = sample.ours - self._anchor.ours
@@ -102,6 +104,8 @@ class ClockOffset:
 
     def to_cabinet(self, ours: int) -> int:
         """The cabinet's clock [ns] when ours shows `ours` [ns]."""
+        if self._rate == 1.0:
+            return ours + self._shift
         anchor = self._anchor
         return round(anchor.theirs + (ours - anchor.ours) * self._rate)
 

@@ -104,8 +104,7 @@ class Session:
         self._key = key
         self._nonce = secrets.token_bytes(32) if nonce is None else nonce
         self._other_nonce = b""
-        self._state = SessionState.START
-        self._legal = TRANSITIONS[SessionState.START]
+        self._enter(SessionState.START)
         self._reader = FrameReader()
         self._sent = 0
         self._received = 0
@@ -170,9 +169,10 @@ class Session:
         Raises:
             LocalProtocolError: it is illegal here; nothing has changed.
         """
-        if self._source != kind.SOURCE or "oneway" not in self._legal:
+        pack = self._packers.get(kind)
+        if pack is None:
             raise self._illegal(kind)
-        data = _PACKERS[kind](self._sent, 0, time, *numbers)
+        data = pack(self._sent, 0, time, *numbers)
         self._sent = (self._sent + 1) & _WRAP
         return data
 
@@ -225,8 +225,8 @@ class Session:
                     return
                 event = self._accept(frame)
             except RemoteProtocolError as error:
-                self._state, self._failed = SessionState.CLOSED, error
-                self._legal = TRANSITIONS[SessionState.CLOSED]
+                self._failed = error
+                self._enter(SessionState.CLOSED)
                 raise
             yield event
 
@@ -267,9 +267,17 @@ class Session:
         self._after(kind, after, frame.request)
         return Received(message, frame.request, frame.time)
 
+    def _enter(self, state: SessionState) -> None:
+        self._state, self._legal = state, TRANSITIONS[state]
+        self._packers = {
+            kind: pack
+            for kind, pack in _PACKERS.items()
+            if kind.SOURCE in (self._source, "both") and _SYMBOLS[kind] in self._legal
+        }
+
     def _after(self, kind: type[Message], after: SessionState, request: int) -> None:
         if after is not self._state:
-            self._state, self._legal = after, TRANSITIONS[after]
+            self._enter(after)
         if kind.KIND == "request":
             self._waiting[request] = kind
         elif kind.KIND == "answer":
