@@ -12,8 +12,9 @@ from heptarm.values.guiding import hand_guide
 from heptarm.values.pose import Pose
 from heptarm.virtual.order import Order
 from heptarm.virtual.planner import CARTESIAN_DEFAULT
-from heptarm.virtual.plant import TICK, Plant
+from heptarm.virtual.plant import Plant
 from heptarm.virtual.safety import Demand
+from heptarm.virtual.tick import TICK
 from tests.virtual.driving import READY
 from tests.virtual.ideal import KINDS, braking, stopping_time
 

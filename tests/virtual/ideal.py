@@ -12,9 +12,9 @@ from heptarm.virtual.interpolator import FAST_JERK
 from heptarm.virtual.order import Order
 from heptarm.virtual.plant import Plant
 from heptarm.virtual.safety import Demand
+from heptarm.virtual.tick import TICK
 from tests.virtual.driving import READY
 
-TICK = 1e-3
 LINE = (0.05, 0.25, 0.05, 0.0, 0.0, 0.0, 1.0)
 BASE = (0.0, 0.0, 0.0, 1.0)
 _HERE = Pose.from_matrix(forward(robot("iiwa14"), READY))

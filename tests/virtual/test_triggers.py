@@ -26,7 +26,7 @@ class Log:
     told: list[tuple[str, Array]] = field(default_factory=list)
 
     def add(self, what: str) -> None:
-        self.told.append((what, forward(self.plant.robot, self.plant.interpolator.command[2])[:3, 3]))
+        self.told.append((what, forward(self.plant.robot, self.plant.interpolator.command.after)[:3, 3]))
 
     def watch(self, name: str, *condition: float, part: int = -1) -> Watch:
         return Watch(condition, lambda: self.add(name), part=part)

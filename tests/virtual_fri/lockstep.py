@@ -18,12 +18,13 @@ from heptarm.rt.params import Params
 from heptarm.values.arrays import Array
 from heptarm.values.mode import Mode, Position
 from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.controller import TICK_NS, Controller
+from heptarm.virtual.fri.controller import Controller
 from heptarm.virtual.fri.events import OverlayEnded
 from heptarm.virtual.fri.overlay import MotionOverlay
 from heptarm.virtual.fri.plant_arm import PlantArm
 from heptarm.virtual.fri.standalone import control_of
 from heptarm.virtual.plant import Plant, Snapshot
+from heptarm.virtual.tick import TICK_NS
 from tests.virtual_fri.rig import READY, State
 
 #: The client's clock begins here [ns].

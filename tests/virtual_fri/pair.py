@@ -8,10 +8,11 @@ from heptarm.fri import messages as m
 from heptarm.fri.session import Session
 from heptarm.fri.setpoint import Setpoint
 from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.controller import TICK_NS, Controller
+from heptarm.virtual.fri.controller import Controller
 from heptarm.virtual.fri.events import Event, OverlayEnded
 from heptarm.virtual.fri.faults import NONE, Faults, Line
 from heptarm.virtual.fri.overlay import MotionOverlay
+from heptarm.virtual.tick import TICK_NS
 from tests.virtual_fri.rig import Arm, State
 
 

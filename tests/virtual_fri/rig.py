@@ -14,10 +14,11 @@ from heptarm.values.arrays import Array
 from heptarm.values.mode import Mode
 from heptarm.values.robot import RobotModel, robot
 from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.controller import TICK_NS, Controller
+from heptarm.virtual.fri.controller import Controller
 from heptarm.virtual.fri.events import Event, OverlayEnded, Refused, StateChanged
 from heptarm.virtual.fri.overlay import MotionOverlay, Reading, Superposition
 from heptarm.virtual.ring import NEWEST, Ring
+from heptarm.virtual.tick import TICK_NS
 
 State = m.SessionState
 READY = (0.0, 0.5, 0.1, -1.3, 0.2, 0.9, 0.0)

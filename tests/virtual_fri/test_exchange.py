@@ -12,8 +12,8 @@ from heptarm.fri import messages as m
 from heptarm.fri.codec import encode_command, encode_monitoring
 from heptarm.fri.version import Version
 from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.controller import TICK_NS
 from heptarm.virtual.fri.events import FrameProvided, OutputWritten
+from heptarm.virtual.tick import TICK_NS
 from tests.virtual_fri.rig import Rig, State, mirror
 
 IN, OUT = m.IoDirection.INPUT, m.IoDirection.OUTPUT

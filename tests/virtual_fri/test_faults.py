@@ -12,10 +12,10 @@ from heptarm.fri import messages as m
 from heptarm.fri.codec import decode_monitoring
 from heptarm.fri.protobuf import MalformedMessage
 from heptarm.fri.version import Version, recognise
-from heptarm.virtual.fri.controller import TICK_NS
 from heptarm.virtual.fri.events import OverlayEnded
 from heptarm.virtual.fri.faults import NONE, Damage, Faults, Line, Scenario
 from heptarm.virtual.fri.overlay import MotionOverlay
+from heptarm.virtual.tick import TICK_NS
 from tests.virtual_fri.rig import Arm, Rig, State
 
 MS = 1_000_000

@@ -14,12 +14,13 @@ from heptarm.model.kinematics import forward
 from heptarm.values.arrays import Array
 from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, Position
 from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.controller import TICK_NS, Controller
+from heptarm.virtual.fri.controller import Controller
 from heptarm.virtual.fri.events import OverlayEnded
 from heptarm.virtual.fri.overlay import MotionOverlay
 from heptarm.virtual.fri.plant_arm import PlantArm
 from heptarm.virtual.fri.standalone import control_of
 from heptarm.virtual.plant import Plant
+from heptarm.virtual.tick import TICK_NS
 from tests.virtual_fri.rig import READY, Client, Law, State, mirror
 
 FLOATING = JointImpedance(0.0)

@@ -14,8 +14,8 @@ from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import Array
 from heptarm.values.mode import JointImpedance
 from heptarm.virtual.order import Order
-from heptarm.virtual.pace import TICK
 from heptarm.virtual.plant import Plant
+from heptarm.virtual.tick import TICK
 
 _SERVO = 1
 

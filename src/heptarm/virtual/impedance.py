@@ -32,8 +32,9 @@ from heptarm.values.mode import CartesianImpedance, SineImpedance
 from heptarm.values.motion import BASE, TOOL
 from heptarm.values.pose import quaternion, rotation
 from heptarm.values.robot import RobotModel
-from heptarm.virtual.law import TICK, Sensed
+from heptarm.virtual.law import Sensed
 from heptarm.virtual.sine import Pattern
+from heptarm.virtual.tick import TICK
 
 #: Parameters that change while the law is in force do so within this time [s]; added forces set in likewise.
 RAMP = 0.05

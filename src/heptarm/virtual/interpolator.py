@@ -25,13 +25,13 @@ from heptarm.virtual.guiding import Guidance
 from heptarm.virtual.law import Sensed
 from heptarm.virtual.load import Load
 from heptarm.virtual.order import Order
-from heptarm.virtual.pace import TICK, Pace
-from heptarm.virtual.path import JointLine
-from heptarm.virtual.profile import Limits, brake
+from heptarm.virtual.pace import Pace
 from heptarm.virtual.queue import Cancellation, Queue
 from heptarm.virtual.run import Run
 from heptarm.virtual.safety import Mode, Safety
 from heptarm.virtual.servo import Follower, SmartFollower, follower
+from heptarm.virtual.setpoints import SetPoints
+from heptarm.virtual.tick import TICK
 
 #: A motion is done when every measured joint is this near to its command [rad] and this slow [rad/s] ...
 SETTLED = 5e-5
@@ -43,11 +43,6 @@ SETTLE_TICKS = 500
 REDUCED_SPEED = 0.249
 #: A fast stop may jerk so many times more than a motion.
 FAST_JERK = 20.0
-
-#: Set-points this far behind a limit are rounding errors [rad].
-ON_LIMIT = 1e-9
-#: A set-point that asks for more than this many times an axis' speed is not followed.
-OVERSPEED = 1.2
 
 
 class Interpolator:
@@ -64,7 +59,7 @@ class Interpolator:
     Attributes:
         queue: orders that wait.
         lookout: looks at the conditions.
-        command: set-points of the last, this and the next tick, shape (7,) each [rad].
+        command: the set-points.
         run: the order under way; None: nothing runs.
         is_paused: come to rest on the path, keeping all orders.
         action: what an FRI overlay wants of the next tick.
@@ -77,9 +72,7 @@ class Interpolator:
         self._robot, self._ring, self._load = robot, shared, load
         self._control, self._safety = control, safety
         self._q, self._dq = sensed.q, sensed.dq
-        self._leap = OVERSPEED * robot.dq_max * TICK
-        self._lowest, self._highest = robot.q_min - ON_LIMIT, robot.q_max + ON_LIMIT
-        self.command = [self._q.copy() for _ in range(3)]
+        self.command = SetPoints(robot, self._q)
         self.queue = Queue(robot, self._rest)
         self.lookout = Lookout(robot, shared.signals)
         self._pace = Pace(robot)
@@ -99,15 +92,15 @@ class Interpolator:
     @property
     def interpolated(self) -> Array:
         """Set-point of the next tick without an overlay, shape (7,) [rad]: where a held arm was when the hold began."""
-        return self.run.plan.end if self.is_overlaid and self.run is not None else self.command[2]
+        return self.run.plan.end if self.is_overlaid and self.run is not None else self.command.after
 
     @property
     def rests(self) -> bool:
         """Whether the set-points rest."""
-        return bool((self.command[2] == self.command[1]).all())
+        return self.command.rests
 
     def _rest(self) -> Array:
-        return self.command[2].copy()
+        return self.command.after.copy()
 
     def change_mode(self, order_id: int, mode: ControlMode) -> None:
         """Change the parameters of a running order's control mode, from any thread; see `Plant.change_mode`."""
@@ -121,7 +114,6 @@ class Interpolator:
 
     def advance(self) -> tuple[float, float]:
         """Shift the set-points and compute the next one; returns progress and remaining time."""
-        command = self.command
         while (wish := self.queue.cancelled()) is not None:
             self._cancel(wish)
         while self._aborts:
@@ -141,9 +133,8 @@ class Interpolator:
         if run is None:
             run = None if self._safety.latched else self._next()
             if run is None and self._control.stiffen():
-                self._stay()
-            command = self.command
-        command[0], command[1] = command[1], command[2]
+                self.command.stay(self._q)
+        self.command.shift()
         if run is None:
             return 0.0, nan
         if not run.started:
@@ -158,13 +149,13 @@ class Interpolator:
         while (accepted := self.queue.take()) is not None:
             order = accepted.order
             if self._control.take(order):
-                self._stay()
-            planned = self.queue.planned(accepted, self.command[2])
+                self.command.stay(self._q)
+            planned = self.queue.planned(accepted, self.command.after)
             if planned is None:
                 continue
             self.run = run = Run(planned, accepted.serial, self.lookout.begin(planned))
             if order.is_servo:
-                run.follower = follower(self._robot, order, self.command[2])
+                run.follower = follower(self._robot, order, self.command.after)
             if order.guide is not None:
                 run.guidance = self._guidance(order, order.guide)
             return run
@@ -213,7 +204,7 @@ class Interpolator:
             return self._serve(run, run.follower)
         if self.action is not None and planned.order.kind == "hold" and not (run.cancelled or run.failure):
             self.is_overlaid = True
-            self.command[2] = self.action.q
+            self.command.after = self.action.q
             return 0.0, nan
         if self.is_overlaid:
             self.is_overlaid = False
@@ -231,7 +222,7 @@ class Interpolator:
         self._reach(run, s)
         # at the very end take the planned joints: the path's samples may end a rounding error beside them
         if s == 1.0 and run.path is planned.path:
-            self.command[2] = planned.end
+            self.command.after = planned.end
         else:
             self._lead(run, s)
         return (nan if run.failure else planned.progress(s, run.part)), run.profile.duration - run.time
@@ -247,9 +238,8 @@ class Interpolator:
     def _lead(self, run: Run, s: float) -> None:
         """Set the next set-point; one that no axis could follow ends the motion."""
         assert run.path is not None
-        here = self.command[2]
         try:
-            there = run.path.at(s, here)
+            there = run.path.at(s, self.command.after)
         except Unreachable as error:
             self._fail(run, f"the path is not reachable: {error.text}")
             return
@@ -257,17 +247,17 @@ class Interpolator:
 
     def _go(self, run: Run, there: Array) -> None:
         """Take a set-point unless an axis could not follow it."""
-        leap = np.abs(there - self.command[2]) > self._leap
-        if leap.any() and not run.failure:
-            self._fail(run, f"Command Velocity violates limit A{int(leap.argmax()) + 1} (singularity)")
+        axis = self.command.leap(there)
+        if axis is not None and not run.failure:
+            self._fail(run, f"Command Velocity violates limit A{axis + 1} (singularity)")
             return
-        self.command[2] = there
+        self.command.after = there
 
     def _settle(self, run: Run) -> tuple[float, float]:
         if self._control.stays and not run.cancelled and not run.failure:
             return 1.0, 0.0
         run.settling += 1
-        at_rest = not self._control.is_stiff or float(np.abs(self._q - self.command[2]).max()) <= SETTLED
+        at_rest = not self._control.is_stiff or float(np.abs(self._q - self.command.after).max()) <= SETTLED
         at_rest = at_rest and float(np.abs(self._dq).max()) <= SETTLED_SPEED
         if at_rest or run.settling >= SETTLE_TICKS:
             cause = "condition" if run.broken else "cancelled" if run.cancelled else "done"
@@ -286,19 +276,8 @@ class Interpolator:
         """Brake every axis by itself, straight on from where the last set-points led."""
         if run.guidance is not None:
             self._control.stiffen()
-        run.braking, run.ended, run.follower, run.guidance = True, False, None, None
-        before, now, here = self.command
-        step = here - (before if now is here else now)  # whether or not the set-points were shifted in this tick
-        speed = np.clip(step / TICK, -self._robot.dq_max, self._robot.dq_max)
-        run.path = JointLine(here.copy(), here + speed)
-        full = float(np.abs(speed).max())
-        if full < 1e-9:
-            run.path, run.ended = None, True
-            return
-        limits = Limits(
-            2.0, float(self._robot.ddq_max.min()) / full, jerk * float(self._robot.dddq_max.min()) / full
-        )
-        run.profile, run.time = brake((0.0, 1.0, 0.0), limits), 0.0
+        hardest = float(self._robot.ddq_max.min()), jerk * float(self._robot.dddq_max.min())
+        run.halt(self.command.after, self.command.speed, hardest)
 
     def _cancel(self, wish: Cancellation) -> None:
         """Carry out a cancellation."""
@@ -319,24 +298,8 @@ class Interpolator:
         if run.guidance is not None:
             self._let_go(run, run.guidance)
             return
-        rate = self._pace.rate
-        if run.follower is not None:
-            run.follower.brake(scale=self._pace.scale, rate=rate)
-            run.braking = True
-            return
-        if self.is_overlaid:
-            return  # the next tick brakes from the overlay's speed
-        if run.ended or run.profile is None or run.path is None:
-            run.ended = run.ended or run.path is None
-            return
-        scale, halts = self._pace.scale, run.plan.halts
-        if halts is not None:
-            run.profile = halts.brake(run.time, scale, rate)
-        else:
-            s, velocity, acceleration = run.profile.at(run.time)
-            state = (s, velocity * scale, acceleration * scale * scale + velocity * rate)
-            run.profile = brake(state, run.plan.braking)
-        run.time, run.braking = 0.0, True
+        if run.follower is not None or not self.is_overlaid:  # else the next tick brakes from the overlay's speed
+            run.brake(scale=self._pace.scale, rate=self._pace.rate)
 
     def _brake_fast(self, run: Run) -> None:
         if run.failure or run.ended or run.guidance is not None:
@@ -361,7 +324,7 @@ class Interpolator:
         elif safety.guides and not (safety.latched or self.is_paused or guidance.law.is_frozen):
             guidance.has_begun, guidance.rest = True, None
             self._control.lead(guidance.law)
-            self.command[2] = self._q + self._dq * TICK
+            self.command.after = self._q + self._dq * TICK
         elif guidance.has_begun:
             self._go(run, self._stopped(guidance).advance(TICK))
 
@@ -392,21 +355,16 @@ class Interpolator:
             self._fail(run, f"the path is not reachable: {error.text}")
             return nan, nan
         run.ended = follower.is_still if run.braking else follower.resting > order.goal_timeout
-        beyond = (there > self._highest) | (there < self._lowest)
-        if beyond.any():
-            self._fail(run, f"Command Position violates limit A{int(beyond.argmax()) + 1}")
+        axis = self.command.beyond(there)
+        if axis is not None:
+            self._fail(run, f"Command Position violates limit A{axis + 1}")
         else:
             self._go(run, there)
         return nan, follower.remaining
 
-    def _stay(self) -> None:
-        """The set-points of an arm that has yielded become what it has yielded to."""
-        self.command = [self._q.copy() for _ in range(3)]
-
     def _catch(self, run: Run, text: str) -> None:
         """A limit of the control mode is exceeded: become stiff and brake from the measured speed."""
         self._control.stiffen()
-        way = self._dq * TICK
-        self.command = [self._q - way, self._q.copy(), self._q.copy()]
+        self.command.go_on(self._q, self._dq)
         run.settling = 0
         self._fail(run, text)

@@ -12,6 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from heptarm.values.arrays import Array
+from heptarm.virtual.tick import TICK
 
 #: Bandwidth of the position controller [rad/s] and its damping ratio.
 BANDWIDTH = 90.0
@@ -24,7 +25,6 @@ LEAST_DAMPER = 0.5
 #: Stiffness that changes while a law is in force does so within this time [s].
 RAMP = 0.05
 
-TICK = 1e-3
 
 
 @dataclass(slots=True)

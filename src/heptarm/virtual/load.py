@@ -9,7 +9,6 @@ import numpy as np
 
 from heptarm.values.arrays import Array
 
-TICK = 1e-3
 #: Damping of the least squares near singularities.
 _DAMPED = 1e-6 * np.eye(6)
 

@@ -14,8 +14,8 @@ from heptarm.model.kinematics import flange, jacobian
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 from heptarm.virtual.profile import Limits, Profile, change
-
-TICK = 1e-3
+from heptarm.virtual.setpoints import SetPoints
+from heptarm.virtual.tick import TICK
 
 #: How fast the application override and pausing change the speed: [1/s], [1/s²], [1/s³].
 OVERRIDE_SLEW = Limits(4.0, 40.0, 800.0)
@@ -57,7 +57,7 @@ class Pace:
     def advance(
         self,
         goal: float,
-        command: list[Array],
+        command: SetPoints,
         *,
         halts: bool = False,
         ceiling: float = inf,
@@ -67,7 +67,7 @@ class Pace:
 
         Args:
             goal: factor to come to without a jerk.
-            command: set-points of the last three ticks, oldest first, shape (7,) each [rad].
+            command: the set-points so far.
             halts: come to a standstill instead, as fast as the axes may brake along the path.
             ceiling: what the speed of a point on the flange never exceeds [m/s].
             tcp: that point, in the flange's axes [m].
@@ -84,16 +84,16 @@ class Pace:
         self.rate = 0.0 if self._slew is None else self._slew.at(self._slew_time)[1]
         if full is None:
             return
-        axes, origin = flange(self._robot, command[2].tolist())
+        axes, origin = flange(self._robot, command.after.tolist())
         point = np.array(origin) + np.array(axes).T @ np.array(tcp)
-        way = float(np.linalg.norm(jacobian(self._robot, command[2], point)[:3] @ full))
+        way = float(np.linalg.norm(jacobian(self._robot, command.after, point)[:3] @ full))
         cap = (1.0 + (way / ceiling) ** _BEND) ** (-1.0 / _BEND)
         self.factor *= cap
         self.scale *= cap
         self.rate *= cap
 
-    def _halt(self, command: list[Array]) -> None:
-        speed, ahead = (command[2] - command[1]) / TICK, self._ahead(command)
+    def _halt(self, command: SetPoints) -> None:
+        speed, ahead = (command.after - command.now) / TICK, self._ahead(command)
         factor = 0.0
         moving = np.abs(ahead) > 1e-9
         if moving.any():
@@ -104,7 +104,7 @@ class Pace:
         self.factor = self.scale = self._free = self._goal = factor
         self._slew = None
 
-    def _ahead(self, command: list[Array]) -> Array:
+    def _ahead(self, command: SetPoints) -> Array:
         """Speed that the next set-point would have at full pace, shape (7,) [rad/s]."""
         if self.factor < _FAINT or self._before < _FAINT:
             return self._full

@@ -20,8 +20,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from heptarm.virtual.plant import TICK_NS
 from heptarm.virtual.ring import ANCHOR, NEWEST, RATE, Ring
+from heptarm.virtual.tick import TICK_NS
 
 #: Ticks that are caught up in one go; beyond them time is given up.
 CATCH_UP = 20

@@ -26,14 +26,12 @@ from heptarm.virtual.interpolator import Interpolator
 from heptarm.virtual.law import PositionLaw, Sensed
 from heptarm.virtual.load import Load
 from heptarm.virtual.order import Order
-from heptarm.virtual.pace import TICK
 from heptarm.virtual.payload import Payload
 from heptarm.virtual.posture import posture
 from heptarm.virtual.safety import Demand, Safety
 from heptarm.virtual.signals import Signals
+from heptarm.virtual.tick import TICK, TICK_NS
 from heptarm.virtual.world import Box, compiled
-
-TICK_NS = 1_000_000
 
 #: After a stop on the path the brakes close when no axis is faster than this [rad/s], or after so many ticks.
 BRAKE_SPEED = 0.02
@@ -307,7 +305,7 @@ class Plant:
         words[ring.TIME] = k * TICK_NS
         q = self._q
         reals[2:9] = q
-        reals[9:16] = self.interpolator.command[2]
+        reals[9:16] = self.interpolator.command.after
         reals[16:23] = self._dq
         reals[23:30] = self._tau
         reals[30:37] = self._load.torque
@@ -362,7 +360,7 @@ class Plant:
         return Snapshot(
             self.tick_count * TICK,
             self._q.copy(),
-            self.interpolator.command[2].copy(),
+            self.interpolator.command.after.copy(),
             self._dq.copy(),
             self._tau.copy(),
             self._load.torque.copy(),

@@ -37,8 +37,7 @@ from heptarm.virtual.fri.quality import Meter
 from heptarm.virtual.fri.report import Status, report
 from heptarm.virtual.fri.setpoint import COAST, SetPoint
 from heptarm.virtual.fri.writer import Writer
-
-TICK_NS = 1_000_000
+from heptarm.virtual.tick import TICK_NS
 
 #: Answers in a row that mirror the interpolator before commands are carried out.
 MIRRORED = 10

@@ -12,7 +12,8 @@ import numpy as np
 from heptarm.fri.messages import CommandMode
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
-from heptarm.virtual.fri.setpoint import OVERSPEED, TICK
+from heptarm.virtual.fri.setpoint import OVERSPEED
+from heptarm.virtual.tick import TICK
 
 #: Under a torque overlay the position only bends a spring, and public clients put it 0.1 rad beside the measured one.
 COMPLIANT_DELTA = 0.12

@@ -15,10 +15,11 @@ from heptarm.errors import ConnectFailed
 from heptarm.fri.messages import DriveState
 from heptarm.fri.version import MAX_DATAGRAM
 from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.controller import TICK_NS, TOLD, Controller
+from heptarm.virtual.fri.controller import TOLD, Controller
 from heptarm.virtual.fri.events import Event, Refused
 from heptarm.virtual.fri.faults import Line, Scenario
 from heptarm.virtual.fri.overlay import MotionOverlay, OverlayTarget, Reading
+from heptarm.virtual.tick import TICK_NS
 
 #: The port of FRI on both sides; KUKA advises the next nine for further sessions and robots.
 PORT = 30200

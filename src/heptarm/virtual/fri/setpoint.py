@@ -12,8 +12,8 @@ import numpy as np
 
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
+from heptarm.virtual.tick import TICK
 
-TICK = 1e-3
 #: Ticks without a command during which the motion goes on.
 COAST = 5
 #: A set-point moves at most this many times as fast as an axis may.
