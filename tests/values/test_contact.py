@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.values.condition import AnyOf, JointTorqueOutside
+from heptarm.values.condition import AnyOf
 from heptarm.values.contact import TapCounter, direction_of
+from heptarm.values.force_condition import JointTorqueOutside
 from heptarm.values.state import Joints, State, Torques
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from math import isnan, nan
 
 from heptarm.values import condition as values
+from heptarm.values import force_condition as forces
 from heptarm.values.arguments import TOOL
-from heptarm.values.condition import Condition, OneOf, check_condition
+from heptarm.values.condition import Condition, check_condition, condition_nodes
 from heptarm.values.io import find_name
 from heptarm.wire import messages as wire
 
@@ -44,25 +45,9 @@ def condition_message(
     """
     if condition is None:
         return wire.Condition(), ()
-    pairs = list(_walk(check_condition(condition)))
+    pairs = list(condition_nodes(check_condition(condition)))
     nodes = tuple(_node(node, signals) for node, _ in pairs)
     return wire.Condition(nodes=nodes), tuple(part for _, part in pairs)
-
-
-def _walk(condition: Condition) -> Iterator[tuple[Condition, Condition]]:
-    """Nodes in postfix order, each with the part that a person would name."""
-    if isinstance(condition, OneOf):
-        for node, _ in _walk(condition.written_out):
-            yield node, condition
-        return
-    parts: tuple[Condition, ...] = ()
-    if isinstance(condition, values.AllOf | values.AnyOf):
-        parts = condition.parts
-    elif isinstance(condition, values.Inverted):
-        parts = (condition.part,)
-    for part in parts:
-        yield from _walk(part)
-    yield condition, condition
 
 
 def _node(node: Condition, signals: Sequence[wire.SignalInfo]) -> wire.ConditionNode:
@@ -76,20 +61,20 @@ def _node(node: Condition, signals: Sequence[wire.SignalInfo]) -> wire.Condition
 
 
 def _leaf(node: Condition, signals: Sequence[wire.SignalInfo]) -> _Leaf:
-    if isinstance(node, values.ForceAbove):
+    if isinstance(node, forces.ForceAbove):
         return wire.ForceAbove(
             frame=_frame(node.frame), threshold=float(node.threshold), tolerance=_tolerance(node.tolerance)
         )
-    if isinstance(node, values.NormalForceAbove | values.ShearForceAbove):
-        made = wire.NormalForceAbove if isinstance(node, values.NormalForceAbove) else wire.ShearForceAbove
+    if isinstance(node, forces.NormalForceAbove | forces.ShearForceAbove):
+        made = wire.NormalForceAbove if isinstance(node, forces.NormalForceAbove) else wire.ShearForceAbove
         return made(
             frame=_frame(node.frame),
             axis=wire.Axis[node.axis.upper()],
             threshold=float(node.threshold),
             tolerance=_tolerance(node.tolerance),
         )
-    if isinstance(node, values.ForceOutside | values.TorqueOutside):
-        outside = wire.ForceOutside if isinstance(node, values.ForceOutside) else wire.TorqueOutside
+    if isinstance(node, forces.ForceOutside | forces.TorqueOutside):
+        outside = wire.ForceOutside if isinstance(node, forces.ForceOutside) else wire.TorqueOutside
         return outside(
             frame=_frame(node.frame),
             axis=wire.Axis[node.axis.upper()],
@@ -97,7 +82,7 @@ def _leaf(node: Condition, signals: Sequence[wire.SignalInfo]) -> _Leaf:
             high=float(node.high),
             tolerance=_tolerance(node.tolerance),
         )
-    if isinstance(node, values.JointTorqueOutside):
+    if isinstance(node, forces.JointTorqueOutside):
         return wire.JointTorqueOutside(joint=node.joint, low=float(node.low), high=float(node.high))
     if isinstance(node, values.SignalIs):
         return wire.SignalIs(signal=find_signal(node.signal, signals).name, value=node.value)

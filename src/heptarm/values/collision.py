@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from heptarm.errors import LimitError
 from heptarm.values.arrays import Array, Value, array, frozen, within
-from heptarm.values.condition import JOINT, AnyOf, Condition, JointTorqueOutside
+from heptarm.values.condition import AnyOf, Condition
+from heptarm.values.force_condition import JOINT, JointTorqueOutside
 from heptarm.values.state import State
 
 

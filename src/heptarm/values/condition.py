@@ -1,28 +1,25 @@
 """Conditions that the cabinet evaluates while the arm moves: frozen values, composed with & | ^ ~.
 
-The makers of the leaves are in heptarm.when. `and`, `or`, `not` and chained comparisons would ask Python for a truth
-that only the cabinet knows; they raise.
+The makers of the leaves are in heptarm.when; those of forces are in heptarm.values.force_condition. `and`, `or`, `not`
+and chained comparisons would ask Python for a truth that only the cabinet knows; they raise.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import isnan, nan
 from typing import NoReturn
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arguments import TOOL, check_name
+from heptarm.values.arguments import check_name
 from heptarm.values.arrays import Value, within
+from heptarm.values.band import band_text, check_band
 
-#: Largest force [N], torque [Nm] and joint torque [Nm] that can be asked for.
-FORCE, TORQUE, JOINT = 1000.0, 1000.0, 500.0
 #: Longest path [m] and delay [s].
 PATH, DELAY = 100.0, 1000.0
 #: Stands for "no bound" of a signal's band.
 UNBOUNDED = 1e300
 
-_AXES = ("x", "y", "z")
 #: Nodes of one condition that the cabinet takes.
 MOST_NODES = 64
 
@@ -96,10 +93,14 @@ def check_condition(condition: object, parameter: str = "until") -> Condition:
     return condition
 
 
-def condition_nodes(condition: Condition) -> Iterator[Condition]:
-    """The nodes in postfix order, as they go over the wire; `OneOf` written out as what it means."""
+def condition_nodes(condition: Condition) -> Iterator[tuple[Condition, Condition]]:
+    """The nodes in postfix order, as they go over the wire, each with the part that a person would name.
+
+    `OneOf` is written out as what it means.
+    """
     if isinstance(condition, OneOf):
-        yield from condition_nodes(condition.written_out)
+        for node, _ in condition_nodes(condition.written_out):
+            yield node, condition
         return
     parts: tuple[Condition, ...] = ()
     if isinstance(condition, (AllOf, AnyOf)):
@@ -108,187 +109,10 @@ def condition_nodes(condition: Condition) -> Iterator[Condition]:
         parts = (condition.part,)
     for part in parts:
         yield from condition_nodes(part)
-    yield condition
+    yield condition, condition
 
 
-def check_band(low: float, high: float, limit: float, unit: str) -> None:
-    """Refuse a band that is none, or lies outside what can be asked for.
-
-    Raises:
-        LimitError: see above.
-    """
-    within(low, "low", -limit, limit, unit=unit)
-    within(high, "high", -limit, limit, unit=unit)
-    if not low < high:
-        raise LimitError(
-            f"low is {low:g} {unit}, high is {high:g} {unit}; low has to be below high",
-            code=2,
-            parameter="low",
-            value=low,
-            allowed=f"below {high:g} {unit}",
-        )
-
-
-def _check_estimate(axis: str | None, frame: str, tolerance: float, unit: str) -> None:
-    if axis is not None and axis not in _AXES:
-        raise ShapeError(f"axis is {axis!r}; allowed are 'x', 'y', 'z'", parameter="axis", value=axis)
-    check_name(frame, "frame")
-    if not (isinstance(tolerance, float) and isnan(tolerance)):
-        within(tolerance, "tolerance", 0.0, FORCE, above=True, unit=unit)
-
-
-# ------------------------------------------------------------------------------------------------- leaves
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ForceAbove(Condition):
-    """The external force's magnitude is above a threshold.
-
-    Attributes:
-        threshold: [N], up to 1000.
-        frame: where it is measured and in whose axes; see `heptarm.when.force`.
-        tolerance: largest inaccuracy of the estimate that is accepted [N]; NaN: any.
-    """
-
-    threshold: float
-    frame: str = TOOL
-    tolerance: float = nan
-
-    def __post_init__(self) -> None:
-        within(self.threshold, "threshold", 0.0, FORCE, unit="N")
-        _check_estimate(None, self.frame, self.tolerance, "N")
-
-    def __str__(self) -> str:
-        return f"force > {self.threshold:g} N"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NormalForceAbove(Condition):
-    """The external force along an axis, in either direction, is above a threshold; see `ForceAbove`.
-
-    Attributes:
-        axis: "x", "y" or "z" of the frame.
-        threshold: [N].
-        frame: see `ForceAbove`.
-        tolerance: see `ForceAbove`.
-    """
-
-    axis: str
-    threshold: float
-    frame: str = TOOL
-    tolerance: float = nan
-
-    def __post_init__(self) -> None:
-        within(self.threshold, "threshold", 0.0, FORCE, unit="N")
-        _check_estimate(self.axis, self.frame, self.tolerance, "N")
-
-    def __str__(self) -> str:
-        return f"force normal to {self.axis} of {self.frame} > {self.threshold:g} N"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ShearForceAbove(Condition):
-    """The external force across an axis is above a threshold; see `NormalForceAbove`.
-
-    Attributes:
-        axis: "x", "y" or "z" of the frame.
-        threshold: [N].
-        frame: see `ForceAbove`.
-        tolerance: see `ForceAbove`.
-    """
-
-    axis: str
-    threshold: float
-    frame: str = TOOL
-    tolerance: float = nan
-
-    def __post_init__(self) -> None:
-        within(self.threshold, "threshold", 0.0, FORCE, unit="N")
-        _check_estimate(self.axis, self.frame, self.tolerance, "N")
-
-    def __str__(self) -> str:
-        return f"force across {self.axis} of {self.frame} > {self.threshold:g} N"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ForceOutside(Condition):
-    """A component of the external force is outside a band.
-
-    Attributes:
-        axis: "x", "y" or "z" of the frame.
-        low: [N], from -1000.
-        high: [N], to 1000.
-        frame: see `ForceAbove`.
-        tolerance: see `ForceAbove`.
-    """
-
-    axis: str
-    low: float
-    high: float
-    frame: str = TOOL
-    tolerance: float = nan
-
-    def __post_init__(self) -> None:
-        check_band(self.low, self.high, FORCE, "N")
-        _check_estimate(self.axis, self.frame, self.tolerance, "N")
-
-    def __str__(self) -> str:
-        return f"force along {self.axis} of {self.frame} {_outside(self.low, self.high, FORCE, 'N')}"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class TorqueOutside(Condition):
-    """A component of the external torque at the moved frame is outside a band.
-
-    Attributes:
-        axis: "x", "y" or "z" of the frame.
-        low: [Nm], from -1000.
-        high: [Nm], to 1000.
-        frame: see `ForceAbove`.
-        tolerance: see `ForceAbove` [Nm].
-    """
-
-    axis: str
-    low: float
-    high: float
-    frame: str = TOOL
-    tolerance: float = nan
-
-    def __post_init__(self) -> None:
-        check_band(self.low, self.high, TORQUE, "Nm")
-        _check_estimate(self.axis, self.frame, self.tolerance, "Nm")
-
-    def __str__(self) -> str:
-        return f"torque about {self.axis} of {self.frame} {_outside(self.low, self.high, TORQUE, 'Nm')}"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class JointTorqueOutside(Condition):
-    """The external torque of a joint is outside a band.
-
-    Attributes:
-        joint: 0 for A1 to 6 for A7.
-        low: [Nm], from -500.
-        high: [Nm], to 500.
-    """
-
-    joint: int
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.joint, int) or isinstance(self.joint, bool) or not 0 <= self.joint <= 6:
-            raise LimitError(
-                f"joint is {self.joint!r}; allowed is 0 (A1) to 6 (A7)",
-                code=2,
-                parameter="joint",
-                value=self.joint,
-                allowed="[0, 6]",
-            )
-        check_band(self.low, self.high, JOINT, "Nm")
-
-    def __str__(self) -> str:
-        return f"external torque of A{self.joint + 1} {_outside(self.low, self.high, JOINT, 'Nm')}"
+# ------------------------------------------------------------------------------------- signals and the path
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -344,7 +168,7 @@ class SignalOutside(Condition):
         check_band(self.low, self.high, UNBOUNDED, "")
 
     def __str__(self) -> str:
-        return f"{self.signal} {_outside(self.low, self.high, UNBOUNDED, '').rstrip()}"
+        return f"{self.signal} {band_text(self.low, self.high, UNBOUNDED, '').rstrip()}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -435,11 +259,3 @@ class Inverted(Condition):
 
     def __str__(self) -> str:
         return f"~({self.part})"
-
-
-def _outside(low: float, high: float, limit: float, unit: str) -> str:
-    if low <= -limit:
-        return f"> {high:g} {unit}"
-    if high >= limit:
-        return f"< {low:g} {unit}"
-    return f"outside [{low:g}, {high:g}] {unit}"

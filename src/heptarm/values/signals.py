@@ -15,18 +15,16 @@ from math import nan
 
 from heptarm.errors import ShapeError
 from heptarm.values.arguments import TOOL
-from heptarm.values.condition import (
+from heptarm.values.condition import Condition, PathReached, SignalIs
+from heptarm.values.force_condition import (
     FORCE,
     JOINT,
     TORQUE,
-    Condition,
     ForceAbove,
     ForceOutside,
     JointTorqueOutside,
     NormalForceAbove,
-    PathReached,
     ShearForceAbove,
-    SignalIs,
     TorqueOutside,
 )
 
