@@ -5,72 +5,44 @@ from __future__ import annotations
 import atexit
 import contextlib
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from types import TracebackType
-from typing import TYPE_CHECKING, Literal, TypedDict, overload
+from typing import TYPE_CHECKING, Literal, overload
 
 from heptarm.arm import fri_settings, program, servo_settings
 from heptarm.arm.collision import Guarding
 from heptarm.arm.conditions import condition_message
-from heptarm.arm.connection import GROUPS, Connection
+from heptarm.arm.connection import Connection
 from heptarm.arm.contact import Touching
 from heptarm.arm.equipment import Equipment
-from heptarm.arm.feed import States
 from heptarm.arm.fri import Fri
 from heptarm.arm.handle import MotionHandle
 from heptarm.arm.io import Io
 from heptarm.arm.modes import mode_message
+from heptarm.arm.observer import Observer
 from heptarm.arm.operator import Operator
 from heptarm.arm.pad import Pad
 from heptarm.arm.servo import JointServo, PoseServo
+from heptarm.arm.servo_settings import ServoSettings
 from heptarm.arm.stopping import REST_TIMEOUT, Stopping
 from heptarm.arm.teaching import Teaching
 from heptarm.arm.tooling import Tooling
-from heptarm.arm.triggers import with_triggers
-from heptarm.errors import CommandRejected, HeptarmError, ShapeError, StaleState, Timeout
+from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
 from heptarm.values.arrays import within
 from heptarm.values.condition import Condition
 from heptarm.values.mode import Mode
 from heptarm.values.motion import TOOL, Motion
 from heptarm.values.result import Result
-from heptarm.values.robot import RobotModel
-from heptarm.values.state import State
-from heptarm.values.trigger import triggers_of
-from heptarm.wire import messages as wire
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 _log = logging.getLogger("heptarm.arm")
 
-_WHEN = {"queue": wire.When.QUEUE, "replace": wire.When.REPLACE, "reject": wire.When.REJECT}
-_DAY = 86400.0
-#: States a stream of all states keeps for a slow loop.
-_STREAM_SIZE = 2000
 
 
-class _ServoSettings(TypedDict, total=False):
-    """What `Arm.servo` can be told, for type checkers."""
-
-    rate: float
-    watchdog: float | None
-    engine: Literal["smart", "direct"]
-    mode: Mode | None
-    speed: float | None
-    acceleration: float | None
-    speed_mps: float | None
-    acceleration_mps2: float | None
-    speed_radps: float | None
-    acceleration_radps2: float | None
-    min_trajectory_time: float | None
-    goal_timeout: float
-    speed_timeout: float | None
-    moving: str
-    until: Condition | None
-
-
-class Arm(Equipment, Stopping, Touching, Guarding, Teaching):
+class Arm(Observer, Equipment, Stopping, Touching, Guarding, Teaching):
     """A connected arm; made by `connect`. Its methods may be called from any thread.
 
     In a `with` block it is left at rest, however the block ends.
@@ -164,21 +136,6 @@ class Arm(Equipment, Stopping, Touching, Guarding, Teaching):
     # ------------------------------------------------------------------------------- properties
 
     @property
-    def robot(self) -> RobotModel:
-        """The connected robot and its limits."""
-        return self._connection.robot
-
-    @property
-    def capabilities(self) -> tuple[str, ...]:
-        """What this cabinet can do: "ptp", "lin", ..."""
-        return self._connection.welcome.capabilities
-
-    @property
-    def is_virtual(self) -> bool:
-        """Whether the robot is simulated."""
-        return self._connection.welcome.virtual
-
-    @property
     def operator(self) -> Operator:
         """The person beside the robot, to be played by this program; a private simulator only.
 
@@ -203,34 +160,9 @@ class Arm(Equipment, Stopping, Touching, Guarding, Teaching):
         return self._pad
 
     @property
-    def software(self) -> str:
-        """Version of the cabinet application."""
-        return self._connection.welcome.software
-
-    @property
-    def cabinet(self) -> str:
-        """Name of the cabinet."""
-        return self._connection.welcome.cabinet
-
-    @property
     def in_control(self) -> bool:
         """Whether this client controls the robot, as far as is known."""
         return self._connection.controls and self._connection.stands
-
-    @property
-    def controller(self) -> str:
-        """Name of the client that controls the robot; empty: nobody."""
-        return self._connection.controller
-
-    @property
-    def connected(self) -> bool:
-        """Whether the connection stands."""
-        return self._connection.stands
-
-    @property
-    def pace(self) -> float:
-        """Seconds of the robot's time per second of ours: 1 on a robot, N on a simulator that runs N times faster."""
-        return self._connection.pace
 
     @property
     def speed(self) -> float:
@@ -243,90 +175,6 @@ class Arm(Equipment, Stopping, Touching, Guarding, Teaching):
     @speed.setter
     def speed(self, value: float) -> None:
         self._speed = within(value, "speed", 0.0, 1.0, above=True)
-
-    # ------------------------------------------------------------------------------------ state
-
-    @property
-    def state(self) -> State:
-        """The newest pushed state; never a question to the cabinet.
-
-        Raises:
-            StaleState: it is too old to act on; the text says how old.
-            ConnectionLost: the connection has ended.
-        """
-        link = self._connection
-        sample, rate = link.feed.newest, link.options.rate
-        if rate <= 0:
-            raise StaleState("no states are subscribed", hint="arm.subscribe(rate=100)")
-        limit = max(1.0, 10.0 / (rate * link.pace))
-        age = float("inf") if sample is None else (link.clock.nanos() - sample.received) * 1e-9
-        if sample is None or age > limit:
-            error = link.end()
-            if error is not None:
-                raise error
-            raise StaleState(
-                f"the newest state is {age:.2f} s old; allowed is {limit:g} s",
-                value=age,
-                allowed=f"[0, {limit:g}] s",
-                hint="check the connection and the load of this machine",
-            )
-        return link.build(sample)
-
-    def states(
-        self, *, rate: float | None = None, duration: float | None = None, size: int = _STREAM_SIZE
-    ) -> States:
-        """States one after the other, never one twice.
-
-        Args:
-            rate: at most this many per second [Hz], the newest each time; None: every state that is pushed, in order.
-            duration: end after this time [s]; None: never.
-            size: without a rate, how many states are kept for a slow loop; `States.lost` counts what was dropped.
-
-        Raises:
-            LimitError: a rate or duration that is not positive.
-        """
-        link = self._connection
-        link.check_open()
-        return States(
-            link.feed,
-            link.clock,
-            build=link.build,
-            check=link.end,
-            rate=None if rate is None else within(rate, "rate", 0.0, 1e4, above=True, unit="Hz"),
-            duration=None if duration is None else within(duration, "duration", 0.0, 1e9, unit="s"),
-            size=size,
-        )
-
-    def wait_until(self, condition: Callable[[State], object], *, timeout: float = 30.0) -> State:
-        """Wait until a condition holds for a pushed state; looked at here, not on the cabinet.
-
-        Args:
-            condition: called with each state that is seen.
-            timeout: how long to wait [s].
-
-        Returns:
-            The state for which it held.
-
-        Raises:
-            Timeout: it did not hold in time.
-            ConnectionLost: the connection has ended.
-        """
-        seconds = within(timeout, "timeout", 0.0, 1e9, unit="s")
-        with self._connection.stopping_on_interrupt():
-            return self._connection.wait_for(condition, seconds)
-
-    def subscribe(self, *, rate: float = 100.0, groups: Sequence[str] = GROUPS) -> None:
-        """Choose what is pushed; a new choice replaces the old.
-
-        Args:
-            rate: states per second [Hz]; 0: none.
-            groups: "joints", "torques", "pose", "wrench", "motion", "safety", "io", "mode".
-
-        Raises:
-            CommandRejected: a group that the cabinet does not have.
-            LimitError: a rate that the cabinet does not reach.
-        """
-        self._connection.subscribe(rate, groups)
 
     # ---------------------------------------------------------------------------------- motion
 
@@ -366,7 +214,7 @@ class Arm(Equipment, Stopping, Touching, Guarding, Teaching):
                 hint="give a timeout, a hold with a duration, or use arm.start()",
             )
         with self._connection.stopping_on_interrupt():
-            handle = self._start(motions, mode=mode, speed=speed, until=until, when="queue")
+            handle = self._send(motions, mode=mode, speed=speed, until=until, when="queue")
             try:
                 return handle.wait(timeout=timeout)
             except Timeout:
@@ -396,7 +244,7 @@ class Arm(Equipment, Stopping, Touching, Guarding, Teaching):
             ConnectionLost: the connection has ended.
         """
         with self._connection.stopping_on_interrupt():
-            return self._start(program.listed(motion), mode=mode, speed=speed, until=until, when=when)
+            return self._send(program.listed(motion), mode=mode, speed=speed, until=until, when=when)
 
     @contextlib.contextmanager
     def using(self, mode: Mode) -> Iterator[None]:
@@ -412,7 +260,7 @@ class Arm(Equipment, Stopping, Touching, Guarding, Teaching):
         finally:
             self._mode = outer
 
-    def _start(
+    def _send(
         self,
         motions: tuple[Motion, ...],
         *,
@@ -421,35 +269,18 @@ class Arm(Equipment, Stopping, Touching, Guarding, Teaching):
         until: Condition | None,
         when: str,
     ) -> MotionHandle:
-        if when not in _WHEN:
-            raise ShapeError(f"when is {when!r}; allowed are {', '.join(map(repr, _WHEN))}", parameter="when")
         ceiling = self._speed
         if speed is not None:
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
-        chosen = mode_message(mode or self._mode)
-        self._tooling.check(motions, mode or self._mode)
-        ends, parts = condition_message(self._guarded(until), self._connection.welcome.signals)
-        self._tooling.check_until(parts)
-        items = program.items(motions, self.robot, ceiling, mode=chosen, until=ends)
-        link = self._connection
-        items = with_triggers(items, motions, link.signals, link.welcome.signals, self._tooling)
-        message = wire.Run(items=items, when=_WHEN[when])
-        triggers = tuple(map(triggers_of, motions))
-        return link.run(message, len(motions), self._limit(motions, ceiling), until=parts, triggers=triggers)
-
-    def _limit(self, motions: tuple[Motion, ...], ceiling: float) -> float:
-        """Time after which waiting for them makes no sense [s], with what is before them in the queue."""
-        link = self._connection
-        newest = link.newest()
-        override = newest.motion.override if newest is not None and newest.motion is not None else 1.0
-        own = program.longest(motions, self.robot, ceiling) / max(override, 0.01) / min(link.pace, 1.0)
-        total = own + link.pending()
-        return total if total < _DAY else _DAY
+        mode, until = mode or self._mode, self._guarded(until)
+        return program.send(
+            self._connection, self._tooling, motions, ceiling=ceiling, mode=mode, until=until, when=when
+        )
 
     @overload
-    def servo(self, kind: Literal["joint"] = "joint", **settings: Unpack[_ServoSettings]) -> JointServo: ...
+    def servo(self, kind: Literal["joint"] = "joint", **settings: Unpack[ServoSettings]) -> JointServo: ...
     @overload
-    def servo(self, kind: Literal["pose", "lin"], **settings: Unpack[_ServoSettings]) -> PoseServo: ...
+    def servo(self, kind: Literal["pose", "lin"], **settings: Unpack[ServoSettings]) -> PoseServo: ...
     def servo(
         self,
         kind: Literal["joint", "pose", "lin"] = "joint",

@@ -1,18 +1,24 @@
-"""From motions to the items of a program, checked against the connected robot before anything is sent."""
+"""Motions as a program: turned into its items, checked against the connected robot before anything is sent."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 from math import inf, isinf, isnan, nan
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from heptarm.arm.conditions import condition_message
+from heptarm.arm.modes import mode_message
+from heptarm.arm.triggers import with_triggers
 from heptarm.errors import HeptarmError, ShapeError
 from heptarm.model.inverse import redundancy
 from heptarm.values import motion as values
 from heptarm.values.arrays import Array
+from heptarm.values.condition import Condition
 from heptarm.values.limits import Blending, CartesianDynamics, JointDynamics
+from heptarm.values.mode import Mode
 from heptarm.values.motion import (
     Circ,
     HandGuide,
@@ -30,9 +36,17 @@ from heptarm.values.motion import (
 from heptarm.values.orientation import Orientation
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
+from heptarm.values.trigger import triggers_of
 from heptarm.wire import messages as wire
 
+if TYPE_CHECKING:
+    from heptarm.arm.connection import Connection
+    from heptarm.arm.handle import MotionHandle
+    from heptarm.arm.tooling import Tooling
+
 _MOTIONS = (Ptp, PtpHome, PtpPose, Lin, LinRel, Circ, Spline, JointSpline, Hold, HandGuide)
+_WHEN = {"queue": wire.When.QUEUE, "replace": wire.When.REPLACE, "reject": wire.When.REJECT}
+_DAY = 86400.0
 #: A motion may take this much longer than its slowest plausible estimate, and this much more [s].
 _GENEROUS, _AND_MORE = 3.0, 15.0
 #: The longest straight line and the longest arc inside the workspace of the largest arm [m].
@@ -63,6 +77,51 @@ def listed(motion: Motion | Sequence[Motion]) -> tuple[Motion, ...]:
                 hint="make motions with ptp, lin, lin_rel, circ, spline and hold; joint positions alone are ptp(q)",
             )
     return tuple(motions)
+
+
+def send(
+    connection: Connection,
+    tooling: Tooling,
+    motions: tuple[Motion, ...],
+    *,
+    ceiling: float,
+    mode: Mode | None,
+    until: Condition | None,
+    when: str,
+) -> MotionHandle:
+    """Check motions and send them as one program; see `Arm.start`.
+
+    Args:
+        connection: to whom.
+        tooling: what hangs on the flange.
+        motions: in their order.
+        ceiling: of the speed, (0, 1].
+        mode: control mode of all of them; None: position.
+        until: condition that ends them.
+        when: while another one runs: "queue", "replace" or "reject".
+    """
+    if when not in _WHEN:
+        raise ShapeError(f"when is {when!r}; allowed are {', '.join(map(repr, _WHEN))}", parameter="when")
+    chosen = mode_message(mode)
+    tooling.check(motions, mode)
+    told = connection.welcome.signals
+    ends, parts = condition_message(until, told)
+    tooling.check_until(parts)
+    made = items(motions, connection.robot, ceiling, mode=chosen, until=ends)
+    made = with_triggers(made, motions, connection.signals, told, tooling)
+    message = wire.Run(items=made, when=_WHEN[when])
+    triggers = tuple(map(triggers_of, motions))
+    limit = _limit(connection, motions, ceiling)
+    return connection.run(message, len(motions), limit, until=parts, triggers=triggers)
+
+
+def _limit(connection: Connection, motions: tuple[Motion, ...], ceiling: float) -> float:
+    """Time after which waiting for them makes no sense [s], with what is before them in the queue."""
+    newest = connection.newest()
+    override = newest.motion.override if newest is not None and newest.motion is not None else 1.0
+    own = longest(motions, connection.robot, ceiling) / max(override, 0.01) / min(connection.pace, 1.0)
+    total = own + connection.pending()
+    return total if total < _DAY else _DAY
 
 
 def items(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TypedDict
+from typing import Literal, TypedDict
 
 from heptarm.arm.modes import mode_message
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.values.arguments import TOOL, check_name
 from heptarm.values.arrays import within
+from heptarm.values.condition import Condition
 from heptarm.values.mode import Mode
 from heptarm.wire import messages as wire
 
@@ -22,6 +23,26 @@ _PERIODS, _SHORTEST = 5.0, 0.05
 _LONGEST = 2.0
 #: How long the cabinet may take until the first target counts [s].
 _FIRST = 2.0
+
+
+class ServoSettings(TypedDict, total=False):
+    """What `Arm.servo` can be told, for type checkers."""
+
+    rate: float
+    watchdog: float | None
+    engine: Literal["smart", "direct"]
+    mode: Mode | None
+    speed: float | None
+    acceleration: float | None
+    speed_mps: float | None
+    acceleration_mps2: float | None
+    speed_radps: float | None
+    acceleration_radps2: float | None
+    min_trajectory_time: float | None
+    goal_timeout: float
+    speed_timeout: float | None
+    moving: str
+    until: Condition | None
 
 
 @dataclass(frozen=True, slots=True)
