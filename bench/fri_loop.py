@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import shutil
 import socket
 import struct
 import subprocess
@@ -16,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from bench.compiler import compiled
 from bench.registry import Figure, benchmark
 from heptarm.fri import codec
 from heptarm.fri import messages as m
@@ -36,14 +36,10 @@ _LIMITS = (("median", 50.0, 1.35), ("p99", 99.0, 1.5))
 @benchmark("fri_loop", "C9")
 def fri_loop() -> Iterator[Figure]:
     """Reply latency at 1 kHz, the client's and a C echo's by turns in one run: user idle, user busy, pure Python."""
-    compiler = shutil.which("gcc") or shutil.which("cc")
-    if compiler is None:
-        raise RuntimeError("this benchmark compiles a UDP echo: install gcc")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for program in ("echo", "sender"):
-            source = str(_SOURCES / f"{program}.c")
-            subprocess.run([compiler, "-O2", "-o", str(folder / program), source, "-lm"], check=True)
+            compiled(_SOURCES / f"{program}.c", folder)
         (folder / "datagrams").write_bytes(_datagrams())
         for label, busy in (("idle", False), ("busy", True)):
             ours, floor, detail = _run(folder, CYCLES, busy=busy)

@@ -39,8 +39,10 @@ class Cabinet:
                 "0",
                 "--stats",
                 str(self._stats),
+                "--parent-pipe",
                 *options,
             ],
+            stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
         )
@@ -54,6 +56,10 @@ class Cabinet:
     @property
     def target(self) -> str:
         return f"sim://127.0.0.1:{self.port}"
+
+    def pin(self, cpu: int) -> None:
+        """Let the plant's loop stay on one processor."""
+        os.sched_setaffinity(self.process.pid, {cpu})
 
     def memory(self) -> float:
         """Proportional set size [MB]: what the process adds to the machine."""

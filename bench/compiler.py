@@ -1,0 +1,21 @@
+"""Compiles the C programs that are floors."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+
+def compiled(source: Path, folder: Path) -> Path:
+    """The program made of one source, in a folder.
+
+    Raises:
+        RuntimeError: there is no C compiler.
+    """
+    compiler = shutil.which("gcc") or shutil.which("cc")
+    if compiler is None:
+        raise RuntimeError(f"this benchmark compiles {source.name}: install gcc")
+    program = folder / source.stem
+    subprocess.run([compiler, "-O2", "-pthread", "-o", str(program), str(source), "-lm"], check=True)
+    return program
