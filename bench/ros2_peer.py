@@ -8,13 +8,12 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import threading
 import time
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import rclpy
-from rclpy.executors import ExternalShutdownException
+from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
 from bench.ros_peer import RATE, WATCHED, follow, timing
@@ -55,7 +54,7 @@ def states(target: str) -> dict[str, Any]:
     node = NodeProcess(target, state_rate=RATE)
     client = Client(ros, None)
     client.ready()
-    ros.node.destroy_subscription(client.subscription)
+    ros.forget(0)
     time.sleep(1.0)
     watch = Watch(ros, "/joint_states")
     until(lambda: len(watch.came) > 10, "states come")
@@ -81,26 +80,20 @@ def bare(target: str) -> dict[str, Any]:
     return found
 
 
-def publish(target: str) -> dict[str, Any]:
-    """Publish joint states with nothing behind them, until told to end."""
-    rclpy.init()
+def publish(target: str) -> NoReturn:
+    """Publish joint states with nothing behind them, until a signal ends the process."""
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("bare")
     publisher = node.create_publisher(JointState, "/bare", 10)
     names = [f"A{i}" for i in range(1, 8)]
     zeros = [0.0] * 7
-    ended = threading.Event()
-    rclpy.get_default_context().on_shutdown(ended.set)
     following = time.monotonic()
-    try:
-        while not ended.is_set():
-            message = JointState(name=names, position=zeros, velocity=zeros, effort=zeros)
-            message.header.stamp = node.get_clock().now().to_msg()
-            publisher.publish(message)
-            following += 1.0 / RATE
-            time.sleep(max(0.0, following - time.monotonic()))
-    except (ExternalShutdownException, KeyboardInterrupt):
-        pass
-    return {}
+    while True:
+        message = JointState(name=names, position=zeros, velocity=zeros, effort=zeros)
+        message.header.stamp = node.get_clock().now().to_msg()
+        publisher.publish(message)
+        following += 1.0 / RATE
+        time.sleep(max(0.0, following - time.monotonic()))
 
 
 if __name__ == "__main__":

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import sys
 
-import rclpy
-from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
-
 from heptarm_ros2.node import HeptarmNode
+from heptarm_ros2.process import run
 
 #: A goal, a cancellation, a stop and a diagnosis may come at once.
 _THREADS = 8
@@ -16,21 +13,7 @@ _THREADS = 8
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the node; returns the process' exit code."""
-    rclpy.init(args=sys.argv if arguments is None else arguments)
-    node = HeptarmNode()
-    executor = MultiThreadedExecutor(num_threads=_THREADS)
-    executor.add_node(node)
-    try:
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        node.close()
-        executor.shutdown()
-        with contextlib.suppress(Exception):  # ROS may have gone first
-            node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
+    return run(HeptarmNode, arguments, threads=_THREADS, close=HeptarmNode.close)
 
 
 if __name__ == "__main__":

@@ -6,13 +6,10 @@ ros2 topic pub --once /reach/target geometry_msgs/msg/PointStamped "{point: {x: 
 
 from __future__ import annotations
 
-import contextlib
 import sys
 from typing import Any
 
-import rclpy
 from geometry_msgs.msg import PointStamped
-from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty, Float64
@@ -20,6 +17,7 @@ from std_msgs.msg import Empty, Float64
 from heptarm.errors import HeptarmError
 from heptarm.rl.follower import Follower
 from heptarm.rl.policy import Policy, shipped
+from heptarm_ros2.process import run
 
 
 class Reach(Node):
@@ -67,13 +65,7 @@ class Reach(Node):
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the node; returns the process' exit code."""
-    rclpy.init(args=sys.argv if arguments is None else arguments)
-    node = Reach()
-    with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
-        rclpy.spin(node)
-    node.destroy_node()
-    rclpy.try_shutdown()
-    return 0
+    return run(Reach, arguments)
 
 
 if __name__ == "__main__":

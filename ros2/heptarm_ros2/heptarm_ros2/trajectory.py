@@ -79,7 +79,9 @@ class TrajectoryAction:
 
     def _number(self, handle: Any) -> int:
         with self._lock:
-            return next((number for number, one in self._handles.items() if one is handle), 0)
+            known = (number for number, one in self._handles.items() if one is handle)
+            # a client that knows of its goal may ask for something before the server has given its handle
+            return next(known, self._numbers.get(id(handle.request), 0))
 
     async def _execute(self, handle: Any) -> FollowJointTrajectory.Result:
         number = self._number(handle)

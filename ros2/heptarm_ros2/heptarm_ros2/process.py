@@ -1,0 +1,82 @@
+"""A process with one node, which ends in order when it is told to."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import rclpy
+from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
+
+One = TypeVar("One", bound=Node)
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def _told_to_end(*_: Any) -> None:
+    for number in _SIGNALS:
+        signal.signal(number, signal.SIG_IGN)  # it ends already
+    raise KeyboardInterrupt
+
+
+def run(
+    make: Callable[[], One],
+    arguments: list[str] | None = None,
+    *,
+    threads: int = 1,
+    close: Callable[[One], None] = lambda _: None,
+) -> int:
+    """Run a node until a signal comes or a callback fails; returns the process' exit code.
+
+    ROS' own handlers of signals would end ROS at once, while the executor uses it and before the node is through.
+
+    Args:
+        make: makes the node.
+        arguments: of the process; None: its own.
+        threads: how many callbacks may run at once.
+        close: ends the node's work while ROS still tells of it; called twice, the second time without callbacks.
+    """
+    rclpy.init(
+        args=sys.argv if arguments is None else arguments, signal_handler_options=SignalHandlerOptions.NO
+    )
+    node: One | None = None
+    executor: Executor = (
+        SingleThreadedExecutor() if threads == 1 else MultiThreadedExecutor(num_threads=threads)
+    )
+    over: Future[None] = Future()
+    failed = threading.Event()
+
+    def spin() -> None:
+        try:
+            executor.spin_until_future_complete(over)
+        finally:
+            if not over.done():
+                failed.set()
+
+    spinner = threading.Thread(target=spin, name="heptarm-ros")
+    try:
+        for number in _SIGNALS:
+            signal.signal(number, _told_to_end)
+        node = make()
+        executor.add_node(node)
+        spinner.start()
+        failed.wait()
+    except KeyboardInterrupt:
+        pass
+    if node is not None:
+        close(node)
+    over.set_result(None)
+    if spinner.ident is not None:
+        spinner.join()
+    executor.shutdown()
+    if node is not None:
+        close(node)
+        node.destroy_node()
+    rclpy.try_shutdown()
+    return int(failed.is_set())
