@@ -5,6 +5,8 @@ A planner's place is taken by a straight way in joint space. Everything else is 
 simple controller manager do with a controller of the type FollowJointTrajectory.
 """
 
+import sys
+
 import actionlib
 import rospy
 from actionlib_msgs.msg import GoalStatus
@@ -15,6 +17,8 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 #: MoveIt's parameters and their defaults.
 ALLOWED_START_TOLERANCE = 0.01  # rad
 ALLOWED_DURATION_SCALING, ALLOWED_DURATION_MARGIN = 1.1, 0.5  # 1, s
+if len(sys.argv) > 1:  # more for a busy machine
+    ALLOWED_DURATION_MARGIN = float(sys.argv[1])
 STATUS = {
     GoalStatus.SUCCEEDED: "SUCCEEDED",
     GoalStatus.ABORTED: "ABORTED",
@@ -95,6 +99,6 @@ begin = dict(zip(here.name, here.position))
 
 print("plan and execute:", execution.execute(plan(here, 2.0, A2=begin["A2"] + 0.3, A7=begin["A7"] - 0.4)))
 here = execution.wait_for_rest()
-print("stop in mid-air: ", execution.execute(plan(here, 3.0, A2=begin["A2"], A7=begin["A7"]), stop_after=1.0))
+print("stop in mid-air: ", execution.execute(plan(here, 6.0, A2=begin["A2"], A7=begin["A7"]), stop_after=1.0))
 here = execution.wait_for_rest()
 print("and home again:  ", execution.execute(plan(here, 2.0, **begin)))

@@ -110,7 +110,7 @@ begin = dict(zip(here.name, here.position))
 
 print("plan and execute:", execution.execute(plan(here, 2.0, A2=begin["A2"] + 0.3, A7=begin["A7"] - 0.4)))
 here = execution.wait_for_rest()
-print("stop in mid-air: ", execution.execute(plan(here, 3.0, A2=begin["A2"], A7=begin["A7"]), stop_after=1.0))
+print("stop in mid-air: ", execution.execute(plan(here, 6.0, A2=begin["A2"], A7=begin["A7"]), stop_after=1.0))
 here = execution.wait_for_rest()
 print("and home again:  ", execution.execute(plan(here, 2.0, **begin)))
 execution.destroy_node()

@@ -48,8 +48,8 @@ class Bare:
     def place(self) -> Sample:
         return Sample(self._q.copy(), self._dq.copy(), np.zeros(7))
 
-    def track(self) -> list[tuple[float, Array]]:
-        return self._track
+    def track(self, begin: float) -> list[tuple[float, Array]]:
+        return [(time, q) for time, q in self._track if time >= begin]
 
     def send(self, goal: Goal) -> Sent:
         try:

@@ -20,6 +20,9 @@ from tests.conftest import RunningCabinet
 HOME = np.radians([0, 30, 0, -90, 0, 60, 0])
 AWAY = np.array([0.3, -0.1, 0.2, 0.2, -0.3, 0.2, 0.5])
 PATIENCE = 60.0
+PATIENT = {"constraints.goal_time": 20.0, "watchdog": 5.0, "fri.period": 10}
+#: A goal that something else is to end [s].
+LONG = 8.0
 
 
 class Ears:
@@ -63,7 +66,7 @@ def way(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture
 def driver(cabinet: RunningCabinet, way: str) -> Iterator[Driver]:
-    values = {"target": cabinet.target, "execution": way, "servo.watchdog": 1.0, "speed": 0.5}
+    values = {"target": cabinet.target, "execution": way, "servo.watchdog": 1.0, "speed": 0.5, **PATIENT}
     driver = Driver(Configuration.of(values), Ears())
     driver.activate()
     driver.move(HOME).wait()
@@ -86,23 +89,44 @@ def goal(driver: Driver, away: np.ndarray = AWAY, duration: float = 2.0) -> Goal
     return Goal(joints=driver.configuration.joints, points=tuple(points))
 
 
-def test_goals_arrive_one_after_the_other(driver: Driver, ears: Ears) -> None:
-    for away in (AWAY, -AWAY):
-        driver.accept(goal(driver, away))
-        ears.until(lambda: bool(ears.ends))
-        assert (ears.ends[-1].outcome, ears.ends[-1].code) == (Outcome.SUCCEEDED, Code.SUCCESSFUL)
+def steadily(driver: Driver, ears: Ears, attempt: Callable[[], None]) -> None:
+    """Again where the cabinet has ended an FRI session: it does so when answers come late, as from a busy machine."""
+    for _ in range(10):
+        try:
+            attempt()
+            return
+        except AssertionError:
+            if not any("FRI" in end.text for end in ears.ends):
+                raise
+        driver.move(HOME).wait()
         ears.ends.clear()
-    assert np.abs(driver.arm.state.q - HOME).max() < 0.01
-    assert max(feedback.time for feedback in ears.told) > 1.5  # told now and then, not at the very end
+        ears.told.clear()
+    raise AssertionError("no FRI session lasts")
+
+
+def test_goals_arrive_one_after_the_other(driver: Driver, ears: Ears) -> None:
+    def there_and_back() -> None:
+        for number, away in enumerate((AWAY, -AWAY), 1):
+            driver.accept(goal(driver, away))
+            ears.until(lambda: len(ears.ends) == number)  # noqa: B023
+            assert (ears.ends[-1].outcome, ears.ends[-1].code) == (Outcome.SUCCEEDED, Code.SUCCESSFUL)
+        assert np.abs(driver.arm.state.q - HOME).max() < 0.01
+        assert max(feedback.time for feedback in ears.told) > 1.5  # told now and then, not at the very end
+
+    steadily(driver, ears, there_and_back)
 
 
 def test_a_goal_takes_the_place_of_another_and_is_cancelled(driver: Driver, ears: Ears) -> None:
-    first = driver.accept(goal(driver))
-    ears.until(lambda: bool(ears.told) and ears.told[-1].time > 0.5)
-    second = driver.accept(goal(driver))
+    steadily(driver, ears, lambda: _replaced_and_cancelled(driver, ears))
+
+
+def _replaced_and_cancelled(driver: Driver, ears: Ears) -> None:
+    first = driver.accept(goal(driver, duration=LONG))
+    ears.until(lambda: bool(ears.ends) or (bool(ears.told) and ears.told[-1].time > 0.5))
+    second = driver.accept(goal(driver, duration=LONG))
     ears.until(lambda: bool(ears.ends))
     assert (ears.ends[0].number, ears.ends[0].outcome) == (first, Outcome.PREEMPTED)
-    ears.until(lambda: ears.told[-1].number == second and ears.told[-1].time > 0.3)
+    ears.until(lambda: len(ears.ends) > 1 or (ears.told[-1].number == second and ears.told[-1].time > 0.3))
     assert driver.cancel(second)
     ears.until(lambda: len(ears.ends) == 2)
     assert ears.ends[1].outcome is Outcome.CANCELED
@@ -110,8 +134,12 @@ def test_a_goal_takes_the_place_of_another_and_is_cancelled(driver: Driver, ears
 
 
 def test_a_command_ends_a_goal_and_the_next_goal_works(driver: Driver, ears: Ears) -> None:
-    driver.accept(goal(driver))
-    ears.until(lambda: bool(ears.told) and ears.told[-1].time > 0.3)
+    steadily(driver, ears, lambda: _commanded(driver, ears))
+
+
+def _commanded(driver: Driver, ears: Ears) -> None:
+    driver.accept(goal(driver, duration=LONG))
+    ears.until(lambda: bool(ears.ends) or (bool(ears.told) and ears.told[-1].time > 0.3))
     assert driver.stop().success
     ears.until(lambda: bool(ears.ends))
     assert ears.ends[-1].outcome is Outcome.ABORTED
@@ -134,7 +162,7 @@ def test_a_way_that_is_not_there_is_refused_by_name() -> None:
 
 
 def test_a_spline_goes_through_the_points_as_fast_as_the_trajectory(cabinet: RunningCabinet) -> None:
-    values = {"target": cabinet.target, "execution": "spline", "speed": 0.5}
+    values = {"target": cabinet.target, "execution": "spline", "speed": 0.5, **PATIENT}
     ears = Ears()
     driver = Driver(Configuration.of(values), ears)
     driver.activate()

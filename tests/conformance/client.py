@@ -66,8 +66,8 @@ class Client(Protocol):
         """Where the arm is, from the newest joint state."""
         ...
 
-    def track(self) -> list[tuple[float, Array]]:
-        """Where the arm was, shape (7,) [rad], in every joint state so far, with its time stamp [s]."""
+    def track(self, begin: float) -> list[tuple[float, Array]]:
+        """Where the arm was, shape (7,) [rad], in every joint state from a time on, with its time stamp [s]."""
         ...
 
     def send(self, goal: Goal) -> Sent:

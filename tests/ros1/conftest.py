@@ -54,6 +54,16 @@ def ros() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(autouse=True)
+def _forget(request: pytest.FixtureRequest) -> Iterator[None]:
+    """What a test has subscribed to ends with it."""
+    from tests.ros1.peer import collected, forget
+
+    before = collected()
+    yield
+    forget(before)
+
+
 @pytest.fixture(scope="session")
 def node(ros: None, stage: Stage) -> Iterator[NodeProcess]:
     """The node of ROS 1 for most tests, active."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import signal
 import socket
@@ -34,7 +35,7 @@ from tests.conformance.stage import ROOT, Stage
 #: A busy machine may need long for what is quick [s].
 PATIENCE = 60.0
 #: And its watchdogs must not bark at that.
-PATIENT = {"watchdog": 5.0, "servo__watchdog": 1.0}
+PATIENT = {"watchdog": 5.0, "servo__watchdog": 1.0, "constraints__goal_time": 20.0}
 PACKAGES = ROOT / "ros1"
 NODE = PACKAGES / "heptarm_ros1" / "scripts" / "heptarm_node"
 
@@ -70,6 +71,17 @@ class Core:
         self._home = tempfile.TemporaryDirectory(prefix="ros1-home-", ignore_cleanup_errors=True)
 
     def __enter__(self) -> Core:
+        while not self._start():
+            self._process.wait()  # somebody else was quicker to take the port
+        try:
+            rospy.init_node(self._name, disable_signals=True)
+        except BaseException:
+            self._end()
+            raise
+        return self
+
+    def _start(self) -> bool:
+        """Start a master at a free port; whether it stands."""
         with socket.socket() as door:
             door.bind(("127.0.0.1", 0))
             port = door.getsockname()[1]
@@ -83,13 +95,8 @@ class Core:
         self._process = subprocess.Popen(
             ["roscore", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
-        try:
-            until(rosgraph.is_master_online, "there is no master")
-            rospy.init_node(self._name, disable_signals=True)
-        except BaseException:
-            self._end()
-            raise
-        return self
+        until(lambda: rosgraph.is_master_online() or self._process.poll() is not None, "there is no master")
+        return self._process.poll() is None
 
     def __exit__(self, *error: object) -> None:
         rospy.signal_shutdown("it is over")
@@ -97,7 +104,7 @@ class Core:
 
     def _end(self) -> None:
         self._process.terminate()
-        self._process.wait(20)
+        self._process.wait(PATIENCE)
         self._home.cleanup()
 
 
@@ -140,11 +147,38 @@ def call(name: str, kind: Any, /, **request: object) -> Any:
     return rospy.ServiceProxy(name, kind)(**request)
 
 
+#: What fills the lists of `collect`.
+_collecting: list[rospy.Subscriber] = []
+
+
 def collect(name: str, kind: Any) -> list[Any]:
     """A list that fills with a topic's messages."""
     found: list[Any] = []
-    rospy.Subscriber(name, kind, found.append, queue_size=100, tcp_nodelay=True)
+    _collecting.append(rospy.Subscriber(name, kind, found.append, queue_size=100, tcp_nodelay=True))
     return found
+
+
+def collected() -> int:
+    """How many topics are collected."""
+    return len(_collecting)
+
+
+def forget(count: int) -> None:
+    """Collect no more but for the first so many topics: each costs time with every message."""
+    while len(_collecting) > count:
+        _collecting.pop().unregister()
+
+
+def fresh(found: list[Any]) -> Any:
+    """A copy of the newest of a topic's messages with headers, measured from now on."""
+    now = rospy.Time.now()
+    until(lambda: found and found[-1].header.stamp >= now, "nothing new comes")
+    return copy.deepcopy(found[-1])
+
+
+def active(status: list[Status]) -> None:
+    """Wait until a node takes commands."""
+    until(lambda: status and status[-1].active, "the node is not active")
 
 
 def publisher(name: str, kind: Any) -> rospy.Publisher:
@@ -192,6 +226,11 @@ def _sample(point: JointTrajectoryPoint) -> Sample:
     )
 
 
+def stamp(message: Any) -> float:
+    """The time stamp of a message with a header [s]."""
+    return float(message.header.stamp.to_sec())
+
+
 class Client:
     """A client as the cases of conformance want it."""
 
@@ -212,7 +251,8 @@ class Client:
     def ready(self) -> None:
         """Wait until the node is active and everything has found each other."""
         assert self._action.wait_for_server(rospy.Duration.from_sec(PATIENCE))
-        until(lambda: self.states and self.status and self.status[-1].active, "the node is not active")
+        active(self.status)
+        until(lambda: self.states, "no joint states come")
 
     def now(self) -> float:
         return float(rospy.Time.now().to_sec())
@@ -221,14 +261,15 @@ class Client:
         time.sleep(seconds)
 
     def place(self) -> Sample:
-        count = len(self.states)
-        until(lambda: len(self.states) > count, "no joint states come")
+        now = self.now()  # a busy machine may still be handing over older ones
+        until(lambda: self.states and stamp(self.states[-1]) >= now, "no joint states come")
         message = self.states[-1]
         assert tuple(message.name) == self.joints
         return Sample(np.array(message.position), np.array(message.velocity), np.zeros(7))
 
-    def track(self) -> list[tuple[float, Any]]:
-        return [(one.header.stamp.to_sec(), np.array(one.position)) for one in list(self.states)]
+    def track(self, begin: float) -> list[tuple[float, Any]]:
+        found = [(stamp(message), message) for message in list(self.states)]
+        return [(time, np.array(message.position)) for time, message in found if time >= begin]
 
     def send(self, goal: Goal) -> Sent:
         told: list[Told] = []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-import time
 
 from heptarm_msgs.msg import Status
 from sensor_msgs.msg import JointState
@@ -13,7 +12,7 @@ from tests.ros1.peer import collect, until
 
 
 def roslaunch(*words: str) -> str:
-    done = subprocess.run(["roslaunch", *words], capture_output=True, text=True, timeout=60, check=True)
+    done = subprocess.run(["roslaunch", *words], capture_output=True, text=True, timeout=200, check=True)
     return done.stdout
 
 
@@ -44,4 +43,3 @@ def test_the_node_is_started_with_its_parameters(ros: None, spare: Stage, tmp_pa
     finally:
         process.terminate()
         process.wait(60)
-    time.sleep(0.2)

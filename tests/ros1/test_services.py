@@ -34,7 +34,7 @@ def ask(name: str, kind=Trigger, /, **request: object) -> str:
 @pytest.fixture(autouse=True)
 def as_it_was(client: Client):
     yield
-    ask("mode/position")
+    until(lambda: call("/heptarm/mode/position", Trigger).success, "a motion is still under way")
 
 
 def test_every_service_answers_success_and_message() -> None:
@@ -92,7 +92,7 @@ def test_cartesian_and_sine_impedance_hold_the_arm(client: Client) -> None:
 
 
 def test_a_mode_waits_for_rest_or_says_that_something_runs(client: Client) -> None:
-    sent = client.send(step(client, time=6.0, size=2.0))
+    sent = client.send(step(client, time=20.0, size=6.0))
     until(lambda: client.feedback(sent), "the goal does not begin")
     answer = call("/heptarm/mode/joint_impedance", SetJointImpedance, stiffness=[1500.0], damping=[])
     assert not answer.success and "stop it first" in answer.message
@@ -102,7 +102,7 @@ def test_a_mode_waits_for_rest_or_says_that_something_runs(client: Client) -> No
 
 
 def test_a_pause_holds_a_goal_and_a_resume_lets_it_go_on(client: Client) -> None:
-    sent = client.send(step(client, time=2.0))
+    sent = client.send(step(client, time=3.0))
     until(lambda: client.feedback(sent), "the goal does not begin")
     ask("pause")
     until(lambda: client.status[-1].paused, "the status does not tell")

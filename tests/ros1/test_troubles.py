@@ -7,6 +7,7 @@ import subprocess
 import sys
 import textwrap
 import time
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from std_srvs.srv import Trigger
 
 from heptarm.bridge.goal import Code, Outcome
-from tests.conformance.cases import rests, step
+from tests.conformance.cases import long, quiet, rests, step
 from tests.conformance.stage import Stage
 from tests.ros1.peer import Client, NodeProcess, call, collect, until
 
@@ -52,15 +53,15 @@ def test_a_killed_client_leaves_a_node_that_lives(client: Client) -> None:
     assert client.result(client.send(step(client, size=-1.0))).code is Code.SUCCESSFUL
 
 
-@pytest.fixture
-def spare_node(ros: None, spare: Stage) -> NodeProcess:
+@pytest.fixture(scope="module")
+def spare_node(ros: None, spare: Stage) -> Iterator[NodeProcess]:
     """Another arm's node, which may come to harm."""
-    node = NodeProcess(spare.target, ns="/other", prefix="other_")
+    node = NodeProcess(spare.target, ns="/other", prefix="other_", diagnostics_rate=10.0)
     yield node
-    assert node.end(signal.SIGTERM) == 0, node.said
+    assert node.end() == 0, node.said
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def other(spare: Stage, spare_node: NodeProcess) -> Client:
     """A client of it."""
     client = Client(spare, name="/other/heptarm", prefix="other_")
@@ -69,7 +70,7 @@ def other(spare: Stage, spare_node: NodeProcess) -> Client:
 
 
 def test_an_emergency_stop_ends_the_goal(other: Client) -> None:
-    sent = other.send(step(other, time=5.0, size=3.0))
+    sent = other.send(long(other))
     until(lambda: other.feedback(sent), "the goal does not begin")
     other.stage.do("press")
     ended = other.result(sent)
@@ -87,17 +88,16 @@ def test_an_emergency_stop_ends_the_goal(other: Client) -> None:
 
 def test_a_cabinet_without_power_and_back(other: Client) -> None:
     reports = collect("/diagnostics", DiagnosticArray)
-    sent = other.send(step(other, time=5.0, size=3.0))
+    sent = other.send(long(other))
     until(lambda: other.feedback(sent), "the goal does not begin")
     other.stage.kill()
     ended = other.result(sent)
     assert ended.outcome is Outcome.ABORTED and ended.code is Code.INVALID_GOAL
     until(lambda: not other.status[-1].connected, "the status does not tell")
-    count = len(other.states)
     until(lambda: any(one.status[0].level == 2 for one in reports), "diagnostics do not tell")
+    until(lambda: quiet(other), "old states are repeated")
     refused = other.send(step_anywhere(other))
     assert not refused.accepted
-    assert len(other.states) == count, "a state is not repeated"
     other.stage.restart()
     until(lambda: other.status[-1].connected, "the node does not reconnect")
     rests(other)
@@ -108,7 +108,7 @@ def test_a_cabinet_without_power_and_back(other: Client) -> None:
 
 def test_a_node_that_the_system_stops_for_a_while(other: Client, spare_node: NodeProcess) -> None:
     """The cabinet brakes the arm, the goal ends, and the node goes on."""
-    sent = other.send(step(other, time=6.0, size=3.0))
+    sent = other.send(step(other, time=9.0, size=6.0))
     until(lambda: other.feedback(sent), "the goal does not begin")
     spare_node.process.send_signal(signal.SIGSTOP)
     time.sleep(2.0)
@@ -125,25 +125,18 @@ def step_anywhere(client: Client):
     return Goal(client.joints, (Point(5.0, (0.0,) * 7),))
 
 
-def test_a_node_without_a_cabinet_waits_for_one(ros: None) -> None:
-    node = NodeProcess("127.0.0.1:9", name="lonely")
-    node.waits_for("not configured")
-    time.sleep(0.1)
-    assert node.end() == 0, node.said
+def test_without_a_cabinet_or_with_a_wrong_parameter_it_waits_and_says_so(ros: None, stage: Stage) -> None:
+    lonely = NodeProcess("127.0.0.1:9", name="lonely")
+    wrong = NodeProcess(stage.target, name="wrong", servo__rate=-3)
+    lonely.waits_for("not configured")
+    wrong.waits_for("servo.rate is -3")
+    assert lonely.end() == 0, lonely.said
+    assert wrong.end(signal.SIGTERM) == 0, wrong.said
 
 
-def test_a_wrong_parameter_is_refused_in_words(ros: None, stage: Stage) -> None:
-    node = NodeProcess(stage.target, name="wrong", servo__rate=-3)
-    node.waits_for("servo.rate is -3")
-    assert node.end() == 0, node.said
-
-
-def test_the_arm_comes_to_rest_when_the_node_ends(ros: None, spare: Stage) -> None:
-    node = NodeProcess(spare.target, ns="/ending")
-    client = Client(spare, name="/ending/heptarm")
-    client.ready()
-    sent = client.send(step(client, time=5.0, size=3.0))
-    until(lambda: client.feedback(sent), "the goal does not begin")
-    assert node.end(signal.SIGINT) == 0, node.said
-    ended = client.result(sent)
+def test_the_arm_comes_to_rest_when_the_node_ends(other: Client, spare_node: NodeProcess) -> None:
+    sent = other.send(long(other))
+    until(lambda: other.feedback(sent), "the goal does not begin")
+    assert spare_node.end(signal.SIGTERM) == 0, spare_node.said
+    ended = other.result(sent)
     assert ended.outcome is Outcome.ABORTED, ended

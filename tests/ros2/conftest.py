@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import socket
 import tempfile
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
@@ -15,12 +16,26 @@ from tests.conformance.stage import Stage
 if TYPE_CHECKING:
     from tests.ros2.peer import Client, NodeProcess, Ros
 
-#: The machine may be busy.
-PATIENT = {"servo__watchdog": 1.0, "watchdog": 5.0}
+
+
+def free_domain(first: int) -> tuple[int, socket.socket]:
+    """A domain that no other run on this machine has, and what keeps it ours until this process ends."""
+    for number in range(first, first + 101):
+        held = socket.socket(socket.AF_UNIX)
+        try:
+            held.bind(f"\0heptarm-ros-domain-{number % 101}")
+        except OSError:
+            held.close()
+            continue
+        return number % 101, held
+    raise OSError("all domains of ROS 2 are taken")
+
+
 collect_ignore_glob = [] if importlib.util.find_spec("rclpy") else ["test_*.py"]
 
 # a run's own domain on this machine: it neither sees nor disturbs others; children inherit it
-os.environ["ROS_DOMAIN_ID"] = str(os.getpid() % 101)
+_domain, _held = free_domain(os.getpid())
+os.environ["ROS_DOMAIN_ID"] = str(_domain)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["FASTDDS_BUILTIN_TRANSPORTS"] = "UDPv4"  # killed processes leave no shared memory behind
 os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="ros-log-")
@@ -40,30 +55,18 @@ def stage() -> Iterator[Stage]:
     running.close()
 
 
-@pytest.fixture
-def stages() -> Iterator[Callable[..., Stage]]:
-    """Starts further cabinets for one test."""
-    running: list[Stage] = []
-
-    def start(*options: str) -> Stage:
-        running.append(Stage(*options))
-        return running[-1]
-
-    yield start
-    for one in running:
-        one.close()
-
-
-@pytest.fixture
-def own_stage(stages: Callable[..., Stage]) -> Stage:
-    """A cabinet for one test alone."""
-    return stages()
+@pytest.fixture(scope="session")
+def spare() -> Iterator[Stage]:
+    """A second one, for tests that start a node of their own; they leave nobody in control of it."""
+    running = Stage()
+    yield running
+    running.close()
 
 
 @pytest.fixture
 def nodes() -> Iterator[Callable[..., NodeProcess]]:
     """Starts further nodes for one test; they must end well."""
-    from tests.ros2.peer import NodeProcess
+    from tests.ros2.peer import PATIENT, NodeProcess
 
     running: list[NodeProcess] = []
 
@@ -86,10 +89,20 @@ def ros() -> Iterator[Ros]:
     running.close()
 
 
+@pytest.fixture(autouse=True)
+def _forget(request: pytest.FixtureRequest) -> Iterator[None]:
+    """What a test has subscribed to ends with it."""
+    ros: Ros | None = request.getfixturevalue("ros") if "ros" in request.fixturenames else None
+    before = 0 if ros is None else ros.collected
+    yield
+    if ros is not None:
+        ros.forget(before)
+
+
 @pytest.fixture(scope="session")
 def node(stage: Stage) -> Iterator[NodeProcess]:
     """The node of ROS 2 for most tests, active."""
-    from tests.ros2.peer import NodeProcess
+    from tests.ros2.peer import PATIENT, NodeProcess
 
     running = NodeProcess(stage.target, execution=os.environ.get("EXECUTION", "servo"), **PATIENT)
     yield running

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import signal
 import subprocess
 import sys
@@ -25,8 +26,9 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.action import ActionClient
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -37,12 +39,14 @@ from tests.conformance.stage import Stage
 
 #: Discovery can take some seconds, and a busy machine many more [s].
 PATIENCE = 60.0
+#: A busy machine needs patience of a node, too.
+PATIENT: dict[str, object] = {"servo__watchdog": 1.0, "watchdog": 5.0, "constraints__goal_time": 20.0}
 #: Parameters that cases change.
 DEFAULTS: dict[str, object] = {
     "max_deceleration_on_cancel": 2.0,
     "allow_nonzero_velocity_at_trajectory_end": False,
     "allow_partial_joints_goal": False,
-    "constraints__goal_time": 2.0,
+    "constraints__goal_time": PATIENT["constraints__goal_time"],
     "constraints__stopped_velocity_tolerance": 0.02,
     "constraints__A7__trajectory": 0.0,
 }
@@ -120,41 +124,55 @@ class Ros:
         rclpy.init(context=self.context)
         self.node = rclpy.create_node(name, context=self.context)
         self._clients: dict[str, Any] = {}
+        self._collected: list[Any] = []
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
-        self._thread = threading.Thread(target=self._spin)
+        self._over: Future[None] = Future()
+        self._thread = threading.Thread(target=self._executor.spin_until_future_complete, args=(self._over,))
         self._thread.start()
-
-    def _spin(self) -> None:
-        try:
-            self._executor.spin()
-        except ExternalShutdownException:
-            pass
 
     def wait(self, future: Any, why: str, timeout: float = PATIENCE) -> Any:
         """What a future brings."""
         until(future.done, why, timeout)
         return future.result()
 
-    def call(self, kind: type, name: str, request: Any) -> Any:
-        """Call a service."""
+    def find(self, kind: type, name: str) -> Any:
+        """A client of a service that is there."""
         if name not in self._clients:
             self._clients[name] = self.node.create_client(kind, name)
         client = self._clients[name]
         until(client.service_is_ready, f"there is no service {name}")
-        return self.wait(client.call_async(request), f"{name} does not answer")
+        return client
+
+    def call(self, kind: type, name: str, request: Any) -> Any:
+        """Call a service."""
+        return self.wait(self.find(kind, name).call_async(request), f"{name} does not answer")
 
     def collect(self, kind: type, name: str, *, latched: bool = False) -> list[Any]:
         """A list that fills with a topic's messages."""
         found: list[Any] = []
         durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
-        self.node.create_subscription(kind, name, found.append, QoSProfile(depth=100, durability=durability))
+        profile = QoSProfile(depth=100, durability=durability)
+        self._collected.append(self.node.create_subscription(kind, name, found.append, profile))
         return found
 
+    def forget(self, count: int) -> None:
+        """Collect no more but for the first so many topics: each costs time with every message."""
+        while len(self._collected) > count:
+            subscription = self._collected.pop()
+            done = self._executor.create_task(self.node.destroy_subscription, subscription)
+            self.wait(done, "a subscription does not end")
+
+    @property
+    def collected(self) -> int:
+        """How many topics are collected."""
+        return len(self._collected)
+
     def close(self) -> None:
-        """End it; a thread inside an executor must not outlive its context."""
-        self._executor.shutdown()
+        """End it; an executor must not be shut down while a thread is in it."""
+        self._over.set_result(None)
         self._thread.join()
+        self._executor.shutdown()
         self.node.destroy_node()
         rclpy.shutdown(context=self.context)
 
@@ -226,6 +244,13 @@ def _value(value: object) -> ParameterValue:
     return ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
 
 
+def fresh(ros: Ros, found: list[Any]) -> Any:
+    """A copy of the newest of a topic's messages with headers, measured from now on."""
+    now = ros.node.get_clock().now().nanoseconds * 1e-9
+    until(lambda: found and stamp(found[-1]) >= now, "nothing new comes")
+    return copy.deepcopy(found[-1])
+
+
 class Client:
     """A client as the cases of conformance want it."""
 
@@ -241,10 +266,7 @@ class Client:
     ) -> None:
         self.ros, self.stage, self.name = ros, stage, name
         self.joints = tuple(f"{prefix}A{i}" for i in range(1, 8))
-        self.states: list[JointState] = []
-        self.subscription = ros.node.create_subscription(
-            JointState, f"{name.rpartition('/')[0]}/joint_states", self.states.append, 100
-        )
+        self.states = ros.collect(JointState, f"{name.rpartition('/')[0]}/joint_states")
         self.status = ros.collect(Status, f"{name}/status", latched=True)
         self._action = ActionClient(ros.node, FollowJointTrajectory, f"{name}/follow_joint_trajectory")
         self._topic = ros.node.create_publisher(JointTrajectory, f"{name}/joint_trajectory", 1)
@@ -270,8 +292,9 @@ class Client:
         assert tuple(message.name) == self.joints
         return Sample(np.array(message.position), np.array(message.velocity), np.zeros(7))
 
-    def track(self) -> list[tuple[float, Any]]:
-        return [(stamp(message), np.array(message.position)) for message in list(self.states)]
+    def track(self, begin: float) -> list[tuple[float, Any]]:
+        found = [(stamp(message), message) for message in list(self.states)]
+        return [(time, np.array(message.position)) for time, message in found if time >= begin]
 
     def send(self, goal: Goal) -> Sent:
         told: list[Told] = []

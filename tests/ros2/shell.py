@@ -12,7 +12,7 @@ from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.action import ActionClient
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy
 
 from tests.ros2.peer import Ros, until
 
@@ -57,11 +57,7 @@ def topic(ros: Ros, verb: str, name: str, *rest: str) -> object:
         one.qos_profile.durability is DurabilityPolicy.TRANSIENT_LOCAL
         for one in ros.node.get_publishers_info_by_topic(name)
     )
-    found: list[Any] = []
-    durability = DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE
-    ros.node.create_subscription(
-        find(known[0]), name, found.append, QoSProfile(depth=1, durability=durability)
-    )
+    found = ros.collect(find(known[0]), name, latched=latched)
     until(lambda: found, f"nothing comes on {name}")
     return found[0]
 

@@ -14,6 +14,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty, Float64
 
 from heptarm.rl.task import ReachTask
+from tests.conformance.cases import rests
 from tests.ros2.peer import PATIENCE, Client, Ros, until
 
 
@@ -54,4 +55,4 @@ def test_it_reaches_targets_one_after_the_other_and_holds(client: Client, ros: R
         distances.clear()
     targets.publish(target(3.0, 0.0, 0.4))  # refused; the last one stays
     hold.publish(Empty())
-    until(lambda: np.abs(client.states[-1].velocity).max() < 1e-3, "the arm does not come to rest")
+    rests(client)

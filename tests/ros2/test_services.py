@@ -25,7 +25,8 @@ def ask(ros: Ros, client: Client):
         return answer
 
     yield call
-    call("mode/position")
+    mode = f"{client.name}/mode/position"
+    until(lambda: ros.call(Trigger, mode, Trigger.Request()).success, "a motion is still under way")
 
 
 def test_every_service_answers_success_and_message() -> None:
@@ -43,7 +44,9 @@ def test_a_goal_runs_under_joint_impedance_and_a_wrong_stiffness_is_refused(clie
 
 
 def test_a_pause_holds_a_goal_and_a_resume_lets_it_go_on(client: Client, ask) -> None:
-    sent = client.send(step(client, time=2.0))
+    for name in ("mode/position", "pause", "resume"):
+        client.ros.find(Trigger, f"{client.name}/{name}")
+    sent = client.send(step(client, time=3.0))
     until(lambda: client.feedback(sent), "the goal does not begin")
     assert "stop it first" in ask("mode/position", refused=True).message
     ask("pause")

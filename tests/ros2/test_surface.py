@@ -11,8 +11,7 @@ from rclpy.action import ActionClient
 
 from tests.conformance import surface
 from tests.conformance.stage import Stage
-from tests.ros2.conftest import PATIENT
-from tests.ros2.peer import NodeProcess, Ros, to_duration, until
+from tests.ros2.peer import PATIENT, NodeProcess, Ros, to_duration, until
 
 NAME = "/surface/heptarm"
 

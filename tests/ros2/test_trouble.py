@@ -9,47 +9,37 @@ import sys
 import time
 from collections.abc import Iterator
 
-import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from std_srvs.srv import Trigger
 
 from heptarm.bridge.goal import Code, Goal, Outcome, Point
-from tests.conformance.cases import rests, step, succeeds
+from tests.conformance.cases import long, quiet, rests, stays, step, succeeds, under_way
 from tests.conformance.stage import ROOT, Stage
-from tests.ros2.peer import Client, NodeProcess, Ros, until
+from tests.ros2.peer import PATIENT, Client, NodeProcess, Ros, stamp, until
 
 
 @pytest.fixture(scope="module")
-def arena() -> Iterator[Stage]:
-    """A cabinet for trouble."""
-    running = Stage()
-    yield running
-    running.close()
-
-
-@pytest.fixture(scope="module")
-def tough(arena: Stage) -> Iterator[NodeProcess]:
+def tough(spare: Stage) -> Iterator[NodeProcess]:
     """A node that has to live through all of it."""
-    running = NodeProcess(
-        arena.target, name="tough", space="/trouble", diagnostics_rate=10.0, servo__watchdog=1.0
-    )
+    running = NodeProcess(spare.target, name="tough", space="/trouble", diagnostics_rate=10.0, **PATIENT)
     yield running
     assert running.process.poll() is None, f"the node has died:\n{running.said}"
     running.finish()
 
 
 @pytest.fixture(scope="module")
-def victim(ros: Ros, arena: Stage, tough: NodeProcess) -> Client:
-    client = Client(ros, arena, "/trouble/tough")
+def victim(ros: Ros, spare: Stage, tough: NodeProcess) -> Client:
+    client = Client(ros, spare, "/trouble/tough")
     client.ready()
     return client
 
 
-def test_an_emergency_stop_ends_a_goal_and_refuses_others(victim: Client, arena: Stage, ros: Ros) -> None:
-    sent = victim.send(step(victim, time=3.0, size=3.0))
-    victim.sleep(1.0)
-    arena.do("press")
+def test_an_emergency_stop_ends_a_goal_and_refuses_others(victim: Client, spare: Stage, ros: Ros) -> None:
+    here = victim.place().q
+    sent = victim.send(long(victim))
+    under_way(victim, here)
+    spare.do("press")
     ended = victim.result(sent)
     assert (ended.outcome, ended.code) == (Outcome.ABORTED, Code.INVALID_GOAL)
     assert "emergency stop" in ended.text
@@ -57,12 +47,11 @@ def test_an_emergency_stop_ends_a_goal_and_refuses_others(victim: Client, arena:
     assert not victim.send(step(victim)).accepted
     answer = ros.call(Trigger, "/trouble/tough/recover", Trigger.Request())
     assert not answer.success and "emergency stop" in answer.message
-    arena.do("release")
+    spare.do("release")
     until(
         lambda: ros.call(Trigger, "/trouble/tough/recover", Trigger.Request()).success, "it does not recover"
     )
-    victim.sleep(0.5)
-    assert np.abs(victim.place().q - rest).max() < 2e-3, "nothing goes on by itself"
+    stays(victim, rest)  # nothing goes on by itself
     succeeds(victim, step(victim))
 
 
@@ -105,35 +94,34 @@ def tough_is(found: list[DiagnosticArray], level: bytes) -> bool:
 
 
 def test_a_cabinet_that_dies_and_comes_back(
-    victim: Client, arena: Stage, ros: Ros, tough: NodeProcess
+    victim: Client, spare: Stage, ros: Ros, tough: NodeProcess
 ) -> None:
     found = ros.collect(DiagnosticArray, "/diagnostics")
-    sent = victim.send(step(victim, time=4.0))
-    victim.sleep(0.5)
-    arena.kill()
+    here = victim.place().q
+    sent = victim.send(long(victim))
+    under_way(victim, here)
+    spare.kill()
+    killed = victim.now()
     ended = victim.result(sent)
     assert (ended.outcome, ended.code) == (Outcome.ABORTED, Code.INVALID_GOAL)
     assert ended.text
     until(lambda: tough_is(found, b"\x02"), "diagnostics tell of it")
-    victim.sleep(1.0)  # what was on its way has come
-    count = len(victim.states)
-    victim.sleep(0.5)
-    assert len(victim.states) == count, "old states are not repeated"
-    here = tuple(victim.states[-1].position)
-    assert not victim.send(Goal(victim.joints, (Point(1.0, here),))).accepted
-    arena.restart()
-    until(lambda: len(victim.states) > count, "states come again")
+    until(lambda: quiet(victim), "old states are repeated")
+    assert not victim.send(Goal(victim.joints, (Point(1.0, tuple(here)),))).accepted
+    spare.restart()
+    until(lambda: stamp(victim.states[-1]) > killed, "states come again")
     until(lambda: tough_is(found, b"\x00"), "diagnostics are well again")
     succeeds(victim, step(victim))
     assert tough.process.poll() is None
-    stamps = [m.header.stamp.sec + m.header.stamp.nanosec * 1e-9 for m in victim.states]
+    stamps = [stamp(message) for message in victim.states]
     assert all(a < b for a, b in zip(stamps, stamps[1:])), "no state twice"  # noqa: RUF007
 
 
 def test_a_node_that_the_system_stops_for_a_while(victim: Client, tough: NodeProcess) -> None:
     """The cabinet brakes the arm, the goal ends, and the node goes on."""
-    sent = victim.send(step(victim, time=6.0, size=3.0))
-    victim.sleep(0.7)
+    here = victim.place().q
+    sent = victim.send(step(victim, time=9.0, size=6.0))
+    under_way(victim, here)
     tough.process.send_signal(signal.SIGSTOP)
     time.sleep(2.0)
     tough.process.send_signal(signal.SIGCONT)
