@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from tests.ros2.peer import Client, NodeProcess, Ros
 
 
-
 def free_domain(first: int) -> tuple[int, socket.socket]:
     """A domain that no other run on this machine has, and what keeps it ours until this process ends."""
     for number in range(first, first + 101):
@@ -45,6 +44,11 @@ os.environ.pop("HEPTARM_TARGET", None)
 def pytest_configure(config: pytest.Config) -> None:
     """Lets the message generators, which rclpy imports, use what Python is about to drop."""
     config.addinivalue_line("filterwarnings", "ignore:module 'sre_:DeprecationWarning")
+
+
+def pytest_unconfigure() -> None:
+    """Gives the domain back."""
+    _held.close()
 
 
 @pytest.fixture(scope="session")
