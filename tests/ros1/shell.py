@@ -44,8 +44,7 @@ def run(words: list[str]) -> int:
     if child == 0:
         code: object = 1
         try:
-            sys.argv = words
-            TOOLS[words[0]]()
+            TOOLS[words[0]](words)
             code = 0
         except SystemExit as end:
             code = end.code
