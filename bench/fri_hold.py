@@ -76,9 +76,9 @@ class Tape:
                 self._positions.append(s.q.copy())
 
     def record(self, seconds: float, look: Callable[[], object] = lambda: None) -> bool:
-        """Take everything for a while, and look at something besides; whether the session still stands."""
-        end, due = time.monotonic() + seconds, 0.0
-        while (rest := end - time.monotonic()) > 0.0 and self._session.wait(min(rest, 0.02)):
+        """Take everything for a while of its time, and look at something besides; whether the session still stands."""
+        end, due = self._session.state.t + seconds, 0.0
+        while (rest := end - self._session.state.t) > 0.0 and self._session.wait(min(rest, 0.02)):
             look()
             if time.monotonic() > due:
                 self.take()

@@ -253,7 +253,13 @@ def test_taught_by_hand_and_replayed(arm: ha.Arm) -> None:
     replay = arm.replay(way, by="spline", pace=0.3)
     assert replay.result.arrived and replay.deviation < 0.05
     assert np.abs(arm.wait_for_rest().q - way.q[-1]).max() < 2e-3
-    replay = arm.replay(way, pace=0.5)
+    for left in (3, 2, 1, 0):
+        try:
+            replay = arm.replay(way, pace=0.5)
+            break
+        except ha.Starved:  # this machine was busy with something else
+            if not left:
+                raise
     assert replay.result.arrived and replay.deviation < 0.3
     assert np.abs(arm.wait_for_rest().q - way.q[-1]).max() < 0.01
 

@@ -22,16 +22,20 @@ def arm(cabinet: RunningCabinet) -> Iterator[ha.Arm]:
         yield arm
 
 
+def _there(pose: ha.Pose, goal: ha.Pose) -> bool:
+    return pose.distance_to(goal) < 1e-3 and pose.angle_to(goal) < 1e-3
+
+
 def test_poses_are_followed_on_straight_lines(arm: ha.Arm) -> None:
     assert "servo_lin" in arm.capabilities
     places = []
     with arm.servo("lin", rate=50, speed_mps=0.1, acceleration_mps2=0.5, watchdog=2.0) as sv:
         start = sv.start.pose
         goal = ha.Pose.of(start.xyz + [0.0, 0.08, -0.06], start.quat) @ ha.Pose.xyz_abc(0, 0, 0, 0.2, 0, 0)
-        while sv.tick() and sv.t < 2.5:
+        while sv.tick() and sv.t < 30.0 and not _there(arm.state.pose, goal):
             sv.set(goal)
             places.append(arm.state.pose.xyz)
-        assert arm.state.pose.distance_to(goal) < 1e-3 and arm.state.pose.angle_to(goal) < 1e-3
+        assert len(places) > 10 and _there(arm.state.pose, goal)
         while sv.tick() and sv.stats.refused == 0 and sv.t < 20.0:
             sv.set(ha.Pose.of([3.0, 0, 0], start.quat))
     assert "not reachable" in sv.stats.text
@@ -48,7 +52,7 @@ def test_a_straight_servo_is_soft_and_renewed_after_its_time_out(arm: ha.Arm) ->
         time.sleep(0.6)  # reached, and timed out
         goal = ha.Pose.of(start.xyz + [0.0, 0.03, 0.0], start.quat)
         sv.set(goal)
-        arm.wait_until(lambda state: state.pose.distance_to(goal) < 5e-3, timeout=5.0)
+        arm.wait_until(lambda state: state.pose.distance_to(goal) < 5e-3, timeout=20.0)
         sv.change(CartesianImpedance((800.0,) * 3 + (100.0,) * 3, damping=0.9))
     assert sv.stats.refused == 0
 

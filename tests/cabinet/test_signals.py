@@ -17,7 +17,7 @@ from tests.cabinet.peer import Peer
 @pytest.fixture
 def peer(cabinet: FakeCabinet) -> Iterator[Peer]:
     with Peer(cabinet.port) as peer:
-        peer.take_control(watchdog=5.0)
+        peer.take_control()
         yield peer
 
 

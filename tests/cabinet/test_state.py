@@ -55,18 +55,24 @@ def test_states_come_at_the_rate(connect: Connect, rate: float) -> None:
     patiently(peer, 1.0, check)
 
 
+def carried(state: wire.State) -> set[wire.Groups]:
+    return {group for group, field in _FIELDS.items() if getattr(state, field) is not None}
+
+
 def test_only_the_groups_that_were_asked_for(connect: Connect) -> None:
     peer = connect()
     for chosen in (G.JOINTS, G.POSE | G.SAFETY, G.TORQUES | G.WRENCH | G.MOTION):
         peer.ask(wire.Subscribe(groups=chosen, rate=200.0))
-        peer.read_for(0.1)
-        state = peer.all(wire.State)[-1]
-        assert {group for group, field in _FIELDS.items() if getattr(state, field) is not None} == set(chosen)
+        # some of the ones before may still be on their way; behind the first of these come no others
+        peer.wait(lambda _, m, g=chosen: isinstance(m, wire.State) and carried(m) == set(g), since=len(peer.seen))
+        later = peer.wait(lambda _, m: isinstance(m, wire.State), since=len(peer.seen))
+        assert carried(later) == set(chosen)
     peer.ask(wire.Subscribe(groups=G.JOINTS, rate=0.0))
-    peer.read_for(0.1)
-    count = len(peer.all(wire.State))
-    peer.read_for(0.2)
-    assert len(peer.all(wire.State)) == count
+
+    def check() -> None:
+        assert not peer.all(wire.State)
+
+    patiently(peer, 0.3, check)
 
 
 def test_a_rate_that_is_too_fast_is_refused(connect: Connect) -> None:
@@ -98,15 +104,17 @@ def test_velocity_follows_the_motion(connect: Connect) -> None:
     peer.ask(wire.Subscribe(groups=G.JOINTS | G.MOTION, rate=200.0))
     begin = peer.ask(run(ptp(0.0)))  # wherever other tests left it
     peer.wait_for(wire.MotionFinished, lambda e: e.id == begin.id)
-    accepted = peer.ask(run(ptp(0.3)))
+    accepted = peer.ask(run(ptp(0.6)))
     peer.wait_for(wire.MotionFinished, lambda e: e.id == accepted.id)
-    peer.read_for(0.2)
+    last = peer.wait(
+        lambda _, m: isinstance(m, wire.State) and m.motion.motion == 0 and abs(m.joints.dq[0]) < 1e-3,
+        since=len(peer.seen),
+    )
     moving = [s for s in peer.all(wire.State) if s.motion.motion == accepted.id]
     assert np.median([s.joints.dq[0] for s in moving[10:]]) == pytest.approx(
         1.0, abs=0.1
     )  # the fake robot's speed
-    assert peer.all(wire.State)[-1].joints.dq[0] == pytest.approx(0.0, abs=1e-3)
-    assert peer.all(wire.State)[-1].motion.motion == 0
+    assert last.joints.q[0] == pytest.approx(0.6)
     peer.ask(run(ptp(0.0)))
     peer.wait_for(wire.MotionFinished, lambda e: e.id == accepted.id + 1)
     peer.ask(wire.ReleaseControl())

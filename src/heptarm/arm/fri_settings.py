@@ -312,8 +312,8 @@ def _listening(port: int | None, make: Callable[[int], Client]) -> Client:
             continue
         try:
             return make(candidate)
-        except ConnectFailed:
-            if _is_free(candidate):  # else somebody was quicker
+        except ConnectFailed as error:
+            if error.parameter != "port":  # else somebody was quicker, or has just looked whether it is free
                 raise
     raise ConnectFailed(
         f"none of FRI's ports {PORTS[0]} to {PORTS[-1]} is free on this machine",

@@ -139,9 +139,12 @@ class Client(Reader):
                 self._worker.kill()
                 raise ConnectFailed(f"the loop's process did not start within {timeout:g} s")
             time.sleep(2e-3)
-        if self._header[at.STATUS] == at.Status.FAILED:
+        if (status := self._header[at.STATUS]) in (at.Status.FAILED, at.Status.NO_PORT):
             self._worker.join(1.0)
-            raise ConnectFailed(self._layout.trouble.read() or "the loop's process did not start")
+            raise ConnectFailed(
+                self._layout.trouble.read() or "the loop's process did not start",
+                parameter="port" if status == at.Status.NO_PORT else "",
+            )
 
     @property
     def is_running(self) -> bool:

@@ -74,6 +74,7 @@ class Status(enum.IntEnum):
     RUNNING = 1
     ENDED = 2
     FAILED = 3
+    NO_PORT = 4
 
 
 class Layout:

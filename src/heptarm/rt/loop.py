@@ -221,7 +221,8 @@ def main(path: str, law: Law | None = None) -> int:
         loop = Loop(first, config, law=law)
     except (ConnectFailed, ImportError, AttributeError) as error:
         first.trouble.write(str(error))
-        header[at.STATUS] = at.Status.FAILED
+        has_port = not isinstance(error, ConnectFailed) or error.parameter != "port"
+        header[at.STATUS] = at.Status.FAILED if has_port else at.Status.NO_PORT
         return 1
     refused = realtime.ask(cpu=config["cpu"], lock=config["lock"]) if config["realtime"] else []
     first.refused.write("\n".join(refused))

@@ -16,6 +16,8 @@ final class Stream implements Activity {
     private static final double STATUS_PERIOD = 1.0;
     /** An older target was sent by a client that does not know the cabinet's clock. */
     private static final double CREDIBLE = 60.0;
+    /** A wait that lasts so much longer than it should says that this machine stood still meanwhile. */
+    private static final long OVERSLEPT_NS = 5000000L;
 
     /** One target. Either joints or a pose. */
     static final class Target {
@@ -230,9 +232,16 @@ final class Stream implements Activity {
 
     /** Under the lock: the next target; null when the watchdog's time is over, or something has ended. */
     private Target await() throws InterruptedException {
-        long deadline = System.nanoTime() + (long) (watchdog * 1e9); // the client's seconds, not a simulator's
+        long period = (long) (watchdog * 1e9); // the client's seconds, not a simulator's
+        long deadline = System.nanoTime() + period;
+        boolean overslept = false;
         while (pending == null && ended == null && !closed) {
             long left = deadline - System.nanoTime();
+            if (left < -OVERSLEPT_NS && !overslept) { // this machine stood still, and what came meanwhile is not read yet
+                overslept = true;
+                left = period;
+                deadline = System.nanoTime() + period;
+            }
             if (left <= 0) {
                 return null;
             }

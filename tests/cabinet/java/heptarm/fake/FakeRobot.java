@@ -51,7 +51,7 @@ import heptarm.wire.WrenchState;
  * Seven axes without dynamics: each motion runs at one speed, a cancelled one rests at once.
  *
  * <p>Errors to order: a PTP whose A7 is 1.25 rad fails when it is planned, one with 1.5 rad fails on the way, and one with
- * 1.0 rad is planned for half a second. One with 0.75 rad needs an option that
+ * 1.0 rad is planned for two seconds. One with 0.75 rad needs an option that
  * the cabinet lacks. A servo motion goes straight to its targets; one to more than 2 rad of A7 is refused by the robot,
  * and after 0.3 s without a target it ends by itself. Of poses it follows those of the engine lin only, and turns A7 by their x.
  * After the message "blind" readings fail for a while, after "jammed" cancelling and writing do.
@@ -77,7 +77,8 @@ final class FakeRobot implements Robot, Runnable {
         new SignalInfo("Cell.Level", IoDirection.OUTPUT, IoType.ANALOG, -10, 10),
         new SignalInfo("Cell.Offset", IoDirection.INPUT, IoType.INTEGER, -128, 127),
     };
-    private static final long SLOWLY_NS = 500000000L;
+    private static final long SLOWLY_NS = 2000000000L;
+    private static final long FAULT_NS = 1500000000L;
     private static final long TICK_NS = 2000000L;
 
     private final Clock clock;
@@ -595,7 +596,7 @@ final class FakeRobot implements Robot, Runnable {
             operate(text);
             return;
         }
-        long until = clock.nanos() + SLOWLY_NS;
+        long until = clock.nanos() + FAULT_NS;
         if ("blind".equals(text)) {
             blindUntil = until;
         }
