@@ -116,7 +116,7 @@ class Peer:
             client.transport.close()
 
     def arm(self, *, control: bool = True, **options: Any) -> Arm:
-        settings = {"timeout": 2.0, "rate": 200.0, "groups": ("joints", "motion", "safety")} | options
+        settings = {"timeout": 20.0, "rate": 200.0, "groups": ("joints", "motion", "safety")} | options
         arm = Arm(Connection(self.dial, Options(**settings), clock=RealClock()))  # type: ignore[arg-type]
         try:
             arm.open(control=control)
@@ -129,7 +129,7 @@ class Peer:
         self.is_open = False
         self.drop()
         for thread in self.threads:
-            thread.join(2.0)
+            thread.join(20.0)
             assert not thread.is_alive()
         assert not self.problems, self.problems
         assert not self.steps, f"never consumed: {[step.kind.__name__ for step in self.steps]}"

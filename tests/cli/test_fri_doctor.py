@@ -16,14 +16,17 @@ from tests.conftest import RunningCabinet
 
 
 def verdicts(*arguments: str, fails: bool = False) -> dict[str, dict[str, Any]]:
-    done = run("doctor", "--fri", "--json", *arguments)
+    for left in (3, 2, 1, 0):
+        done = run("doctor", "--fri", "--json", *arguments)
+        found = {one["what"]: one for one in map(json.loads, done.stdout.splitlines())}
+        if not left or fails or "missed" not in found.get("FRI quality", {}).get("found", ""):
+            break  # else this machine was busy with something else, and is told so
     assert done.returncode == (1 if fails else 0), done.stdout + done.stderr
-    found = [json.loads(line) for line in done.stdout.splitlines()]
-    return {one["what"]: one for one in found}
+    return found
 
 
 def test_a_cabinet_with_fri_is_looked_at_without_moving_anything(cabinet: RunningCabinet) -> None:
-    found = verdicts("--target", cabinet.target, "--fri-period", "10", "--seconds", "2")
+    found = verdicts("--target", cabinet.target, "--fri-period", "10", "--seconds", "4")
     assert found["FRI command"]["how"] == "ok"
     assert "position, torque, wrench; not offered: pose; signals" in found["FRI command"]["found"]
     assert "FRI 1.14-1.16, every 10 ms" in found["FRI messages"]["found"]

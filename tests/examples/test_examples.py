@@ -19,7 +19,7 @@ def test_example(example: Path, cabinet) -> None:
         [sys.executable, str(example)],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=240,
         env=environment,
         check=False,
     )

@@ -308,7 +308,7 @@ class Arm(Observer, Equipment, Stopping, Touching, Guarding, Teaching):
                 "lin": the same, to be reached on straight lines.
             rate: ticks per second of the loop [Hz].
             watchdog: within this time after a target the next one has to come, or the arm stops [s], 0.005 to 2;
-                None: five periods, and at least 0.05 s.
+                None: five periods, and at least 0.2 s.
             engine: of joints and poses: "smart" plans a limited trajectory to each target; "direct" goes straight for
                 it, for targets that are close and smooth.
             mode: control mode; None: position. It may change its parameters while the arm follows.

@@ -19,7 +19,7 @@ _GENTLE = 0.2
 #: How long the velocity of a target is kept after the target was passed [s].
 _KEPT = 0.1
 #: Without a word of the user the watchdog is so many periods long, but no shorter than this [s].
-_PERIODS, _SHORTEST = 5.0, 0.05
+_PERIODS, _SHORTEST = 5.0, 0.2
 _LONGEST = 2.0
 #: How long the cabinet may take until the first target counts [s].
 _FIRST = 2.0

@@ -173,16 +173,18 @@ def record(
 ) -> Course:
     """Carry out a motion, or several, and keep all states meanwhile. Raises as `Arm.move` does."""
     before = arm.state.stamp
+    pushed = arm.states()  # from before the beginning: a slow machine would miss the first of them
     handle = arm.start(motion, mode=mode, until=until, speed=speed)
     states: dict[int, State] = {}
     end = None
-    for state in arm.states(duration=handle.limit):
+    for state in pushed:
         if state.stamp > before:
             states[state.stamp] = state  # a group that is sampled less often makes two of one stamp
         if end is None and handle.done:
             end = arm.state.stamp  # a slow machine has not seen all of them yet
-        if end is not None and state.stamp >= end:
+        if state.stamp >= end if end is not None else state.stamp - before > handle.limit * 1e9:
             break
+    pushed.close()
     return Course(handle.wait(), tuple(states.values()))
 
 
