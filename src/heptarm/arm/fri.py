@@ -90,6 +90,7 @@ class Fri(Block):
         self._events: deque[Event] = deque(maxlen=_EVENTS)
         self._failure = ""  # of the law
         self._closed = False
+        self._limited: list[str] = []
 
     @property
     def kind(self) -> str:
@@ -184,6 +185,7 @@ class Fri(Block):
 
     def _end(self) -> None:
         client, self._closed = self.client, True
+        self._limited = client.limited  # the law is called a last time when the overlay is off, and asks for too much
         try:
             if self._number and self._stands:
                 with contextlib.suppress(CommandRejected):  # it has just ended by itself
@@ -361,7 +363,7 @@ class Fri(Block):
     @property
     def limited(self) -> list[str]:
         """What the guard has limited, one line for each axis and quantity; also after the block."""
-        return self.client.limited
+        return self._limited if self._closed else self.client.limited
 
     @property
     def refused(self) -> list[str]:
