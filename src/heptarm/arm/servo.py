@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from math import inf, nan
+from operator import le
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -252,8 +253,7 @@ class JointServo(Servo):
 
     def __init__(self, connection: Connection, message: wire.ServoOpen, **settings: Any) -> None:
         super().__init__(connection, message, **settings)
-        robot = connection.robot
-        self._limits = tuple(zip(robot.q_min.tolist(), robot.q_max.tolist(), strict=True))
+        self._low, self._high = connection.robot.q_min.tolist(), connection.robot.q_max.tolist()
 
     def __enter__(self) -> JointServo:
         """Begin; see `Servo`."""
@@ -282,17 +282,14 @@ class JointServo(Servo):
                 parameter="dq",
                 hint='leave dq out, or use engine="smart"',
             )
-        if type(q) is np.ndarray and q.dtype is _DOUBLES and q.shape == (7,):
-            sent = q.copy()
-        else:
-            sent = array(q, 7, "q").copy()
+        # caches are cold at every tick: few different functions cost less than few calls
+        if not (type(q) is np.ndarray and q.dtype is _DOUBLES and q.shape == (7,)):
+            q = array(q, 7, "q")
+        sent = q.copy()
         target = sent.tolist()
-        for value, (low, high) in zip(target, self._limits, strict=True):
-            if not low <= value <= high:
-                robot = self._connection.robot
-                sent = array(sent, 7, "q").clip(robot.q_min, robot.q_max)
-                target = sent.tolist()
-                break
+        if not (all(map(le, self._low, target)) and all(map(le, target, self._high))):  # nor is NaN
+            sent = array(sent, 7, "q").clip(self._low, self._high)
+            target = sent.tolist()
         if dq is None:
             self._tell(began, wire.ServoJoints, target)
         else:
