@@ -60,6 +60,6 @@ def test_an_fri_application_and_its_client(tmp_path: Path) -> None:
                 client.output("Sample.Level", 2.5)
                 client.output("Sample.Count", 300)
             time.sleep(0.005)
-        output = application.communicate(timeout=10)[0]
+        output = application.communicate(timeout=60)[0]
     assert application.returncode == 0, output
     assert said.read_text().splitlines() == [f"{one} = true" for one in SAID]

@@ -25,7 +25,7 @@ POINT = (0.55, 0.1, 0.4)
 
 @pytest.fixture(scope="module")
 def reached() -> Report:
-    with ha.connect(FAST) as arm:
+    with ha.connect(FAST, watchdog=5.0) as arm:
         return deploy(arm, shipped(feature=True), [POINT, (0.65, -0.15, 0.3)], settings=Settings(homing=0.6))
 
 
@@ -36,14 +36,14 @@ def test_the_shipped_policy_reaches_its_targets(reached: Report) -> None:
 
 
 def test_the_one_with_the_feature_does_so_softly_and_late() -> None:
-    with ha.connect(FAST) as arm:
+    with ha.connect(FAST, watchdog=5.0) as arm:
         settings = Settings(mode=JointImpedance(300.0), latency=0.06, homing=0.6)
         report = deploy(arm, shipped(feature=True), [POINT], settings=settings)
     assert report.success_rate == 1.0 and report.mean < 0.012
 
 
 def test_a_moving_target_is_followed() -> None:
-    with ha.connect(FAST) as arm:
+    with ha.connect(FAST, watchdog=5.0) as arm:
         moving = circle((0.6, 0.0, 0.4), 0.1, period=8.0)
         report = deploy(arm, shipped(feature=True), [moving])
     assert report.distances[0, 60:].max() < 0.08
@@ -52,11 +52,11 @@ def test_a_moving_target_is_followed() -> None:
 
 def test_targets_outside_the_box_and_foreign_robots_are_refused_before_anything_moves() -> None:
     with (
-        ha.connect("sim://iiwa7?speed=5") as arm,
+        ha.connect("sim://iiwa7?speed=5", watchdog=5.0) as arm,
         pytest.raises(ha.LimitError, match="trained for the LBR iiwa 14"),
     ):
         deploy(arm, shipped(feature=True), [POINT])
-    with ha.connect(FAST) as arm:
+    with ha.connect(FAST, watchdog=5.0) as arm:
         before = arm.state.q
         for bad in ([2.0, 0, 0.4], [np.nan, 0, 0.4], [0.5, 0.1]):
             with pytest.raises(ha.CommandRejected):
@@ -84,7 +84,7 @@ class Wild:
 
 def test_a_wild_policy_stays_in_the_box_and_within_the_limits() -> None:
     guard = Guard(low=(0.3, -0.3, 0.3), high=(0.7, 0.3, 0.8))
-    with ha.connect(FAST) as arm:
+    with ha.connect(FAST, watchdog=5.0) as arm:
         report = deploy(arm, Wild(), [POINT, POINT], settings=Settings(guard=guard, homing=0.6))
         arm.wait_for_rest()
     assert (report.paths > np.array(guard.low) - 0.03).all()

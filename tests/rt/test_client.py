@@ -123,7 +123,7 @@ def test_a_law_of_this_very_function_is_taken_over_by_a_fork() -> None:
 
 
 def _until(client: Client, goal: np.ndarray) -> None:
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 30.0
     while time.monotonic() < deadline:
         if np.abs(client.next().q - goal).max() < 1e-9:
             return
@@ -188,7 +188,7 @@ def test_a_wrong_version_is_told_in_words() -> None:
         controller = Controller(client.port, wire=Version.V2_7)
         wanted = pytest.raises(Timeout, match='speaks FRI 2.7 ."3.0"., this side FRI 1.14-1.16')
         with controller.running(), wanted:
-            client.next(timeout=0.3)
+            client.next(timeout=1.0)
         assert client.stats.malformed > 20 and not controller.answers
 
 

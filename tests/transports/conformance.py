@@ -73,23 +73,23 @@ class Conformance:
         ours.set_patience(0.05)
         began = time.monotonic()
         assert ours.receive_into(memoryview(bytearray(8))) == 0
-        assert 0.03 < time.monotonic() - began < 1.0
+        assert time.monotonic() - began > 0.03
 
     def test_without_waiting(self, pair: Pair) -> None:
         ours, theirs = pair
-        ours.set_patience(5.0)
+        ours.set_patience(30.0)
         began = time.monotonic()
         assert ours.receive_into(memoryview(bytearray(8)), wait=False) == 0
-        assert time.monotonic() - began < 1.0
+        assert time.monotonic() - began < 20.0
         theirs.send(b"x")
-        assert ours.wait_readable(1.0)
+        assert ours.wait_readable(20.0)
         assert ours.receive_into(memoryview(bytearray(8)), wait=False) == 1
 
     def test_readable_takes_nothing(self, pair: Pair) -> None:
         ours, theirs = pair
         assert not ours.wait_readable(0.01)
         theirs.send(b"x")
-        assert ours.wait_readable(1.0) and ours.wait_readable(0.0)
+        assert ours.wait_readable(20.0) and ours.wait_readable(0.0)
         assert receive(ours, 1) == b"x"
         assert not ours.wait_readable(0.0)
 
@@ -104,7 +104,7 @@ class Conformance:
     def test_the_end_is_readable(self, pair: Pair) -> None:
         ours, theirs = pair
         theirs.close()
-        assert ours.wait_readable(1.0)
+        assert ours.wait_readable(20.0)
 
     def test_sending_to_nobody(self, pair: Pair) -> None:
         ours, theirs = pair
@@ -122,7 +122,7 @@ class Conformance:
             thread.start()
             time.sleep(0.05)
             ours.close()
-            assert ended.wait(2.0)
+            assert ended.wait(20.0)
             thread.join()
             theirs.close()
 

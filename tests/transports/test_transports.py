@@ -61,7 +61,7 @@ def test_a_peer_that_reads_nothing_is_lost(monkeypatch: pytest.MonkeyPatch) -> N
     began = time.monotonic()
     with pytest.raises(ConnectionLost, match="no answer"):
         ours.send(bytes(64 << 20))
-    assert time.monotonic() - began < 5.0
+    assert time.monotonic() - began < 30.0
     ours.close()
     theirs.close()
 

@@ -154,16 +154,16 @@ def test_the_tick_does_not_wait_for_a_plan(monkeypatch: pytest.MonkeyPatch) -> N
 
     def slow(*arguments: object) -> Plan:
         planning.set()
-        assert go_on.wait(10)
+        assert go_on.wait(60)
         return plan(*arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(queue_module, "plan", slow)
     other = threading.Thread(target=plant.submit, args=(Order(2, "ptp", joints=READY),))
     other.start()
-    assert planning.wait(10)
+    assert planning.wait(60)
     began = time.monotonic()
     plant.step(1500)  # the first order ends while the second is being planned
-    assert ear.causes == ["started", "done"] and time.monotonic() - began < 8
+    assert ear.causes == ["started", "done"] and time.monotonic() - began < 50
     go_on.set()
     other.join()
     run(plant)

@@ -37,19 +37,19 @@ def _under_way(arm: Arm, handle: MotionHandle) -> None:
 @scenario(line=2, rows="B2 B3 B4 B5 B7 B8 G15", space=0.1, needs=("ptp",))
 def queue(arm: Arm) -> None:
     """Motions are started, wait for each other on the cabinet, and can be awaited; states flow meanwhile."""
-    first, second = arm.start(_turned(20)), arm.start(_turned(0))
+    pushed = arm.states()
+    first, second = arm.start(_turned(20), speed=0.15), arm.start(_turned(0))
     holds(not first.done and not second.done, "both calls return before anything is done")
-    arm.wait_until(
-        lambda s: s.motion is not None and (s.motion.id, s.motion.queued) == (first.id, 1), timeout=10.0
-    )
-    note("the cabinet says that one runs and one waits")
-    farthest, end = 0.0, None
-    for state in arm.states():
+    farthest, end, told = 0.0, None, False
+    for state in pushed:
+        told = told or (state.motion is not None and (state.motion.id, state.motion.queued) == (first.id, 1))
         farthest = max(farthest, state.q[6])
         if end is None and first.done:
             end = arm.state.stamp  # a slow machine has not seen all of them yet
         if end is not None and state.stamp >= end:
             break
+    pushed.close()
+    holds(told, "the cabinet says that one runs and one waits")
     near(farthest, np.radians(20), 0.02, "seen while it ran: A7 got to", unit="rad")
     ended: list[int] = []
     second.add_done_callback(lambda handle: ended.append(handle.id))
@@ -96,14 +96,19 @@ def cancel(arm: Arm) -> None:
 @scenario(line=2, rows="B10 B11 B15", space=0.1, needs=("ptp", "joint_impedance"))
 def stop(arm: Arm) -> None:
     """A stop from another thread ends a blocking move with an error; the arm holds its place, stiff, then soft."""
-    timer = threading.Timer(0.4 / max(arm.pace, 0.1), arm.stop)
-    timer.start()
+
+    def stopping() -> None:
+        arm.wait_until(lambda s: abs(s.q[6] - HOME[6]) > 0.03, timeout=20.0)
+        arm.stop()
+
+    other = threading.Thread(target=stopping)
+    other.start()
     try:
         arm.move(ptp(HOME + deg(0, 0, 0, 0, 0, 0, 90), speed=0.1))
         holds(False, "the move ends with an error")
     except MotionAborted as error:
         holds(error.cause is Cause.STOPPED and len(error.history) > 3, f"{error.text}, with its last states")
-    timer.join()
+    other.join()
     rests = arm.wait_for_rest()
     near(fresh(arm, after=0.2).q, rests.q, 1e-3, "held, stiff", unit="rad")
     soft = record(arm, hold(0.4), mode=JointImpedance(300.0))
@@ -151,13 +156,18 @@ def blending(arm: Arm) -> None:
 @scenario(line=2, rows="B6 B5", space=0.1, needs=("ptp",))
 def progress(arm: Arm) -> None:
     """Progress grows, the time to the destination shrinks as time passes."""
+    pushed = arm.states()  # from before the beginning: a slow machine would miss the first of them
     handle = arm.start(_turned(60))
     seen = []
-    for state in arm.states():
+    end = None
+    for state in pushed:
         if state.motion is not None and state.motion.id == handle.id:
             seen.append((state.motion.stamp * 1e-9, handle.progress, state.motion.remaining))
-        if handle.done:
+        if end is None and handle.done:
+            end = arm.state.stamp
+        if end is not None and state.stamp >= end:
             break
+    pushed.close()
     told = np.array([one for one in seen if np.isfinite(one[2])])
     above(len(told), 5, "states that tell the time to the destination")
     holds((np.diff([one[1] for one in seen]) >= 0).all(), "progress never goes back")

@@ -102,7 +102,7 @@ def poses(arm: Arm) -> None:
 
             stream(arm, servo, 2.0, target)
             if engine == "smart":
-                for _ in range(5):
+                for _ in range(25):  # of those that come together the newest counts
                     servo.set(Pose.of([3.0, 0.0, 0.0], start.quat))
                     servo.tick()
                 target(2.0)

@@ -82,7 +82,13 @@ def keys(arm: Arm) -> None:
     heard: list[tuple[int, bool]] = []
     end = arm.pad.on_key(lambda slot, down: heard.append((slot, down)))
     arm.pad.set_key(2, "next part", led="green")
-    presses = threading.Timer(0.1, arm.operator.press_key, (2,))
+    listeners = arm._connection.key_listeners
+
+    def press() -> None:
+        arm.wait_until(lambda _: len(listeners) == 2, timeout=_PATIENCE)  # somebody waits for it
+        arm.operator.press_key(2)
+
+    presses = threading.Thread(target=press)
     presses.start()
     holds(arm.pad.wait_for_key(2, timeout=_PATIENCE) == 2, "key 2 was waited for")
     presses.join()
