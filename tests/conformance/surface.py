@@ -26,7 +26,7 @@ PROJECT = f"""<persistence><processDataContainer>
 PARAMETERS: dict[str, object] = {"publish_signals": True, "publish_tf": True, "speed": 0.6}
 HOME = np.radians([0, 30, 0, -90, 0, 60, 0]).tolist()
 #: A busy machine may need long for what is quick [s].
-PATIENCE = 60.0
+PATIENCE = 120.0
 
 
 class Probe(Protocol):

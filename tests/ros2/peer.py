@@ -38,7 +38,7 @@ from tests.conformance.client import Ended, Sent, Told
 from tests.conformance.stage import Stage
 
 #: Discovery can take some seconds, and a busy machine many more [s].
-PATIENCE = 60.0
+PATIENCE = 120.0
 #: A busy machine needs patience of a node, too.
 PATIENT: dict[str, object] = {"servo__watchdog": 1.0, "watchdog": 5.0, "constraints__goal_time": 20.0}
 #: Parameters that cases change.
