@@ -96,7 +96,8 @@ class Core:
         process = self._process = subprocess.Popen(
             ["roscore", "-p", str(port)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
         )
-        until(lambda: rosgraph.is_master_online() or process.poll() is not None, "there is no master")
+        answered = lambda: rosgraph.is_master_online() or process.poll() is not None  # noqa: E731
+        until(answered, "there is no master", 2 * PATIENCE)
         return process.poll() is None
 
     def __exit__(self, *error: object) -> None:
