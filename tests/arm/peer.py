@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.connection import Connection, Options
+from heptarm.arm.connection import Connection
+from heptarm.arm.options import Options
 from heptarm.errors import ConnectionLost
 from heptarm.io.clock import RealClock
 from heptarm.io.memory import MemoryTransport, memory_pair

@@ -8,7 +8,9 @@ import socket
 from typing import Literal
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.connection import GROUPS, Connection, Options
+from heptarm.arm.connection import Connection
+from heptarm.arm.groups import GROUPS
+from heptarm.arm.options import Options
 from heptarm.arm.private_cabinet import PrivateCabinet
 from heptarm.arm.target import parse_target, target_from_env
 from heptarm.errors import ShapeError

@@ -1,20 +1,22 @@
-"""An arm's connection: one link after the other, who controls, which programs are under way, what is pushed."""
+"""An arm's connection: one link after the other, who controls, requests, what is pushed."""
 
 from __future__ import annotations
 
 import contextlib
 import logging
 import threading
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from heptarm import __version__
+from heptarm.arm.events import Events
 from heptarm.arm.feed import Feed, Sample
+from heptarm.arm.groups import groups_of
 from heptarm.arm.handle import MotionHandle
 from heptarm.arm.link import Link
+from heptarm.arm.options import Options
 from heptarm.arm.private_cabinet import PrivateCabinet
 from heptarm.arm.reading import read_firing, read_result, read_robot, read_signals, read_state
 from heptarm.errors import CommandRejected, ConnectionLost, HeptarmError, Timeout
@@ -33,27 +35,10 @@ from heptarm.wire.messages import Message
 
 _log = logging.getLogger("heptarm.arm")
 
-#: What a state contains unless something else is asked for.
-GROUPS = ("joints", "torques", "pose", "wrench", "motion", "safety", "mode")
 #: Pauses between attempts to reconnect [s].
 _BACK_OFF, _LONGEST_BACK_OFF = 0.1, 2.0
-#: FRI sessions whose last change is remembered.
-_FRI_SESSIONS = 64
 #: Longest wait for a state before looking whether any will come [s].
 _LOOK = 0.2
-
-
-@dataclass(frozen=True, slots=True)
-class Options:
-    """How to talk to the cabinet; see `connect`."""
-
-    name: str = "heptarm"
-    key: bytes | None = None
-    timeout: float = 5.0
-    rate: float = 100.0
-    groups: tuple[str, ...] = GROUPS
-    finishes: bool = False
-    watchdog: float = 0.5
 
 
 class Connection:
@@ -66,11 +51,13 @@ class Connection:
         cabinet: the private virtual cabinet at the other end, if it is one.
 
     Attributes:
-        feed: what is pushed.
+        feed: states that are pushed.
+        events: what else the cabinet tells.
         controls: whether this client took control and has not lost it.
         controller: name of the client that controls the robot; empty: nobody.
         closed: set when the arm is closed.
         guard: the collision guard in force.
+        signals: those that the cabinet has.
     """
 
     def __init__(
@@ -94,12 +81,8 @@ class Connection:
         self._welcome: wire.Welcome | None = None
         self._robot: RobotModel | None = None
         self._read: tuple[int, State] | None = None
-        self._handles: dict[int, MotionHandle] = {}
-        self._servo_status: wire.ServoStatus | None = None
-        self._fri_changes: dict[int, wire.FriChanged] = {}
-        self._unclaimed: deque[Message] = deque(maxlen=256)
+        self.events = Events(self._on_control)
         self.signals: tuple[Signal, ...] = ()
-        self.key_listeners: list[Callable[[int, bool], None]] = []
         self._lock = threading.RLock()
 
     # ---------------------------------------------------------------------------------- the link
@@ -146,11 +129,11 @@ class Connection:
 
     def open(self) -> None:
         """Make a link, and subscribe."""
-        link = self._new_link(self._on_event, self.feed.push, self._on_lost)
+        link = self._new_link(self.events.take, self.feed.push, self._on_lost)
         self._welcome = link.open(name=self.options.name, version=__version__, timeout=self.options.timeout)
         self.controller = self._welcome.controller
         self.controls = False
-        self._unclaimed.clear()
+        self.events.forget()
         self._link = link
         try:
             self._robot = read_robot(self._welcome.robot)
@@ -175,7 +158,7 @@ class Connection:
         """End the link, what waits for it, and a private cabinet."""
         if self._link is not None:
             self._link.close()
-        self._lose_handles(ConnectionLost("the arm was closed"))
+        self.events.lose(ConnectionLost("the arm was closed"))
         self.feed.wake()
         if self.cabinet is not None:
             self.cabinet.close()
@@ -241,20 +224,7 @@ class Connection:
 
     def subscribe(self, rate: float, groups: Sequence[str]) -> None:
         """Choose what is pushed, now and after a reconnection."""
-        chosen = wire.Groups.NONE
-        offered = self.welcome.groups
-        for name in groups:
-            group = wire.Groups.__members__.get(str(name).upper(), wire.Groups.NONE)
-            if not group & offered:
-                names = ", ".join(one.name.lower() for one in wire.Groups if one & offered and one.name)
-                raise CommandRejected(
-                    f"no group {name!r}",
-                    parameter="groups",
-                    value=name,
-                    allowed=names,
-                    hint=f"choose from {names}",
-                )
-            chosen |= group
+        chosen = groups_of(groups, self.welcome.groups)
         within(rate, "rate", 0.0, self.welcome.max_rate, unit="Hz")
         self.request(wire.Subscribe(groups=chosen, rate=rate))
         self.link.expect_states(rate * self.pace)
@@ -279,23 +249,14 @@ class Connection:
 
         def claim(answer: Message) -> None:
             if isinstance(answer, wire.Accepted):
-                self._claim(handle, answer.id)
+                self.events.claim(handle, answer.id)
 
         self.link.accept(message, timeout=self.options.timeout, on_answer=claim)
         return handle
 
     def servo_status(self, number: int) -> wire.ServoStatus | None:
         """What the cabinet said last of a servo motion's stream."""
-        told = self._servo_status
-        return told if told is not None and told.servo == number else None
-
-    def fri_change(self, number: int) -> wire.FriChanged | None:
-        """What the cabinet said last of an FRI session; its end is the last word."""
-        return self._fri_changes.get(number)
-
-    def pending(self) -> float:
-        """How long the programs under way may take, all together [s]."""
-        return sum(handle.limit for handle in list(self._handles.values()))
+        return self.events.servo_status(number)
 
     def cancel(self, handle: MotionHandle) -> None:
         """End a program; nothing happens if it has ended."""
@@ -304,7 +265,7 @@ class Connection:
         try:
             self.request(wire.Cancel(id=handle.id))
         except CommandRejected:
-            if handle.id in self._handles and not handle.done:  # otherwise it has just ended by itself
+            if self.events.awaits(handle) and not handle.done:  # otherwise it has just ended by itself
                 raise
 
     def stop(self, kind: wire.StopKind) -> None:
@@ -399,59 +360,15 @@ class Connection:
 
     # ---------------------------------------------------------------------------- from the link
 
-    def _on_event(self, message: Message) -> None:
-        if isinstance(message, _OF_PROGRAMS):
-            handle = self._handles.get(message.id)
-            if handle is None:
-                self._unclaimed.append(message)  # its Accepted may still be on its way
-            else:
-                self._hand_over(handle, message)
-        elif isinstance(message, wire.ServoStatus):
-            self._servo_status = message
-        elif isinstance(message, wire.KeyPressed):
-            for listener in list(self.key_listeners):
-                listener(message.slot, message.down)
-        elif isinstance(message, wire.FriChanged):
-            self._note_fri(message)
-        elif isinstance(message, wire.ControlChanged):
-            self.controller = message.controller
-            if self.controls and message.session != self.welcome.session:
-                self.controls = False
-                _log.warning("control is lost: %s", message.text)
-        elif isinstance(message, wire.SafetyChanged):
-            _log.info("safety: %s", message.text)
-        elif isinstance(message, wire.Notice):
-            _log.log(_LEVELS[message.severity], "cabinet: %s", message.text)
-
-    def _note_fri(self, message: wire.FriChanged) -> None:
-        _log.info(
-            "FRI session %d: %s, %s %s",
-            message.session,
-            message.state.name,
-            message.quality.name,
-            message.text,
-        )
-        changes, known = self._fri_changes, self._fri_changes.get(message.session)
-        if known is None or known.state is not wire.FriSessionState.IDLE:
-            changes[message.session] = message
-        while len(changes) > _FRI_SESSIONS:
-            del changes[next(iter(changes))]
-
-    def _claim(self, handle: MotionHandle, number: int) -> None:
-        handle.accepted(number)
-        self._handles[number] = handle
-        for message in list(self._unclaimed):
-            if message.id == number:  # type: ignore[union-attr]
-                self._hand_over(handle, message)
-
-    def _hand_over(self, handle: MotionHandle, message: Message) -> None:
-        if isinstance(message, wire.MotionFinished):
-            self._handles.pop(message.id, None)
-        handle.on_event(message)
+    def _on_control(self, message: wire.ControlChanged) -> None:
+        self.controller = message.controller
+        if self.controls and message.session != self.welcome.session:
+            self.controls = False
+            _log.warning("control is lost: %s", message.text)
 
     def _on_lost(self, error: HeptarmError) -> None:
         """A link's last act: motions end with an error; an observer goes on by itself, a controller does not."""
-        self._lose_handles(error)
+        self.events.lose(error)
         self.feed.wake()
         if self.controls:
             return
@@ -470,31 +387,7 @@ class Connection:
                 _log.info("not reconnected: %s", failure)
                 pause = min(2 * pause, _LONGEST_BACK_OFF)
 
-    def _lose_handles(self, error: HeptarmError) -> None:
-        while self._handles:
-            with contextlib.suppress(KeyError):  # it has just ended by itself
-                self._handles.popitem()[1].lose(error)
-
-
-#: Events that tell what becomes of a program.
-_OF_PROGRAMS = (
-    wire.MotionStarted,
-    wire.SegmentReached,
-    wire.ItemReached,
-    wire.TriggerFired,
-    wire.ConditionFired,
-    wire.MotionFinished,
-)
-
-
 def _ends_stiffly(item: wire.Item) -> bool:
     """Whether the arm does not yield at the end of an item, so that it has to be where it was sent."""
     stiff = item.mode is None or isinstance(item.mode, wire.PositionMode)
     return stiff and not isinstance(item.motion, wire.HandGuide)
-
-
-_LEVELS = {
-    wire.Severity.INFO: logging.INFO,
-    wire.Severity.WARNING: logging.WARNING,
-    wire.Severity.ERROR: logging.ERROR,
-}

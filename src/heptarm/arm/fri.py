@@ -205,7 +205,7 @@ class Fri(Block):
 
     def _last_words(self) -> wire.FriChanged:
         """The last that the cabinet told of this session."""
-        return self._connection.fri_change(self._number) or nothing_told(self._number)
+        return self._connection.events.fri_change(self._number) or nothing_told(self._number)
 
     def _why(self) -> str:
         """What spoilt the session, as far as this side can tell."""
@@ -218,7 +218,7 @@ class Fri(Block):
             return not self._handle.done
         if self._connection.end() is not None:
             return False
-        told = self._connection.fri_change(self._number)
+        told = self._connection.events.fri_change(self._number)
         return told is None or told.state is not wire.FriSessionState.IDLE
 
     @property

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from heptarm.arm.connection import GROUPS, Connection
+from heptarm.arm.connection import Connection
 from heptarm.arm.feed import States
+from heptarm.arm.groups import GROUPS
 from heptarm.errors import StaleState
 from heptarm.values.arrays import within
 from heptarm.values.robot import RobotModel

@@ -61,7 +61,7 @@ class Pad:
         Returns:
             What ends it.
         """
-        listeners = self._connection.key_listeners
+        listeners = self._connection.events.key_listeners
         listeners.append(callback)
 
         def end() -> None:

@@ -120,7 +120,7 @@ def _limit(connection: Connection, motions: tuple[Motion, ...], ceiling: float) 
     newest = connection.newest()
     override = newest.motion.override if newest is not None and newest.motion is not None else 1.0
     own = longest(motions, connection.robot, ceiling) / max(override, 0.01) / min(connection.pace, 1.0)
-    total = own + connection.pending()
+    total = own + connection.events.pending()
     return total if total < _DAY else _DAY
 
 

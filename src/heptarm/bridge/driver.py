@@ -16,7 +16,7 @@ import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.arm.connect import connect
-from heptarm.arm.connection import GROUPS
+from heptarm.arm.groups import GROUPS
 from heptarm.arm.handle import MotionHandle
 from heptarm.bridge.execution import Execution, Listener
 from heptarm.bridge.feed import Feed
