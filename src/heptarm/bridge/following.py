@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import logging
-import threading
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import Protocol
 
 from heptarm.arm.arm import Arm
 from heptarm.bridge.execution import Listener, measured
-from heptarm.bridge.goal import End, Goal, GoalRefused
-from heptarm.bridge.runner import Feedback, Runner, Settings, Step
+from heptarm.bridge.goal import Goal, GoalRefused
+from heptarm.bridge.runner import Runner, Settings, Step
 from heptarm.bridge.trajectory import Sample
+from heptarm.bridge.worker import Worker
 from heptarm.errors import HeptarmError
-from heptarm.io.clock import Clock, RealClock
+from heptarm.io.clock import Clock
 
 _log = logging.getLogger("heptarm.bridge")
-
-#: How long to wait for the thread at the end [s].
-_PATIENCE = 10.0
 
 
 class Follower(Protocol):
@@ -40,7 +37,7 @@ class Follower(Protocol):
         ...
 
 
-class Following(ABC):
+class Following(Worker):
     """Executes goals in a motion that opens with a goal and closes a moment after the last one.
 
     In between the arm is free for others.
@@ -64,16 +61,11 @@ class Following(ABC):
         settings: Settings | None = None,
         clock: Clock | None = None,
     ) -> None:
-        self._arm = arm
-        self._listener = listener
+        super().__init__(arm, listener, clock)
         self._linger = linger
         self._runner = Runner(names, arm.robot, settings)
-        self._clock = clock or RealClock()
-        self._changed = threading.Condition()
-        self._closing = False
         self._dropped = False
         self._is_open = False
-        self._thread = threading.Thread(target=self._run, name="heptarm-execution")
         self._thread.start()
 
     @property
@@ -95,11 +87,6 @@ class Following(ABC):
     def goal(self) -> int:
         """Number of the goal under way; 0: none."""
         return self._runner.goal
-
-    @property
-    def now(self) -> float:
-        """The time on the clock that goals start by [s]."""
-        return self._clock.nanos() * 1e-9
 
     def accept(self, goal: Goal) -> int:
         """Take a goal; see `Execution`."""
@@ -146,37 +133,22 @@ class Following(ABC):
         with self._changed:
             return self._changed.wait_for(lambda: not self._runner.busy and not self._is_open, timeout)
 
-    def close(self) -> None:
-        """End the goal under way and leave the arm at rest."""
-        self.abort("the driver closes")
-        with self._changed:
-            self._closing = True
-            self._changed.notify_all()
-        self._thread.join(_PATIENCE)
-
     # ------------------------------------------------------------------------------------ thread
 
-    def _run(self) -> None:
-        while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._closing or self._runner.busy)
-                if self._closing and not self._runner.busy:
-                    ends = self._runner.ends()
-                    break
-            try:
-                self._stream()
-            except HeptarmError as error:
-                self._lose(str(error))
-            except Exception as error:
-                _log.exception("executing a goal")
-                self._lose(f"{type(error).__name__}: {error}")
+    def _wait(self) -> bool:
+        with self._changed:
+            self._changed.wait_for(lambda: self._closing or self._runner.busy)
+            if self._runner.busy:
+                return True
+            ends = self._runner.ends()
         self._tell(None, ends)
+        return False
 
     @abstractmethod
     def _motion(self) -> AbstractContextManager[Follower]:
         """A motion that follows commands."""
 
-    def _stream(self) -> None:
+    def _work(self) -> None:
         """One motion: from the first goal to some time after the last one."""
         self._dropped = False
         with self._motion() as follower:
@@ -209,12 +181,3 @@ class Following(ABC):
             ends = self._runner.ends()
             self._changed.notify_all()
         self._tell(None, ends)
-
-    def _tell(self, feedback: Feedback | None, ends: Sequence[End]) -> None:
-        try:
-            if feedback is not None:
-                self._listener.on_feedback(feedback)
-            for end in ends:
-                self._listener.on_end(end)
-        except Exception:
-            _log.exception("telling of a goal")

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
@@ -25,8 +24,9 @@ from heptarm.bridge.goal import Code, End, Goal, GoalRefused, Outcome
 from heptarm.bridge.runner import Feedback, Settings
 from heptarm.bridge.tolerance import Tolerances
 from heptarm.bridge.trajectory import Sample, Trajectory
+from heptarm.bridge.worker import Worker
 from heptarm.errors import ArrivalError, HeptarmError
-from heptarm.io.clock import Clock, RealClock
+from heptarm.io.clock import Clock
 from heptarm.values.arrays import Array
 from heptarm.values.motion import JointSpline, ptp, spline_joints
 from heptarm.values.result import Cause
@@ -45,7 +45,7 @@ _SLOWEST = 0.01
 _WINDOW, _GRID = 0.5, 51
 #: A joint that is slower at the end is at rest [rad/s].
 _STILL = 1e-6
-#: How long the arm may take to come to rest, and the thread to end [s].
+#: How long the arm may take to come to rest [s].
 _PATIENCE = 10.0
 
 
@@ -85,7 +85,7 @@ class _Running:
         return np.asarray((led - last[1]) / (1e-9 * (stamp - last[0])))
 
 
-class SplineExecution:
+class SplineExecution(Worker):
     """Executes goals as joint splines of the cabinet; a new one waits until the arm is at rest. See `Execution`.
 
     Args:
@@ -107,33 +107,25 @@ class SplineExecution:
         settings: Settings | None = None,
         clock: Clock | None = None,
     ) -> None:
+        super().__init__(arm, listener, clock)
         self.settings = settings or Settings()
-        self._arm, self._names, self._listener, self._speed = arm, tuple(names), listener, speed
-        self._clock = clock or RealClock()
-        self._changed = threading.Condition()
-        self._running: _Running | None = None
+        self._names, self._speed = tuple(names), speed
+        self._running: _Running | None = None  # the goal under way
+        self._moving: _Running | None = None  # the one whose motion is
         self._ends: list[End] = []
         self._number = 0
-        self._is_moving = False
-        self._closing = False
-        self._thread = threading.Thread(target=self._run, name="heptarm-execution")
         self._thread.start()
 
     @property
     def busy(self) -> bool:
         """Whether a goal is under way or the arm brakes after one."""
-        return self._running is not None or self._is_moving
+        return self._running is not None or self._moving is not None
 
     @property
     def goal(self) -> int:
         """Number of the goal under way; 0: none."""
         running = self._running
         return 0 if running is None else running.number
-
-    @property
-    def now(self) -> float:
-        """The time on the clock that goals start by [s]."""
-        return self._clock.nanos() * 1e-9
 
     def accept(self, goal: Goal) -> int:
         """Take a goal; one under way ends as preempted, and its motion brakes.
@@ -197,13 +189,6 @@ class SplineExecution:
         with self._changed:
             return self._changed.wait_for(lambda: not self.busy, timeout)
 
-    def close(self) -> None:
-        """End the goal under way and leave the arm at rest."""
-        with self._changed:
-            self._closing = True
-        self.abort("the driver closes")
-        self._thread.join(_PATIENCE)
-
     def _finish(self, outcome: Outcome, code: Code, text: str) -> None:
         """Under the lock: the goal under way ends; its motion is cancelled by the thread."""
         if self._running is not None:
@@ -212,25 +197,26 @@ class SplineExecution:
 
     # ------------------------------------------------------------------------------------ thread
 
-    def _run(self) -> None:
+    def _wait(self) -> bool:
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._closing or self._running is not None or self._ends)
-                run = self._running
-                self._is_moving = run is not None
-            self._tell()
-            if run is None:
-                if self._closing:
-                    return
-                continue
-            try:
-                self._carry_out(run)
-            except HeptarmError as error:
-                self._fail(run, str(error))
-            except Exception as error:
-                _log.exception("executing a goal")
-                self._fail(run, f"{type(error).__name__}: {error}")
-            self._leave(run)
+                self._moving = self._running
+            self._tell_ends()
+            if self._moving is not None:
+                return True
+            if self._closing:
+                return False
+
+    def _work(self) -> None:
+        assert self._moving is not None
+        self._carry_out(self._moving)
+        self._leave(self._moving)
+
+    def _lose(self, text: str) -> None:
+        assert self._moving is not None
+        self._fail(self._moving, text)
+        self._leave(self._moving)
 
     def _carry_out(self, run: _Running) -> None:
         if run.goal.start is not None and not self._waited(run, run.goal.start):
@@ -242,7 +228,7 @@ class SplineExecution:
             self._look(run, self._arm.state)
             with self._changed:
                 self._changed.wait_for(lambda: self._running is not run, _LOOK)
-            self._tell()
+            self._tell_ends()
         if self._running is run:
             with contextlib.suppress(
                 ArrivalError
@@ -283,7 +269,7 @@ class SplineExecution:
                     self._finish(Outcome.ABORTED, Code.GOAL_TOLERANCE_VIOLATED, text)
         count = len(run.trajectory.times)
         index = max(run.trajectory.index(run.tau), min(1, count - 1)) - (count - len(run.goal.points))
-        self._listener.on_feedback(Feedback(run.number, desired, actual, run.tau, elapsed, index))
+        self._tell(Feedback(run.number, desired, actual, run.tau, elapsed, index), ())
 
     def _arrive(self, run: _Running) -> None:
         """The motion has come to its end: is the arm there?"""
@@ -316,13 +302,12 @@ class SplineExecution:
                 handle.wait(timeout=_PATIENCE)
             except HeptarmError as error:
                 _log.info("ending the motion of goal %d: %s", run.number, error)
-        self._tell()
+        self._tell_ends()
         with self._changed:
-            self._is_moving = False
+            self._moving = None
             self._changed.notify_all()
 
-    def _tell(self) -> None:
+    def _tell_ends(self) -> None:
         with self._changed:
             ends, self._ends = self._ends, []
-        for end in ends:
-            self._listener.on_end(end)
+        self._tell(None, ends)
