@@ -117,7 +117,7 @@ def arm(cabinet: RunningCabinet) -> Iterator[Arm]:
     """An arm in control of the shared cabinet, at its home position."""
     import heptarm
 
-    with heptarm.connect(cabinet.target, watchdog=5.0) as arm:  # patient, for busy machines
+    with heptarm.connect(cabinet.target, watchdog=5.0, timeout=30.0) as arm:  # patient, for busy machines
         home = heptarm.deg(0, 30, 0, -90, 0, 60, 0)
         if abs(arm.state.q - home).max() > 1e-3:
             arm.move(heptarm.ptp(home))

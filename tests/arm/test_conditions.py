@@ -24,7 +24,7 @@ SIGNALS = tuple(
 @pytest.fixture(scope="module")
 def table() -> Iterator[ha.Arm]:
     """An arm above a table."""
-    with ha.connect(f"sim://iiwa14?box=0.6,0,{TABLE / 2},0.4,0.6,{TABLE}") as arm:
+    with ha.connect(f"sim://iiwa14?box=0.6,0,{TABLE / 2},0.4,0.6,{TABLE}", watchdog=5.0, timeout=30.0) as arm:
         yield arm
 
 
@@ -71,7 +71,7 @@ def test_one_of_two_is_named_as_it_was_written(arm: ha.Arm) -> None:
 
 
 def test_the_cabinets_application_watches_a_servo_motion(arm: ha.Arm) -> None:
-    with arm.servo("pose", rate=50, speed=0.3, acceleration=0.5, watchdog=0.5, until=TOUCH) as sv:
+    with arm.servo("pose", rate=50, speed=0.3, acceleration=0.5, watchdog=2.0, until=TOUCH) as sv:
         start = sv.start.pose
         while sv.tick() and sv.t < 20.0:
             sv.set(ha.Pose.of(start.xyz - [0, 0, 0.05 * sv.t], start.quat))

@@ -33,7 +33,7 @@ LONG = 10
 @pytest.fixture
 def arm(cabinet: RunningCabinet) -> Iterator[ha.Arm]:
     """At its home, with a watchdog that a busy machine does not trip."""
-    with ha.connect(cabinet.target, watchdog=5.0) as arm:
+    with ha.connect(cabinet.target, watchdog=5.0, timeout=30.0) as arm:
         home = ha.deg(0, 30, 0, -90, 0, 60, 0)
         if abs(arm.state.q - home).max() > 1e-3:
             arm.move(ha.ptp(home))
@@ -336,7 +336,7 @@ def test_an_error_of_the_block_is_not_hidden_and_the_arm_rests(arm: ha.Arm) -> N
 
 
 def test_an_emergency_stop_ends_the_overlay_in_words_and_the_next_session_works() -> None:
-    with ha.connect("sim://iiwa14", watchdog=5.0) as arm:
+    with ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0) as arm:
         arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=0.6)
         for _ in range(2):
             with (

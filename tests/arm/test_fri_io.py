@@ -19,7 +19,7 @@ BUTTON, LAMP = "MediaFlange.UserButton", "MediaFlange.LEDBlue"
 @pytest.fixture(scope="module")
 def arm() -> Iterator[ha.Arm]:
     """One with an operator, who presses the button."""
-    with ha.connect("sim://iiwa14", watchdog=5.0) as arm:
+    with ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0) as arm:
         arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=0.6)
         yield arm
 

@@ -26,7 +26,7 @@ PROJECT = f"""<persistence><processDataContainer>
 def arm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ha.Arm]:
     project = tmp_path_factory.mktemp("project") / "RoboticsAPI.data.xml"
     project.write_text(PROJECT)
-    with ha.connect(f"sim://iiwa14?project={project}") as arm:
+    with ha.connect(f"sim://iiwa14?project={project}", watchdog=5.0, timeout=30.0) as arm:
         arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=0.7)
         yield arm
 

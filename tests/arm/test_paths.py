@@ -20,9 +20,9 @@ def moved(pose: Pose, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Pose:
 
 def carried_out(arm: Arm, motion: object) -> tuple[ha.Result, Array]:
     """Result and the flange's places meanwhile, shape (n, 3)."""
+    states: States = arm.states()  # from before the beginning
     handle = arm.start(motion)  # type: ignore[arg-type]
     places = []
-    states: States = arm.states(rate=100)
     for state in states:
         places.append(state.pose.xyz)
         if handle.done:
@@ -52,10 +52,11 @@ def test_a_blended_program_does_not_stop_and_tells_of_every_motion(arm: Arm) -> 
     start = arm.wait_for_rest().pose
     corners = [(0.0, 0.12), (0.08, 0.12), (0.08, 0.0), (0.0, 0.0)]
     sides = [ha.lin(moved(start, x, y), speed_mps=SPEED, blend_m=0.02) for x, y in corners]
+    states: States = arm.states()
     handle = arm.start(sides)
     speeds, shares = [], []
     last = None
-    for state in arm.states(rate=100):
+    for state in states:
         if last is not None and state.stamp > last.stamp:
             speeds.append(state.pose.distance_to(last.pose) / (state.stamp - last.stamp) * 1e9)
         last = state

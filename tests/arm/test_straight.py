@@ -17,7 +17,7 @@ from tests.conftest import RunningCabinet
 @pytest.fixture
 def arm(cabinet: RunningCabinet) -> Iterator[ha.Arm]:
     """An arm at home; patient, for busy machines."""
-    with ha.connect(cabinet.target, watchdog=5.0) as arm:
+    with ha.connect(cabinet.target, watchdog=5.0, timeout=30.0) as arm:
         arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)))
         yield arm
 

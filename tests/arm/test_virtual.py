@@ -182,11 +182,11 @@ def test_control_is_given_and_taken(arm: Arm, cabinet: RunningCabinet) -> None:
 
 
 def test_pause_and_override_end_with_their_controller(cabinet: RunningCabinet) -> None:
-    with ha.connect(cabinet.target, watchdog=5.0) as first:
+    with ha.connect(cabinet.target, watchdog=5.0, timeout=30.0) as first:
         first.set_override(0.1)
         first.pause()
         first.wait_until(lambda state: state.safety.paused, timeout=20.0)
-    with ha.connect(cabinet.target, watchdog=5.0) as second:
+    with ha.connect(cabinet.target, watchdog=5.0, timeout=30.0) as second:
         state = second.wait_until(lambda state: not state.safety.paused, timeout=20.0)
         assert state.motion is not None and state.motion.override == 1.0
         assert second.move(hold(0.1)).arrived
@@ -222,12 +222,12 @@ def test_requests_while_states_stream_and_the_arm_moves(arm: Arm) -> None:
 
 
 def test_leaving_the_block_leaves_the_arm_at_rest(cabinet: RunningCabinet) -> None:
-    with ha.connect(cabinet.target, watchdog=5.0) as arm:
+    with ha.connect(cabinet.target, watchdog=5.0, timeout=30.0) as arm:
         handle = arm.start(FAR)
         under_way(arm)
     with pytest.raises((ha.MotionAborted, ha.ConnectionLost)):
         handle.wait(timeout=20.0)
-    with ha.connect(cabinet.target, control=False) as observer:
+    with ha.connect(cabinet.target, control=False, timeout=30.0) as observer:
         state = observer.state
         assert state.motion is not None and not state.motion.active
         assert not np.abs(state.dq[np.isfinite(state.dq)]).max() > 0.01
@@ -286,7 +286,7 @@ def test_ctrl_c_stops_the_arm(cabinet: RunningCabinet, tmp_path: Path) -> None:
     assert "interrupted" in out, (out, errors)
     assert "KeyboardInterrupt" in errors and process.returncode != 0
     assert float(out.split()[-1]) < np.radians(55)
-    with ha.connect(cabinet.target, watchdog=5.0) as arm:
+    with ha.connect(cabinet.target, watchdog=5.0, timeout=30.0) as arm:
         assert speed(arm) < 0.01
 
 
@@ -307,7 +307,7 @@ def test_ctrl_c_amid_requests_breaks_nothing(arm: Arm) -> None:
 
 
 def test_a_killed_controller_is_stopped_and_replaced(cabinet: RunningCabinet, tmp_path: Path) -> None:
-    with ha.connect(cabinet.target, control=False) as observer:
+    with ha.connect(cabinet.target, control=False, timeout=30.0) as observer:
         for _ in range(2):
             process, said = script(tmp_path, cabinet.target)
             assert said == "moving"
@@ -317,12 +317,12 @@ def test_a_killed_controller_is_stopped_and_replaced(cabinet: RunningCabinet, tm
             observer.wait_until(lambda s: np.abs(s.dq).max() < 0.01 and not s.motion.active, timeout=8.0)
             end(process)
             observer.wait_until(lambda s: observer.controller == "", timeout=20.0)
-            with ha.connect(cabinet.target, watchdog=5.0) as arm:
+            with ha.connect(cabinet.target, watchdog=5.0, timeout=30.0) as arm:
                 assert arm.move(ptp(HOME)).arrived
 
 
 def test_a_frozen_controller_loses_control_and_learns_it(cabinet: RunningCabinet, tmp_path: Path) -> None:
-    with ha.connect(cabinet.target, control=False) as observer:
+    with ha.connect(cabinet.target, control=False, timeout=30.0) as observer:
         process, said = script(tmp_path, cabinet.target, watchdog=1.0)
         assert said == "moving"
         process.send_signal(signal.SIGSTOP)
@@ -338,7 +338,7 @@ def test_a_lost_controller_may_let_its_motion_finish(cabinet: RunningCabinet, tm
     assert said == "moving"
     process.kill()
     end(process)
-    with ha.connect(cabinet.target, control=False) as observer:
+    with ha.connect(cabinet.target, control=False, timeout=30.0) as observer:
         target = deg(60, 30, 0, -90, 0, 60, 0)
         observer.wait_until(lambda s: np.abs(s.q - target).max() < 1e-3, timeout=20.0)
 
@@ -350,12 +350,12 @@ def test_the_key_opens_the_cabinet() -> None:
     cabinet = PrivateCabinet.start(Target(model="iiwa7", options=(("key", "sesame"),)))
     target = f"{cabinet.host}:{cabinet.port}"
     try:
-        with ha.connect(target, key="sesame") as arm:
+        with ha.connect(target, key="sesame", timeout=30.0) as arm:
             assert arm.robot.name == "iiwa7"
         with pytest.raises(ha.ConnectFailed, match="key is wrong"):
-            ha.connect(target, key="barley")
+            ha.connect(target, key="barley", timeout=30.0)
         with pytest.raises(ha.ConnectFailed, match="asks for a pre-shared key"):
-            ha.connect(target)
+            ha.connect(target, timeout=30.0)
     finally:
         cabinet.close()
 
@@ -380,7 +380,7 @@ def gone(pid: int, seconds: float = 20.0) -> bool:
 
 def test_a_private_simulator_comes_and_goes_with_its_arm(private_target: str) -> None:
     threads = set(threading.enumerate())
-    with ha.connect(private_target, watchdog=5.0) as arm:
+    with ha.connect(private_target, watchdog=5.0, timeout=30.0) as arm:
         assert arm._connection.cabinet is not None
         pid = arm._connection.cabinet.pid
         assert alive(pid) and arm.is_virtual and arm.robot.name == "iiwa14"
@@ -404,7 +404,7 @@ def test_a_private_simulator_ends_with_a_killed_program(private_target: str, tmp
 
 
 def test_a_simulator_that_dies_is_a_lost_connection(private_target: str) -> None:
-    arm = ha.connect(private_target, watchdog=5.0)
+    arm = ha.connect(private_target, watchdog=5.0, timeout=30.0)
     assert arm._connection.cabinet is not None
     handle = arm.start(ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.05))
     os.kill(arm._connection.cabinet.pid, signal.SIGKILL)
