@@ -14,7 +14,8 @@ from heptarm.bridge.trajectory import Sample
 from heptarm.errors import HeptarmError
 from heptarm.values.arrays import Array
 from heptarm.values.robot import robot
-from tests.conformance.cases import CASES, HOME
+from tests.conformance.case import HOME
+from tests.conformance.cases import CASES
 from tests.conformance.client import Ended, Sent, Told
 
 PERIOD = 0.01

@@ -86,7 +86,7 @@ def _client(stage: Stage, node: NodeProcess) -> Client:
 @pytest.fixture
 def client(_client: Client) -> Iterator[Client]:
     """A client of the shared node; everything is as at the start afterwards."""
-    from tests.conformance.cases import rests
+    from tests.conformance.case import rests
 
     yield _client
     _client.behave("follows")

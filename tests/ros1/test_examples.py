@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.conformance.cases import rests
+from tests.conformance.case import rests
 from tests.conformance.stage import ROOT
 from tests.ros1.peer import Client
 

@@ -10,7 +10,7 @@ from actionlib_msgs.msg import GoalStatus
 from geometry_msgs.msg import PoseStamped
 from heptarm_msgs.msg import MoveJointsAction, MoveJointsGoal, MovePoseAction, MovePoseGoal
 
-from tests.conformance.cases import rests
+from tests.conformance.case import rests
 from tests.ros1.peer import Client, collect, fresh, until
 
 HOME = np.radians([0, 30, 0, -90, 0, 60, 0]).tolist()

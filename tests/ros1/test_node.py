@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 from std_srvs.srv import Trigger
 
-from tests.conformance.cases import arrives, long, quiet, rests, step
+from tests.conformance.case import arrives, long, quiet, rests, step
 from tests.ros1.peer import Client, NodeProcess, call, collect, fresh, publisher, until
 
 

@@ -21,7 +21,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from heptarm.bridge.services import SERVICES
-from tests.conformance.cases import rests, step, succeeds
+from tests.conformance.case import rests, step, succeeds
 from tests.ros1.peer import Client, call, publisher, until
 
 

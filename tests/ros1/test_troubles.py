@@ -15,7 +15,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from std_srvs.srv import Trigger
 
 from heptarm.bridge.goal import Code, Outcome
-from tests.conformance.cases import long, quiet, rests, step
+from tests.conformance.case import long, quiet, rests, step
 from tests.conformance.stage import Stage
 from tests.ros1.peer import Client, NodeProcess, call, collect, until
 

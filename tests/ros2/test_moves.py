@@ -15,7 +15,7 @@ from rclpy.action import ActionClient
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
-from tests.conformance.cases import rests
+from tests.conformance.case import rests
 from tests.conformance.stage import Stage
 from tests.ros2.peer import Client, NodeProcess, Ros, fresh, until
 

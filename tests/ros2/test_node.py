@@ -20,7 +20,7 @@ from std_srvs.srv import Trigger
 
 import heptarm as ha
 from heptarm.bridge import parameters
-from tests.conformance.cases import TOUCH, long, rests, step, succeeds, under_way
+from tests.conformance.case import TOUCH, long, rests, step, succeeds, under_way
 from tests.conformance.stage import Stage
 from tests.ros2.peer import Client, NodeProcess, Ros, fresh, until
 

@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty, Float64
 
 from heptarm.rl.task import ReachTask
-from tests.conformance.cases import rests
+from tests.conformance.case import rests
 from tests.ros2.peer import PATIENCE, Client, Ros, until
 
 

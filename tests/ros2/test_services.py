@@ -11,7 +11,7 @@ from heptarm_msgs.srv import AttachTool, GetNames, SetJointImpedance, SetNumber,
 from std_srvs.srv import Trigger
 
 from heptarm.bridge.services import SERVICES
-from tests.conformance.cases import rests, step, succeeds
+from tests.conformance.case import rests, step, succeeds
 from tests.ros2.peer import Client, Ros, until
 
 

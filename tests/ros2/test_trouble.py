@@ -14,7 +14,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from std_srvs.srv import Trigger
 
 from heptarm.bridge.goal import Code, Goal, Outcome, Point
-from tests.conformance.cases import long, quiet, rests, stays, step, succeeds, under_way
+from tests.conformance.case import long, quiet, rests, stays, step, succeeds, under_way
 from tests.conformance.stage import ROOT, Stage
 from tests.ros2.peer import PATIENT, Client, NodeProcess, Ros, stamp, until
 
@@ -58,7 +58,7 @@ def test_an_emergency_stop_ends_a_goal_and_refuses_others(victim: Client, spare:
 CHILD = """
 import sys, time
 from tests.conformance.stage import Stage
-from tests.conformance.cases import step
+from tests.conformance.case import step
 from tests.ros2.peer import Client, Ros
 import os, threading
 threading.Timer(120, os._exit, (1,)).start()
