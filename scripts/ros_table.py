@@ -28,7 +28,7 @@ from heptarm.arm.io import Io  # noqa: E402
 from heptarm.arm.operator import Operator  # noqa: E402
 from heptarm.arm.pad import Pad  # noqa: E402
 from heptarm.arm.servo import JointServo, PoseServo  # noqa: E402
-from heptarm.bridge.moves import MOVES  # noqa: E402
+from heptarm.bridge.actions import ACTIONS  # noqa: E402
 from heptarm.bridge.names import PRESETS  # noqa: E402
 from heptarm.bridge.parameters import PARAMETERS, Parameter, of_joints  # noqa: E402
 from heptarm.bridge.services import SERVICES  # noqa: E402
@@ -101,10 +101,9 @@ def _of(tree: ast.Module) -> Iterator[Declared]:
             if node.module == "heptarm.bridge.topics":
                 for topic in TOPICS:
                     yield Declared(topic.name, "subscribes", topic.type)
-            for imported in node.names if node.module == "heptarm.bridge.moves" else ():
-                if imported.name == "MOVES":
-                    for move in MOVES:
-                        yield Declared(move.name, "action", move.type)
+            if node.module == "heptarm.bridge.actions":
+                for action in ACTIONS:
+                    yield Declared(action.name, "action", action.type)
             package, _, kind = node.module.partition(".")
             if kind in ("msg", "srv", "action"):
                 for name in node.names:

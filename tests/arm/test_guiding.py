@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from threading import Event, Thread
 
@@ -186,13 +187,15 @@ def test_taps(arm: ha.Arm) -> None:
 
 
 def test_a_guard_stops_at_a_collision_and_says_which_joint(arm: ha.Arm) -> None:
-    with arm.guarded(arm.collision_guard(10.0)):
+    met: list[ha.Collision] = []
+    with arm.guarded(arm.collision_guard(10.0), on_collision=met.append):
         assert arm.move(ha.lin_rel(z=0.02, frame="base", speed_mps=0.1)).arrived
         with pytest.raises(ha.CollisionDetected, match="A[24]: .* allowed are 10.0 Nm") as error:
             arm.move(ha.lin_rel(z=-0.4, frame="base", speed_mps=0.05))
         with pytest.raises(ha.ModeConflict), arm.guarded():
             pass
     found = error.value.collision
+    assert met == [found]
     assert found.joint in (1, 3) and abs(found.torque) > 10.0 and found.state is not None
     assert error.value.cause is ha.Cause.CONDITION
     assert arm.wait_for_rest().pose.xyz[2] > TABLE - 0.02
@@ -221,8 +224,14 @@ def test_a_guard_watches_a_servo_motion(arm: ha.Arm) -> None:
 def test_a_guard_with_a_margin_is_watched_here(arm: ha.Arm) -> None:
     guard = arm.collision_guard(10.0, margin=5.0)
     assert guard.is_moving
-    with pytest.raises(ha.CollisionDetected) as error, arm.guarded(guard):
-        arm.move(ha.lin_rel(z=-0.4, frame="base", speed_mps=0.05))
+    met: list[ha.Collision] = []
+    with pytest.raises(ha.CollisionDetected) as error, arm.guarded(guard, on_collision=met.append):
+        for _ in range(2):  # it goes on watching
+            with contextlib.suppress(ha.MotionAborted):
+                arm.move(ha.lin_rel(z=-0.4, frame="base", speed_mps=0.05))
+            arm.wait_for_rest()
+        arm.move(ha.lin_rel(z=-0.1, frame="base", speed_mps=0.05))
+    assert len(met) == 3 and error.value.collision == met[0]
     assert error.value.collision.joint in (1, 3) and error.value.cause is ha.Cause.STOPPED
     arm.wait_for_rest()
     handle = arm.start(ha.lin_rel(z=0.1, frame="base", speed_mps=0.05))
@@ -250,7 +259,9 @@ def test_taught_by_hand_and_replayed(arm: ha.Arm) -> None:
     assert whole.robot == "iiwa14" and np.ptp(whole.q, axis=0).max() > 0.05
     way = whole.trimmed().thinned()
     assert len(way) < len(whole)
-    replay = arm.replay(way, by="spline", pace=0.3)
+    shares: list[float] = []
+    replay = arm.replay(way, by="spline", pace=0.3, on_progress=shares.append)
+    assert shares == sorted(shares) and shares[-1] == 1.0
     assert replay.result.arrived and replay.deviation < 0.05
     assert np.abs(arm.wait_for_rest().q - way.q[-1]).max() < 2e-3
     for left in (3, 2, 1, 0):

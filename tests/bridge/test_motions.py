@@ -12,7 +12,9 @@ import pytest
 import heptarm as ha
 from heptarm.bridge.motions import motion_of, pose_of, program_of
 from heptarm.bridge.parameters import Configuration
+from heptarm.do import notify, set_output
 from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.when import path
 
 HERE = np.arange(7) * 0.1
 EMPTY: dict[str, Any] = {
@@ -25,7 +27,7 @@ EMPTY: dict[str, Any] = {
     name: []
     for name in (
         *("joint_names", "position", "segments", "near", "redundancy", "q_min", "q_max"),
-        *("joint_speed", "joint_acceleration", "joint_jerk"),
+        *("joint_speed", "joint_acceleration", "joint_jerk", "triggers"),
     )
 }
 
@@ -134,6 +136,28 @@ def test_a_message_is_the_motion_that_python_makes(given: SimpleNamespace, wante
 def test_what_is_no_motion_is_refused(given: SimpleNamespace, error: type[Exception], words: str) -> None:
     with pytest.raises(error, match=words):
         made(given)
+
+
+def trigger(condition: str, **action: Any) -> SimpleNamespace:
+    return SimpleNamespace(**({"signal": "", "value": 0.0, "label": ""} | {"condition": condition, **action}))
+
+
+def test_motions_of_a_program_have_their_triggers() -> None:
+    driver: Any = FakeDriver()
+    lamp = trigger("path.after(0.1, seconds=-0.2)", signal="LEDBlue", value=1.0)
+    near = trigger("path.before_end(0.02)", label="near")
+    first, second = program_of(driver, [message(1, triggers=[lamp, near]), message(6)])
+    assert first == ha.lin(TARGET).trigger(path.after(0.1, seconds=-0.2), set_output("LEDBlue", 1.0)).trigger(
+        path.before_end(0.02), notify("near")
+    )
+    assert second == ha.hold(inf)
+    for wrong, words in (
+        (message(1, triggers=[trigger("")]), r"triggers\[0\].condition is empty"),
+        (message(1, triggers=[near, trigger("now")]), "no condition"),
+        (message(8, triggers=[near]), "hand guiding has no triggers"),
+    ):
+        with pytest.raises(CommandRejected, match=words):
+            program_of(driver, [wrong])
 
 
 def test_a_program_has_motions_and_a_pose_without_turn_is_none() -> None:

@@ -24,9 +24,28 @@ PROJECT = f"""<persistence><processDataContainer>
 </processDataContainer></persistence>"""
 #: Parameters of the node.
 PARAMETERS: dict[str, object] = {"publish_signals": True, "publish_tf": True, "speed": 0.6}
+#: Height of the table [m]; the flange is 10 cm above it at home.
+TABLE = 0.3
 HOME = np.radians([0, 30, 0, -90, 0, 60, 0]).tolist()
 #: A busy machine may need long for what is quick [s].
 PATIENCE = 120.0
+
+
+class Sent(Protocol):
+    """A goal that was sent."""
+
+    @property
+    def told(self) -> list[Any]:
+        """Its feedback so far."""
+        ...
+
+    def cancel(self) -> None:
+        """Ask to end it."""
+        ...
+
+    def end(self) -> Any:
+        """Its result, when it has ended; refused goals have one, too."""
+        ...
 
 
 class Probe(Protocol):
@@ -36,12 +55,8 @@ class Probe(Protocol):
         """The answer of a service."""
         ...
 
-    def act(self, name: str, kind: str, /, **goal: Any) -> Any:
-        """The result of a goal of an action, when it has ended; refused goals have one, too."""
-        ...
-
-    def start(self, name: str, kind: str, /, **goal: Any) -> Callable[[], Any]:
-        """Likewise, but at once: what waits for the result."""
+    def send(self, name: str, kind: str, /, **goal: Any) -> Sent:
+        """Send a goal to an action."""
         ...
 
     def listen(self, name: str, kind: str, /, *, latched: bool = False) -> list[Any]:
@@ -66,10 +81,10 @@ class Probe(Protocol):
 
 
 def stage(folder: Path) -> Stage:
-    """A cabinet with signals and process data."""
+    """A cabinet with signals and process data, whose arm stands before a table."""
     project = folder / "RoboticsAPI.data.xml"
     project.write_text(PROJECT)
-    return Stage("--project", str(project))
+    return Stage("--project", str(project), "--box", f"0.6,0,{TABLE / 2},0.4,0.6,{TABLE}")
 
 
 def until(what: Callable[[], Any], why: str) -> Any:
@@ -93,6 +108,11 @@ def refused(answer: Any, *words: str) -> None:
     assert not answer.success and all(word in answer.message for word in words), answer.message
 
 
+def act(probe: Probe, name: str, kind: str, /, **goal: Any) -> Any:
+    """The result of a goal, when it has ended."""
+    return probe.send(name, kind, **goal).end()
+
+
 def ready(probe: Probe) -> None:
     """Wait until the node is active."""
     status = probe.listen("status", "heptarm_msgs/Status", latched=True)
@@ -100,7 +120,7 @@ def ready(probe: Probe) -> None:
 
 
 def home(probe: Probe) -> None:
-    done(probe.act("move_joints", "MoveJoints", position=HOME, speed=0.6))
+    done(act(probe, "move_joints", "MoveJoints", position=HOME, speed=0.6))
 
 
 def case_signals_are_listed_written_and_published(probe: Probe, stage: Stage) -> None:
@@ -142,18 +162,18 @@ def case_a_condition_ends_a_motion(probe: Probe, stage: Stage) -> None:
     home(probe)
     states = probe.listen("state", "heptarm_msgs/RobotState")
     until(lambda: states, "no states")
-    ended = probe.start("move_joints", "MoveJoints", joint_names=["A1"], position=[2.0], until="io.user_button")
+    ended = probe.send("move_joints", "MoveJoints", joint_names=["A1"], position=[2.0], until="io.user_button")
     until(lambda: states[-1].position[0] > 0.05, "the arm does not set out")
     stage.do("set UserButton true")
-    result = done(ended())
+    result = done(ended.end())
     assert "UserButton" in result.stopped_by or "user_button" in result.stopped_by, result.stopped_by
     assert states[-1].position[0] < 1.9
     stage.do("set UserButton false")
-    result = done(probe.act("move_joints", "MoveJoints", position=HOME, until="~io.user_button | (force > 900)"))
+    result = done(act(probe, "move_joints", "MoveJoints", position=HOME, until="~io.user_button | (force > 900)"))
     assert "user_button" in result.stopped_by.casefold().replace("userbutton", "user_button")
     bad = "__import__('os').system('true')"
-    refused(probe.act("move_joints", "MoveJoints", position=HOME, until=bad), "no condition", "force.along")
-    refused(probe.act("move_joints", "MoveJoints", position=HOME, until="force > 9999"), "9999")
+    refused(act(probe, "move_joints", "MoveJoints", position=HOME, until=bad), "no condition", "force.along")
+    refused(act(probe, "move_joints", "MoveJoints", position=HOME, until="force > 9999"), "9999")
     home(probe)
 
 
@@ -208,7 +228,7 @@ def case_a_servo_topic_follows_lines(probe: Probe, stage: Stage) -> None:
 def case_splines_and_programs(probe: Probe, stage: Stage) -> None:
     home(probe)
     points = [0.1, 0.2, 0.2, 0.0]
-    done(probe.act("move_spline", "MoveSpline", joint_names=["A1", "A7"], position=points, speed=0.6))
+    done(act(probe, "move_spline", "MoveSpline", joint_names=["A1", "A7"], position=points, speed=0.6))
     here = done(probe.call("get_pose", "GetPose", frame="flange")).pose
     assert abs(math.atan2(here.position.y, here.position.x) - 0.2) < 0.02
 
@@ -222,10 +242,10 @@ def case_splines_and_programs(probe: Probe, stage: Stage) -> None:
         probe.make("heptarm_msgs/Segment", kind=1, pose=at(0.06, -0.03), speed_mps=0.1),
         probe.make("heptarm_msgs/Segment", kind=2, via=at(0.08, -0.02), pose=at(0.06, 0.0)),
     ]
-    done(probe.act("move_spline", "MoveSpline", segments=curve, speed_mps=0.2))
+    done(act(probe, "move_spline", "MoveSpline", segments=curve, speed_mps=0.2))
     there = done(probe.call("get_pose", "GetPose", frame="flange")).pose
     assert abs(there.position.y - here.position.y - 0.06) < 2e-3
-    refused(probe.act("move_spline", "MoveSpline", position=[0.1]), "position")
+    refused(act(probe, "move_spline", "MoveSpline", position=[0.1]), "position")
     back = probe.make("geometry_msgs/PoseStamped")
     back.pose.position.y, back.header.frame_id = -0.06, "base"
     program = [
@@ -234,12 +254,12 @@ def case_splines_and_programs(probe: Probe, stage: Stage) -> None:
         probe.make("heptarm_msgs/Motion", kind=7, joint_speed=[0.5]),
         probe.make("heptarm_msgs/Motion", kind=6, duration=0.1),
     ]
-    result = done(probe.act("run_program", "RunProgram", motions=program, when="queue", speed=0.6))
+    result = done(act(probe, "run_program", "RunProgram", motions=program, when="queue", speed=0.6))
     assert result.item == 3 and not result.stopped_by and result.residual < 1e-3
-    refused(probe.act("run_program", "RunProgram", motions=[]), "no motions")
+    refused(act(probe, "run_program", "RunProgram", motions=[]), "no motions")
     odd = probe.make("heptarm_msgs/Motion", kind=9)
-    refused(probe.act("run_program", "RunProgram", motions=[odd]), "motions[0]", "9")
-    refused(probe.act("run_program", "RunProgram", motions=program, when="later"), "later")
+    refused(act(probe, "run_program", "RunProgram", motions=[odd]), "motions[0]", "9")
+    refused(act(probe, "run_program", "RunProgram", motions=program, when="later"), "later")
 
 
 def case_modes_with_all_their_parameters(probe: Probe, stage: Stage) -> None:
@@ -258,7 +278,7 @@ def case_modes_with_all_their_parameters(probe: Probe, stage: Stage) -> None:
         "frame": "base",
     }
     done(probe.call("mode/sine_impedance", "SetSineImpedance", **sine))
-    done(probe.act("run_program", "RunProgram", motions=[probe.make("heptarm_msgs/Motion", kind=6, duration=0.6)]))
+    done(act(probe, "run_program", "RunProgram", motions=[probe.make("heptarm_msgs/Motion", kind=6, duration=0.6)]))
     for pattern in (
         {"pattern": "force", "force": [0.0, 0.0, 5.0, 0.0, 0.0, 0.0], "total_time": [1.0]},
         {"pattern": "sine", "direction": "z", "frequency": 2.0, "amplitude": 5.0},

@@ -1,4 +1,4 @@
-"""Services, actions and topics beside trajectories, by the cases of `tests.conformance.surface`."""
+"""Services, actions and topics beside trajectories, by the cases of `tests.conformance.surface` and `hands`."""
 
 from __future__ import annotations
 
@@ -10,11 +10,27 @@ import actionlib
 import pytest
 import rospy
 
-from tests.conformance import surface
+from tests.conformance import hands, surface
 from tests.conformance.stage import Stage
-from tests.ros1.peer import NodeProcess, call, collect, publisher
+from tests.ros1.peer import NodeProcess, call, collect, publisher, until
 
 NAME = "/surface/heptarm"
+
+
+class Sent:
+    """A goal of ROS 1."""
+
+    def __init__(self, client: actionlib.ActionClient, goal: Any) -> None:
+        self.told: list[Any] = []
+        self._handle = client.send_goal(goal, feedback_cb=lambda _, feedback: self.told.append(feedback))
+
+    def cancel(self) -> None:
+        self._handle.cancel()
+
+    def end(self) -> Any:
+        done = actionlib.CommState.DONE
+        until(lambda: self._handle.get_comm_state() == done, "it does not end")
+        return self._handle.get_result()
 
 
 class Client:
@@ -26,19 +42,10 @@ class Client:
     def call(self, name: str, kind: str, /, **request: Any) -> Any:
         return call(f"{NAME}/{name}", found(kind, "srv"), **request)
 
-    def start(self, name: str, kind: str, /, **goal: Any) -> Callable[[], Any]:
-        client = actionlib.SimpleActionClient(f"{NAME}/{name}", found(f"{kind}Action", "msg"))
-        assert client.wait_for_server(rospy.Duration(60))
-        client.send_goal(found(f"{kind}Goal", "msg")(**goal))
-
-        def end() -> Any:
-            assert client.wait_for_result(rospy.Duration(60))
-            return client.get_result()
-
-        return end
-
-    def act(self, name: str, kind: str, /, **goal: Any) -> Any:
-        return self.start(name, kind, **goal)()
+    def send(self, name: str, kind: str, /, **goal: Any) -> Sent:
+        client = actionlib.ActionClient(f"{NAME}/{name}", found(f"{kind}Action", "msg"))
+        assert client.wait_for_action_server_to_start(rospy.Duration(60))
+        return Sent(client, found(f"{kind}Goal", "msg")(**goal))
 
     def listen(self, name: str, kind: str, /, *, latched: bool = False) -> list[Any]:
         return collect(f"/surface{name}" if name == "/joint_states" else full(name), found(kind, "msg"))
@@ -90,6 +97,9 @@ def probe(ros: None, arena: Stage) -> Iterator[Client]:
     assert node.end() == 0, node.said
 
 
-@pytest.mark.parametrize("case", surface.CASES)
+CASES = surface.CASES | hands.CASES
+
+
+@pytest.mark.parametrize("case", CASES)
 def test_surface(probe: Client, arena: Stage, case: str) -> None:
-    surface.CASES[case](probe, arena)
+    CASES[case](probe, arena)

@@ -1,4 +1,4 @@
-"""Services, actions and topics beside trajectories, by the cases of `tests.conformance.surface`."""
+"""Services, actions and topics beside trajectories, by the cases of `tests.conformance.surface` and `hands`."""
 
 from __future__ import annotations
 
@@ -9,11 +9,29 @@ from typing import Any
 import pytest
 from rclpy.action import ActionClient
 
-from tests.conformance import surface
+from tests.conformance import hands, surface
 from tests.conformance.stage import Stage
 from tests.ros2.peer import PATIENT, NodeProcess, Ros, to_duration, until
 
 NAME = "/surface/heptarm"
+
+
+class Sent:
+    """A goal of ROS 2."""
+
+    def __init__(self, ros: Ros, client: ActionClient, goal: Any) -> None:
+        self.told: list[Any] = []
+        self._ros = ros
+        sent = client.send_goal_async(goal, feedback_callback=lambda one: self.told.append(one.feedback))
+        self._handle = ros.wait(sent, "no answer")
+        assert self._handle.accepted
+        self._result = self._handle.get_result_async()
+
+    def cancel(self) -> None:
+        assert self._ros.wait(self._handle.cancel_goal_async(), "cancelling is not answered").goals_canceling
+
+    def end(self) -> Any:
+        return self._ros.wait(self._result, "it does not end").result
 
 
 class Client:
@@ -28,18 +46,13 @@ class Client:
         one = found(kind, "srv")
         return self._ros.call(one, f"{NAME}/{name}", one.Request(**request))
 
-    def start(self, name: str, kind: str, /, **goal: Any) -> Callable[[], Any]:
+    def send(self, name: str, kind: str, /, **goal: Any) -> Sent:
         one = found(kind, "action")
         if name not in self._actions:
             self._actions[name] = ActionClient(self._ros.node, one, f"{NAME}/{name}")
         client = self._actions[name]
         until(client.server_is_ready, f"there is no {name}")
-        handle = self._ros.wait(client.send_goal_async(one.Goal(**goal)), "no answer")
-        assert handle.accepted
-        return lambda: self._ros.wait(handle.get_result_async(), f"{name} does not end").result
-
-    def act(self, name: str, kind: str, /, **goal: Any) -> Any:
-        return self.start(name, kind, **goal)()
+        return Sent(self._ros, client, one.Goal(**goal))
 
     def listen(self, name: str, kind: str, /, *, latched: bool = False) -> list[Any]:
         topic = f"/surface{name}" if name == "/joint_states" else full(name)
@@ -91,6 +104,9 @@ def probe(ros: Ros, arena: Stage) -> Iterator[Client]:
     node.finish()
 
 
-@pytest.mark.parametrize("case", surface.CASES)
+CASES = surface.CASES | hands.CASES
+
+
+@pytest.mark.parametrize("case", CASES)
 def test_surface(probe: Client, arena: Stage, case: str) -> None:
-    surface.CASES[case](probe, arena)
+    CASES[case](probe, arena)

@@ -9,7 +9,7 @@ import pytest
 
 import heptarm as ha
 from heptarm.values.condition import AnyOf
-from heptarm.values.contact import TapCounter, direction_of
+from heptarm.values.contact import TapCounter, TapWatch, direction_of
 from heptarm.values.force_condition import JointTorqueOutside
 from heptarm.values.state import Joints, State, Torques
 
@@ -92,3 +92,23 @@ def test_errors_carry_what_was_seen() -> None:
     contact = ha.Contact(ha.Pose.at(z=0.1), np.zeros(3), 0.1, np.zeros(7), ha.Result(ha.Cause.CONDITION))
     assert np.isnan(contact.spread)
     assert replace(contact, first=replace(contact, pose=ha.Pose.at(z=0.3))).spread == pytest.approx(0.2)
+
+
+def test_taps_stand_out_from_what_acts_all_the_time() -> None:
+    def taps(level: float, strong: float = 20.0) -> int:
+        """Of two pushes on an arm that bears a force, after 5 s."""
+        watch, count = TapWatch(force=8.0), 0
+        for i in range(700):
+            t = 0.01 * i
+            push = strong if 5.0 <= t < 5.1 or 5.5 <= t < 5.6 else 0.0
+            rises = level if t > 0.2 else 0.0  # something begins to hang on it
+            count = watch.see(t, np.array([0.0, rises, 3.0 + push]))
+            if t >= 5.7:
+                break
+        return count
+
+    assert taps(0.0) == 2 and taps(0.0, strong=5.0) == 0
+    assert taps(10.0) == 2
+    for wrong in ({"force": 0.0}, {"force": 501.0}, {"gap": 0.0}):
+        with pytest.raises(ha.LimitError):
+            TapWatch(**wrong)

@@ -21,11 +21,13 @@ from heptarm.bridge.names import PRESETS, Meaning
 from heptarm.bridge.parameters import Configuration, Parameter
 from heptarm.bridge.runner import Feedback
 from heptarm.errors import HeptarmError
+from heptarm.values.collision import Collision
+from heptarm.values.event import MotionEvent
 from heptarm.values.state import State
 from heptarm_ros2 import convert, peers
+from heptarm_ros2.actions import ActionServers
 from heptarm_ros2.commands import Commands
 from heptarm_ros2.events import Events
-from heptarm_ros2.moves import MoveActions
 from heptarm_ros2.peers import Peers
 from heptarm_ros2.publishers import Publishers
 from heptarm_ros2.trajectory import TrajectoryAction
@@ -44,7 +46,7 @@ class HeptarmNode(LifecycleNode):
         self._outputs: Publishers | None = None
         self._inputs: Commands | None = None
         self._goals: TrajectoryAction | None = None
-        self._moves: MoveActions | None = None
+        self._actions: ActionServers | None = None
         self._peers: Peers | None = None
         self._events: Events | None = None
         self._ending = threading.Event()
@@ -131,7 +133,7 @@ class HeptarmNode(LifecycleNode):
         actions = [entry.name for entry in peers.entries(self, Meaning.FOLLOW)]
         group = ReentrantCallbackGroup()
         self._goals = TrajectoryAction(self, ("~/follow_joint_trajectory", *actions), group)
-        self._moves = MoveActions(self, group)
+        self._actions = ActionServers(self, self.driver, group)
         self._inputs = Commands(self, self.driver)
         period = 1.0 / self.value("diagnostics_rate")
         self._report_timer = self.create_timer(
@@ -183,11 +185,11 @@ class HeptarmNode(LifecycleNode):
         if driver is not None:
             driver.close()
             self.destroy_timer(self._report_timer)
-        sides = (self._goals, self._moves, self._inputs, self._outputs)
+        sides = (self._goals, self._actions, self._inputs, self._outputs)
         for one in (*sides, self._peers, self._events):
             if one is not None:
                 one.destroy()
-        self._goals = self._moves = self._inputs = self._outputs = None
+        self._goals = self._actions = self._inputs = self._outputs = None
         self._peers = self._events = None
 
     # -------------------------------------------------------------------------- from the driver
@@ -219,6 +221,16 @@ class HeptarmNode(LifecycleNode):
         """A user key of the smartPAD was pressed or released."""
         if self._events is not None and self._lives:
             self._events.key(slot, down)
+
+    def on_event(self, number: int, event: MotionEvent) -> None:
+        """Something has become of a program."""
+        if self._events is not None and self._lives:
+            self._events.motion(number, event)
+
+    def on_collision(self, found: Collision) -> None:
+        """The collision guard has met something."""
+        if self._events is not None and self._lives:
+            self._events.collision(found)
 
     # ------------------------------------------------------------------------------------ others
 

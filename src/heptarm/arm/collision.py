@@ -64,7 +64,12 @@ class Guarding:
         return CollisionGuard.of(threshold, baseline=np.mean(found, axis=0), margin=margin)
 
     @contextlib.contextmanager
-    def guarded(self, guard: CollisionGuard | None = None) -> Iterator[CollisionGuard]:
+    def guarded(
+        self,
+        guard: CollisionGuard | None = None,
+        *,
+        on_collision: Callable[[Collision], None] | None = None,
+    ) -> Iterator[CollisionGuard]:
         """A block whose motions and servo motions end at a collision.
 
         The cabinet watches, as a break condition of each motion; the arm brakes on its path. A guard with a margin is
@@ -72,6 +77,8 @@ class Guarding:
 
         Args:
             guard: the bands; None: `collision_guard()` as the block begins.
+            on_collision: told of each collision, from another thread, so it must not block. A guard with a margin
+                goes on watching then: each further motion that meets something is stopped as well.
 
         Raises:
             CollisionDetected: from `move`, `wait` or the end of the block; says which joint and how much.
@@ -81,8 +88,8 @@ class Guarding:
         if link.guard is not None:
             raise ModeConflict("a collision guard is in force already", hint="leave its block first")
         bands = self.collision_guard() if guard is None else guard
-        watch = _Watch(link, bands) if bands.is_moving else None
-        link.guard = bands
+        watch = _Watch(link, bands, on_collision) if bands.is_moving else None
+        link.guard, link.on_collision = bands, on_collision
         try:
             yield bands
         except HeptarmError as error:
@@ -90,7 +97,7 @@ class Guarding:
                 raise collided(watch.found, getattr(error, "result", None), link.history()) from error
             raise
         finally:
-            link.guard = None
+            link.guard = link.on_collision = None
             if watch is not None:
                 watch.close()
         if watch is not None and watch.found is not None:
@@ -105,11 +112,15 @@ class Guarding:
 
 
 class _Watch:
-    """Looks at every state until it is closed; stops the arm at the first collision."""
+    """Looks at every state until it is closed; stops the arm at the first collision, or at that of each motion."""
 
-    def __init__(self, link: Connection, guard: CollisionGuard) -> None:
+    def __init__(
+        self, link: Connection, guard: CollisionGuard, on_collision: Callable[[Collision], None] | None
+    ) -> None:
         self.found: Collision | None = None
-        self._link, self._guard = link, guard
+        self._link, self._guard, self._tell = link, guard, on_collision
+        self._hit: Collision | None = None
+        self._stopped = 0  # the motion that the last collision ended
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._work, name="heptarm-guard", daemon=True)
         self._thread.start()
@@ -121,17 +132,29 @@ class _Watch:
             except Timeout:
                 continue
             except HeptarmError:  # the link is lost; whatever runs says so, and the cabinet stops the arm
+                self._closed.wait(_NAP)
+                continue
+            if self._hit is None:
                 return
-            if self.found is not None:
-                with contextlib.suppress(HeptarmError):  # likewise
-                    self._link.stop(wire.StopKind.FAST)
-            return
+            self.found = self.found or self._hit
+            with contextlib.suppress(HeptarmError):  # likewise
+                self._link.stop(wire.StopKind.FAST)
+            if self._tell is None:
+                return
+            self._tell(self._hit)
 
     def _is_hit(self, state: State) -> bool:
+        self._hit = None
         if self._closed.is_set():
             return True
-        self.found = self._guard.collision(state)
-        return self.found is not None
+        motion = state.motion
+        number = motion.id if motion is not None and motion.active else 0
+        if self.found is not None and number in (0, self._stopped):
+            return False  # of this one it was told
+        self._hit = self._guard.collision(state)
+        if self._hit is not None:
+            self._stopped = number
+        return self._hit is not None
 
     def close(self) -> None:
         self._closed.set()

@@ -23,7 +23,7 @@ from heptarm.errors import CommandRejected, ConnectionLost, HeptarmError, Timeou
 from heptarm.io.clock import Clock
 from heptarm.io.transport import Transport
 from heptarm.values.arrays import within
-from heptarm.values.collision import CollisionGuard
+from heptarm.values.collision import Collision, CollisionGuard
 from heptarm.values.condition import Condition
 from heptarm.values.io import Signal
 from heptarm.values.result import Result
@@ -57,6 +57,7 @@ class Connection:
         controller: name of the client that controls the robot; empty: nobody.
         closed: set when the arm is closed.
         guard: the collision guard in force.
+        on_collision: told of each collision that it meets.
         signals: those that the cabinet has.
     """
 
@@ -76,6 +77,7 @@ class Connection:
         self.controller = ""
         self.closed = threading.Event()
         self.guard: CollisionGuard | None = None
+        self.on_collision: Callable[[Collision], None] | None = None
         self._dial = dial
         self._link: Link | None = None
         self._welcome: wire.Welcome | None = None
@@ -169,6 +171,12 @@ class Connection:
             was_open = not self.closed.is_set()
             self.closed.set()
             return was_open
+
+    def tell_collision(self, found: Collision) -> None:
+        """The guard has met something."""
+        told = self.on_collision
+        if told is not None:
+            told(found)
 
     def check_open(self) -> None:
         """Raise ConnectionLost if the arm was closed."""

@@ -15,9 +15,9 @@ from heptarm.arm.tooling import Tooling
 from heptarm.errors import LimitError, MotionAborted, NoContact, ShapeError, Timeout
 from heptarm.values.arrays import Array, within
 from heptarm.values.condition import Condition
-from heptarm.values.contact import Contact, TapCounter, direction_of
+from heptarm.values.contact import Contact, TapWatch, direction_of
 from heptarm.values.mode import Mode
-from heptarm.values.motion import BASE, TOOL, lin_rel
+from heptarm.values.motion import TOOL, lin_rel
 from heptarm.values.result import Cause, Result
 from heptarm.values.signals import force as force_signal
 from heptarm.values.state import State
@@ -25,10 +25,6 @@ from heptarm.values.state import State
 #: States whose mean is what acts on the arm before it touches anything, and how long they may take to come [s].
 _SAMPLES = 8
 _PATIENCE = 5.0
-#: A force that lasts so long is no tap any more, but what the arm bears [s].
-_LASTING = 3.0
-#: Largest force that can be waited for [N].
-_STRONGEST = 500.0
 
 
 class Touching:
@@ -81,7 +77,7 @@ class Touching:
         """
         ahead = direction_of(direction)
         way = within(distance, "distance", 0.0, 2.0, above=True, unit="m")
-        threshold = within(force, "force", 0.0, _STRONGEST, above=True, unit="N")
+        threshold = within(force, "force", 0.0, TapWatch.STRONGEST, above=True, unit="N")
         if retreat is not None:
             within(retreat, "retreat", 0.0, 2.0, unit="m")
         if baseline not in ("rest", "zero"):
@@ -165,16 +161,9 @@ class Touching:
         """
         if not isinstance(count, int) or isinstance(count, bool) or count < 1:
             raise ShapeError(f"count is {count!r}; a whole number from 1 is wanted", parameter="count")
-        taps = TapCounter(force=within(force, "force", 0.0, _STRONGEST, above=True, unit="N"), gap=gap)
-        bias, last = self._mean_force(BASE), None
+        taps = TapWatch(force=force, gap=gap)
         for state in self.states(duration=within(timeout, "timeout", 0.0, 1e6, unit="s")):
-            seen = state.wrench
-            # what lasts becomes part of what acts all the time
-            bias += (seen.force - bias) * (
-                0.0 if last is None else min(1.0, (seen.stamp - last) * 1e-9 / _LASTING)
-            )
-            last = seen.stamp
-            if taps.see(seen.stamp * 1e-9, float(np.linalg.norm(seen.force - bias))) >= count:
+            if taps.see(state.wrench.stamp * 1e-9, state.wrench.force) >= count:
                 return state
         raise Timeout(f"the arm was not tapped {count} times within {timeout:g} s")
 

@@ -123,7 +123,7 @@ class Teaching:
         finally:
             handle.cancel()
         handle.wait(timeout=_SETTLE + link.options.timeout)
-        return _trajectory(recorded, self._connection.robot.name)
+        return trajectory_of(recorded, self._connection.robot.name)
 
     def replay(
         self,
@@ -135,6 +135,7 @@ class Teaching:
         rate: float = 100.0,
         mode: Mode | None = None,
         until: Condition | None = None,
+        on_progress: Callable[[float], None] | None = None,
     ) -> Replay:
         """Move to the start of a trajectory and do it again.
 
@@ -147,6 +148,7 @@ class Teaching:
             rate: targets per second [Hz].
             mode: control mode; None: that of `using`, otherwise position.
             until: condition that ends it.
+            on_progress: told how much of it is done, [0, 1], again and again once the start is reached.
 
         Returns:
             How it ended and how near the arm stayed to what was taught.
@@ -165,9 +167,10 @@ class Teaching:
             self._check_speed(trajectory, pace)
         if float(np.abs(self.wait_for_rest().q - trajectory.q[0]).max()) > 1e-4:
             self.move(ptp(trajectory.q[0]), speed=approach)
+        tell = on_progress or _nobody
         if by == "spline":
-            return self._by_spline(trajectory, pace, mode, until)
-        return self._by_servo(trajectory, pace, rate, mode, until)
+            return self._by_spline(trajectory, pace, mode, until, tell)
+        return self._by_servo(trajectory, pace, rate, mode, until, tell)
 
     def _check_speed(self, trajectory: Trajectory, pace: float) -> None:
         allowed = self._connection.robot.dq_max * self.speed
@@ -186,13 +189,19 @@ class Teaching:
             )
 
     def _by_spline(
-        self, trajectory: Trajectory, pace: float, mode: Mode | None, until: Condition | None
+        self,
+        trajectory: Trajectory,
+        pace: float,
+        mode: Mode | None,
+        until: Condition | None,
+        tell: Callable[[float], None],
     ) -> Replay:
         handle = self.start(trajectory.spline(), mode=mode, speed=pace, until=until, when="reject")
         seen: list[Array] = []
         try:
             for state in self.states():
                 seen.append(state.q)
+                tell(handle.progress)
                 if handle.done:
                     break
         finally:
@@ -201,7 +210,13 @@ class Teaching:
         return Replay(handle.wait(), deviation)
 
     def _by_servo(
-        self, trajectory: Trajectory, pace: float, rate: float, mode: Mode | None, until: Condition | None
+        self,
+        trajectory: Trajectory,
+        pace: float,
+        rate: float,
+        mode: Mode | None,
+        until: Condition | None,
+        tell: Callable[[float], None],
     ) -> Replay:
         per_second = pace * self._connection.pace
         seen: list[tuple[float, Array]] = []
@@ -216,6 +231,7 @@ class Teaching:
                 if state is None:
                     continue
                 seen.append((t, state.q))
+                tell(min(1.0, t / trajectory.duration))
                 if t < trajectory.duration:
                     continue
                 due = due or state.stamp + round(_SETTLE * 1e9)  # by the cabinet's clock, which the arm follows
@@ -229,6 +245,10 @@ class Teaching:
         lags = [t - there for t, _, there in beside if t < trajectory.duration]
         deviation = max((off for _, off, _ in beside), default=0.0)
         return Replay(ended, deviation, float(np.median(lags)) if lags else float("nan"))
+
+
+def _nobody(progress: float) -> None:
+    """Nobody asks how much is done."""
 
 
 def _beside(trajectory: Trajectory, q: Array) -> tuple[float, float]:
@@ -258,8 +278,16 @@ def _check(trajectory: Trajectory, robot: RobotModel) -> None:
         robot.check(extreme, f"trajectory, {('lowest', 'highest')[index]} q")
 
 
-def _trajectory(recorded: Sequence[State], name: str) -> Trajectory:
-    """Positions of the states that carry new ones."""
+def trajectory_of(recorded: Sequence[State], name: str) -> Trajectory:
+    """Positions of the states that carry new ones.
+
+    Args:
+        recorded: states in the order of their coming.
+        name: model of the robot.
+
+    Raises:
+        CommandRejected: fewer than two of them do.
+    """
     rows: dict[int, Array] = {}
     for state in recorded:
         if state.joints is not None:

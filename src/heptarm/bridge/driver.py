@@ -9,7 +9,6 @@ import logging
 import os
 import socket
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
@@ -18,6 +17,7 @@ from heptarm.arm.arm import Arm
 from heptarm.arm.connect import connect
 from heptarm.arm.groups import GROUPS
 from heptarm.arm.handle import MotionHandle
+from heptarm.bridge.collision import CollisionWatch
 from heptarm.bridge.execution import Execution, Listener
 from heptarm.bridge.feed import Feed
 from heptarm.bridge.fri_execution import FriExecution
@@ -29,11 +29,15 @@ from heptarm.bridge.runner import Feedback
 from heptarm.bridge.servo_execution import ServoExecution
 from heptarm.bridge.spline_execution import SplineExecution
 from heptarm.bridge.stream import Stream
+from heptarm.bridge.task import Task
 from heptarm.bridge.trajectory import Sample
 from heptarm.errors import HeptarmError, NotReady
 from heptarm.values.arrays import Array
+from heptarm.values.collision import Collision
 from heptarm.values.condition import Condition
-from heptarm.values.motion import Motion, lin, ptp
+from heptarm.values.event import MotionEvent
+from heptarm.values.mode import Mode
+from heptarm.values.motion import Motion
 from heptarm.values.pose import Pose
 from heptarm.values.state import State
 
@@ -58,18 +62,13 @@ class DriverListener(Listener, Protocol):
         """A user key of the smartPAD was pressed or released."""
         ...
 
+    def on_event(self, number: int, event: MotionEvent) -> None:
+        """Something has become of the program of that number."""
+        ...
 
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """What a service answers.
-
-    Attributes:
-        success: whether it was done.
-        message: what was done, or why not.
-    """
-
-    success: bool
-    message: str
+    def on_collision(self, found: Collision) -> None:
+        """The collision guard has met something."""
+        ...
 
 
 class Driver:
@@ -82,6 +81,7 @@ class Driver:
     Attributes:
         configuration: what the node's parameters say now.
         fri: the session that services open.
+        collisions: the guard against them.
 
     Raises:
         ConnectFailed: nobody answers.
@@ -94,6 +94,7 @@ class Driver:
         self._listener = listener
         self._active = False
         self._handle: MotionHandle | None = None
+        self._task: Task | None = None
         self._arm = connect(
             values["target"] or None,
             key=values["key"] or None,
@@ -104,6 +105,7 @@ class Driver:
         )
         self._arm.pad.on_key(listener.on_key)
         self.fri = FriSession(self._arm)
+        self.collisions = CollisionWatch(self._arm, tell=self._on_collision, start=self.start)
         self._told = (0, 0.0)  # the last feedback: of which goal, and when
         self._execution = self._way()
         self._stream = Stream(
@@ -148,6 +150,7 @@ class Driver:
     def deactivate(self) -> None:
         """Take no more; what runs comes to rest."""
         self._active = False
+        self._end_task("the node was deactivated")
         self._execution.abort("the node was deactivated")
         self._stream.close()
         self.fri.close()
@@ -164,6 +167,7 @@ class Driver:
             return
         self.deactivate()
         self._feed.end()
+        self.collisions.off()
         self._execution.close()
         self._arm.close()
         self._feed.join()
@@ -209,17 +213,43 @@ class Driver:
             raise GoalRefused("the node is not active", hint="activate it")
         if self.trouble:
             raise GoalRefused(f"no connection: {self.trouble}")
-        handle = self._handle
         try:
             self._check_ready()
             self._hold_control()
-            self._stream.close()
-            if handle is not None and not handle.done:
-                handle.cancel()
-                self._arm.wait_for_rest(timeout=_REST)
+            self._clear("a trajectory took the place of it")
         except HeptarmError as error:
             raise GoalRefused(str(error)) from error
         return self._execution.accept(goal)
+
+    def begin(self, what: str, work: Callable[[], object]) -> Task:
+        """Begin a call that moves the arm several times; whatever else moves it comes to rest first.
+
+        Args:
+            what: what it is, in words.
+            work: the call.
+
+        Raises:
+            HeptarmError: refused; the text says why.
+        """
+        self._check_active()
+        self._check_ready()
+        self._execution.abort(f"{what} took the place of this goal")
+        self._execution.wait_idle(_REST)
+        self._clear(f"{what} took the place of it")
+        self._task = Task(self._arm, what, work)
+        return self._task
+
+    def _clear(self, why: str) -> None:
+        """Bring to rest what moves the arm beside goals."""
+        self._end_task(why)
+        self._stream.close()
+        if self._handle is not None and not self._handle.done:
+            self._handle.cancel()
+            self._arm.wait_for_rest(timeout=_REST)
+
+    def _end_task(self, why: str) -> None:
+        if self._task is not None:
+            self._task.end(why)
 
     def at(self, time: float) -> Sample | None:
         """What the goal under way wants at a time on the clock of `now` [s]; None: nothing."""
@@ -256,27 +286,11 @@ class Driver:
 
     # --------------------------------------------------------------------------------- commands
 
-    def move(self, target: Array | Pose, *, straight: bool = False) -> MotionHandle:
-        """Start a motion to joint positions or a pose; it takes the place of whatever runs.
-
-        Args:
-            target: joint positions, shape (7,) [rad], or a pose of the flange in the base.
-            straight: on a straight line; needs a pose.
-
-        Raises:
-            HeptarmError: refused; the text says why.
-        """
-        motion: Motion
-        if isinstance(target, Pose):
-            motion = lin(target) if straight else ptp(target)
-        else:
-            motion = ptp(target)
-        return self.start(motion)
-
     def start(
         self,
         motion: Motion | Sequence[Motion],
         *,
+        mode: Mode | None = None,
         speed: float | None = None,
         until: Condition | None = None,
         when: Literal["queue", "replace", "reject"] = "replace",
@@ -285,6 +299,7 @@ class Driver:
 
         Args:
             motion: what to do.
+            mode: control mode; None: that of the services.
             speed: ceiling for this one, (0, 1]; None: that of the parameter `speed`.
             until: condition that ends it; None: that of `guard`.
             when: while something runs: "replace" it, "queue" behind it, or "reject" this one.
@@ -294,17 +309,17 @@ class Driver:
         """
         self._check_active()
         if when == "replace":
+            self._end_task("a command took the place of it")
             self._execution.abort("a command took the place of this goal")
             self._stream.close()
+        self._check_task()
         ceiling = self.configuration.values["speed"] if speed is None else speed
-        self._handle = self._arm.start(
-            motion, speed=ceiling, until=self.guard if until is None else until, when=when
-        )
-        return self._handle
+        ends = self.guard if until is None else until
+        handle = self._handle = self._arm.start(motion, mode=mode, speed=ceiling, until=ends, when=when)
+        handle.add_event_callback(lambda event: self._listener.on_event(handle.id, event))
+        return handle
 
-    def follow(
-        self, target: Array | Pose, dq: Array | None = None, *, straight: bool = False
-    ) -> None:
+    def follow(self, target: Array | Pose, dq: Array | None = None, *, straight: bool = False) -> None:
         """Follow a target of a servo topic until none comes for `command_timeout`.
 
         Args:
@@ -332,6 +347,7 @@ class Driver:
 
     def _prepare_stream(self) -> None:
         self._check_active()
+        self._check_task()
         if not self._stream.active:
             if self._execution.busy:
                 self._execution.abort("a servo command took the place of this goal")
@@ -341,6 +357,10 @@ class Driver:
         if not self._active:
             raise NotReady("the node is not active", hint="activate it")
         self._hold_control()
+
+    def _check_task(self) -> None:
+        if self._task is not None and not self._task.done:
+            raise NotReady(f"{self._task.what} is under way", hint="cancel it first")
 
     # --------------------------------------------------------------------------------- services
 
@@ -353,28 +373,19 @@ class Driver:
     def guard(self, value: Condition | None) -> None:
         self._stream.guard = value
 
-    def stop(self) -> Answer:
-        """Stop whatever runs."""
-        return self._answer(self._arm.stop, "stopped")
+    def stop(self, kind: Literal["path", "fast", "after_motion"] = "path") -> None:
+        """Stop whatever runs; see `Arm.stop`. A task is one motion: "after_motion" lets it finish.
 
-    def recover(self) -> Answer:
-        """Come back after trouble as far as a program may, see `Arm.recover`; says what is left to a person."""
-        try:
-            done = self._arm.recover()
-        except HeptarmError as error:
-            return Answer(False, str(error))
-        return Answer(done.done, str(done))
+        Raises:
+            HeptarmError: it cannot be stopped; the text says why.
+        """
+        if kind != "after_motion":
+            self._end_task("it was stopped")
+        self._arm.stop(kind)
 
-    def set_override(self, value: float) -> Answer:
-        """Set the cabinet's application override, [0, 1]."""
-        return self._answer(lambda: self._arm.set_override(value), f"override is {value:g}")
-
-    def _answer(self, work: Callable[[], None], done: str) -> Answer:
-        try:
-            work()
-        except HeptarmError as error:
-            return Answer(False, str(error))
-        return Answer(True, done)
+    def _on_collision(self, found: Collision) -> None:
+        self._stream.latch(str(found))
+        self._listener.on_collision(found)
 
 
 def _name() -> str:

@@ -9,7 +9,7 @@ A node says once what it has, and its modules only publish and subscribe::
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -68,6 +68,15 @@ def class_of(kind: str, part: Literal["msg", "srv", "action"]) -> Any:
     """
     package, _, name = kind.partition("/")
     return getattr(importlib.import_module(f"{package}.{part}"), name)
+
+
+def put(message: Any, fields: Mapping[str, Any]) -> None:
+    """Give fields of a message values; those of a message in it are a mapping."""
+    for name, value in fields.items():
+        if isinstance(value, Mapping):
+            put(getattr(message, name), value)
+        else:
+            setattr(message, name, value)
 
 
 # -------------------------------------------------------------------------------------- trajectories

@@ -10,6 +10,7 @@ from math import inf
 from typing import Any
 
 from heptarm.bridge.driver import Driver
+from heptarm.bridge.events import with_triggers
 from heptarm.bridge.order import positions
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.values.arrays import Array
@@ -88,7 +89,10 @@ def program_of(driver: Driver, messages: Sequence[Any]) -> tuple[Motion, ...]:
     """
     if not messages:
         raise ShapeError("the program has no motions", parameter="motions")
-    return tuple(motion_of(driver, one, f"motions[{index}]") for index, one in enumerate(messages))
+    return tuple(
+        with_triggers(motion_of(driver, one, f"motions[{index}]"), one.triggers)
+        for index, one in enumerate(messages)
+    )
 
 
 def motion_of(driver: Driver, message: Any, name: str = "motion") -> Motion:
@@ -111,7 +115,7 @@ def motion_of(driver: Driver, message: Any, name: str = "motion") -> Motion:
     if kind == HOME:
         return ptp_home(**plain, **blending)
     if kind == GUIDE:
-        return _guiding(message)
+        return guiding(message)
     if kind == JOINT_SPLINE:
         return spline_joints(joint_points(driver, message.joint_names, message.position), **plain)
     if kind == PTP and len(message.position):
@@ -177,7 +181,8 @@ def _pose(driver: Driver, message: Any) -> Pose:
     return stamped_pose(message, driver.configuration.frame("base"))
 
 
-def _guiding(message: Any) -> Motion:
+def guiding(message: Any) -> Motion:
+    """Guiding by hand, of a message with the limits of it: heptarm_msgs/Motion, a goal of Guide or Teach."""
     limits = {name: list(getattr(message, name)) for name in ("q_min", "q_max") if len(getattr(message, name))}
     words = {name: getattr(message, name) for name in ("at_limit", "outside") if getattr(message, name)}
     how: dict[str, Any] = limits | words

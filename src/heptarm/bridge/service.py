@@ -7,11 +7,25 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from heptarm.bridge.driver import Answer, Driver
+from heptarm.bridge.driver import Driver
+from heptarm.bridge.messages import put
 from heptarm.errors import NotReady, Timeout
 
 #: How long a motion may take to end of itself before something that it stands in the way of [s].
 _PATIENCE = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What a service answers.
+
+    Attributes:
+        success: whether it was done.
+        message: what was done, or why not.
+    """
+
+    success: bool
+    message: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,16 +94,8 @@ def fill(response: Any, answer: Answer) -> Any:
         fields = {}
     if isinstance(answer, Told):
         fields.update(answer.fields)
-    _put(response, fields)
+    put(response, fields)
     return response
-
-
-def _put(message: Any, fields: Mapping[str, Any]) -> None:
-    for name, value in fields.items():
-        if isinstance(value, Mapping):
-            _put(getattr(message, name), value)
-        else:
-            setattr(message, name, value)
 
 
 def scalar(values: Sequence[float], default: Any) -> Any:

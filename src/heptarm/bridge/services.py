@@ -13,13 +13,14 @@ import contextlib
 import threading
 from typing import Any
 
+from heptarm.bridge.collision_services import COLLISIONS, CollisionServices
 from heptarm.bridge.conditions import condition_of
-from heptarm.bridge.driver import Answer, Driver
+from heptarm.bridge.driver import Driver
 from heptarm.bridge.fri_services import FRI, FriServices
 from heptarm.bridge.io_services import SIGNALS, Signals
 from heptarm.bridge.messages import Ros
 from heptarm.bridge.mode_services import MODES, Modes
-from heptarm.bridge.service import Service, Told, names
+from heptarm.bridge.service import Answer, Service, Told, names
 from heptarm.bridge.tool_services import TOOLS, Tools
 from heptarm.errors import HeptarmError, NotReady
 
@@ -27,7 +28,7 @@ from heptarm.errors import HeptarmError, NotReady
 _STOPS = ("path", "fast", "after_motion")
 
 
-class Services(Modes, Tools, Signals, FriServices):
+class Services(Modes, Tools, Signals, FriServices, CollisionServices):
     """What the services do with an arm.
 
     Args:
@@ -56,15 +57,16 @@ class Services(Modes, Tools, Signals, FriServices):
 
     # ------------------------------------------------------------------------------- stop and go
 
-    def stop(self, request: Any) -> Answer:
+    def stop(self, request: Any) -> str:
         """Stop whatever runs."""
-        return self._driver.stop()
+        self._driver.stop()
+        return "stopped"
 
     def stop_as(self, request: Any) -> str:
         """Stop on the path, fast, or after the motion that runs."""
         if request.value not in _STOPS:
             raise NotReady(f"there is no stop {request.value!r}", hint=f"choose from {', '.join(_STOPS)}")
-        self._arm.stop(request.value)
+        self._driver.stop(request.value)
         return f"stopped: {request.value}"
 
     def pause(self, request: Any) -> str:
@@ -79,7 +81,8 @@ class Services(Modes, Tools, Signals, FriServices):
 
     def recover(self, request: Any) -> Answer:
         """Come back after trouble as far as a program may."""
-        return self._driver.recover()
+        done = self._arm.recover()
+        return Answer(done.done, str(done))
 
     def take_control(self, request: Any) -> str:
         """Become the one who may move the arm."""
@@ -114,9 +117,10 @@ class Services(Modes, Tools, Signals, FriServices):
 
     # ------------------------------------------------------------------------------------ limits
 
-    def set_override(self, request: Any) -> Answer:
+    def set_override(self, request: Any) -> str:
         """Set the cabinet's application override."""
-        return self._driver.set_override(request.value)
+        self._arm.set_override(request.value)
+        return f"override is {request.value:g}"
 
     def set_speed(self, request: Any) -> str:
         """Set the ceiling of the speed of motions that come."""
@@ -172,4 +176,5 @@ SERVICES = (
     *TOOLS,
     *SIGNALS,
     *FRI,
+    *COLLISIONS,
 )

@@ -60,6 +60,10 @@ class Stream:
         with self._lock:
             self._guard, self._fired = value, ""
 
+    def latch(self, why: str) -> None:
+        """Follow no more until somebody sets the guard anew; it waits for nothing."""
+        self._fired = why
+
     @property
     def active(self) -> bool:
         """Whether the arm follows."""

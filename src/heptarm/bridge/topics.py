@@ -23,7 +23,7 @@ from heptarm.bridge.messages import Ros, trajectory_goal
 from heptarm.bridge.motions import stamped_pose
 from heptarm.bridge.names import PRESETS, Meaning, joint_target, pose_target
 from heptarm.bridge.order import positions, velocities, wishes
-from heptarm.errors import NotReady
+from heptarm.values.motion import lin, ptp
 from heptarm.values.pose import Pose
 
 
@@ -75,23 +75,21 @@ class Topics:
 
     def stop(self, message: Any = None) -> None:
         """Stop whatever runs."""
-        answer = self._driver.stop()
-        if not answer.success:
-            raise NotReady(answer.message)
+        self._driver.stop()
 
     # --------------------------------------------------------------------------------- motions
 
     def command_joint(self, message: Any) -> None:
         """A motion to the positions of a sensor_msgs/JointState."""
-        self._driver.move(positions(self._driver, message.name, message.position))
+        self._driver.start(ptp(positions(self._driver, message.name, message.position)))
 
     def command_pose(self, message: Any) -> None:
         """A motion to a geometry_msgs/PoseStamped."""
-        self._driver.move(self._pose(message))
+        self._driver.start(ptp(self._pose(message)))
 
     def command_lin(self, message: Any) -> None:
         """Likewise on a straight line."""
-        self._driver.move(self._pose(message), straight=True)
+        self._driver.start(lin(self._pose(message)))
 
     def joint_trajectory(self, message: Any) -> None:
         """Follow a trajectory_msgs/JointTrajectory; an empty one stops."""
@@ -102,13 +100,13 @@ class Topics:
 
     def their_joint(self, message: Any) -> None:
         """A motion to the positions of a sensor_msgs/JointState as libiiwa takes it."""
-        self._driver.move(joint_target(self._driver, message.name, message.position))
+        self._driver.start(ptp(joint_target(self._driver, message.name, message.position)))
 
     def their_pose(self, message: Any) -> None:
         """A motion to a geometry_msgs/Pose as libiiwa takes it."""
         place, turn = message.position, message.orientation
         xyz, quat = (place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)
-        self._driver.move(pose_target(self._driver, xyz, quat))
+        self._driver.start(ptp(pose_target(self._driver, xyz, quat)))
 
     # ----------------------------------------------------------------------------------- servo
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import Array, Value, array, frozen
+from heptarm.values.arrays import Array, Value, array, frozen, within
 from heptarm.values.pose import Pose
 from heptarm.values.result import Result
 
@@ -106,3 +106,49 @@ class TapCounter:
             self.count = self.count + 1 if short else 0
             self._rose, self._last = nan, time
         return self.count
+
+
+class TapWatch:
+    """Counts the taps on a resting arm, by the forces that act on it.
+
+    What acts all the time is no tap: the mean of the first forces, and whatever lasts becomes part of it.
+
+    Args:
+        force: a tap is at least so strong [N].
+        gap: the next one comes within this time [s].
+
+    Raises:
+        LimitError: a value outside its range.
+    """
+
+    #: Forces whose mean is what acts before anybody taps.
+    SAMPLES = 8
+    #: Largest force that can be waited for [N].
+    STRONGEST = 500.0
+    #: A force that lasts so long is no tap any more, but what the arm bears [s].
+    LASTING = 3.0
+
+    def __init__(self, *, force: float = 8.0, gap: float = 1.0) -> None:
+        strong = within(force, "force", 0.0, self.STRONGEST, above=True, unit="N")
+        self._taps = TapCounter(force=strong, gap=within(gap, "gap", 0.0, 60.0, above=True, unit="s"))
+        self._first: list[Array] = []
+        self._bias = np.zeros(3)
+        self._last = nan
+
+    def see(self, time: float, force: Array) -> int:
+        """Look at a force.
+
+        Args:
+            time: of the measurement [s].
+            force: what acts on the robot, in axes that rest, shape (3,) [N].
+
+        Returns:
+            Taps of the present row; 0 while the first forces come.
+        """
+        if len(self._first) < self.SAMPLES:
+            self._first.append(force)
+            self._bias, self._last = np.mean(self._first, axis=0), time
+            return 0
+        self._bias = self._bias + (force - self._bias) * min(1.0, (time - self._last) / self.LASTING)
+        self._last = time
+        return self._taps.see(time, float(np.linalg.norm(force - self._bias)))

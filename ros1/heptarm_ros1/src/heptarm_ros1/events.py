@@ -1,4 +1,4 @@
-"""What the node publishes beside the arm's state: signals, keys, the FRI session, transforms."""
+"""What the node publishes beside the arm's state: signals, keys, programs, collisions, the FRI session, transforms."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import rospy
 from geometry_msgs.msg import TransformStamped
-from heptarm_msgs.msg import FriStatus, KeyEvent, Signals
+from heptarm_msgs.msg import Collision, FriStatus, KeyEvent, MotionEvent, Signals
 from tf2_msgs.msg import TFMessage
 
+from heptarm.bridge.events import collision_message, event_message
 from heptarm.bridge.frames import Frames
+from heptarm.values import collision, event
 from heptarm.values.state import State
 from heptarm_ros1.convert import ROS
 from heptarm_ros1.publishers import publisher
@@ -27,6 +29,8 @@ class Events:
         self._signals = publisher(Signals, "~signals", latch=True)
         self._keys = publisher(KeyEvent, "~keys")
         self._fri = publisher(FriStatus, "~fri/status", latch=True)
+        self._motions = publisher(MotionEvent, "~events")
+        self._collisions = publisher(Collision, "~collisions")
         wanted = node.configuration.values["publish_tf"]
         self._tf = publisher(TFMessage, "/tf") if wanted else None
         self._frames: Frames | None = None
@@ -52,6 +56,14 @@ class Events:
         """Publish that a key was pressed or released."""
         _send(self._keys, KeyEvent(slot=slot, down=down))
 
+    def motion(self, number: int, news: event.MotionEvent) -> None:
+        """Publish what has become of a program."""
+        self._motions.publish(event_message(ROS, number, news))
+
+    def collision(self, found: collision.Collision) -> None:
+        """Publish what the collision guard has met."""
+        self._collisions.publish(collision_message(ROS, found, self._node.configuration.joints))
+
     def fri(self, status: Mapping[str, Any]) -> None:
         """Publish how the FRI session is, if there is one or it has just ended."""
         if status != self._told:
@@ -60,7 +72,7 @@ class Events:
 
     def destroy(self) -> None:
         """End them."""
-        for one in (self._signals, self._keys, self._fri, self._tf):
+        for one in (self._signals, self._keys, self._motions, self._collisions, self._fri, self._tf):
             if one is not None:
                 one.unregister()
 

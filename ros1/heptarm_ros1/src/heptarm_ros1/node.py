@@ -19,11 +19,13 @@ from heptarm.bridge.goal import End
 from heptarm.bridge.parameters import Configuration
 from heptarm.bridge.runner import Feedback
 from heptarm.errors import HeptarmError, NotReady
+from heptarm.values.collision import Collision
+from heptarm.values.event import MotionEvent
 from heptarm.values.state import State
 from heptarm_ros1 import peers, settings
+from heptarm_ros1.actions import ActionServers
 from heptarm_ros1.commands import Commands
 from heptarm_ros1.events import Events
-from heptarm_ros1.moves import MoveActions
 from heptarm_ros1.peers import Peers
 from heptarm_ros1.publishers import Publishers
 from heptarm_ros1.trajectory import TrajectoryAction
@@ -48,7 +50,7 @@ class HeptarmNode:
         self._wake = threading.Event()
         # actionlib cannot end a server, so they live as long as the node, and reject while it is not configured
         self._goals = TrajectoryAction(self, ("~follow_joint_trajectory", *peers.actions()))
-        self._moves = MoveActions(self)
+        self._actions = ActionServers()
         steps: tuple[tuple[type, str, Callable[[], str]], ...] = (
             (Trigger, "~configure", self.configure),
             (Trigger, "~activate", self.activate),
@@ -98,6 +100,7 @@ class HeptarmNode:
                 self._destroy()
                 raise
             self._inputs = Commands(self.driver)
+            self._actions.serve(self.driver)
             arm = self.driver.arm
             text = f"heptarm {_version()}, {arm.robot.title}, cabinet {arm.cabinet!r} with software {arm.software}"
             rospy.loginfo(text)
@@ -177,6 +180,7 @@ class HeptarmNode:
 
     def _destroy(self) -> None:
         driver, self.driver = self.driver, None
+        self._actions.serve(None)
         if driver is not None:
             driver.close()
         for one in (self._inputs, self._outputs, self._peers, self._events):
@@ -212,6 +216,16 @@ class HeptarmNode:
         """A user key of the smartPAD was pressed or released."""
         if self._events is not None and not rospy.is_shutdown():
             self._events.key(slot, down)
+
+    def on_event(self, number: int, event: MotionEvent) -> None:
+        """Something has become of a program."""
+        if self._events is not None and not rospy.is_shutdown():
+            self._events.motion(number, event)
+
+    def on_collision(self, found: Collision) -> None:
+        """The collision guard has met something."""
+        if self._events is not None and not rospy.is_shutdown():
+            self._events.collision(found)
 
     # -------------------------------------------------------------------------- now and then
 

@@ -1,0 +1,268 @@
+"""What a node feels and is led by, and what it tells on the way; for both ROS, see `tests.conformance.surface`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from threading import Event, Thread
+from typing import Any
+
+import numpy as np
+
+from tests.conformance.stage import Stage
+from tests.conformance.surface import HOME, TABLE, Probe, Sent, act, done, home, refused, until
+
+
+def towards(probe: Probe, z: float) -> Any:
+    """An offset along z of the base."""
+    offset = probe.make("geometry_msgs/PoseStamped")
+    offset.pose.position.z, offset.header.frame_id = z, "base"
+    return offset
+
+
+def along(probe: Probe, z: float, **more: Any) -> Any:
+    """A motion of a program by that offset."""
+    return probe.make("heptarm_msgs/Motion", kind=3, pose=towards(probe, z), **more)
+
+
+def lead(stage: Stage, sent: Sent, way: float) -> None:
+    """Push until a joint has turned so far [rad]."""
+    before = until(lambda: sent.told, "no feedback")[-1].position
+    stage.do("push 0 6 6 300")
+    until(lambda: np.abs(np.subtract(sent.told[-1].position, before)).max() > way, "the arm is not led")
+    stage.do("push 0 0 0 0")
+
+
+def case_the_arm_touches_once_and_twice(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    down: dict[str, Any] = {"direction": "-z", "frame": "base", "distance": 0.2, "force": 10.0}
+    sent = probe.send("touch", "Touch", **down, speed_mps=0.05, retreat=True, retreat_m=0.02)
+    contact = done(sent.end())
+    assert contact.contact and abs(contact.pose.pose.position.z - TABLE) < 0.01
+    assert contact.pose.header.frame_id == "link_0" and contact.force.z > 8.0
+    assert 0.05 < contact.travel < 0.15 and len(contact.position) == 7 and math.isnan(contact.spread)
+    assert sent.told and max(one.travel for one in sent.told) > 0.05
+    here = done(probe.call("get_pose", "GetPose", frame="flange")).pose
+    assert abs(here.position.z - contact.pose.pose.position.z - 0.02) < 2e-3
+    vector = probe.make("geometry_msgs/Vector3", z=-2.0)
+    goal = {
+        "vector": vector,
+        "frame": "base",
+        "distance": 0.1,
+        "force": 8.0,
+        "retreat": True,
+        "retreat_m": 0.05,
+    }
+    exact = done(act(probe, "touch", "Touch", **goal, twice=True))
+    assert abs(exact.pose.pose.position.z - TABLE) < 3e-3 and 0.0 <= exact.spread < 0.02
+    refused(act(probe, "touch", "Touch", direction="z", frame="base", distance=0.02, force=10.0, speed_mps=0.1),
+            "nothing was touched")  # fmt: skip
+    refused(act(probe, "touch", "Touch", **{**down, "direction": "up"}), "up")
+    refused(act(probe, "touch", "Touch", **{**down, "force": 0.0}), "force")
+    refused(act(probe, "touch", "Touch", **down, vector=vector), "both")
+
+
+def case_a_touch_is_cancelled_and_gives_way_to_others(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    slowly = {"direction": "-z", "frame": "base", "distance": 0.08, "force": 20.0, "speed_mps": 0.02}
+    sent = probe.send("touch", "Touch", **slowly)
+    until(lambda: sent.told and sent.told[-1].travel > 2e-3, "the arm does not set out")
+    follow = probe.tell("servo/velocity", "sensor_msgs/JointState", name=["A7"], velocity=[0.2])
+    follow()  # a servo topic waits for no place of its own
+    sent.cancel()
+    refused(sent.end(), "cancelled")
+    sent = probe.send("touch", "Touch", **slowly)
+    until(lambda: sent.told and sent.told[-1].travel > 2e-3, "the arm does not set out")
+    home(probe)
+    refused(sent.end(), "took the place")
+    sent = probe.send("touch", "Touch", **slowly)
+    until(lambda: sent.told and sent.told[-1].travel > 2e-3, "the arm does not set out")
+    done(probe.call("stop", "std_srvs/Trigger"))
+    refused(sent.end(), "stopped")
+    states = probe.listen("state", "heptarm_msgs/RobotState")
+    until(lambda: states and not states[-1].motion and not states[-1].queued, "something runs on")
+
+
+def case_triggers_write_outputs_and_tell(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    news = probe.listen("events", "heptarm_msgs/MotionEvent")
+    signals = probe.listen("signals", "heptarm_msgs/Signals", latched=True)
+    done(probe.call("set_signals", "SetSignals", names=["LEDRed", "LEDBlue"], values=[0.0, 0.0]))
+
+    def trigger(condition: str, **action: Any) -> Any:
+        return probe.make("heptarm_msgs/Trigger", condition=condition, **action)
+
+    def lit(name: str) -> bool:
+        return bool(signals) and dict(zip(signals[-1].names, signals[-1].values))[name] == 1.0
+
+    red = trigger("path.after(0.02)", signal="LEDRed", value=1.0)
+    near = trigger("path.before_end(0.01)", label="nearly there")
+    here = done(probe.call("get_pose", "GetPose", frame="flange")).pose
+    curve = [
+        probe.make(
+            "heptarm_msgs/Segment",
+            pose=probe.make(
+                "geometry_msgs/Pose",
+                position=probe.make(
+                    "geometry_msgs/Point", x=here.position.x, y=here.position.y + dy, z=here.position.z
+                ),
+                orientation=here.orientation,
+            ),
+        )
+        for dy in (0.03, 0.06)
+    ]
+    program = [
+        along(probe, 0.05, speed_mps=0.1, triggers=[red, near]),
+        along(probe, -0.05, speed_mps=0.1),
+        probe.make("heptarm_msgs/Motion", kind=4, segments=curve, speed_mps=0.1),
+    ]
+    sent = probe.send("run_program", "RunProgram", motions=program)
+    assert done(sent.end()).item == 2
+    until(lambda: lit("MediaFlange.LEDRed"), "the output is not written")
+    fed = [one for feedback in sent.told for one in feedback.events]  # the last may come behind the result
+    assert fed[0].kind == "begun" and {feedback.item for feedback in sent.told} == {0, 1, 2}
+    assert any(feedback.remaining > 0.0 for feedback in sent.told)
+    number = fed[0].motion
+    last = ("ended", 2)
+    until(lambda: any((one.motion, one.kind, one.item) == (number, *last) for one in list(news)), "no events")
+    told = [one for one in news if one.motion == number]
+    kinds = [(one.kind, one.item) for one in told]
+    assert kinds[0] == ("begun", 0) and kinds[-1] == last, kinds
+    fired = {one.signal or one.label: one for one in told if one.kind == "trigger"}
+    assert set(fired) == {"LEDRed", "nearly there"} and all(one.item == 0 for one in fired.values())
+    assert 0.0 < fired["LEDRed"].time < fired["nearly there"].time
+    assert fired["LEDRed"].code == 0 and len(fired["LEDRed"].position) == 7
+    assert [one.segment for one in told if one.kind == "segment"] == [0, 1]
+    blue = trigger("path.before_end()", signal="LEDBlue", value=1.0)
+    done(act(probe, "move_joints", "MoveJoints", position=HOME, speed=0.6, triggers=[blue]))
+    until(lambda: lit("MediaFlange.LEDBlue"), "the output is not written")
+    for wrong, words in (
+        ([trigger("", label="never")], ("triggers[0].condition", "empty")),
+        ([trigger("sometimes")], ("no condition",)),
+        ([trigger("path.after()", signal="UserButton")], ("input",)),
+        ([trigger("path.after()")] * 17, ("at most 16",)),
+    ):
+        refused(act(probe, "move_joints", "MoveJoints", position=HOME, triggers=wrong), *words)
+    guided = probe.make("heptarm_msgs/Motion", kind=8, triggers=[near])
+    refused(act(probe, "run_program", "RunProgram", motions=[guided]), "hand guiding has no triggers")
+
+
+def case_a_collision_guard_stops_motions_and_may_give_way(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    seen = probe.listen("collisions", "heptarm_msgs/Collision")
+    states = probe.listen("state", "heptarm_msgs/RobotState")
+    down: dict[str, Any] = {"path": 3, "pose": towards(probe, -0.2), "speed_mps": 0.05}
+    answer = done(probe.call("collision_guard", "SetCollisionGuard", threshold=[12.0]))
+    assert len(answer.baseline) == 7 and "the cabinet" in answer.message
+    refused(act(probe, "move_pose", "MovePose", **down), "collision at A", "12.0 Nm")
+    met = until(lambda: seen, "no collision is told")[-1]
+    assert met.joint in ("A2", "A4") and abs(met.torque) > 12.0 and met.allowed == 12.0
+    turn = probe.tell("servo/velocity", "sensor_msgs/JointState", name=["A7"], velocity=[0.2])
+    until(lambda: states and not states[-1].motion, "the arm does not rest")
+    count = len(states)
+
+    def told() -> bool:
+        turn()
+        return len(states) > count + 50
+
+    until(told, "no states")
+    assert not any(one.motion for one in states[count:]), "a servo topic is not followed after a collision"
+    done(probe.call("collision_guard", "SetCollisionGuard", disable=True))
+    home(probe)
+    answer = done(
+        probe.call(
+            "collision_guard", "SetCollisionGuard", threshold=[12.0] * 7, margin=[2.0], reaction="soft"
+        )
+    )
+    assert "this node" in answer.message
+    count = len(seen)
+    assert not act(probe, "move_pose", "MovePose", **down).success
+    until(lambda: len(seen) > count, "no collision is told")
+    until(lambda: states[-1].motion, "the arm does not give way")
+    home(probe)  # the guard is off, and the hold gives its place
+    refused(probe.call("collision_guard", "SetCollisionGuard", threshold=[-1.0]), "threshold")
+    refused(probe.call("collision_guard", "SetCollisionGuard", reaction="flee"), "flee", "brake, soft")
+
+
+def case_the_arm_is_led_by_hand(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    before = done(probe.call("get_pose", "GetPose", frame="flange")).pose.position
+    sent = probe.send("guide", "Guide", free="y", frame="base")
+    lead(stage, sent, 0.03)
+    sent.cancel()
+    assert done(sent.end()).message == "ended by its client"
+    after = done(probe.call("get_pose", "GetPose", frame="flange")).pose.position
+    assert after.y - before.y > 0.005 and abs(after.z - before.z) < 5e-3
+    limits = {"joint_velocity": 0.5, "q_max": [0.8] + [math.nan] * 6}
+    sent = probe.send("guide", "Guide", **limits)
+    until(lambda: sent.told, "no feedback")
+    stage.do("guide")
+    until(lambda: sent.told[-1].held, "the switch is not seen")
+    lead(stage, sent, 0.03)
+    stage.do("let_go")
+    result = done(sent.end())
+    assert "let go" in result.message and len(result.position) == 7
+    done(act(probe, "guide", "Guide", free="xyz", frame="base", duration=0.2))
+    assert done(act(probe, "guide", "Guide", free="xyz", frame="base", until="~(force > 50)")).stopped_by
+    refused(act(probe, "guide", "Guide", free="w"), "xyzabc")
+    refused(act(probe, "guide", "Guide", q_max=[9.0] + [math.nan] * 6), "A1")
+
+
+def case_a_way_is_taught_and_done_again(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    refused(act(probe, "replay", "Replay", name="nothing"), "nothing")
+    sent = probe.send("teach", "Teach", free="xyz", frame="base", key="done", slot=1, name="wave")
+    lead(stage, sent, 0.06)
+    stage.do("press 1 client")
+    taught = done(sent.end())
+    way = taught.trajectory
+    assert "the key 'done'" in taught.message and taught.name == "wave"
+    assert 2 <= len(way.points) < taught.recorded and list(way.joint_names) == [f"A{i}" for i in range(1, 8)]
+    again = probe.send("replay", "Replay", name="wave", by="spline", pace=0.5)
+    result = done(again.end())
+    assert result.deviation < 0.1 and math.isnan(result.lag)
+    assert max(one.progress for one in again.told) > 0.2
+    result = done(act(probe, "replay", "Replay", trajectory=way))
+    assert result.deviation < 0.3 and math.isfinite(result.lag)
+    slowly = probe.send("replay", "Replay", name="wave", pace=0.05)
+    until(lambda: slowly.told and slowly.told[-1].progress > 0.01, "it does not begin")
+    slowly.cancel()
+    refused(slowly.end(), "cancelled")
+    sent = probe.send("teach", "Teach", free="xyz", frame="base", whole=True)
+    until(lambda: sent.told and sent.told[-1].recorded > 20, "nothing is recorded")
+    sent.cancel()
+    taught = done(sent.end())
+    assert taught.name == "last" and len(taught.trajectory.points) > 20
+    refused(act(probe, "teach", "Teach", free="xyz", frame="base", duration=0.2), "nothing moves")
+    refused(act(probe, "replay", "Replay", name="wave", by="foot"), "foot")
+
+
+def case_somebody_taps_the_arm(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    sent = probe.send("wait_for_taps", "WaitForTaps", count=2, gap=10.0)
+    until(lambda: sent.told, "no feedback")
+    over = Event()
+
+    def tap() -> None:
+        while not over.wait(0.5):
+            stage.do("push 0 0 30 0.1")
+
+    hand = Thread(target=tap)
+    hand.start()
+    try:
+        assert len(done(sent.end()).position) == 7
+    finally:
+        over.set()
+        hand.join()
+    refused(act(probe, "wait_for_taps", "WaitForTaps", timeout=0.2), "not tapped 2 times")
+    sent = probe.send("wait_for_taps", "WaitForTaps")
+    until(lambda: sent.told, "no feedback")
+    sent.cancel()
+    refused(sent.end(), "cancelled")
+    refused(act(probe, "wait_for_taps", "WaitForTaps", force=9999.0), "force")
+
+
+#: All cases by name.
+CASES: dict[str, Callable[[Probe, Stage], None]] = {
+    name.removeprefix("case_"): case for name, case in list(globals().items()) if name.startswith("case_")
+}
