@@ -9,7 +9,7 @@ import logging
 import os
 import socket
 from collections.abc import Callable, Sequence
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
@@ -18,11 +18,12 @@ from heptarm.arm.connect import connect
 from heptarm.arm.groups import GROUPS
 from heptarm.arm.handle import MotionHandle
 from heptarm.bridge.collision import CollisionWatch
-from heptarm.bridge.execution import Execution, Listener
+from heptarm.bridge.execution import Execution
 from heptarm.bridge.feed import Feed
 from heptarm.bridge.fri_execution import FriExecution
 from heptarm.bridge.fri_session import FriSession
 from heptarm.bridge.goal import End, Goal, GoalRefused
+from heptarm.bridge.listener import DriverListener
 from heptarm.bridge.parameters import Configuration
 from heptarm.bridge.report import Report, report
 from heptarm.bridge.runner import Feedback
@@ -35,7 +36,6 @@ from heptarm.errors import HeptarmError, NotReady
 from heptarm.values.arrays import Array
 from heptarm.values.collision import Collision
 from heptarm.values.condition import Condition
-from heptarm.values.event import MotionEvent
 from heptarm.values.mode import Mode
 from heptarm.values.motion import Motion
 from heptarm.values.pose import Pose
@@ -45,30 +45,6 @@ _log = logging.getLogger("heptarm.bridge")
 
 #: How long a motion may take to come to rest before a goal [s].
 _REST = 5.0
-
-
-class DriverListener(Listener, Protocol):
-    """Hears of everything, from the driver's threads; it must not block."""
-
-    def on_state(self, state: State) -> None:
-        """A new state came."""
-        ...
-
-    def on_link(self, trouble: str) -> None:
-        """The connection came (empty) or went (why)."""
-        ...
-
-    def on_key(self, slot: int, down: bool) -> None:
-        """A user key of the smartPAD was pressed or released."""
-        ...
-
-    def on_event(self, number: int, event: MotionEvent) -> None:
-        """Something has become of the program of that number."""
-        ...
-
-    def on_collision(self, found: Collision) -> None:
-        """The collision guard has met something."""
-        ...
 
 
 class Driver:
