@@ -107,7 +107,7 @@ def steadily(driver: Driver, ears: Ears, attempt: Callable[[], None]) -> None:
         except AssertionError:
             if not any("FRI" in end.text for end in ears.ends):
                 raise
-        driver.move(HOME).wait()
+        driver.start(ptp(HOME)).wait()
         ears.ends.clear()
         ears.told.clear()
     raise AssertionError("no FRI session lasts")

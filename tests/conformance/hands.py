@@ -36,14 +36,18 @@ def lead(stage: Stage, sent: Sent, way: float) -> None:
 def case_the_arm_touches_once_and_twice(probe: Probe, stage: Stage) -> None:
     home(probe)
     down: dict[str, Any] = {"direction": "-z", "frame": "base", "distance": 0.2, "force": 10.0}
-    sent = probe.send("touch", "Touch", **down, speed_mps=0.05, retreat=True, retreat_m=0.02)
+    sent = probe.send("touch", "Touch", **down, speed_mps=0.08, retreat=True, retreat_m=0.02)
     contact = done(sent.end())
-    assert contact.contact and abs(contact.pose.pose.position.z - TABLE) < 0.01
+    assert contact.contact and abs(contact.pose.pose.position.z - TABLE) < 0.015
     assert contact.pose.header.frame_id == "link_0" and contact.force.z > 8.0
     assert 0.05 < contact.travel < 0.15 and len(contact.position) == 7 and math.isnan(contact.spread)
     assert sent.told and max(one.travel for one in sent.told) > 0.05
-    here = done(probe.call("get_pose", "GetPose", frame="flange")).pose
-    assert abs(here.position.z - contact.pose.pose.position.z - 0.02) < 2e-3
+
+    def height() -> float:
+        return float(done(probe.call("get_pose", "GetPose", frame="flange")).pose.position.z)
+
+    above = contact.pose.pose.position.z + 0.02
+    until(lambda: abs(height() - above) < 2e-3, "the arm does not retreat")
     vector = probe.make("geometry_msgs/Vector3", z=-2.0)
     goal = {
         "vector": vector,
@@ -53,7 +57,7 @@ def case_the_arm_touches_once_and_twice(probe: Probe, stage: Stage) -> None:
         "retreat": True,
         "retreat_m": 0.05,
     }
-    exact = done(act(probe, "touch", "Touch", **goal, twice=True))
+    exact = done(act(probe, "touch", "Touch", **goal, twice=True, slow_mps=0.01))
     assert abs(exact.pose.pose.position.z - TABLE) < 3e-3 and 0.0 <= exact.spread < 0.02
     refused(act(probe, "touch", "Touch", direction="z", frame="base", distance=0.02, force=10.0, speed_mps=0.1),
             "nothing was touched")  # fmt: skip
@@ -151,7 +155,7 @@ def case_a_collision_guard_stops_motions_and_may_give_way(probe: Probe, stage: S
     home(probe)
     seen = probe.listen("collisions", "heptarm_msgs/Collision")
     states = probe.listen("state", "heptarm_msgs/RobotState")
-    down: dict[str, Any] = {"path": 3, "pose": towards(probe, -0.2), "speed_mps": 0.05}
+    down: dict[str, Any] = {"path": 3, "pose": towards(probe, -0.2), "speed_mps": 0.1}
     answer = done(probe.call("collision_guard", "SetCollisionGuard", threshold=[12.0]))
     assert len(answer.baseline) == 7 and "the cabinet" in answer.message
     refused(act(probe, "move_pose", "MovePose", **down), "collision at A", "12.0 Nm")

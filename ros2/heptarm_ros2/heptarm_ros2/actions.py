@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from rclpy.action import ActionServer, CancelResponse
-from rclpy.task import Future
 
-from heptarm.bridge.action import Action, Ended, Work, fill
+from heptarm.bridge.action import Action, fill
 from heptarm.bridge.actions import ACTIONS, Actions
 from heptarm.bridge.goal import Outcome
 from heptarm.bridge.messages import class_of
@@ -23,7 +21,8 @@ if TYPE_CHECKING:
 class ActionServers:
     """Gives goals to the driver, and their feedback and ends back to their clients.
 
-    A goal that makes no sense is accepted and aborted at once: a rejection could not say why.
+    A goal that makes no sense is accepted and aborted at once: a rejection could not say why. A goal under way takes a
+    thread of the executor: what waits in a coroutine would keep all of them busy asking for it.
     """
 
     def __init__(self, node: HeptarmNode, driver: Driver, group: Any) -> None:
@@ -39,8 +38,8 @@ class ActionServers:
     def _server(self, row: Action, group: Any) -> ActionServer:
         kind = class_of(row.type, "action")
 
-        async def execute(handle: Any) -> Any:
-            return await self._execute(row, kind, handle)
+        def execute(handle: Any) -> Any:
+            return self._execute(row, kind, handle)
 
         return ActionServer(
             self._node,
@@ -51,19 +50,14 @@ class ActionServers:
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
 
-    async def _execute(self, row: Action, kind: Any, handle: Any) -> Any:
+    def _execute(self, row: Action, kind: Any, handle: Any) -> Any:
         try:
             work = self._actions.begin(row, handle.request)
         except HeptarmError as error:
             self._node.get_logger().warning(f"{row.name} refused: {error}")
             handle.abort()
             return kind.Result(success=False, message=str(error))
-        end: Future[Ended] = Future(executor=self._node.executor)
-        # a thread of its own, for the executor's threads are few, and a stop wants one of them
-        threading.Thread(
-            target=_carry_out, args=(work, _Client(handle, kind), end), name="heptarm-goal"
-        ).start()
-        ended: Ended = await end
+        ended = work(_Client(handle, kind))
         if ended.outcome is Outcome.SUCCEEDED:
             handle.succeed()
         elif handle.is_cancel_requested:
@@ -89,7 +83,3 @@ class _Client:
     def has_cancelled(self) -> bool:
         """Whether it does not want the goal any more."""
         return bool(self._handle.is_cancel_requested)
-
-
-def _carry_out(work: Work, client: _Client, end: Future[Ended]) -> None:
-    end.set_result(work(client))

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sys
 
+from heptarm.bridge.actions import MOST
 from heptarm_ros2.node import HeptarmNode
 from heptarm_ros2.process import run
 
-#: A goal, a cancellation, a stop and a diagnosis may come at once.
-_THREADS = 8
+#: As many goals as the bridge takes, and beside them a cancellation, a stop and a diagnosis may come at once.
+_THREADS = MOST + 8
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -10,6 +10,7 @@ A node makes a service of every row of `SERVICES`; the fields of a request are t
 from __future__ import annotations
 
 import contextlib
+import logging
 import threading
 from typing import Any
 
@@ -23,6 +24,8 @@ from heptarm.bridge.mode_services import MODES, Modes
 from heptarm.bridge.service import Answer, Service, Told, names
 from heptarm.bridge.tool_services import TOOLS, Tools
 from heptarm.errors import HeptarmError, NotReady
+
+_log = logging.getLogger("heptarm.bridge")
 
 #: Names of stops by what the service is called with.
 _STOPS = ("path", "fast", "after_motion")
@@ -53,6 +56,9 @@ class Services(Modes, Tools, Signals, FriServices, CollisionServices):
                 done = row.work(self, request)
         except HeptarmError as error:
             return Answer(False, str(error))
+        except Exception as error:  # it would end the node, and what the arm does
+            _log.exception("%s", row.name)
+            return Answer(False, f"the node failed: {error!r}")
         return done if isinstance(done, Answer) else Answer(True, done)
 
     # ------------------------------------------------------------------------------- stop and go
