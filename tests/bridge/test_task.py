@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import threading
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from heptarm.bridge.action import watch
 from heptarm.bridge.task import Task
-from heptarm.errors import MotionAborted, NoContact
+from heptarm.errors import MotionAborted, NoContact, StaleState
 
 
 class FakeArm:
@@ -58,3 +60,16 @@ def test_it_is_stopped_until_it_gives_up(deaf: int) -> None:
     assert long.done and long.why == "cancelled" and arm.stops == deaf + 1
     with pytest.raises(MotionAborted):
         long.result()
+
+
+def test_a_goal_whose_client_fails_leaves_nothing_running() -> None:
+    arm = FakeArm()
+    long = task(arm, arm.move)
+    client: Any = SimpleNamespace(has_cancelled=lambda: 1 / 0)
+
+    def stale() -> None:
+        raise StaleState("the newest state is 2 s old")  # no reason to end
+
+    with pytest.raises(ZeroDivisionError):
+        watch(long, client, stale)
+    assert long.done and long.why

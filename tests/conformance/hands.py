@@ -226,8 +226,16 @@ def case_a_way_is_taught_and_done_again(probe: Probe, stage: Stage) -> None:
     result = done(again.end())
     assert result.deviation < 0.1 and math.isnan(result.lag)
     assert max(one.progress for one in again.told) > 0.2
-    result = done(act(probe, "replay", "Replay", trajectory=way))
-    assert result.deviation < 0.3 and math.isfinite(result.lag)
+    tries: list[Any] = []
+
+    def repeated() -> bool:
+        tries.append(act(probe, "replay", "Replay", trajectory=way))
+        if not tries[-1].success:  # a busy machine may fall silent
+            refused(tries[-1], "for want of targets")
+        return bool(tries[-1].success)
+
+    until(repeated, "the way is not done again")
+    assert tries[-1].deviation < 0.3 and math.isfinite(tries[-1].lag)
     slowly = probe.send("replay", "Replay", name="wave", pace=0.05)
     until(lambda: slowly.told and slowly.told[-1].progress > 0.01, "it does not begin")
     slowly.cancel()

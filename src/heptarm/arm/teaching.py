@@ -31,7 +31,7 @@ _SETTLE = 2.0
 _THERE = 5e-3
 #: Places of a trajectory that a spline is compared with.
 _DENSE = 2001
-#: Within this time the next target has to come [s].
+#: Within this time the next target has to come, where nothing else is said [s].
 _WATCHDOG = 0.3
 
 
@@ -133,6 +133,7 @@ class Teaching:
         pace: float = 1.0,
         approach: float = 0.2,
         rate: float = 100.0,
+        watchdog: float = _WATCHDOG,
         mode: Mode | None = None,
         until: Condition | None = None,
         on_progress: Callable[[float], None] | None = None,
@@ -146,6 +147,7 @@ class Teaching:
             pace: by servo: so many times as fast; by spline: fraction of each axis' maximum, (0, 1].
             approach: speed of the motion to its start, a fraction of each axis' maximum in (0, 1].
             rate: targets per second [Hz].
+            watchdog: by servo: within this time after a target the next one has to come [s].
             mode: control mode; None: that of `using`, otherwise position.
             until: condition that ends it.
             on_progress: told how much of it is done, [0, 1], again and again once the start is reached.
@@ -170,7 +172,7 @@ class Teaching:
         tell = on_progress or _nobody
         if by == "spline":
             return self._by_spline(trajectory, pace, mode, until, tell)
-        return self._by_servo(trajectory, pace, rate, mode, until, tell)
+        return self._by_servo(trajectory, pace, rate, watchdog, mode, until, tell)
 
     def _check_speed(self, trajectory: Trajectory, pace: float) -> None:
         allowed = self._connection.robot.dq_max * self.speed
@@ -214,6 +216,7 @@ class Teaching:
         trajectory: Trajectory,
         pace: float,
         rate: float,
+        watchdog: float,
         mode: Mode | None,
         until: Condition | None,
         tell: Callable[[float], None],
@@ -222,7 +225,7 @@ class Teaching:
         seen: list[tuple[float, Array]] = []
         due = 0
         with self.servo(
-            "joint", rate=rate, watchdog=_WATCHDOG, speed=1.0, acceleration=1.0, mode=mode, until=until
+            "joint", rate=rate, watchdog=watchdog, speed=1.0, acceleration=1.0, mode=mode, until=until
         ) as sv:
             while sv.tick():
                 t = sv.t * per_second

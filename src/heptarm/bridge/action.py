@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from math import isnan
@@ -131,10 +132,15 @@ def watch(task: Task, client: Client, tell: Callable[[], None]) -> HeptarmError 
     Returns:
         What went wrong; None: nothing.
     """
-    while not task.wait(PERIOD):
-        tell()
-        if client.has_cancelled():
-            task.end("cancelled")
+    try:
+        while not task.wait(PERIOD):
+            with contextlib.suppress(HeptarmError):  # no news for a moment
+                tell()
+            if client.has_cancelled():
+                task.end("cancelled")
+    except BaseException:
+        task.end("nobody waits for it")
+        raise
     try:
         task.result()
     except HeptarmError as error:

@@ -124,6 +124,7 @@ class Leading(Doing):
             by=goal.by or "servo",
             pace=goal.pace or 1.0,
             until=self._driver.guard if until is None else until,
+            watchdog=self._driver.configuration.values["servo.watchdog"],
             on_progress=note,
             **({"approach": goal.approach} if goal.approach else {}),
         )

@@ -43,8 +43,9 @@ class Touching(Doing):
         how |= {name: getattr(goal, ours) for ours, name in names.items() if getattr(goal, ours)}
         arm = self._arm
         call = arm.touch_twice if goal.twice else arm.touch
+        start = arm.state.pose
         task = self._driver.begin("the touch", partial(call, ahead, **how))
-        return partial(self._feel, task, arm.state.pose)
+        return partial(self._feel, task, start)
 
     def _feel(self, task: Task, start: Pose, client: Client) -> Ended:
         def tell() -> None:
