@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import pytest
 
 import heptarm as ha
@@ -14,13 +12,6 @@ from tests.arm.peer import Peer
 
 HOME = ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0))
 STEPS = "release the emergency stop; close the safeguard"
-
-
-@pytest.fixture
-def peer() -> Iterator[Peer]:
-    peer = Peer()
-    yield peer
-    peer.close()
 
 
 def test_what_is_left_comes_step_by_step(peer: Peer) -> None:

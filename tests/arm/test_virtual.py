@@ -5,13 +5,9 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-import subprocess
-import sys
-import textwrap
 import threading
 import time
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 import pytest
@@ -20,6 +16,7 @@ import heptarm as ha
 from heptarm import Arm, deg, hold, lin_rel, ptp
 from heptarm.arm.private_cabinet import PrivateCabinet
 from heptarm.arm.target import Target
+from tests.arm.programs import end, script
 from tests.conftest import RunningCabinet
 
 HOME = deg(0, 30, 0, -90, 0, 60, 0)
@@ -234,49 +231,6 @@ def test_leaving_the_block_leaves_the_arm_at_rest(cabinet: RunningCabinet) -> No
         assert observer.controller == ""
 
 
-PROGRAM = """
-    import signal, sys, heptarm as ha
-    from heptarm import deg, ptp
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
-    arm = ha.connect(sys.argv[1], name="script", on_disconnect=sys.argv[2], watchdog=float(sys.argv[3]))
-    arm.move(ptp(deg(0, 30, 0, -90, 0, 60, 0)))
-    handle = arm.start(ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.2))
-    arm.wait_until(lambda s: abs(s.dq).max() > 0.1)
-    try:
-        print(arm._connection.cabinet.pid if arm._connection.cabinet else "moving", flush=True)
-        handle.wait()
-        print("arrived", flush=True)
-    except KeyboardInterrupt:
-        print("interrupted at", arm.wait_for_rest().q[0], flush=True)
-        raise
-"""
-
-
-def script(
-    tmp_path: Path, target: str, on_disconnect: str = "stop", *, watchdog: float = 10.0
-) -> tuple[subprocess.Popen[str], str]:
-    """A program of its own in the middle of a motion, and what it said."""
-    file = tmp_path / "program.py"
-    file.write_text(textwrap.dedent(PROGRAM))
-    process = subprocess.Popen(
-        [sys.executable, str(file), target, on_disconnect, str(watchdog)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    return process, line(process.stdout)
-
-
-def line(stream: IO[str] | None) -> str:
-    assert stream is not None
-    return stream.readline().strip()
-
-
-def end(process: subprocess.Popen[str]) -> tuple[str, str]:
-    out, errors = process.communicate(timeout=60.0)
-    return out, errors
-
-
 def test_ctrl_c_stops_the_arm(cabinet: RunningCabinet, tmp_path: Path) -> None:
     process, said = script(tmp_path, cabinet.target)
     assert said == "moving"
@@ -358,67 +312,3 @@ def test_the_key_opens_the_cabinet() -> None:
             ha.connect(target, timeout=30.0)
     finally:
         cabinet.close()
-
-
-# ------------------------------------------------------------------------------------- private
-
-
-def alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    return Path(f"/proc/{pid}/stat").read_text().split(") ")[1][0] != "Z"
-
-
-def gone(pid: int, seconds: float = 20.0) -> bool:
-    deadline = time.monotonic() + seconds
-    while alive(pid) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    return not alive(pid)
-
-
-def test_a_private_simulator_comes_and_goes_with_its_arm(private_target: str) -> None:
-    threads = set(threading.enumerate())
-    with ha.connect(private_target, watchdog=5.0, timeout=30.0) as arm:
-        assert arm._connection.cabinet is not None
-        pid = arm._connection.cabinet.pid
-        assert alive(pid) and arm.is_virtual and arm.robot.name == "iiwa14"
-        began = time.monotonic()
-        result = arm.move(ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.1))
-        assert result.arrived and time.monotonic() - began < 0.7 * result.duration
-        arm.wait_until(lambda _: 2.5 < arm._connection.link.offset.rate < 6.0, timeout=60.0)
-        assert -0.5 < np.median([state.age for state in arm.states(duration=0.3)]) < 0.5
-    assert gone(pid)
-    left = {thread.name for thread in set(threading.enumerate()) - threads if thread.is_alive()}
-    assert "heptarm-link" not in left
-
-
-def test_a_private_simulator_ends_with_a_killed_program(private_target: str, tmp_path: Path) -> None:
-    process, said = script(tmp_path, private_target)
-    pid = int(said)
-    assert alive(pid)
-    process.kill()
-    end(process)
-    assert gone(pid)
-
-
-def test_a_simulator_that_dies_is_a_lost_connection(private_target: str) -> None:
-    arm = ha.connect(private_target, watchdog=5.0, timeout=30.0)
-    assert arm._connection.cabinet is not None
-    handle = arm.start(ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.05))
-    os.kill(arm._connection.cabinet.pid, signal.SIGKILL)
-    with pytest.raises(ha.ConnectionLost):
-        handle.wait(timeout=20.0)
-    with pytest.raises(ha.ConnectionLost):
-        arm.move(ptp(HOME))
-    arm.close()
-
-
-def test_a_simulator_that_does_not_start_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PATH", "")
-    monkeypatch.setenv("JAVA_HOME", "/nonexistent")
-    monkeypatch.setenv("PYTHONPATH", "/nonexistent")
-    monkeypatch.setattr(sys, "executable", "/bin/false")
-    with pytest.raises(ha.ConnectFailed, match="did not start"):
-        ha.connect("sim://iiwa14")

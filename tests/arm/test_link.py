@@ -1,0 +1,146 @@
+"""The arm's link to a scripted cabinet in memory: how it is lost, kept and used by many."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+
+import pytest
+
+import heptarm as ha
+from heptarm.wire import messages as wire
+from heptarm.wire.codes import Code
+from tests.arm.peer import Peer
+
+HOME = ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0))
+
+
+def test_a_lost_connection_ends_motions_and_nothing_goes_on_by_itself(peer: Peer) -> None:
+    peer.runs(1, wire.MotionStarted(id=1, item=0))
+    arm = peer.arm()
+    handle = arm.start(HOME)
+    peer.drop()
+    with pytest.raises(ha.ConnectionLost, match="motion 1"):
+        handle.wait(timeout=20.0)
+    assert not arm.connected
+    with pytest.raises(ha.ConnectionLost):
+        arm.move(HOME)
+    time.sleep(0.3)
+    assert peer.dials == 1
+    arm.reconnect()
+    assert arm.in_control and arm.state.q is not None
+    peer.runs(2, peer.finished(2))
+    assert arm.move(HOME).arrived
+    arm.close()
+
+
+def test_stop_finds_its_way_when_the_connection_is_lost(peer: Peer) -> None:
+    arm = peer.arm()
+    peer.drop()
+    arm.stop()
+    assert peer.dials == 2 and any(isinstance(message, wire.Stop) for message in peer.seen)
+    arm.close()
+
+
+def test_an_observer_reconnects_and_its_states_go_on(peer: Peer) -> None:
+    with peer.arm(control=False) as arm:
+        states = arm.states()
+        next(states)
+        peer.refuses_dials = 2
+        peer.drop()
+        stamps = [next(states).stamp for _ in range(200)]
+        assert stamps == sorted(set(stamps))
+        assert peer.dials >= 4 and arm.connected
+        states.close()
+
+
+def test_silence_is_noticed() -> None:
+    peer = Peer(heartbeat=0.1)
+    arm = peer.arm()
+    peer.clients[0].is_mute = True
+    with pytest.raises(ha.ConnectionLost, match="nothing heard"):
+        for _ in arm.states(duration=30.0):
+            pass
+    arm.close()
+    peer.close()
+
+
+def test_heartbeats_go_both_ways() -> None:
+    peer = Peer(heartbeat=0.2)
+    with peer.arm(rate=0.0) as arm:
+        count = arm._connection.link.offset.count  # type: ignore[union-attr]
+        peer.tell(wire.Ping(sent=77))
+        deadline = time.monotonic() + 20.0
+        while arm._connection.link.offset.count < count + 5 or wire.Pong not in {type(m) for m in peer.seen}:  # type: ignore[union-attr]
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        with pytest.raises(ha.StaleState):
+            _ = arm.state
+    peer.close()
+
+
+def test_a_cabinet_that_ends_says_so(peer: Peer) -> None:
+    arm = peer.arm()
+    peer.tell(wire.Goodbye(code=Code.SHUTTING_DOWN, text="bye"))
+    with pytest.raises(ha.ConnectionLost, match="bye"):
+        for _ in arm.states(duration=30.0):
+            pass
+    arm.close()
+
+
+def test_control_that_is_lost_is_noticed(peer: Peer) -> None:
+    with peer.arm() as arm:
+        peer.tell(wire.ControlChanged(controller="", session=0, text="silent"))
+        arm.wait_until(lambda s: not arm.in_control, timeout=20.0)
+        arm.take_control()
+        assert arm.in_control
+
+
+def test_requests_from_many_threads(peer: Peer) -> None:
+    with peer.arm() as arm:
+        problems: list[BaseException] = []
+
+        def hammer() -> None:
+            try:
+                for _ in range(100):
+                    arm.stop()
+            except BaseException as error:
+                problems.append(error)
+
+        threads = [threading.Thread(target=hammer) for _ in range(6)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert not problems
+        assert sum(isinstance(message, wire.Stop) for message in peer.seen) == 600
+
+
+def test_an_answer_that_does_not_come(peer: Peer) -> None:
+    peer.expect(wire.Stop)
+    with peer.arm(timeout=0.2) as arm, pytest.raises(ha.Timeout, match="Stop"):
+        arm.stop()
+
+
+def test_a_cabinet_that_breaks_the_protocol(peer: Peer) -> None:
+    arm = peer.arm()
+    peer.clients[0].transport.send(b"GET / HTTP/1.1\r\n")
+    with pytest.raises(ha.ConnectionLost, match="frame begins"):
+        for _ in arm.states(duration=30.0):
+            pass
+    arm.close()
+
+
+def test_an_interrupted_request_leaves_a_sound_link(peer: Peer) -> None:
+    peer.expect(wire.Stop)  # the first stop is never answered, so the caller waits in receive_into
+    with peer.arm() as arm:
+        timer = threading.Timer(
+            0.1, lambda: signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+        )
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            arm.stop()
+        timer.join()
+        arm.stop()
+        assert arm.connected

@@ -1,0 +1,241 @@
+"""Motions of the arm against a scripted cabinet in memory: their ends, refusals and handles."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import threading
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm.wire import messages as wire
+from heptarm.wire.codes import Code
+from tests.arm.peer import Peer, Served
+
+HOME = ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0))
+
+
+def later(seconds: float, *messages: wire.Message):
+    """Replies that come after a while."""
+
+    def reply(client: Served, _: int) -> None:
+        def speak() -> None:
+            for message in messages:
+                client.say(message)
+
+        timer = threading.Timer(seconds, speak)
+        client.peer.threads.append(timer)
+        timer.start()
+
+    return reply
+
+
+def test_a_move_returns_its_result(peer: Peer) -> None:
+    peer.runs(5, wire.MotionStarted(id=5, item=0), peer.finished(5))
+    with peer.arm() as arm:
+        result = arm.move(HOME)
+    assert result.arrived and result.residual == 1e-5 and result.duration == 1.5
+    assert result.state is not None and result.state.q == pytest.approx(peer.q)
+
+
+def test_events_may_come_before_the_answer(peer: Peer) -> None:
+    peer.expect(wire.Run, wire.MotionStarted(id=9, item=0), peer.finished(9), wire.Accepted(id=9))
+    with peer.arm() as arm:
+        assert arm.move(HOME, timeout=20.0).arrived
+
+
+def test_events_of_other_clients_motions_change_nothing(peer: Peer) -> None:
+    peer.runs(6, later(0.05, peer.finished(6)))
+    with peer.arm() as arm:
+        handle = arm.start(HOME)
+        peer.tell(peer.finished(5, wire.Cause.STOPPED))
+        assert handle.wait(timeout=20.0).arrived
+
+
+def test_a_batch_is_one_program(peer: Peer) -> None:
+    sent: list[wire.Run] = []
+    peer.runs(1, wire.ItemReached(id=1, item=0), peer.finished(1, item=1), check=sent.append)
+    with peer.arm() as arm:
+        assert arm.move([HOME, ha.lin_rel(z=0.1)]).item == 1
+    (run,) = sent
+    assert [type(item.motion).__name__ for item in run.items] == ["Ptp", "LinRel"]
+
+
+def test_the_ceiling_only_slows_down(peer: Peer) -> None:
+    sent: list[wire.Run] = []
+    for number in range(1, 4):
+        peer.runs(number, peer.finished(number), check=sent.append)
+    with peer.arm() as arm:
+        arm.speed = 0.5
+        arm.move(HOME)
+        arm.move(HOME, speed=0.9)
+        arm.move(ha.ptp(np.zeros(7), speed=0.1), speed=0.3)
+        for wrong in (0.0, 1.5, float("nan")):
+            with pytest.raises(ha.LimitError):
+                arm.speed = wrong
+    assert [run.items[0].motion.dynamics.velocity[0] for run in sent] == [0.5, 0.5, 0.1]  # type: ignore[union-attr]
+
+
+def test_a_target_outside_the_robot_is_refused_before_it_is_sent(peer: Peer) -> None:
+    with peer.arm() as arm:
+        with pytest.raises(ha.LimitError, match="A2") as error:
+            arm.move(ha.ptp([0, 2.05, 0, 0, 0, 0, 0]))
+        assert error.value.parameter == "q[1]" and error.value.value == 2.05 and error.value.hint
+        with pytest.raises(ha.LimitError, match=r"motions\[1\]"):
+            arm.start([HOME, ha.ptp([0, 2.05, 0, 0, 0, 0, 0])])
+        for wrong in ("up", [], [1.0] * 7, None):
+            with pytest.raises(ha.ShapeError):
+                arm.move(wrong)  # type: ignore[arg-type]
+        with pytest.raises(ha.ShapeError, match="when"):
+            arm.start(HOME, when="later")  # type: ignore[arg-type]
+        with pytest.raises(ha.ShapeError, match="cancelled"):
+            arm.move(ha.hold())
+
+
+@pytest.mark.parametrize(
+    ("code", "kind"),
+    [
+        (Code.UNREACHABLE, ha.LimitError),
+        (Code.BUSY, ha.ModeConflict),
+        (Code.NOT_IN_CONTROL, ha.NotInControl),
+        (Code.NOT_READY, ha.NotReady),
+        (Code.NEEDS_OPERATOR, ha.NeedsOperator),
+        (999, ha.CommandRejected),
+    ],
+)
+def test_a_rejection_becomes_the_error_of_its_code(
+    peer: Peer, code: int, kind: type[ha.HeptarmError]
+) -> None:
+    peer.expect(
+        wire.Run, wire.Rejected(code=code, parameter="items[0]", value="7", allowed="[0, 1]", text="no")
+    )
+    with peer.arm() as arm, pytest.raises(kind) as error:
+        arm.move(HOME)
+    assert type(error.value) is kind
+    assert (error.value.code, error.value.parameter, error.value.allowed) == (code, "items[0]", "[0, 1]")
+    assert "[0, 1]" in str(error.value)
+
+
+def test_a_stopped_move_carries_its_evidence(peer: Peer) -> None:
+    peer.runs(
+        1,
+        wire.MotionStarted(id=1, item=0),
+        later(0.5, peer.finished(1, wire.Cause.STOPPED, text="red button")),
+    )
+    with peer.arm() as arm, pytest.raises(ha.MotionAborted, match="red button") as error:
+        arm.move(HOME)
+    assert error.value.cause is ha.Cause.STOPPED
+    assert error.value.state is not None and 10 <= len(error.value.history) <= 50
+    assert error.value.history[-1].stamp > error.value.history[0].stamp
+
+
+def test_a_motion_that_cannot_be_planned_is_a_rejection(peer: Peer) -> None:
+    failed = peer.finished(1, wire.Cause.FAILED, code=Code.UNREACHABLE, residual=float("nan"), text="too far")
+    peer.runs(1, failed)
+    with peer.arm() as arm, pytest.raises(ha.LimitError, match="too far"):
+        arm.move(HOME)
+
+
+@pytest.mark.parametrize(
+    ("cause", "kind"),
+    [
+        (wire.Cause.LOST, ha.ConnectionLost),
+        (wire.Cause.STARVED, ha.Starved),
+        (wire.Cause.SAFETY, ha.MotionAborted),
+        (wire.Cause.DROPPED, ha.MotionAborted),
+    ],
+)
+def test_bad_ends_are_errors(peer: Peer, cause: wire.Cause, kind: type[Exception]) -> None:
+    peer.runs(1, peer.finished(1, cause))
+    with peer.arm() as arm:
+        handle = arm.start(HOME)
+        with pytest.raises(kind):
+            handle.wait(timeout=20.0)
+        assert handle.done and handle.result is None
+
+
+def test_cancelling_is_a_result(peer: Peer) -> None:
+    peer.runs(3, wire.MotionStarted(id=3, item=0))
+    peer.expect(
+        wire.Cancel, wire.Accepted(id=0), peer.finished(3, wire.Cause.CANCELLED), check=lambda m: m.id == 3
+    )
+    peer.motion = 3
+    with peer.arm() as arm:
+        handle = arm.start(HOME)
+        arm.wait_until(lambda s: handle.started)
+        assert not handle.done and handle.progress == 0.5 and handle.id == 3
+        handle.cancel()
+        assert handle.wait(timeout=20.0).cause is ha.Cause.CANCELLED
+        handle.cancel()
+        peer.motion = 0
+
+
+def test_a_move_that_takes_too_long_is_cancelled(peer: Peer) -> None:
+    peer.runs(3)
+    peer.expect(wire.Cancel, wire.Accepted(id=0), peer.finished(3, wire.Cause.CANCELLED))
+    with peer.arm() as arm, pytest.raises(ha.Timeout, match="motion 3"):
+        arm.move(HOME, timeout=0.05)
+
+
+def test_stop_from_another_thread_ends_a_blocking_move(peer: Peer) -> None:
+    arms: list[ha.Arm] = []
+
+    def stop() -> None:
+        arms[0].stop()
+
+    timer = threading.Timer(0.05, stop)
+    peer.runs(1, wire.MotionStarted(id=1, item=0), lambda *_: timer.start())
+    peer.expect(wire.Stop, wire.Accepted(id=0), peer.finished(1, wire.Cause.STOPPED))
+    with peer.arm() as arm:
+        arms.append(arm)
+        with pytest.raises(ha.MotionAborted):
+            arm.move(HOME, timeout=20.0)
+        timer.join()
+        arm.stop()
+        arm.stop(kind="fast")
+        with pytest.raises(ha.ShapeError):
+            arm.stop(kind="now")  # type: ignore[arg-type]
+
+
+def test_handles_can_be_awaited(peer: Peer) -> None:
+    peer.runs(1, later(0.05, peer.finished(1)))
+
+    async def program(arm: ha.Arm) -> ha.Result:
+        return await arm.start(HOME)
+
+    with peer.arm() as arm:
+        assert asyncio.run(program(arm)).arrived
+
+
+def test_a_callback_hears_of_the_end(peer: Peer) -> None:
+    heard = threading.Event()
+    peer.runs(1, peer.finished(1))
+    with peer.arm() as arm:
+        arm.start(HOME).add_done_callback(lambda handle: heard.set() if handle.done else None)
+        assert heard.wait(20.0)
+
+
+def test_a_callback_may_talk_to_the_cabinet(peer: Peer) -> None:
+    done = threading.Event()
+    peer.runs(1, later(0.05, peer.finished(1)))
+    with peer.arm() as arm:
+
+        def stop(_: ha.MotionHandle) -> None:
+            arm.stop()
+            done.set()
+
+        arm.start(HOME).add_done_callback(stop)
+        assert done.wait(20.0)
+        assert arm.connected
+
+
+def test_ctrl_c_stops_the_arm_and_goes_on(peer: Peer) -> None:
+    timer = threading.Timer(0.05, lambda: signal.pthread_kill(threading.main_thread().ident, signal.SIGINT))
+    peer.runs(1, wire.MotionStarted(id=1, item=0), lambda *_: timer.start())
+    peer.expect(wire.Stop, wire.Accepted(id=0), peer.finished(1, wire.Cause.STOPPED))
+    with peer.arm() as arm:
+        with pytest.raises(KeyboardInterrupt):
+            arm.move(HOME, timeout=20.0)
+        timer.join()
