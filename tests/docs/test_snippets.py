@@ -57,15 +57,18 @@ def test_snippets_run(page: Path, tmp_path: Path) -> None:
             # Named after its place in the page, so that a traceback leads there.
             files.append(tmp_path / f"{page.stem}-line-{line}.py")
             files[-1].write_text(source, encoding="utf-8")
-    done = subprocess.run(
-        [sys.executable, "-W", "error::SyntaxWarning", "-c", RUNNER, *map(str, files)],
-        cwd=tmp_path,
-        env=os.environ | {"HEPTARM_TARGET": "sim://iiwa14"},
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-    )
+    for left in (2, 1, 0):
+        done = subprocess.run(
+            [sys.executable, "-W", "error::SyntaxWarning", "-c", RUNNER, *map(str, files)],
+            cwd=tmp_path,
+            env=os.environ | {"HEPTARM_TARGET": "sim://iiwa14"},
+            capture_output=True,
+            text=True,
+            timeout=240,
+            check=False,
+        )
+        if not left or "this machine answers late" not in done.stderr:
+            break  # else it was too busy for FRI; the page's program is told so
     assert done.returncode == 0, f"{_id(page)}:\n{done.stdout}\n{done.stderr}"
 
 

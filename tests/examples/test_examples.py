@@ -15,13 +15,16 @@ EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
 def test_example(example: Path, cabinet) -> None:
     environment = os.environ | {"HEPTARM_TARGET": cabinet.target}
-    done = subprocess.run(
-        [sys.executable, str(example)],
-        capture_output=True,
-        text=True,
-        timeout=240,
-        env=environment,
-        check=False,
-    )
+    for left in (2, 1, 0):
+        done = subprocess.run(
+            [sys.executable, str(example)],
+            capture_output=True,
+            text=True,
+            timeout=140,
+            env=environment,
+            check=False,
+        )
+        if not left or "this machine answers late" not in done.stderr:
+            break  # else it was too busy for FRI; the example is told so
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() and "Traceback" not in done.stderr
