@@ -172,12 +172,6 @@ class Connection:
             self.closed.set()
             return was_open
 
-    def tell_collision(self, found: Collision) -> None:
-        """The guard has met something."""
-        told = self.on_collision
-        if told is not None:
-            told(found)
-
     def check_open(self) -> None:
         """Raise ConnectionLost if the arm was closed."""
         if self.closed.is_set():

@@ -312,7 +312,9 @@ class MotionHandle:
             result = replace(result, stopped_by=self._until[message.fired], fired_at=self._fired)
             if self._guard is not None and result.stopped_by in self._guard.parts:
                 found = self._guard.named(result.stopped_by, result.fired_at or result.state)
-                self._connection.tell_collision(found)
+                told = self._connection.on_collision
+                if told is not None:
+                    told(found)
                 self._end(collided(found, result, self._connection.history()))
                 return
         if result.cause is Cause.FINISHED and self.is_stiff and result.residual > ARRIVAL:

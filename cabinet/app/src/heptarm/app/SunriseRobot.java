@@ -14,20 +14,12 @@ import com.kuka.roboticsAPI.controllerModel.sunrise.ResumeMode;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseExecutionService;
 import com.kuka.roboticsAPI.deviceModel.Device;
 import com.kuka.roboticsAPI.deviceModel.LBR;
-import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
-import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
-import com.kuka.roboticsAPI.geometricModel.Frame;
-import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
-import com.kuka.roboticsAPI.geometricModel.math.Transformation;
-import com.kuka.roboticsAPI.geometricModel.math.Vector;
-import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
 import com.kuka.roboticsAPI.motionModel.ErrorHandlingAction;
 import com.kuka.roboticsAPI.motionModel.IErrorHandler;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.PositionHold;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
-import com.kuka.roboticsAPI.sensorModel.ForceSensorData;
 
 import heptarm.core.Fri;
 import heptarm.core.Insight;
@@ -45,7 +37,6 @@ import heptarm.wire.HandGuide;
 import heptarm.wire.Item;
 import heptarm.wire.Mode;
 import heptarm.wire.PoseState;
-import heptarm.wire.Redundancy;
 import heptarm.wire.RobotInfo;
 import heptarm.wire.SafetyState;
 import heptarm.wire.ServoOpen;
@@ -64,6 +55,7 @@ final class SunriseRobot implements Robot, IErrorHandler {
     private final Motions motions;
     private final RobotInfo info;
     private final Insight insight;
+    private final Readings readings;
     private CabinetPanel panel = new CabinetPanel(null, null);
     private final SunriseSafety safety;
     private final Map<IMotionContainer, SunriseJob> jobs = new IdentityHashMap<IMotionContainer, SunriseJob>();
@@ -80,6 +72,7 @@ final class SunriseRobot implements Robot, IErrorHandler {
                 lbr.getJointLimits().getMaxJointPosition().get());
         Iterator<Insight> found = ServiceLoader.load(Insight.class, Insight.class.getClassLoader()).iterator();
         this.insight = found.hasNext() ? found.next() : null;
+        this.readings = new Readings(lbr, tools, insight);
         this.safety = new SunriseSafety(lbr, execution, insight);
         control.registerMoveAsyncErrorHandler(this);
     }
@@ -155,53 +148,27 @@ final class SunriseRobot implements Robot, IErrorHandler {
     }
 
     public void readJoints(double[] q, double[] commanded) {
-        System.arraycopy(lbr.getCurrentJointPosition().getInternalArray(), 0, q, 0, q.length);
-        System.arraycopy(lbr.getCommandedJointPosition().getInternalArray(), 0, commanded, 0, q.length);
+        readings.joints(q, commanded);
     }
 
     public void readTorques(double[] measured, double[] external, double[] commanded) {
-        System.arraycopy(lbr.getMeasuredTorque().getTorqueValues(), 0, measured, 0, measured.length);
-        System.arraycopy(lbr.getExternalTorque().getTorqueValues(), 0, external, 0, external.length);
-        if (insight != null) {
-            insight.readTorques(commanded);
-        } else {
-            java.util.Arrays.fill(commanded, Double.NaN);
-        }
+        readings.torques(measured, external, commanded);
     }
 
     public PoseState readPose(long stamp) {
-        // relative to the robot's own base: the world's axes are others when it hangs from a wall
-        ObjectFrame moved = tools.moved();
-        Frame measured = lbr.getCurrentCartesianPosition(moved, lbr.getRootFrame());
-        Frame commanded = lbr.getCommandedCartesianPosition(moved, lbr.getRootFrame());
-        IRedundancyCollection collection = measured.getRedundancyInformationForDevice(lbr);
-        Redundancy redundancy = new Redundancy(Double.NaN, -1, -1);
-        if (collection instanceof LBRE1Redundancy) {
-            LBRE1Redundancy e1 = (LBRE1Redundancy) collection;
-            redundancy = new Redundancy(e1.getE1(), e1.getStatus(), e1.getTurn());
-        }
-        Transformation pose = measured.getTransformationFromParent();
-        Transformation wanted = commanded.getTransformationFromParent();
-        return new PoseState(stamp, Convert.xyz(pose), Convert.quaternion(pose), Convert.xyz(wanted), Convert.quaternion(wanted),
-                redundancy);
+        return readings.pose(stamp);
     }
 
     public WrenchState readWrench(long stamp) {
-        ForceSensorData data = lbr.getExternalForceTorque(tools.moved(), lbr.getRootFrame());
-        return new WrenchState(stamp, array(data.getForce()), array(data.getTorque()), array(data.getForceInaccuracy()),
-                array(data.getTorqueInaccuracy()));
+        return readings.wrench(stamp);
     }
 
     public WrenchState readWrench(String axes, long stamp) {
-        AbstractFrame turned;
-        try {
-            turned = tools.reference(axes);
-        } catch (Refusal e) {
-            throw new IllegalArgumentException(e.getMessage());
-        }
-        ForceSensorData data = lbr.getExternalForceTorque(tools.moved(), turned == null ? tools.moved() : turned);
-        return new WrenchState(stamp, array(data.getForce()), array(data.getTorque()), array(data.getForceInaccuracy()),
-                array(data.getTorqueInaccuracy()));
+        return readings.wrench(axes, stamp);
+    }
+
+    public void readProgress(double[] progressAndRemaining) {
+        readings.progress(progressAndRemaining);
     }
 
     public void readSignals(double[] values, int from, int count) {
@@ -228,18 +195,8 @@ final class SunriseRobot implements Robot, IErrorHandler {
         return BreakConditions.can(condition);
     }
 
-    private static double[] array(Vector v) {
-        return new double[] {v.getX(), v.getY(), v.getZ()};
-    }
-
     public SafetyState readSafety(long stamp) {
         return safety.read(stamp);
-    }
-
-    public void readProgress(double[] progressAndRemaining) {
-        if (insight != null) {
-            insight.readProgress(progressAndRemaining);
-        }
     }
 
     public void check(Item item, String path) throws Refusal {
