@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,10 +24,20 @@ FAST = "sim://iiwa14?speed=2"
 POINT = (0.55, 0.1, 0.4)
 
 
+def tried(arm: ha.Arm, *arguments: Any, **named: Any) -> Report:
+    """A deployment that begins anew if the guard, or the cabinet, found this machine too busy."""
+    for _ in range(3):
+        try:
+            return deploy(arm, *arguments, **named)
+        except (ha.StaleState, ha.Starved):
+            arm.wait_for_rest()
+    return deploy(arm, *arguments, **named)
+
+
 @pytest.fixture(scope="module")
 def reached() -> Report:
     with ha.connect(FAST, watchdog=5.0) as arm:
-        return deploy(arm, shipped(feature=True), [POINT, (0.65, -0.15, 0.3)], settings=Settings(homing=0.6))
+        return tried(arm, shipped(feature=True), [POINT, (0.65, -0.15, 0.3)], settings=Settings(homing=0.6))
 
 
 def test_the_shipped_policy_reaches_its_targets(reached: Report) -> None:
@@ -38,14 +49,14 @@ def test_the_shipped_policy_reaches_its_targets(reached: Report) -> None:
 def test_the_one_with_the_feature_does_so_softly_and_late() -> None:
     with ha.connect(FAST, watchdog=5.0) as arm:
         settings = Settings(mode=JointImpedance(300.0), latency=0.06, homing=0.6)
-        report = deploy(arm, shipped(feature=True), [POINT], settings=settings)
+        report = tried(arm, shipped(feature=True), [POINT], settings=settings)
     assert report.success_rate == 1.0 and report.mean < 0.012
 
 
 def test_a_moving_target_is_followed() -> None:
     with ha.connect(FAST, watchdog=5.0) as arm:
         moving = circle((0.6, 0.0, 0.4), 0.1, period=8.0)
-        report = deploy(arm, shipped(feature=True), [moving])
+        report = tried(arm, shipped(feature=True), [moving])
     assert report.distances[0, 60:].max() < 0.08
     assert np.linalg.norm(report.targets[0] - moving(99 / 30)) < 1e-9
 
@@ -85,7 +96,7 @@ class Wild:
 def test_a_wild_policy_stays_in_the_box_and_within_the_limits() -> None:
     guard = Guard(low=(0.3, -0.3, 0.3), high=(0.7, 0.3, 0.8))
     with ha.connect(FAST, watchdog=5.0) as arm:
-        report = deploy(arm, Wild(), [POINT, POINT], settings=Settings(guard=guard, homing=0.6))
+        report = tried(arm, Wild(), [POINT, POINT], settings=Settings(guard=guard, homing=0.6))
         arm.wait_for_rest()
     assert (report.paths > np.array(guard.low) - 0.03).all()
     assert (report.paths < np.array(guard.high) + 0.03).all()
