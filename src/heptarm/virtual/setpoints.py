@@ -67,8 +67,9 @@ class SetPoints:
         self.before, self.now, self.after = here.copy(), here.copy(), here.copy()
 
     def go_on(self, here: Array, speed: Array) -> None:
-        """Be at a position, having come there at a speed [rad/s]."""
-        self.before, self.now, self.after = here - speed * TICK, here.copy(), here.copy()
+        """Be at a position, having come there at a speed [rad/s]; called after a shift."""
+        self.before = here - speed * TICK
+        self.now = self.after = here.copy()
 
     def leap(self, there: Array) -> int | None:
         """The fastest axis of those that could not follow to a next set-point, from 0; None: all could."""

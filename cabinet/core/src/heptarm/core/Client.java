@@ -103,21 +103,16 @@ final class Client {
         return heard;
     }
 
-    /**
-     * For how long the client has said nothing [ns]. On a machine that was held up its words may wait unread, or just be
-     * read: so silence is what two looks in succession found. For the watchdog alone.
-     */
+    /** For how long it has said nothing [ns], as two looks found: a machine held up may not have read its words yet. */
     long silence() {
-        boolean waits;
+        boolean waits = false;
         try {
             waits = in.available() > 0;
-        } catch (IOException e) {
-            waits = false; // the reader finds out why
+        } catch (IOException e) { // the reader finds out why
         }
-        long silence = waits ? 0 : server.clock.nanos() - heard;
-        long found = Math.min(silence, silenceBefore);
-        silenceBefore = silence;
-        return found;
+        long before = silenceBefore;
+        silenceBefore = waits ? 0 : server.clock.nanos() - heard;
+        return Math.min(silenceBefore, before);
     }
 
     /** Cabinet time of the last frame to the client. */
