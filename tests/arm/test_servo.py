@@ -49,9 +49,10 @@ def test_a_target_is_reached_and_passed_with_a_velocity(arm: ha.Arm) -> None:
         while sv.tick() and sv.t < 20.0 and np.abs(arm.state.q - goal).max() > TOUCH:
             sv.set(goal)
         assert np.abs(arm.state.q - goal).max() < TOUCH
-        while sv.tick() and sv.t < 20.0 and arm.state.q[6] < goal[6] + 2 * TOUCH:
-            sv.set(goal, 0.05 * A7)
-        assert arm.state.q[6] > goal[6] + 2 * TOUCH
+        began = sv.t
+        while sv.tick() and sv.t < 20.0 and arm.state.q[6] < goal[6] + 5 * TOUCH:
+            sv.set(goal + 0.05 * (sv.t - began) * A7, 0.05 * A7)
+        assert arm.state.q[6] >= goal[6] + 5 * TOUCH and arm.state.dq[6] > 0.02
     assert sv.stats.refused == 0
 
 
