@@ -25,7 +25,7 @@ from heptarm.fri.version import Version
 from heptarm.virtual import processdata, templates
 from heptarm.virtual.fri.sessions import Sessions
 from heptarm.virtual.operator import Operator, timed
-from heptarm.virtual.pacer import ROOM, Pacer
+from heptarm.virtual.pacer import ROOM, Pacer, courteous
 from heptarm.virtual.payload import hanging
 from heptarm.virtual.plant import Plant
 from heptarm.virtual.world import Box
@@ -286,7 +286,8 @@ def main(argv: list[str] | None = None) -> int:
     except (ValueError, OSError) as error:
         print(json.dumps({"ready": False, "error": str(error)}), flush=True)
         return 2
-    cabinet = VirtualCabinet(options, data)
+    with courteous():
+        cabinet = VirtualCabinet(options, data)
     stopping = threading.Event()
     failed: list[str] = []
 
@@ -301,7 +302,8 @@ def main(argv: list[str] | None = None) -> int:
     if options.parent_pipe:
         threading.Thread(target=_when_orphaned, args=(cabinet.operator, end), daemon=True).start()
     announcer = threading.Thread(target=_announce, args=(cabinet, stopping, failed), daemon=True)
-    cabinet.start()
+    with courteous():
+        cabinet.start()
     announcer.start()
     cabinet.pacer.run()
     stopping.set()

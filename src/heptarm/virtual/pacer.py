@@ -10,12 +10,13 @@ locked: that would make all that the JVM has only reserved real.
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import gc
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -67,6 +68,20 @@ def ask_for_real_time() -> list[str]:
     except (OSError, AttributeError) as error:
         refused.append(f"timer slack not set ({error})")
     return refused
+
+
+@contextlib.contextmanager
+def courteous() -> Iterator[None]:
+    """Threads begun within take no processor from whoever wakes them: a real cabinet is another machine."""
+    batch, other = (getattr(os, name, None) for name in ("SCHED_BATCH", "SCHED_OTHER"))
+    if batch is None or other is None:  # this system knows no such threads
+        yield
+        return
+    os.sched_setscheduler(0, batch, os.sched_param(0))
+    try:
+        yield
+    finally:
+        os.sched_setscheduler(0, other, os.sched_param(0))
 
 
 class Pacer:
@@ -135,7 +150,7 @@ class Pacer:
                     time.sleep((start - now - spin) * 1e-9)
                 while (now := now_ns()) < start:
                     pass
-                if now - start > room > 0 and not is_second:  # the machine stood still: leave the room once more
+                if now - start > room > 0 and not is_second:  # the machine stood still: leave room once more
                     end, is_second = now, True
                     continue
             begin, is_second = now_ns(), False
