@@ -110,10 +110,9 @@ class Tracking:
         messages: in which commands were effective.
         lost: messages that the client never had or did not answer.
         late: messages that it answered more than a period late.
-        error: largest distance between plant and law at the same time, but for what came when the machine stood still
-            [rad].
-        whole: the same with nothing left out [rad].
-        beyond: messages at which it was more than a milliradian, with nothing left out.
+        error: largest distance between plant and law at the same time [rad].
+        calm: the same but for what came when the machine stood still [rad].
+        beyond: messages at which it was more than a milliradian.
         moments: when it came to be more than that [s].
         stalls: how often a bare real-time thread missed a period meanwhile.
         longest: for how long at most [s].
@@ -127,7 +126,7 @@ class Tracking:
     lost: int
     late: int
     error: float
-    whole: float
+    calm: float
     beyond: int
     moments: list[float]
     stalls: int
@@ -203,8 +202,8 @@ def track(arm: ha.Arm, seconds: float, *, period_ms: int = 1) -> Tracking:
         len(t),
         tape.lost,
         tape.late,
-        float(errors[0][calm].max()),
         float(errors[0].max()),
+        float(errors[0][calm].max()),
         int(beyond.sum()),
         t[1:][beyond[1:] & ~beyond[:-1]].round(2).tolist(),
         len(missed),
@@ -299,7 +298,7 @@ def fri_hold() -> Iterator[Figure]:
         detail={
             "beyond": sine.beyond,
             "moments_s": sine.moments,
-            "whole_mrad": sine.whole * 1e3,
+            "calm_mrad": sine.calm * 1e3,
             "stalls": sine.stalls,
             "longest_stall_ms": sine.longest * 1e3,
             "left_out": sine.left_out,

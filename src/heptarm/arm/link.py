@@ -241,11 +241,7 @@ class Link:
             if self._error is not None:
                 raise self._lost()
             data = self._session.send_numbers(kind, numbers, time=self.offset.to_cabinet(now))
-            try:
-                self._transport.send(data)
-            except BaseException as error:
-                self._spoil(error)
-                raise
+            self._transmit(data)
 
     def ping(self) -> None:
         """Probe the cabinet's clock; the answer goes into `offset`."""
@@ -260,17 +256,19 @@ class Link:
                 request = self._session.next_request()
                 self._slots[request] = slot
             data = self._session.send(message, request=request, time=self._clock.nanos())
-            try:
-                self._transport.send(data)
-            except BaseException as error:
-                self._spoil(error)
-                raise
+            self._transmit(data)
 
-    def _spoil(self, error: BaseException) -> None:
-        """A part of a frame may have left: nothing can follow it."""
-        if not isinstance(error, HeptarmError):
-            error = ConnectionLost("interrupted while sending")
-        self._lose(error)
+    def _transmit(self, data: bytes) -> None:
+        """Send octets; the caller holds the lock."""
+        try:
+            self._transport.send(data)
+        except HeptarmError as error:
+            self._lose(error)
+            raise
+        except BaseException:
+            # a part of the frame may have left: nothing can follow it
+            self._lose(ConnectionLost("interrupted while sending"))
+            raise
 
     # ------------------------------------------------------------------------------------ reading
 

@@ -22,6 +22,8 @@ final class Client {
     private static final int MAX_STATES = 64;
     private static final long LINGER_MS = 500;
     private static final int SEQ = 10;
+    /** What waits unread excuses no more silence than this [client's ns]: a reader that is stuck must not hide a dead client. */
+    private static final double UNREAD_NS = 1e9;
 
     final int session;
     private final Server server;
@@ -105,13 +107,13 @@ final class Client {
 
     /** For how long it has said nothing [ns], as two looks found: a machine held up may not have read its words yet. */
     long silence() {
-        boolean waits = false;
+        double excused = 0.0;
         try {
-            waits = in.available() > 0;
+            excused = in.available() > 0 ? UNREAD_NS * server.clock.rate() : 0.0;
         } catch (IOException e) { // the reader finds out why
         }
         long before = silenceBefore;
-        silenceBefore = waits ? 0 : server.clock.nanos() - heard;
+        silenceBefore = server.clock.nanos() - heard - (long) excused;
         return Math.min(silenceBefore, before);
     }
 
