@@ -98,6 +98,7 @@ def _forget(request: pytest.FixtureRequest) -> Iterator[None]:
     """What a test has subscribed to ends with it."""
     ros: Ros | None = request.getfixturevalue("ros") if "ros" in request.fixturenames else None
     before = 0 if ros is None else ros.collected
+    assert ros is None or ros.serves, "the node of the tests is served no more: an earlier error ended it"
     yield
     if ros is not None:
         ros.forget(before)

@@ -124,6 +124,7 @@ class Ros:
         rclpy.init(context=self.context)
         self.node = rclpy.create_node(name, context=self.context)
         self._clients: dict[str, Any] = {}
+        self._actions: dict[str, ActionClient[Any, Any, Any]] = {}
         self._collected: list[Any] = []
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
@@ -131,10 +132,28 @@ class Ros:
         self._thread = threading.Thread(target=self._executor.spin_until_future_complete, args=(self._over,))
         self._thread.start()
 
+    @property
+    def serves(self) -> bool:
+        """Whether the thread still serves the node; an error of a callback ends it."""
+        return self._thread.is_alive()
+
     def wait(self, future: Any, why: str, timeout: float = PATIENCE) -> Any:
         """What a future brings."""
-        until(future.done, why, timeout)
+        until(lambda: future.done() or not self.serves, why, timeout)
+        assert future.done(), f"{why}: the node of the tests is served no more"
         return future.result()
+
+    def act(self, kind: type, name: str) -> ActionClient[Any, Any, Any]:
+        """A client of an action that is there.
+
+        rclpy shows a client to the executor before it is whole, so the executor's thread has to make it.
+        """
+        if name not in self._actions:
+            made = self._executor.create_task(ActionClient, self.node, kind, name)
+            self._actions[name] = self.wait(made, f"no client of {name} can be made")
+        client = self._actions[name]
+        until(client.server_is_ready, f"there is no action {name}")
+        return client
 
     def find(self, kind: type, name: str) -> Any:
         """A client of a service that is there."""
@@ -268,7 +287,6 @@ class Client:
         self.joints = tuple(f"{prefix}A{i}" for i in range(1, 8))
         self.states = ros.collect(JointState, f"{name.rpartition('/')[0]}/joint_states")
         self.status = ros.collect(Status, f"{name}/status", latched=True)
-        self._action = ActionClient(ros.node, FollowJointTrajectory, f"{name}/follow_joint_trajectory")
         self._topic = ros.node.create_publisher(JointTrajectory, f"{name}/joint_trajectory", 1)
         self._told: dict[int, list[Told]] = {}
         self._changed: set[str] = set()
@@ -276,8 +294,12 @@ class Client:
 
     def ready(self) -> None:
         """Wait until the node is active and everything has found each other."""
-        until(self._action.server_is_ready, "there is no action server")
+        _ = self._action
         until(lambda: self.states and self.status and self.status[-1].active, "the node is not active")
+
+    @property
+    def _action(self) -> ActionClient[Any, Any, Any]:
+        return self.ros.act(FollowJointTrajectory, f"{self.name}/follow_joint_trajectory")
 
     def now(self) -> float:
         return float(self.ros.node.get_clock().now().nanoseconds * 1e-9)

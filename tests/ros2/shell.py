@@ -11,7 +11,6 @@ from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
-from rclpy.action import ActionClient
 from rclpy.qos import DurabilityPolicy
 
 from tests.ros2.peer import Ros, until
@@ -72,8 +71,7 @@ def service(ros: Ros, verb: str, name: str, kind: str, values: str = "{}") -> ob
 
 def action(ros: Ros, verb: str, name: str, kind: str, values: str) -> object:
     assert verb == "send_goal"
-    client = ActionClient(ros.node, find(kind), name)
-    until(client.server_is_ready, f"there is no action {name}")
+    client = ros.act(find(kind), name)
     goal = fill(find(kind).Goal(), yaml.safe_load(values))  # type: ignore[attr-defined]
     handle = ros.wait(client.send_goal_async(goal), "no answer")
     if not handle.accepted:

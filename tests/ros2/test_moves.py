@@ -11,7 +11,6 @@ import pytest
 from action_msgs.msg import GoalStatus
 from geometry_msgs.msg import Pose, PoseStamped
 from heptarm_msgs.action import MoveJoints, MovePose
-from rclpy.action import ActionClient
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 
@@ -27,8 +26,7 @@ class Moves:
 
     def __init__(self, ros: Ros, kind: Any, name: str) -> None:
         self.ros, self.kind, self.told = ros, kind, []
-        self._client = ActionClient(ros.node, kind, name)
-        until(self._client.server_is_ready, f"there is no {name}")
+        self._client = ros.act(kind, name)
 
     def start(self, **goal: Any) -> Any:
         future = self._client.send_goal_async(

@@ -39,7 +39,6 @@ class Client:
 
     def __init__(self, ros: Ros) -> None:
         self._ros = ros
-        self._actions: dict[str, ActionClient] = {}
         self._publishers: dict[str, Any] = {}
 
     def call(self, name: str, kind: str, /, **request: Any) -> Any:
@@ -48,11 +47,7 @@ class Client:
 
     def send(self, name: str, kind: str, /, **goal: Any) -> Sent:
         one = found(kind, "action")
-        if name not in self._actions:
-            self._actions[name] = ActionClient(self._ros.node, one, f"{NAME}/{name}")
-        client = self._actions[name]
-        until(client.server_is_ready, f"there is no {name}")
-        return Sent(self._ros, client, one.Goal(**goal))
+        return Sent(self._ros, self._ros.act(one, f"{NAME}/{name}"), one.Goal(**goal))
 
     def listen(self, name: str, kind: str, /, *, latched: bool = False) -> list[Any]:
         topic = f"/surface{name}" if name == "/joint_states" else full(name)

@@ -243,6 +243,10 @@ class Link:
             data = self._session.send_numbers(kind, numbers, time=self.offset.to_cabinet(now))
             self._transmit(data)
 
+    def rehearse(self, kind: type[OneWay], numbers: Iterable[float], *, now: int) -> bytes:
+        """What `tell` would send now; nothing is sent."""
+        return self._session.pack_numbers(kind, numbers, time=self.offset.to_cabinet(now))
+
     def ping(self) -> None:
         """Probe the cabinet's clock; the answer goes into `offset`."""
         self._say(Ping(sent=self._clock.nanos()))

@@ -12,6 +12,7 @@ Each target brings the time within which the next one has to come; a program tha
 from __future__ import annotations
 
 from collections import deque
+from contextlib import suppress
 from dataclasses import dataclass
 from math import inf, nan
 from operator import le
@@ -23,7 +24,8 @@ import numpy.typing as npt
 from heptarm.arm.block import Block
 from heptarm.arm.handle import MotionHandle
 from heptarm.arm.modes import mode_message
-from heptarm.errors import CommandRejected, LocalProtocolError, ShapeError, Timeout
+from heptarm.errors import CommandRejected, HeptarmError, LocalProtocolError, ShapeError, Timeout
+from heptarm.io.rehearsal import Rehearsal
 from heptarm.values.arrays import Array, array
 from heptarm.values.condition import Condition
 from heptarm.values.mode import Mode
@@ -39,6 +41,8 @@ if TYPE_CHECKING:
 _PATIENCE = 5.0
 #: Calls of `set` whose cost is remembered.
 _REMEMBERED = 4096
+#: How long before a tick its waiter wakes, to make ready [s].
+_EARLY = 200e-6
 _DOUBLES = np.dtype(np.float64)
 
 
@@ -111,6 +115,8 @@ class Servo(Block):
         self._began = self._due = self._last = 0
         self._first_sent = self._last_sent = 0
         self._sent = self._late_ticks = 0
+        self._rehearsal: Rehearsal | None = None
+        self._told: tuple[type[wire.OneWay], tuple[float, ...]] | None = None
         self._costs: deque[int] = deque(maxlen=_REMEMBERED)
 
     # ------------------------------------------------------------------------------------ life
@@ -138,6 +144,7 @@ class Servo(Block):
         self._start = self._connection.wait_for(
             lambda state: state.joints is not None and state.joints.stamp > before, _PATIENCE
         )
+        self._rehearsal = Rehearsal()
         self._began = self._due = self._last = self._clock.nanos()
         self._number, self._active = handle.id, True
         handle.add_done_callback(self._on_end)
@@ -146,6 +153,8 @@ class Servo(Block):
     def close(self) -> None:
         """End the motion at rest; raises what ended it early. Closing twice is legal."""
         handle = self._handle
+        if self._rehearsal is not None:
+            self._rehearsal.close()
         if handle is None or self._result is not None:
             return
         if not handle.done:
@@ -192,7 +201,9 @@ class Servo(Block):
         self._due += round(self.period * 1e9)
         now = clock.nanos()
         if now < self._due:
-            clock.sleep((self._due - now) * 1e-9)
+            clock.sleep((self._due - now) * 1e-9 - _EARLY)
+            self._rehearse()
+            clock.sleep_until(self._due)
             now = clock.nanos()
         late = (now - self._due) * 1e-9
         if late > 0.5 * self.period:
@@ -203,11 +214,18 @@ class Servo(Block):
         self._last = now
         return passed if self._active else None
 
+    def _rehearse(self) -> None:
+        """Tell the last target once more, to nobody: between two ticks the caches have forgotten how."""
+        if self._told is not None and self._rehearsal is not None:
+            with suppress(HeptarmError):  # the link has ended: the next target tells
+                self._rehearsal.send(self._link.rehearse(*self._told, now=self._clock.nanos()))
+
     def _tell(self, began: int, kind: type[wire.OneWay], target: list[float]) -> None:
         if not self._active:
             _ = self.start  # raises unless it has begun
             return
-        self._link.tell(kind, (self._number, self.watchdog, *target), now=began)
+        self._told = kind, (self._number, self.watchdog, *target)
+        self._link.tell(*self._told, now=began)
         self._sent += 1
         self._last_sent = now = self._clock.nanos()
         self._costs.append(now - began)
@@ -254,6 +272,7 @@ class JointServo(Servo):
     def __init__(self, connection: Connection, message: wire.ServoOpen, **settings: Any) -> None:
         super().__init__(connection, message, **settings)
         self._low, self._high = connection.robot.q_min.tolist(), connection.robot.q_max.tolist()
+        self._newest: Array | None = None
 
     def __enter__(self) -> JointServo:
         """Begin; see `Servo`."""
@@ -282,7 +301,17 @@ class JointServo(Servo):
                 parameter="dq",
                 hint='leave dq out, or use engine="smart"',
             )
-        # caches are cold at every tick: few different functions cost less than few calls
+        sent, target = self._within(q)
+        self._newest = sent
+        if dq is None:
+            self._tell(began, wire.ServoJoints, target)
+        else:
+            self._tell(began, wire.ServoJointsVelocity, target + array(dq, 7, "dq").tolist())
+        return sent
+
+    def _within(self, q: npt.ArrayLike) -> tuple[Array, list[float]]:
+        """Joint positions brought back to the limits, and the same as numbers."""
+        # where caches may be cold, few different functions cost less than few calls
         if not (type(q) is np.ndarray and q.dtype is _DOUBLES and q.shape == (7,)):
             q = array(q, 7, "q")
         sent = q.copy()
@@ -290,11 +319,12 @@ class JointServo(Servo):
         if not (all(map(le, self._low, target)) and all(map(le, target, self._high))):  # nor is NaN
             sent = array(sent, 7, "q").clip(self._low, self._high)
             target = sent.tolist()
-        if dq is None:
-            self._tell(began, wire.ServoJoints, target)
-        else:
-            self._tell(began, wire.ServoJointsVelocity, target + array(dq, 7, "dq").tolist())
-        return sent
+        return sent, target
+
+    def _rehearse(self) -> None:
+        if self._newest is not None:
+            self._within(self._newest)
+        super()._rehearse()
 
 
 class PoseServo(Servo):

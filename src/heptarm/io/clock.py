@@ -5,6 +5,9 @@ from __future__ import annotations
 import time
 from typing import Protocol
 
+#: A sleeper is woken up to so much late [s]: Linux gives timers 50 us of slack, and waking takes time, too.
+_AWAKE = 100e-6
+
 
 class Clock(Protocol):
     """A monotonic clock."""
@@ -15,6 +18,10 @@ class Clock(Protocol):
 
     def sleep(self, seconds: float) -> None:
         """Let that much time pass."""
+        ...
+
+    def sleep_until(self, nanos: int) -> None:
+        """Let time pass until the clock shows that [ns]: to the point, at the price of waiting awake at the end."""
         ...
 
 
@@ -29,6 +36,13 @@ class RealClock:
         """Sleep."""
         if seconds > 0:
             time.sleep(seconds)
+
+    def sleep_until(self, nanos: int) -> None:
+        """Sleep; then wait awake, because a sleeper is woken late."""
+        now = self.nanos
+        self.sleep((nanos - now()) * 1e-9 - _AWAKE)
+        while now() < nanos:
+            pass
 
 
 class StepClock:
@@ -50,6 +64,10 @@ class StepClock:
     def sleep(self, seconds: float) -> None:
         """Move on at once."""
         self.step(seconds)
+
+    def sleep_until(self, nanos: int) -> None:
+        """Be there at once."""
+        self._now = max(self._now, nanos)
 
     def step(self, seconds: float) -> None:
         """Move on by that many seconds."""

@@ -169,12 +169,16 @@ class Session:
         Raises:
             LocalProtocolError: it is illegal here; nothing has changed.
         """
+        data = self.pack_numbers(kind, numbers, time=time)
+        self._sent = (self._sent + 1) & _WRAP
+        return data
+
+    def pack_numbers(self, kind: type[OneWay], numbers: Iterable[float], *, time: int) -> bytes:
+        """What `send_numbers` would return now; nothing is taken for sent. Raises what it raises."""
         pack = self._packers.get(kind)
         if pack is None:
             raise self._illegal(kind)
-        data = pack(self._sent, 0, time, *numbers)
-        self._sent = (self._sent + 1) & _WRAP
-        return data
+        return pack(self._sent, 0, time, *numbers)
 
     def hello(self, *, name: str, version: str = "") -> Hello:
         """The client's first message; of a longer name its first 64 octets."""
