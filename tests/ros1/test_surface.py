@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -11,8 +12,9 @@ import pytest
 import rospy
 
 from tests.conformance import hands, surface
-from tests.conformance.stage import Stage
+from tests.conformance.stage import ROOT, Stage
 from tests.ros1.peer import NodeProcess, call, collect, publisher, until
+from tests.ros1.test_examples import run
 
 NAME = "/surface/heptarm"
 
@@ -103,3 +105,8 @@ CASES = surface.CASES | hands.CASES
 @pytest.mark.parametrize("case", CASES)
 def test_surface(probe: Client, arena: Stage, case: str) -> None:
     CASES[case](probe, arena)
+
+
+def test_the_example_finds_the_table(probe: Client) -> None:
+    found = run([sys.executable, str(ROOT / "examples" / "ros1" / "touch.py"), "__ns:=/surface"]).split()
+    assert abs(float(found[3]) - surface.TABLE) < 3e-3, found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -10,8 +11,9 @@ import pytest
 from rclpy.action import ActionClient
 
 from tests.conformance import hands, surface
-from tests.conformance.stage import Stage
+from tests.conformance.stage import ROOT, Stage
 from tests.ros2.peer import PATIENT, NodeProcess, Ros, to_duration, until
+from tests.ros2.test_examples import run
 
 NAME = "/surface/heptarm"
 
@@ -105,3 +107,9 @@ CASES = surface.CASES | hands.CASES
 @pytest.mark.parametrize("case", CASES)
 def test_surface(probe: Client, arena: Stage, case: str) -> None:
     CASES[case](probe, arena)
+
+
+def test_the_example_finds_the_table(probe: Client) -> None:
+    script = str(ROOT / "examples" / "ros2" / "touch.py")
+    found = run([sys.executable, script, "--ros-args", "-r", "__ns:=/surface"]).split()
+    assert abs(float(found[3]) - surface.TABLE) < 3e-3, found
