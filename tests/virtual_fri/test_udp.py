@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 
 import numpy as np
@@ -232,6 +232,16 @@ def test_a_scenario_acts_on_both_directions_and_on_the_robot() -> None:
 def test_a_taken_port_is_named_with_what_to_do() -> None:
     with bench() as b, pytest.raises(ConnectFailed, match=rf"UDP port {b.server.port}.*30200 to 30209"):
         Server(b.configuration, b.arm, client=b.peer.address, port=b.server.port, bind=HERE)
+
+
+def test_beside_a_client_on_this_machine_any_port_will_do() -> None:
+    with bench() as b, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        port = source_port(b.peer.address)
+        with suppress(OSError):  # somebody else has it: as good
+            other.bind((HERE, port))
+        server = Server(b.configuration, b.arm, client=b.peer.address, bind=HERE)
+        assert server.port not in (port, b.peer.address[1])
+        server.release()
 
 
 @pytest.mark.parametrize(
