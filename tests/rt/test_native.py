@@ -216,6 +216,16 @@ def test_numbers_of_more_than_32_bits_are_refused_and_break_nothing(numbers: tup
     twins.check()
 
 
+def test_of_a_pose_nothing_is_left_when_joints_are_commanded() -> None:
+    twins = Twins(wire=Version.V2_5)
+    twins.activate()
+    for mode in (CommandMode.CARTESIAN_POSE, CommandMode.POSITION, CommandMode.CARTESIAN_POSE):
+        twins.pure.controller.mode = mode
+        twins.step()
+        twins.step()
+    twins.check()
+
+
 @settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data(), wire=st.sampled_from(list(Version)))
 def test_whatever_happens(data: st.DataObject, wire: Version) -> None:

@@ -181,6 +181,9 @@ class Cycle:
         by_pose = session.mode is m.CommandMode.CARTESIAN_POSE
         if by_pose:
             posing.look(sample.message)
+        elif posing.knows:
+            posing.guard.stop()
+            posing.forget()
         again = session.counters.restarts != self._restarts
         self._restarts = session.counters.restarts
         self._skipped = 0

@@ -54,6 +54,11 @@ class Posing:
         self._turning = 0.0  # of the redundancy angle [rad/s]
 
     @property
+    def knows(self) -> bool:
+        """Whether an interpolator's pose has come."""
+        return self._frame is not None
+
+    @property
     def on_wire(self) -> tuple[float, ...]:
         """Interpolator's pose as it came; NaN while there is none."""
         return self._frame.values if self._frame is not None else _NAN7

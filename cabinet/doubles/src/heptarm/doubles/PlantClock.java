@@ -43,8 +43,7 @@ public final class PlantClock implements Clock {
         } else if (Thread.interrupted()) {
             throw new InterruptedException();
         }
-        ring.view(tick);
-        return tick * Ring.TICK_NS;
+        return ring.view(tick) * Ring.TICK_NS;
     }
 
     @Override

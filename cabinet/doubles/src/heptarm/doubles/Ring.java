@@ -61,6 +61,8 @@ public final class Ring {
     private static final int OVERRIDE = 40;
     /** A view further back than this may be overwritten while it is read. */
     private static final int OLDEST = 200;
+    /** Whoever wakes later than this is shown the present: it has time left to read before its view is overwritten. */
+    private static final int FAR = OLDEST / 2;
 
     private static final VarHandle LONGS =
             MethodHandles.byteBufferViewVarHandle(long[].class, ByteOrder.nativeOrder());
@@ -116,9 +118,12 @@ public final class Ring {
         LONGS.setRelease(memory, box + BOX_SEQ, seq + 2);
     }
 
-    /** The calling thread's getters read this tick from now on. */
-    void view(long tick) {
-        views.get()[0] = tick;
+    /** The calling thread's getters read this tick from now on, or the newest if it is long past; returns which. */
+    long view(long tick) {
+        long newest = newest();
+        long seen = newest - tick > FAR ? newest : tick;
+        views.get()[0] = seen;
+        return seen;
     }
 
     private long tick() {
