@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from heptarm import _resources
+from heptarm.values.robot import robot
 
 HERE = Path(__file__).parent
 
@@ -92,6 +93,15 @@ def test_a_sunrise_application_behaves_as_on_a_cabinet(tmp_path: Path) -> None:
     done = _run("sample.Sample", tmp_path, f"sample.file={said}")
     assert done.returncode == 0, done.stdout + done.stderr
     assert tuple(said.read_text().splitlines()) == SAID
+
+
+def test_who_wakes_late_is_not_shown_the_present_for_the_past(tmp_path: Path) -> None:
+    _compile(HERE / "java" / "Oversleeping.java", tmp_path)
+    said = tmp_path / "said.txt"
+    done = _run("sample.Oversleeping", tmp_path, f"sample.file={said}")
+    assert done.returncode == 0, done.stdout + done.stderr
+    top = 0.1 * robot("iiwa14").dq_max[0]
+    assert 0.5 * top < float(said.read_text()) < 1.5 * top
 
 
 def test_queue_listeners_pause_and_an_error_of_the_application(tmp_path: Path) -> None:

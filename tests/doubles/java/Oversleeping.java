@@ -1,0 +1,52 @@
+package sample;
+
+import static com.kuka.roboticsAPI.motionModel.BasicMotions.ptp;
+
+import java.io.PrintWriter;
+
+import javax.inject.Inject;
+
+import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+
+import heptarm.doubles.PlantClock;
+
+/** Looks at a moving arm every 10 ms and sometimes wakes 0.3 s late; what it sees belongs to the time that it is told. */
+public class Oversleeping extends RoboticsAPIApplication {
+    private static final long STEP = 10000000L;
+
+    @Inject
+    private LBR lbr;
+
+    @Override
+    public void run() {
+        try {
+            double fastest = watch();
+            PrintWriter out = new PrintWriter((String) getApplicationData().getProcessData("sample.file").getValue(), "UTF-8");
+            out.println(fastest);
+            out.close();
+        } catch (Exception e) {
+            throw new IllegalStateException(e);
+        }
+    }
+
+    /** The fastest that A1 seems to turn [rad/s], on its way at 0.1 of its maximum. */
+    private double watch() throws InterruptedException {
+        PlantClock clock = new PlantClock();
+        lbr.moveAsync(ptp(1.0, 0, 0, 0, 0, 0, 0).setJointVelocityRel(0.1));
+        double fastest = 0.0;
+        double last = lbr.getCommandedJointPosition().get(0);
+        long before = clock.sleepUntil(clock.nanos());
+        for (int look = 1; look <= 150; look++) {
+            long now = clock.sleepUntil(before + STEP);
+            double place = lbr.getCommandedJointPosition().get(0);
+            fastest = Math.max(fastest, Math.abs(place - last) / ((now - before) * 1e-9));
+            last = place;
+            before = now;
+            if (look % 50 == 0) {
+                Thread.sleep(300);
+            }
+        }
+        return fastest;
+    }
+}
