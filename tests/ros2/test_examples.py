@@ -13,7 +13,7 @@ from tests.conformance.stage import ROOT
 from tests.ros2 import shell
 from tests.ros2.peer import Client
 
-#: The others feel for a table, which stands before the arm of the surface's tests.
+#: Without the one that feels for a table, which stands before the arm of the surface's tests.
 SCRIPTS = sorted(path for path in (ROOT / "examples" / "ros2").glob("*.py") if path.name != "touch.py")
 GUIDE = (ROOT / "docs" / "guide" / "ros2.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"^```(\w+)[^\n]*\n(.*?)^```", re.S | re.M)

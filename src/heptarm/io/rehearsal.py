@@ -18,7 +18,7 @@ class Rehearsal:
     __slots__ = ("_far", "_near")
 
     def __init__(self) -> None:
-        self._near, self._far = socket.socket(), socket.socket()
+        self._near = self._far = socket.socket()
         with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", 0)) as server:
             self._near.connect(server.getsockname())
             self._far = server.accept()[0]
