@@ -27,10 +27,10 @@ def protocol(spec: Spec) -> str:
         "This page is generated from `schema/protocol.toml`; any language can speak the protocol from it.",
         "",
         f"TCP, port {p['port']}, the cabinet listens. Version {p['major']}.{p['minor']}: equal major versions understand each"
-        " other. Everything is big endian, SI units, quaternions x y z w. Poses are of the moved frame in the robot's base frame.",
+        " other. Everything is big endian, SI units, quaternions x y z w. Poses are of the motion frame in the robot's base frame.",
         "",
-        f"A frame is a header of {sum(SIZES[one['type']] for one in spec.header)} octets and a body of at most"
-        f" {p['max_body']} octets. Any split or merge of the byte stream is legal.",
+        f"A frame is a header of {sum(SIZES[one['type']] for one in spec.header)} bytes and a body of at most"
+        f" {p['max_body']} bytes. Any split or merge of the byte stream is legal.",
         "",
         "## Header",
         "",
@@ -42,9 +42,9 @@ def protocol(spec: Spec) -> str:
         "",
         "## Types",
         "",
-        "`str` is a u16 count of octets and UTF-8; `bytes` a u32 count and octets; `list<T>` a u16 count and the entries;"
-        " `opt<T>` an octet 0 or 1 and, with 1, the value; `f64[7]` seven numbers. A union is an octet with the tag and the"
-        " member. NaN and infinity are refused unless a field says that NaN keeps its default.",
+        "`str` is a u16 count of bytes and UTF-8; `bytes` a u32 count and bytes; `list<T>` a u16 count and the entries;"
+        " `opt<T>` a byte 0 or 1 and, with 1, the value; `f64[7]` seven numbers. A union is a byte with the tag and the"
+        " member. NaN and infinity are refused except in fields where NaN keeps the default.",
         "",
         "## Messages",
         "",

@@ -1,4 +1,4 @@
-"""Writes the Python codec, the Java codec, the golden vectors and the protocol pages from the schema.
+"""Write the codecs, the golden vectors, the protocol pages and the header of the native FRI loop from the schema.
 
 python schema/generate.py           write
 python schema/generate.py --check   fail if anything that is committed differs from the schema
@@ -12,12 +12,15 @@ from pathlib import Path
 
 import docs
 import java
+import native
+import plant
 import python
 import sample_bodies
 import spec as schema
 
 ROOT = schema.HERE.parent
 JAVA = ROOT / "cabinet" / "core" / "src" / "heptarm" / "wire"
+SEAM = ROOT / "cabinet" / "doubles" / "src" / "heptarm" / "doubles" / "seam"
 
 
 def outputs() -> dict[Path, str]:
@@ -27,16 +30,32 @@ def outputs() -> dict[Path, str]:
     result = {
         wire / "messages.py": python.messages(spec),
         wire / "codes.py": python.codes(spec),
+        wire / "states.py": python.states(spec),
         pages / "protocol.md": docs.protocol(spec),
         pages / "errors.md": docs.errors(spec),
+        ROOT / "src" / "heptarm" / "fri" / "loop" / "native_layout.h": native.header(),
         schema.HERE / "golden" / "vectors.json": json.dumps(sample_bodies.golden(spec), indent=1) + "\n",
     }
+    seam = plant.load()
+    result[ROOT / "src" / "heptarm" / "sim" / "seam.py"] = plant.python_module(seam)
+    result |= {SEAM / name: text for name, text in plant.java_files(seam).items()}
     return result | {JAVA / name: text for name, text in java.files(spec).items()}
+
+
+def stale(current: set[Path]) -> list[Path]:
+    """Generated classes that the schema no longer has."""
+    found = [path for folder in (JAVA, SEAM) for path in folder.glob("*.java") if path not in current]
+    return [path for path in found if path.read_text(encoding="utf-8").startswith("// Generated")]
 
 
 def main() -> int:
     differing = []
-    for path, text in outputs().items():
+    texts = outputs()
+    for path in stale(set(texts)):
+        differing.append(path.relative_to(ROOT))
+        if "--check" not in sys.argv:
+            path.unlink()
+    for path, text in texts.items():
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             differing.append(path.relative_to(ROOT))
             if "--check" not in sys.argv:

@@ -1,4 +1,4 @@
-"""Writes src/heptarm/wire/messages.py and codes.py from the schema."""
+"""Writes src/heptarm/wire/messages.py, codes.py and states.py from the schema."""
 
 from __future__ import annotations
 
@@ -139,12 +139,13 @@ class Body:
             ]
         elif t.kind == "opt":
             assert t.of is not None
+            write = self._write_one(t.of, f"self.{name}")  # before the read, which uses the same layout
             self.write += [
                 f"if self.{name} is None:",
                 '    out.append(b"\\x00")',
                 "else:",
                 '    out.append(b"\\x01")',
-                f"    {self._write_one(t.of, f'self.{name}')}",
+                f"    {write}",
             ]
             self.read += [
                 "present, pos = codec.read_flag(data, pos)",
@@ -161,6 +162,10 @@ class Body:
             return f"_write_{t.name}({value}, out)"
         if t.kind == "str":
             return f"out.append(codec.put_str({value}))"
+        if t.kind in ("array", "enum"):
+            layout = f"_{self.name}_{next(self._numbers)}"
+            self.layouts.append(f'{layout} = Struct(">{self._code(t)}")')
+            return f"out.append({layout}.pack({'*' if t.kind == 'array' else ''}{value}))"
         return f"{value}._write(out)"
 
     def _read_one(self, t: Type) -> str:
@@ -168,6 +173,11 @@ class Body:
             return f"_read_{t.name}(data, pos)"
         if t.kind == "str":
             return "codec.read_str(data, pos)"
+        if t.kind in ("array", "enum"):
+            layout = self.layouts[-1].split()[0]
+            value = f"codec.unpack({layout}, data, pos)"
+            value = value if t.kind == "array" else f"codec.read_enum({t.name}, {value}[0])"
+            return f"{value}, pos + {layout}.size"
         return f"{t.name}._read(data, pos)"
 
     def _validate(self, one: Field) -> None:
@@ -204,8 +214,9 @@ def _doc(text: str) -> str:
     return text.replace('"', "'")
 
 
-def _fields(spec: Spec, fields: list[Field]) -> list[str]:
-    return [f"    {one.name}: {annotation(one.type)}{default(spec, one)}" for one in fields]
+def fields(spec: Spec, chosen: list[Field]) -> list[str]:
+    """Annotated fields of a dataclass."""
+    return [f"    {one.name}: {annotation(one.type)}{default(spec, one)}" for one in chosen]
 
 
 def _methods(name: str, body: Body, fields: list[Field]) -> list[str]:
@@ -219,7 +230,8 @@ def _methods(name: str, body: Body, fields: list[Field]) -> list[str]:
     return lines
 
 
-def _message_methods(name: str) -> list[str]:
+def encoding(name: str) -> list[str]:
+    """Methods that encode and decode a whole body."""
     return [
         "",
         "    def encode(self) -> bytes:",
@@ -234,6 +246,12 @@ def _message_methods(name: str) -> list[str]:
         "        value, pos = cls._read(data, 0)",
         f'        codec.end(data, pos, "{name}")',
         "        return value",
+    ]
+
+
+def _message_methods(name: str) -> list[str]:
+    return [
+        *encoding(name),
         "",
         "    def validate(self) -> None:",
         '        """Raise Violation for a field outside its range."""',
@@ -300,7 +318,7 @@ def messages(spec: Spec) -> str:
         lines += [""]
     for name in ordered_structs(spec):
         if name in spec.unions:
-            lines += _union(spec, name)
+            lines += union(spec, name)
             continue
         struct = spec.structs[name]
         body = Body(spec, name, struct.fields)
@@ -313,7 +331,7 @@ def messages(spec: Spec) -> str:
             f"class {name}:",
         ]
         lines += [f'    """{_doc(struct.doc)}"""', ""]
-        lines += _fields(spec, struct.fields) + _methods(name, body, struct.fields) + [""]
+        lines += fields(spec, struct.fields) + _methods(name, body, struct.fields) + [""]
     for message in spec.messages.values():
         body = Body(spec, message.name, message.fields)
         lines += [
@@ -338,7 +356,7 @@ def messages(spec: Spec) -> str:
         if message.groups:
             lines += _state(message)
         else:
-            lines += _fields(spec, message.fields) + _methods(message.name, body, message.fields)
+            lines += fields(spec, message.fields) + _methods(message.name, body, message.fields)
         lines += _message_methods(message.name) + [""]
     lines += ["", f"Message: TypeAlias = {' | '.join(spec.messages)}"]
     one_way = [name for name, message in spec.messages.items() if message.kind == "oneway"]
@@ -349,11 +367,12 @@ def messages(spec: Spec) -> str:
     return "\n".join(lines)
 
 
-def _union(spec: Spec, name: str) -> list[str]:
-    union = spec.unions[name]
-    members = [member for _, member in union.members]
+def union(spec: Spec, name: str) -> list[str]:
+    """A union's alias, writer and reader."""
+    found = spec.unions[name].members
+    members = [member for _, member in found]
     lines = ["", f"{name}: TypeAlias = {' | '.join(members)}", f"_{name}_TAGS = {{"]
-    lines += [f"    {member}: {tag}," for tag, member in union.members] + ["}", ""]
+    lines += [f"    {member}: {tag}," for tag, member in found] + ["}", ""]
     lines += ["", f"def _write_{name}(value: {name}, out: list[bytes]) -> None:"]
     lines += [f"    out.append(bytes((_{name}_TAGS[type(value)],)))", "    value._write(out)", ""]
     lines += [
@@ -361,10 +380,10 @@ def _union(spec: Spec, name: str) -> list[str]:
         f"def _read_{name}(data: bytes, pos: int) -> tuple[{name}, int]:",
         "    tag, pos = codec.read_tag(data, pos)",
     ]
-    for tag, member in union.members:
+    for tag, member in found:
         lines += [f"    if tag == {tag}:", f"        return {member}._read(data, pos)"]
     lines += [
-        f'    raise DecodeError(f"{name} has tag {{tag}}; legal are {[tag for tag, _ in union.members]}")',
+        f'    raise DecodeError(f"{name} has tag {{tag}}; legal are {[tag for tag, _ in found]}")',
         "",
     ]
     return lines
@@ -407,3 +426,65 @@ def codes(spec: Spec) -> str:
             f"    {error['code']}: Meaning({error['class']!r}, {error['title']!r}, {error['advice']!r}),"
         ]
     return "\n".join([*lines, "}", ""])
+
+
+STATES = '''"""Generated by schema/generate.py from schema/protocol.toml. Do not edit.
+
+All states of a session and the transitions between them, as data; the same for both sides.
+"""
+
+from __future__ import annotations
+
+import enum
+
+from heptarm.wire.messages import Message
+'''
+
+LOOKUP = '''
+
+def symbol(kind: type[Message]) -> str:
+    """The name under which a message stands in the table."""
+    if kind.KIND == "handshake" or kind.__name__ == "Goodbye":
+        return kind.__name__
+    return kind.KIND
+
+
+def markdown() -> str:
+    """The table for people; docs/reference/session.md holds it, and a test compares them."""
+    names = [name for row in TRANSITIONS.values() for name in row]
+    columns = list(dict.fromkeys(names))
+    lines = [
+        f"| in state | {' | '.join(columns)} |",
+        f"|---|{'---|' * len(columns)}",
+    ]
+    for state, row in TRANSITIONS.items():
+        cells = (row[name].value if name in row else "" for name in columns)
+        lines.append(f"| **{state.value}** | {' | '.join(cells)} |")
+    return "\\n".join(lines) + "\\n"
+'''
+
+
+def states(spec: Spec) -> str:
+    """The states of a session and their transitions."""
+    lines = [
+        STATES,
+        "",
+        "class SessionState(enum.Enum):",
+        '    """Where a session is; both sides pass through the same states."""',
+        "",
+    ]
+    lines += [f'    {one.name.upper()} = "{one.name}"  # {one.doc}' for one in spec.session.values()]
+    lines += ["", "", "_S = SessionState", ""]
+    lines += [
+        "#: State, then what is sent or received, then the new state. Handshake messages and Goodbye stand under"
+    ]
+    lines += ["#: their names, all others under their kinds. What is missing is illegal."]
+    lines += ["TRANSITIONS: dict[SessionState, dict[str, SessionState]] = {"]
+    for one in spec.session.values():
+        if not one.next:
+            lines += [f"    _S.{one.name.upper()}: {{}},"]
+            continue
+        lines += [f"    _S.{one.name.upper()}: {{"]
+        lines += [f'        "{name}": _S.{target.upper()},' for name, target in one.next.items()]
+        lines += ["    },"]
+    return "\n".join([*lines, "}"]) + "\n" + LOOKUP.replace("\\\\n", "\\n")

@@ -1,6 +1,6 @@
 """Deterministic example bodies of every message, encoded here by a second, independent walk over the schema.
 
-The generated Python codec and the Java codec are both checked against these octets, so a mistake would have to be made three
+The generated Python codec and the Java codec are both checked against these bytes, so a mistake would have to be made three
 times to go unseen.
 """
 

@@ -106,6 +106,15 @@ class Message:
 
 
 @dataclass(frozen=True)
+class State:
+    """A state of a session; `next` maps a message or a kind of message to the new state."""
+
+    name: str
+    doc: str
+    next: dict[str, str]
+
+
+@dataclass(frozen=True)
 class Spec:
     protocol: dict[str, Any]
     header: list[dict[str, Any]]
@@ -114,6 +123,7 @@ class Spec:
     unions: dict[str, Union]
     messages: dict[str, Message]
     errors: list[dict[str, Any]]
+    session: dict[str, State] = field(default_factory=dict)
 
     def defaulted(self, name: str) -> bool:
         """Whether every field of a struct has a default."""
@@ -128,62 +138,79 @@ class Spec:
         return kind == "struct" and self.defaulted(one.type.name)
 
 
+_ATTRIBUTES = {
+    "name",
+    "type",
+    "doc",
+    "unit",
+    "min",
+    "max",
+    "min_open",
+    "nan",
+    "norm",
+    "min_len",
+    "max_len",
+    "default",
+}
+
+
+def kinds_of(raw: dict[str, Any]) -> dict[str, str]:
+    """Kind of each named type: enum, flags, struct or union."""
+    return {name: kind for kind in ("enum", "flags", "struct", "union") for name in raw[kind]}
+
+
+def parse_type(text: str, kinds: dict[str, str]) -> Type:
+    """Read a type such as `f64[7]` or `list<Item>`.
+
+    Raises:
+        ValueError: there is no such type.
+    """
+    if text in PRIMITIVES:
+        return Type("prim", text)
+    if text in ("str", "bytes"):
+        return Type(text)
+    if match := re.fullmatch(r"(list|opt)<(.+)>", text):
+        return Type(match[1], of=parse_type(match[2], kinds))
+    if match := re.fullmatch(r"(\w+)\[(\d+)\]", text):
+        return Type("array", match[1], int(match[2]))
+    if text in kinds:
+        return Type(kinds[text], text)
+    raise ValueError(f"unknown type {text!r}")
+
+
+def parse_field(entry: dict[str, Any], kinds: dict[str, str]) -> Field:
+    """Read a field.
+
+    Raises:
+        ValueError: an unknown type or attribute.
+    """
+    if extra := set(entry) - _ATTRIBUTES:
+        raise ValueError(f"field {entry['name']}: unknown attributes {extra}")
+    return Field(
+        entry["name"],
+        parse_type(entry["type"], kinds),
+        entry.get("doc", ""),
+        entry.get("unit", ""),
+        float(entry.get("min", -math.inf)),
+        float(entry.get("max", math.inf)),
+        entry.get("min_open", False),
+        entry.get("nan") == "keeps",
+        entry.get("norm"),
+        entry.get("min_len", 0),
+        entry.get("max_len", 65535),
+        entry.get("default"),
+        "default" in entry,
+    )
+
+
 def load(folder: Path = HERE) -> Spec:
     raw = tomllib.loads((folder / "protocol.toml").read_text(encoding="utf-8"))
     errors = tomllib.loads((folder / "errors.toml").read_text(encoding="utf-8"))["error"]
-    kinds = {name: "enum" for name in raw["enum"]} | {name: "flags" for name in raw["flags"]}
-    kinds |= {name: "struct" for name in raw["struct"]} | {name: "union" for name in raw["union"]}
-
-    def parse(text: str) -> Type:
-        if text in PRIMITIVES:
-            return Type("prim", text)
-        if text in ("str", "bytes"):
-            return Type(text)
-        if match := re.fullmatch(r"(list|opt)<(.+)>", text):
-            return Type(match[1], of=parse(match[2]))
-        if match := re.fullmatch(r"(\w+)\[(\d+)\]", text):
-            return Type("array", match[1], int(match[2]))
-        if text in kinds:
-            return Type(kinds[text], text)
-        raise ValueError(f"unknown type {text!r}")
-
-    def parse_field(entry: dict[str, Any]) -> Field:
-        known = {
-            "name",
-            "type",
-            "doc",
-            "unit",
-            "min",
-            "max",
-            "min_open",
-            "nan",
-            "norm",
-            "min_len",
-            "max_len",
-            "default",
-        }
-        if extra := set(entry) - known:
-            raise ValueError(f"field {entry['name']}: unknown attributes {extra}")
-        return Field(
-            entry["name"],
-            parse(entry["type"]),
-            entry.get("doc", ""),
-            entry.get("unit", ""),
-            float(entry.get("min", -math.inf)),
-            float(entry.get("max", math.inf)),
-            entry.get("min_open", False),
-            entry.get("nan") == "keeps",
-            entry.get("norm"),
-            entry.get("min_len", 0),
-            entry.get("max_len", 65535),
-            entry.get("default"),
-            "default" in entry,
-        )
-
+    kinds = kinds_of(raw)
     enums = {n: Enum(n, e.get("base", "u8"), e["doc"], e["values"]) for n, e in raw["enum"].items()}
     enums |= {n: Enum(n, e["base"], e["doc"], e["values"], flags=True) for n, e in raw["flags"].items()}
     structs = {
-        n: Struct(n, s["doc"], [parse_field(f) for f in s["fields"]]) for n, s in raw["struct"].items()
+        n: Struct(n, s["doc"], [parse_field(f, kinds) for f in s["fields"]]) for n, s in raw["struct"].items()
     }
     unions = {
         n: Union(n, u["doc"], [(m["tag"], m["type"]) for m in u["members"]]) for n, u in raw["union"].items()
@@ -201,15 +228,32 @@ def load(folder: Path = HERE) -> Spec:
             entry["kind"],
             entry.get("role", "any"),
             entry["doc"],
-            [parse_field(f) for f in entry.get("fields", [])],
+            [parse_field(f, kinds) for f in entry.get("fields", [])],
             groups,
         )
-    spec = Spec(raw["protocol"], raw["header"]["fields"], enums, structs, unions, messages, errors)
+    session = {n: State(n, e["doc"], e["next"]) for n, e in raw.get("session", {}).items()}
+    spec = Spec(raw["protocol"], raw["header"]["fields"], enums, structs, unions, messages, errors, session)
     _refuse_recursion(spec)
+    _refuse_unknown_symbols(spec)
     ids = [message.id for message in messages.values()]
     if len(set(ids)) != len(ids):
         raise ValueError("two messages share an id")
     return spec
+
+
+def symbol(message: Message) -> str:
+    """The name of a message in the session's table: its own for the handshake and Goodbye, its kind for all others."""
+    return message.name if message.kind == "handshake" or message.name == "Goodbye" else message.kind
+
+
+def _refuse_unknown_symbols(spec: Spec) -> None:
+    known = {symbol(message) for message in spec.messages.values()}
+    for state in spec.session.values():
+        for name, target in state.next.items():
+            if name not in known or target not in spec.session:
+                raise ValueError(
+                    f"session state {state.name}: {name} -> {target} names no message or no state"
+                )
 
 
 def _refuse_recursion(spec: Spec) -> None:
