@@ -16,9 +16,9 @@ import com.kuka.roboticsAPI.geometricModel.math.CoordinateAxis;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 
-import heptarm.core.Conditions;
-import heptarm.core.Job;
-import heptarm.core.Refusal;
+import heptarm.core.CommandRejected;
+import heptarm.core.checks.Conditions;
+import heptarm.core.robot.MotionJob;
 import heptarm.wire.AllOf;
 import heptarm.wire.Axis;
 import heptarm.wire.Condition;
@@ -37,8 +37,8 @@ import heptarm.wire.TorqueOutside;
 import heptarm.wire.Trigger;
 
 /**
- * Break conditions and triggers of a motion as those of Sunrise. Each alternative is one by itself, so that Sunrise can say which fired; a
- * trigger on the same condition tells at once, while the motion still brakes.
+ * Builds break conditions and triggers of Sunrise. Each alternative becomes a condition of its own, so that Sunrise reports which
+ * one fired; a trigger on the same condition reports it at once, while the motion still brakes.
  */
 final class BreakConditions {
     private final Conditions.Tree[] trees;
@@ -49,14 +49,14 @@ final class BreakConditions {
         this.conditions = conditions;
     }
 
-    /** Whether Sunrise can watch it. */
-    static boolean can(Condition condition) {
+    /** Whether Sunrise can monitor a condition. */
+    static boolean isSupported(Condition condition) {
         return !Conditions.contains(condition, SignalOutside.class);
     }
 
-    /** The conditions of a checked one for a motion of a frame; none if Sunrise cannot watch it. */
-    static BreakConditions of(Condition until, AbstractFrame moved, Tools tools, IoSignals signals) throws Refusal {
-        Conditions.Tree[] trees = can(until) ? Conditions.alternatives(until) : new Conditions.Tree[0];
+    /** Build the conditions for a motion of a frame; none if Sunrise cannot monitor them. */
+    static BreakConditions of(Condition until, AbstractFrame moved, SunriseTools tools, SunriseSignals signals) throws CommandRejected {
+        Conditions.Tree[] trees = isSupported(until) ? Conditions.alternatives(until) : new Conditions.Tree[0];
         ICondition[] made = new ICondition[trees.length];
         for (int i = 0; i < trees.length; i++) {
             made[i] = make(trees[i], moved, tools, signals);
@@ -64,8 +64,8 @@ final class BreakConditions {
         return new BreakConditions(trees, made);
     }
 
-    /** Lets a motion be ended by them. */
-    void watch(RobotMotion<?> motion, final Job.Listener listener) {
+    /** Let the conditions end a motion. */
+    void addTo(RobotMotion<?> motion, final MotionJob.Listener listener) {
         for (int i = 0; i < conditions.length; i++) {
             final int node = trees[i].index;
             motion.breakWhen(conditions[i]);
@@ -77,8 +77,8 @@ final class BreakConditions {
         }
     }
 
-    /** Says which one has ended a motion. */
-    void tell(IMotionContainer ended, Job.Listener listener) {
+    /** Report which condition has ended a motion. */
+    void report(IMotionContainer ended, MotionJob.Listener listener) {
         for (int i = 0; i < conditions.length; i++) {
             if (ended.hasFired(conditions[i])) {
                 listener.fired(trees[i].index);
@@ -87,20 +87,20 @@ final class BreakConditions {
         }
     }
 
-    /** Tells a listener when one of a motion's triggers fires. */
-    static void trigger(RobotMotion<?> motion, Trigger[] triggers, AbstractFrame moved, Tools tools, IoSignals signals,
-            final Job.Listener listener) throws Refusal {
+    /** Add triggers to a motion; the listener receives their firing. */
+    static void addTriggers(RobotMotion<?> motion, Trigger[] triggers, AbstractFrame moved, SunriseTools tools, SunriseSignals signals,
+            final MotionJob.Listener listener) throws CommandRejected {
         for (int i = 0; i < triggers.length; i++) {
-            final int place = i;
+            final int index = i;
             motion.triggerWhen(make(Conditions.tree(triggers[i].condition), moved, tools, signals), new ICallbackAction() {
                 public void onTriggerFired(IFiredTriggerInfo info) {
-                    listener.triggered(place);
+                    listener.triggered(index);
                 }
             });
         }
     }
 
-    private static ICondition make(Conditions.Tree tree, AbstractFrame moved, Tools tools, IoSignals signals) throws Refusal {
+    private static ICondition make(Conditions.Tree tree, AbstractFrame moved, SunriseTools tools, SunriseSignals signals) throws CommandRejected {
         if (tree.parts.length == 0) {
             return leaf(tree.node, moved, tools, signals);
         }
@@ -115,7 +115,7 @@ final class BreakConditions {
         return tree.node instanceof AllOf ? first.and(others) : first.or(others);
     }
 
-    private static ICondition leaf(ConditionNode node, AbstractFrame moved, Tools tools, IoSignals signals) throws Refusal {
+    private static ICondition leaf(ConditionNode node, AbstractFrame moved, SunriseTools tools, SunriseSignals signals) throws CommandRejected {
         if (node instanceof ForceAbove) {
             ForceAbove one = (ForceAbove) node;
             AbstractFrame axes = axes(one.frame, moved, tools);
@@ -161,7 +161,7 @@ final class BreakConditions {
                 Convert.toMillimetres(one.distance), Math.round(one.delay * 1000));
     }
 
-    private static AbstractFrame axes(String name, AbstractFrame moved, Tools tools) throws Refusal {
+    private static AbstractFrame axes(String name, AbstractFrame moved, SunriseTools tools) throws CommandRejected {
         AbstractFrame found = tools.reference(name);
         return found == null ? moved : found;
     }

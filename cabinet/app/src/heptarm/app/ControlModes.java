@@ -10,28 +10,28 @@ import com.kuka.roboticsAPI.motionModel.controlModeModel.CartesianSineImpedanceC
 import com.kuka.roboticsAPI.motionModel.controlModeModel.JointImpedanceControlMode;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.PositionControlMode;
 
-import heptarm.core.Refusal;
+import heptarm.core.CommandRejected;
 import heptarm.wire.CartesianImpedance;
 import heptarm.wire.JointImpedance;
 import heptarm.wire.Mode;
 import heptarm.wire.SineImpedance;
 import heptarm.wire.SpiralPattern;
 
-/** Control modes of the protocol as those of Sunrise. */
-final class Modes {
-    /** Sunrise's names of the protocol's directions x y z, about x, about y, about z. */
+/** Builds Sunrise control modes from those of the protocol. */
+final class ControlModes {
+    /** Sunrise's names of the protocol's directions: along x y z, then about x y z. */
     private static final CartDOF[] DIRECTIONS = {CartDOF.X, CartDOF.Y, CartDOF.Z, CartDOF.C, CartDOF.B, CartDOF.A};
-    /** In a direction without a limit where another has one [N, Nm, mm, rad, ...]. */
-    private static final double OFF = 1e6;
+    /** Limit for a direction without one, where another direction has one [N, Nm, mm, rad, ...]. */
+    private static final double UNLIMITED = 1e6;
 
-    private final Tools tools;
+    private final SunriseTools tools;
 
-    Modes(Tools tools) {
+    ControlModes(SunriseTools tools) {
         this.tools = tools;
     }
 
-    /** Refuses a mode whose directions cannot be had while a frame is moved. */
-    void check(Mode mode, ObjectFrame moved, String path) throws Refusal {
+    /** Refuses a mode whose axes are not available with a motion frame. */
+    void check(Mode mode, ObjectFrame moved, String path) throws CommandRejected {
         String at = path;
         CartesianImpedance spring = null;
         if (mode instanceof SineImpedance) {
@@ -45,8 +45,8 @@ final class Modes {
         }
     }
 
-    /** The Sunrise mode of a checked one; null is position control. */
-    AbstractMotionControlMode of(Mode mode) throws Refusal {
+    /** Build the Sunrise mode of a checked one; null: position control. */
+    AbstractMotionControlMode of(Mode mode) throws CommandRejected {
         if (mode instanceof JointImpedance) {
             JointImpedance spring = (JointImpedance) mode;
             JointImpedanceControlMode joints = new JointImpedanceControlMode(spring.stiffness.length);
@@ -73,7 +73,7 @@ final class Modes {
         return new PositionControlMode();
     }
 
-    private void set(CartesianImpedanceControlMode spring, CartesianImpedance from) throws Refusal {
+    private void set(CartesianImpedanceControlMode spring, CartesianImpedance from) throws CommandRejected {
         for (int i = 0; i < DIRECTIONS.length; i++) {
             spring.parametrize(DIRECTIONS[i]).setStiffness(from.stiffness[i]);
             spring.parametrize(DIRECTIONS[i]).setDamping(from.damping[i]);
@@ -143,7 +143,7 @@ final class Modes {
         double[] result = new double[values.length];
         for (int i = 0; i < values.length; i++) {
             double value = lengths && i < 3 ? Convert.toMillimetres(values[i]) : values[i];
-            result[i < 3 ? i : 8 - i] = Double.isNaN(value) ? OFF : value;
+            result[i < 3 ? i : 8 - i] = Double.isNaN(value) ? UNLIMITED : value;
         }
         return result;
     }

@@ -9,13 +9,13 @@ import heptarm.wire.IoDirection;
 import heptarm.wire.IoType;
 import heptarm.wire.SignalInfo;
 
-/** A group of the cabinet's inputs and outputs, as the classes that a project generates, but for any of them. */
+/** A group of the cabinet's inputs and outputs, like the classes that a project generates, but for any group. */
 final class IoGroup extends AbstractIOGroup {
     IoGroup(Controller controller, String name) {
         super(controller, name);
     }
 
-    /** Makes a signal known; one that the cabinet does not have throws, here or when it is read. */
+    /** Register a signal; an unknown one throws here or when it is read. */
     void add(String name, SignalInfo info, int bits) {
         IOTypes type = type(info.type);
         if (info.direction == IoDirection.INPUT) {

@@ -5,27 +5,27 @@ import java.lang.reflect.Constructor;
 import com.kuka.roboticsAPI.geometricModel.LoadData;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 
-import heptarm.core.Principal;
-import heptarm.core.Refusal;
+import heptarm.core.CommandRejected;
+import heptarm.core.tools.PrincipalAxes;
 import heptarm.wire.Code;
 import heptarm.wire.Pose;
 import heptarm.wire.ToolInfo;
 
-/** Load data of Sunrise. */
-final class Loads {
-    /** Where releases have the class of moments of inertia; it is asked for by name, so that one without it still runs. */
+/** Converts loads to load data of Sunrise. */
+final class LoadConversion {
+    /** Class names of the moments of inertia in different releases; found by name, so that a release without it still works. */
     private static final String[] INERTIA = {"com.kuka.roboticsAPI.geometricModel.Inertia",
         "com.kuka.roboticsAPI.geometricModel.math.Inertia"};
 
-    private Loads() {
+    private LoadConversion() {
     }
 
-    static LoadData of(ToolInfo info, String path) throws Refusal {
-        boolean solid = false;
+    static LoadData of(ToolInfo info, String path) throws CommandRejected {
+        boolean hasInertia = false;
         for (int i = 0; i < info.inertia.length; i++) {
-            solid |= info.inertia[i] != 0.0;
+            hasInertia |= info.inertia[i] != 0.0;
         }
-        if (solid) {
+        if (hasInertia) {
             return withInertia(info, path);
         }
         LoadData load = new LoadData();
@@ -35,8 +35,8 @@ final class Loads {
         return load;
     }
 
-    private static LoadData withInertia(ToolInfo info, String path) throws Refusal {
-        Principal principal = new Principal(info.inertia);
+    private static LoadData withInertia(ToolInfo info, String path) throws CommandRejected {
+        PrincipalAxes principal = new PrincipalAxes(info.inertia);
         Transformation centre = Convert.transformation(new Pose(info.com, Convert.quaternion(principal.axes)));
         double[] moments = new double[3];
         for (int i = 0; i < 3; i++) {
@@ -44,21 +44,21 @@ final class Loads {
         }
         for (int i = 0; i < INERTIA.length; i++) {
             try {
-                Class<?> kind = Class.forName(INERTIA[i], true, Loads.class.getClassLoader());
+                Class<?> kind = Class.forName(INERTIA[i], true, LoadConversion.class.getClassLoader());
                 Object inertia = kind.getMethod("of", double.class, double.class, double.class)
                         .invoke(null, moments[0], moments[1], moments[2]);
                 Constructor<?>[] makers = LoadData.class.getConstructors();
                 for (int k = 0; k < makers.length; k++) {
-                    Class<?>[] wanted = makers[k].getParameterTypes();
-                    if (wanted.length == 3 && wanted[0] == double.class && wanted[1].isInstance(centre) && wanted[2] == kind) {
+                    Class<?>[] types = makers[k].getParameterTypes();
+                    if (types.length == 3 && types[0] == double.class && types[1].isInstance(centre) && types[2] == kind) {
                         return (LoadData) makers[k].newInstance(info.mass, centre, inertia);
                     }
                 }
-            } catch (Exception e) { // not there, or otherwise than expected
+            } catch (Exception e) { // absent, or with another signature
                 continue;
             }
         }
-        throw new Refusal(Code.UNSUPPORTED, path + "inertia", "given", "zeros", "this cabinet takes the inertia of a tool from a"
-                + " template of the project only; leave it out, or define the tool in the project");
+        throw new CommandRejected(Code.UNSUPPORTED, path + "inertia", "given", "zeros", "this cabinet accepts an inertia only in"
+                + " a tool template of the project; leave it out, or define the tool in the project");
     }
 }

@@ -26,7 +26,7 @@ import com.kuka.roboticsAPI.motionModel.RobotMotion;
 import com.kuka.roboticsAPI.motionModel.SplineMotionCP;
 import com.kuka.roboticsAPI.motionModel.SplineOrientationType;
 
-import heptarm.core.Refusal;
+import heptarm.core.CommandRejected;
 import heptarm.wire.Blending;
 import heptarm.wire.CartesianDynamics;
 import heptarm.wire.Circ;
@@ -51,8 +51,8 @@ import heptarm.wire.Redundancy;
 import heptarm.wire.ServoOpen;
 import heptarm.wire.Spline;
 
-/** Turns items of a program into Sunrise motions. What cannot be carried out is refused, never ignored. */
-final class Motions {
+/** Builds Sunrise motions from the items of a program. It refuses what it cannot express, and ignores nothing. */
+final class MotionBuilder {
     static final String[] CAPABILITIES = {"ptp", "ptp_pose", "ptp_home", "lin", "lin_rel", "circ", "spline", "spline_joints", "hold", "blending", "override", "pause",
         "servo", "servo_direct", "servo_pose", "conditions", "triggers", "segments", "io", "user_keys", "process_data", "joint_impedance", "cartesian_impedance", "sine_impedance",
         "tools", "workpieces", "frames"};
@@ -60,20 +60,20 @@ final class Motions {
     private static final int JOINTS = 7;
 
     private final LBR robot;
-    private final Tools tools;
-    private final Modes modes;
-    private final Splines splines;
+    private final SunriseTools tools;
+    private final ControlModes modes;
+    private final SplineBuilder splines;
 
-    Motions(LBR robot, Tools tools) {
+    MotionBuilder(LBR robot, SunriseTools tools, ControlModes modes) {
         this.robot = robot;
         this.tools = tools;
-        this.modes = new Modes(tools);
-        this.splines = new Splines(robot);
+        this.modes = modes;
+        this.splines = new SplineBuilder(robot);
     }
 
-    /** Refuses what this cabinet cannot carry out. */
-    void check(Item item, String path) throws Refusal {
-        modes.check(item.mode, tools.moved(item.frame), path + "mode.");
+    /** Refuses an item that this cabinet cannot execute. */
+    void check(Item item, String path) throws CommandRejected {
+        modes.check(item.mode, tools.motionFrame(item.frame), path + "mode.");
         Motion motion = item.motion;
         String at = path + "motion.";
         if (motion instanceof PtpPose) {
@@ -87,53 +87,53 @@ final class Motions {
         } else if (motion instanceof LinRel) {
             checkOrientation(((LinRel) motion).orientation, at);
         } else if (motion instanceof Spline) {
-            Splines.check((Spline) motion, at);
+            SplineBuilder.check((Spline) motion, at);
         } else if (!(motion instanceof Ptp || motion instanceof PtpHome || motion instanceof JointSpline || motion instanceof Hold
                 || motion instanceof HandGuide)) {
             throw unsupported(path + "motion", motion.getClass().getSimpleName());
         }
     }
 
-    /** Refuses a servo motion that this cabinet cannot carry out. */
-    void check(ServoOpen open) throws Refusal {
-        modes.check(open.mode, tools.moved(open.frame), "mode.");
+    /** Refuses a servo motion that this cabinet cannot execute. */
+    void check(ServoOpen open) throws CommandRejected {
+        modes.check(open.mode, tools.motionFrame(open.frame), "mode.");
     }
 
-    private static Refusal unsupported(String parameter, String what) {
-        return new Refusal(Code.UNSUPPORTED, parameter, what, "", "this version of the cabinet application cannot do that yet: " + what);
+    private static CommandRejected unsupported(String parameter, String what) {
+        return new CommandRejected(Code.UNSUPPORTED, parameter, what, "", "this cabinet application does not support " + what + "; update heptarm on the cabinet");
     }
 
-    private static void checkOrientation(Orientation orientation, String path) throws Refusal {
+    private static void checkOrientation(Orientation orientation, String path) throws CommandRejected {
         if (orientation.type == OrientationType.IGNORE) {
-            throw new Refusal(Code.OUT_OF_RANGE, path + "orientation.type", "ignore", "variable, constant, joint",
-                    "the orientation of a motion by itself cannot be ignored; that belongs to segments of a spline");
+            throw new CommandRejected(Code.OUT_OF_RANGE, path + "orientation.type", "ignore", "variable, constant, joint",
+                    "orientation.type must be variable, constant or joint, got ignore; only segments of a spline may ignore the orientation");
         }
-        checkLead(orientation, path);
+        checkOrientationReference(orientation, path);
     }
 
-    static void checkLead(Orientation orientation, String path) throws Refusal {
+    static void checkOrientationReference(Orientation orientation, String path) throws CommandRejected {
         if (orientation.type == OrientationType.JOINT && orientation.reference == OrientationReference.PATH) {
-            throw new Refusal(Code.OUT_OF_RANGE, path + "orientation.reference", "path", "base",
-                    "an orientation that the joints lead is not relative to the path");
+            throw new CommandRejected(Code.OUT_OF_RANGE, path + "orientation.reference", "path", "base",
+                    "orientation.reference must be base with orientation.type joint, got path");
         }
     }
 
-    private static void checkRedundancy(Redundancy redundancy, String path) throws Refusal {
+    private static void checkRedundancy(Redundancy redundancy, String path) throws CommandRejected {
         if (Double.isNaN(redundancy.e1) != redundancy.status < 0) {
-            throw new Refusal(Code.OUT_OF_RANGE, path + "redundancy", "E1 " + redundancy.e1 + ", status " + redundancy.status, "",
-                    "E1 and Status belong together: give both or none");
+            throw new CommandRejected(Code.OUT_OF_RANGE, path + "redundancy", "E1 " + redundancy.e1 + ", status " + redundancy.status, "",
+                    "E1 and status must both be set or both be left out, got E1 " + redundancy.e1 + ", status " + redundancy.status);
         }
     }
 
-    /** The Sunrise motion of a checked item; segments of a spline are added to a list. */
-    RobotMotion<?> motion(Item item, Mode mode, List<IMotion> segments) throws Refusal {
+    /** Build the Sunrise motion of a checked item; adds the segments of a spline to the list. */
+    RobotMotion<?> motion(Item item, Mode mode, List<IMotion> segments) throws CommandRejected {
         RobotMotion<?> motion = motion(item, segments);
         motion.setMode(modes.of(mode));
         return motion;
     }
 
-    /** The Sunrise motions of checked items that are carried out together. */
-    RobotMotion<?>[] motions(Item[] items) throws Refusal {
+    /** Build the Sunrise motions of checked items that form one batch. */
+    RobotMotion<?>[] motions(Item[] items) throws CommandRejected {
         RobotMotion<?>[] result = new RobotMotion<?>[items.length];
         for (int i = 0; i < items.length; i++) {
             result[i] = motion(items[i], new ArrayList<IMotion>());
@@ -141,20 +141,20 @@ final class Motions {
         return result;
     }
 
-    /** A batch of them. */
-    RobotMotion<?> batch(RobotMotion<?>[] motions, Mode mode) throws Refusal {
+    /** Build a batch of motions. */
+    RobotMotion<?> batch(RobotMotion<?>[] motions, Mode mode) throws CommandRejected {
         MotionBatch batch = new MotionBatch(motions);
         batch.setMode(modes.of(mode));
         return batch;
     }
 
-    private RobotMotion<?> motion(Item item, List<IMotion> segments) throws Refusal {
+    private RobotMotion<?> motion(Item item, List<IMotion> segments) throws CommandRejected {
         Motion motion = item.motion;
         if (motion instanceof Spline) {
             return splines.of((Spline) motion, segments);
         }
         if (motion instanceof JointSpline) {
-            return Splines.of((JointSpline) motion, segments);
+            return SplineBuilder.of((JointSpline) motion, segments);
         }
         if (motion instanceof Ptp) {
             Ptp one = (Ptp) motion;
@@ -228,7 +228,7 @@ final class Motions {
         return motion;
     }
 
-    /** NaN keeps the default, which is all of it. */
+    /** Replace NaN by the default, 1. */
     private static double[] filled(double[] fractions) {
         double[] result = new double[JOINTS];
         for (int i = 0; i < JOINTS; i++) {
@@ -237,9 +237,9 @@ final class Motions {
         return result;
     }
 
-    static void orientation(SplineMotionCP<?> motion, Orientation led) {
-        motion.setOrientationType(type(led.type));
-        motion.setOrientationReferenceSystem(led.reference == OrientationReference.PATH ? OrientationReferenceSystem.Path
+    static void orientation(SplineMotionCP<?> motion, Orientation from) {
+        motion.setOrientationType(type(from.type));
+        motion.setOrientationReferenceSystem(from.reference == OrientationReference.PATH ? OrientationReferenceSystem.Path
                 : OrientationReferenceSystem.Base);
     }
 

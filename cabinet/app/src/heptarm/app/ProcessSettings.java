@@ -5,7 +5,7 @@ import com.kuka.roboticsAPI.persistenceModel.PersistenceException;
 
 import heptarm.core.Log;
 
-/** Settings of heptarm among the process data of an application; one that is missing has a usual value. */
+/** Settings of heptarm in the process data of an application; a missing one has its default. */
 final class ProcessSettings {
     private final IApplicationData data;
     private final Log log;
@@ -15,22 +15,22 @@ final class ProcessSettings {
         this.log = log;
     }
 
-    String text(String name, String otherwise) {
+    String text(String name, String fallback) {
         try {
             Object value = data.getProcessData(name).getValue();
-            return value == null ? otherwise : value.toString();
+            return value == null ? fallback : value.toString();
         } catch (PersistenceException e) {
-            return otherwise;
+            return fallback;
         }
     }
 
-    double number(String name, double otherwise) {
+    double number(String name, double fallback) {
         String value = text(name, "");
         try {
-            return value.trim().length() == 0 ? otherwise : Double.parseDouble(value.trim());
+            return value.trim().length() == 0 ? fallback : Double.parseDouble(value.trim());
         } catch (NumberFormatException e) {
-            log.warn("process data " + name + " is " + value + ", which is no number; " + otherwise + " is used");
-            return otherwise;
+            log.warn("process data " + name + " must be a number, got " + value + "; using the default " + fallback);
+            return fallback;
         }
     }
 }

@@ -15,7 +15,7 @@ import com.kuka.roboticsAPI.motionModel.PTP;
 import com.kuka.roboticsAPI.motionModel.SplineJP;
 import com.kuka.roboticsAPI.motionModel.SplineMotionCP;
 
-import heptarm.core.Refusal;
+import heptarm.core.CommandRejected;
 import heptarm.wire.CartesianDynamics;
 import heptarm.wire.CircSegment;
 import heptarm.wire.JointDynamics;
@@ -28,17 +28,17 @@ import heptarm.wire.SplSegment;
 import heptarm.wire.Spline;
 import heptarm.wire.SplineSegment;
 
-/** Turns splines of the protocol into those of Sunrise. */
-final class Splines {
+/** Builds Sunrise splines from those of the protocol. */
+final class SplineBuilder {
     private final LBR robot;
 
-    Splines(LBR robot) {
+    SplineBuilder(LBR robot) {
         this.robot = robot;
     }
 
-    static void check(Spline spline, String path) throws Refusal {
+    static void check(Spline spline, String path) throws CommandRejected {
         for (int i = 0; i < spline.segments.length; i++) {
-            Motions.checkLead(orientation(spline.segments[i]), path + "segments[" + i + "].");
+            MotionBuilder.checkOrientationReference(orientation(spline.segments[i]), path + "segments[" + i + "].");
         }
     }
 
@@ -46,13 +46,13 @@ final class Splines {
         SplineMotionCP<?>[] segments = new SplineMotionCP<?>[spline.segments.length];
         for (int i = 0; i < segments.length; i++) {
             segments[i] = of(spline.segments[i]);
-            Motions.cartesian(segments[i], dynamics(spline.segments[i]));
-            Motions.orientation(segments[i], orientation(spline.segments[i]));
+            MotionBuilder.cartesian(segments[i], dynamics(spline.segments[i]));
+            MotionBuilder.orientation(segments[i], orientation(spline.segments[i]));
             listed.add(segments[i]);
         }
         com.kuka.roboticsAPI.motionModel.Spline block = new com.kuka.roboticsAPI.motionModel.Spline(segments);
-        Motions.joints(block, spline.joints);
-        Motions.cartesian(block, spline.dynamics);
+        MotionBuilder.joints(block, spline.joints);
+        MotionBuilder.cartesian(block, spline.dynamics);
         return block;
     }
 
@@ -89,17 +89,17 @@ final class Splines {
         for (int i = 0; i < points.length; i++) {
             JointPoint point = spline.points[i];
             points[i] = ptp(new JointPosition(point.q));
-            Motions.joints(points[i], new JointDynamics(either(point.dynamics.velocity, spline.dynamics.velocity),
+            MotionBuilder.joints(points[i], new JointDynamics(either(point.dynamics.velocity, spline.dynamics.velocity),
                     either(point.dynamics.acceleration, spline.dynamics.acceleration),
                     either(point.dynamics.jerk, spline.dynamics.jerk)));
             listed.add(points[i]);
         }
         SplineJP block = new SplineJP(points);
-        Motions.joints(block, spline.dynamics);
+        MotionBuilder.joints(block, spline.dynamics);
         return block;
     }
 
-    /** What a point does not say, the spline says. */
+    /** The point's values; where they are NaN, the spline's. */
     private static double[] either(double[] own, double[] whole) {
         double[] result = own.clone();
         for (int i = 0; i < result.length; i++) {

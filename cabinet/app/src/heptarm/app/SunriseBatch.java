@@ -2,14 +2,14 @@ package heptarm.app;
 
 import com.kuka.roboticsAPI.motionModel.IMotion;
 
-import heptarm.core.Job;
+import heptarm.core.robot.MotionJob;
 
-/** A batch of Sunrise as a job of the core: its container is one, its motions are told of one by one. */
+/** A batch of Sunrise as a job of the core: one container, whose motions are reported one by one. */
 final class SunriseBatch extends SunriseJob {
     private final IMotion[] motions;
     private final Parts parts;
 
-    SunriseBatch(IMotion[] motions, Job.Listener[] listeners) {
+    SunriseBatch(IMotion[] motions, MotionJob.Listener[] listeners) {
         this(motions, new Parts(listeners));
     }
 
@@ -27,22 +27,22 @@ final class SunriseBatch extends SunriseJob {
                 return;
             }
         }
-        parts.begin(0); // a cabinet that tells of the batch as a whole
+        parts.begin(0); // a cabinet that reports the batch as a whole
     }
 
-    /** Tells everybody's listener what becomes of his part, each once and in order. */
-    private static final class Parts implements Job.Listener {
-        private final Job.Listener[] listeners;
+    /** Reports to the listener of every part, each once and in order. */
+    private static final class Parts implements MotionJob.Listener {
+        private final MotionJob.Listener[] listeners;
         private int at = -1;
 
-        Parts(Job.Listener[] listeners) {
+        Parts(MotionJob.Listener[] listeners) {
             this.listeners = listeners;
         }
 
         synchronized void begin(int part) {
             while (at < part) {
                 if (at >= 0) {
-                    listeners[at].finished(Job.Ended.DONE, 0, "");
+                    listeners[at].finished(MotionJob.Outcome.DONE, 0, "");
                 }
                 at++;
                 listeners[at].started();
@@ -65,16 +65,16 @@ final class SunriseBatch extends SunriseJob {
             listeners[Math.max(at, 0)].fired(node);
         }
 
-        public synchronized void finished(Job.Ended ended, int code, String text) {
-            if (ended == Job.Ended.DONE) {
+        public synchronized void finished(MotionJob.Outcome outcome, int code, String text) {
+            if (outcome == MotionJob.Outcome.DONE) {
                 begin(listeners.length - 1);
             }
             int last = Math.max(at, 0);
             at = listeners.length;
             for (int i = last + 1; i < listeners.length; i++) {
-                listeners[i].finished(Job.Ended.CANCELLED, 0, "");
+                listeners[i].finished(MotionJob.Outcome.CANCELLED, 0, "");
             }
-            listeners[last].finished(ended, code, text);
+            listeners[last].finished(outcome, code, text);
         }
     }
 }

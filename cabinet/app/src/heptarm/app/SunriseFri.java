@@ -15,9 +15,9 @@ import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.ioModel.AbstractIO;
 import com.kuka.roboticsAPI.motionModel.PositionHold;
 
-import heptarm.core.Fri;
-import heptarm.core.Job;
-import heptarm.core.Refusal;
+import heptarm.core.CommandRejected;
+import heptarm.core.robot.FriSession;
+import heptarm.core.robot.MotionJob;
 import heptarm.wire.CartesianImpedance;
 import heptarm.wire.Code;
 import heptarm.wire.FriCommandMode;
@@ -27,25 +27,25 @@ import heptarm.wire.FriSessionState;
 import heptarm.wire.JointImpedance;
 import heptarm.wire.SineImpedance;
 
-/** An FRI session of Sunrise. Only this class names the option's classes, so that a cabinet without it still runs. */
-final class SunriseFri implements Fri, IFRISessionListener {
-    /** A client that commands has to be asked at least this often [s]; torques more often still. */
-    private static final double SLOWEST = 0.01;
-    private static final double SLOWEST_TORQUE = 0.005;
+/** An FRI session of Sunrise. Only this class refers to the option's classes, so a cabinet without it still works. */
+final class SunriseFri implements FriSession, IFRISessionListener {
+    /** Longest answer period of a commanding client [s]; shorter with a torque overlay. */
+    private static final double MAX_PERIOD = 0.01;
+    private static final double MAX_PERIOD_TORQUE = 0.005;
 
     private final FriOpen open;
-    private final Modes modes;
+    private final ControlModes modes;
     private final Mover mover;
-    private final Fri.Listener listener;
+    private final FriSession.Listener listener;
     private final FRISession session;
 
-    /** Commands motions of the robot. */
+    /** Starts motions of the robot. */
     interface Mover {
-        Job move(PositionHold hold, Job.Listener listener) throws Refusal;
+        MotionJob move(PositionHold hold, MotionJob.Listener listener) throws CommandRejected;
     }
 
-    private SunriseFri(FriOpen open, LBR robot, Modes modes, IoSignals signals, Mover mover, Fri.Listener listener)
-            throws Refusal {
+    private SunriseFri(FriOpen open, LBR robot, ControlModes modes, SunriseSignals signals, Mover mover, FriSession.Listener listener)
+            throws CommandRejected {
         this.open = open;
         this.modes = modes;
         this.mover = mover;
@@ -61,16 +61,16 @@ final class SunriseFri implements Fri, IFRISessionListener {
         session.addFRISessionListener(this);
     }
 
-    private static void register(String[] names, IoSignals signals, FRIConfiguration configuration) throws Refusal {
+    private static void register(String[] names, SunriseSignals signals, FRIConfiguration configuration) throws CommandRejected {
         if (!carriesSignals()) {
-            throw new Refusal(Code.UNSUPPORTED, "io", names[0], "none", "this cabinet's FRI carries no signals; they came with 1.14");
+            throw new CommandRejected(Code.UNSUPPORTED, "io", names[0], "none", "the FRI of this cabinet carries no signals; update it to 1.14 or later");
         }
         for (int i = 0; i < names.length; i++) {
             configuration.registerIO(signals.signal(names[i]));
         }
     }
 
-    /** FRI 1.11 has none. */
+    /** Whether this FRI carries signals; version 1.11 does not. */
     private static boolean carriesSignals() {
         try {
             FRIConfiguration.class.getMethod("registerIO", AbstractIO.class);
@@ -80,20 +80,20 @@ final class SunriseFri implements Fri, IFRISessionListener {
         }
     }
 
-    static SunriseFri of(FriOpen open, LBR robot, Modes modes, IoSignals signals, Mover mover, Fri.Listener listener)
-            throws Refusal {
+    static SunriseFri of(FriOpen open, LBR robot, ControlModes modes, SunriseSignals signals, Mover mover, FriSession.Listener listener)
+            throws CommandRejected {
         SunriseFri fri = new SunriseFri(open, robot, modes, signals, mover, listener);
-        FRIChannelInformation now = fri.session.getFRIChannelInformation(); // from before the listener was there
-        FRIChannelInformation told;
+        FRIChannelInformation now = fri.session.getFRIChannelInformation(); // the state before the listener was added
+        FRIChannelInformation reported;
         do {
-            told = now;
-            fri.tell(told);
-            now = fri.session.getFRIChannelInformation(); // the listener may have told newer things meanwhile
-        } while (now.getFRISessionState() != told.getFRISessionState() || now.getQuality() != told.getQuality());
+            reported = now;
+            fri.report(reported);
+            now = fri.session.getFRIChannelInformation(); // the listener may have received a newer state meanwhile
+        } while (now.getFRISessionState() != reported.getFRISessionState() || now.getQuality() != reported.getQuality());
         return fri;
     }
 
-    /** What the option adds to the cabinet's capabilities. */
+    /** Capabilities that the option adds. */
     static String[] capabilities() {
         List<String> all = new ArrayList<String>(
                 Arrays.asList("fri", "fri_monitor", "fri_position", "fri_torque", "fri_wrench"));
@@ -103,37 +103,37 @@ final class SunriseFri implements Fri, IFRISessionListener {
         return all.toArray(new String[0]);
     }
 
-    /** Refuses what FRI cannot do. */
-    static void check(FriOpen open) throws Refusal {
+    /** Refuses settings that FRI does not support. */
+    static void check(FriOpen open) throws CommandRejected {
         double answers = open.period * open.receive_multiplier;
         if (Math.abs(open.period * 1000 - milliseconds(open.period)) > 1e-6) {
-            throw new Refusal(Code.OUT_OF_RANGE, "period", Double.toString(open.period), "whole milliseconds",
-                    "FRI sends every whole number of milliseconds, not every " + open.period + " s");
+            throw new CommandRejected(Code.OUT_OF_RANGE, "period", Double.toString(open.period), "whole milliseconds",
+                    "period must be a whole number of milliseconds, got " + open.period * 1000 + " ms");
         }
         if (answers > 0.1) {
-            throw new Refusal(Code.OUT_OF_RANGE, "receive_multiplier", Integer.toString(open.receive_multiplier), "",
-                    "the client would answer every " + answers + " s; at most 0.1 s are legal");
+            throw new CommandRejected(Code.OUT_OF_RANGE, "receive_multiplier", Integer.toString(open.receive_multiplier), "",
+                    "period * receive_multiplier must be at most 0.1 s, got " + answers + " s");
         }
         if (open.command == FriCommandMode.POSE) {
-            throw new Refusal(Code.UNSUPPORTED, "command", "pose", "monitor, position, wrench, torque",
-                    "Cartesian pose overlays came with Sunrise 2.x; this application runs on 1.x");
+            throw new CommandRejected(Code.UNSUPPORTED, "command", "pose", "monitor, position, wrench, torque",
+                    "pose overlays need Sunrise 2.x, this is 1.x; use position");
         }
         if (open.command != FriCommandMode.MONITOR && open.mode instanceof SineImpedance) {
-            throw new Refusal(Code.MODE_CONFLICT, "mode", name(open), "PositionMode, JointImpedance, CartesianImpedance",
-                    "no overlay goes with a superposed force");
+            throw new CommandRejected(Code.MODE_CONFLICT, "mode", name(open), "PositionMode, JointImpedance, CartesianImpedance",
+                    "an overlay cannot be combined with a superposed force; use another control mode");
         }
         if (open.command == FriCommandMode.TORQUE && !(open.mode instanceof JointImpedance)) {
-            throw new Refusal(Code.MODE_CONFLICT, "mode", name(open), "JointImpedance",
-                    "a torque overlay needs joint impedance under it");
+            throw new CommandRejected(Code.MODE_CONFLICT, "mode", name(open), "JointImpedance",
+                    "a torque overlay needs the control mode JointImpedance, got " + name(open));
         }
         if (open.command == FriCommandMode.WRENCH && !(open.mode instanceof CartesianImpedance)) {
-            throw new Refusal(Code.MODE_CONFLICT, "mode", name(open), "CartesianImpedance",
-                    "a wrench overlay needs Cartesian impedance under it");
+            throw new CommandRejected(Code.MODE_CONFLICT, "mode", name(open), "CartesianImpedance",
+                    "a wrench overlay needs the control mode CartesianImpedance, got " + name(open));
         }
-        double slowest = open.command == FriCommandMode.TORQUE ? SLOWEST_TORQUE : SLOWEST;
-        if (open.command != FriCommandMode.MONITOR && answers > slowest + 1e-9) {
-            throw new Refusal(Code.OUT_OF_RANGE, "period", Double.toString(answers), "[0.001, " + slowest + "] s",
-                    "a client that commands has to answer at least every " + slowest + " s");
+        double longest = open.command == FriCommandMode.TORQUE ? MAX_PERIOD_TORQUE : MAX_PERIOD;
+        if (open.command != FriCommandMode.MONITOR && answers > longest + 1e-9) {
+            throw new CommandRejected(Code.OUT_OF_RANGE, "period", Double.toString(answers), "[0.001, " + longest + "] s",
+                    "period * receive_multiplier of a commanding client must be at most " + longest + " s, got " + answers + " s");
         }
     }
 
@@ -145,7 +145,7 @@ final class SunriseFri implements Fri, IFRISessionListener {
         return (int) Math.round(seconds * 1000);
     }
 
-    public Job command(Job.Listener jobListener) throws Refusal {
+    public MotionJob command(MotionJob.Listener jobListener) throws CommandRejected {
         PositionHold hold = new PositionHold(modes.of(open.mode), -1, TimeUnit.SECONDS);
         hold.addMotionOverlay(new FRIJointOverlay(session, mode()));
         return mover.move(hold, jobListener);
@@ -167,15 +167,15 @@ final class SunriseFri implements Fri, IFRISessionListener {
     }
 
     public void onFRISessionStateChanged(FRIChannelInformation information) {
-        tell(information);
+        report(information);
     }
 
     public void onFRIConnectionQualityChanged(FRIChannelInformation information) {
-        tell(information);
+        report(information);
     }
 
-    /** By their names: nothing is known of the constants' order. */
-    private void tell(FRIChannelInformation information) {
+    /** Convert by name: the order of the constants is undocumented. */
+    private void report(FRIChannelInformation information) {
         listener.changed(FriSessionState.valueOf(information.getFRISessionState().name()),
                 FriQuality.valueOf(information.getQuality().name()));
     }

@@ -5,25 +5,25 @@ import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.motionModel.HandGuidingMotion;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 
-import heptarm.core.Refusal;
+import heptarm.core.CommandRejected;
 import heptarm.wire.Code;
 import heptarm.wire.HandGuide;
 
-/** Hand guiding of Sunrise. Only this class names the option's classes, so that a cabinet without it still runs. */
-final class SunriseGuiding {
+/** Hand guiding of Sunrise. Only this class refers to the option's classes, so a cabinet without it still works. */
+final class SunriseHandGuiding {
     private static final int JOINTS = 7;
 
-    private SunriseGuiding() {
+    private SunriseHandGuiding() {
     }
 
-    /** What the option is called; a LinkageError if it is not installed. */
+    /** Capability that the option adds; a LinkageError if it is not installed. */
     static String capability() {
         new HandGuidingMotion();
         return "hand_guide";
     }
 
-    /** The motion of a checked order. */
-    static IMotion of(HandGuide guide, LBR robot) throws Refusal {
+    /** Build the motion of a checked item. */
+    static IMotion of(HandGuide guide, LBR robot) throws CommandRejected {
         HandGuidingMotion motion = new HandGuidingMotion();
         JointLimits own = robot.getJointLimits();
         double[] lowest = own.getMinJointPosition().get();
@@ -39,7 +39,7 @@ final class SunriseGuiding {
             motion.setJointLimitsMax(highest);
             motion.setJointLimitsEnabled(enabled);
             motion.setJointLimitViolationFreezesAll(guide.freezes_all);
-        } catch (NoSuchMethodError e) { // older cabinets have other names for the same
+        } catch (NoSuchMethodError e) { // older cabinets have other method names
             motion.setAxisLimitsMin(lowest);
             motion.setAxisLimitsMax(highest);
             motion.setAxisLimitsEnabled(enabled);
@@ -50,7 +50,7 @@ final class SunriseGuiding {
         return motion;
     }
 
-    private static void limitSpeed(HandGuidingMotion motion, HandGuide guide) throws Refusal {
+    private static void limitSpeed(HandGuidingMotion motion, HandGuide guide) throws CommandRejected {
         try {
             if (!Double.isNaN(guide.joint_velocity)) {
                 motion.setJointVelocityLimit(guide.joint_velocity);
@@ -59,7 +59,7 @@ final class SunriseGuiding {
                 motion.setCartVelocityLimit(Convert.toMillimetres(guide.cartesian_velocity));
             }
         } catch (NoSuchMethodError e) {
-            throw new Refusal(Code.UNSUPPORTED, "the hand guiding of this cabinet cannot limit the speed (" + e.getMessage() + ")");
+            throw new CommandRejected(Code.UNSUPPORTED, "the hand guiding of this cabinet has no speed limit (" + e.getMessage() + "); leave velocity limits out");
         }
     }
 }

@@ -10,30 +10,30 @@ import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 
-import heptarm.core.Job;
+import heptarm.core.robot.MotionJob;
 import heptarm.wire.Code;
 
-/** A motion container of Sunrise as a job of the core. It ends once, whoever hears of it first. */
-class SunriseJob implements Job, IMotionContainerListener {
-    private final Job.Listener listener;
-    /** Segments of a spline, told of one by one where the cabinet does. */
+/** A motion container of Sunrise as a job of the core. It ends once, whichever callback comes first. */
+class SunriseJob implements MotionJob, IMotionContainerListener {
+    private final MotionJob.Listener listener;
+    /** Segments of a spline, which some cabinets report one by one. */
     final List<IMotion> segments = new ArrayList<IMotion>();
     private BreakConditions until;
     private IMotionContainer container;
     private boolean cancelled;
     private boolean ended;
 
-    SunriseJob(Job.Listener listener) {
+    SunriseJob(MotionJob.Listener listener) {
         this.listener = listener;
     }
 
-    /** A motion that conditions may end. */
-    void guard(RobotMotion<?> motion, BreakConditions conditions) {
+    /** Let conditions end a motion. */
+    void breakWhen(RobotMotion<?> motion, BreakConditions conditions) {
         until = conditions;
-        conditions.watch(motion, listener);
+        conditions.addTo(motion, listener);
     }
 
-    /** The container, once moveAsync has returned it. */
+    /** Set the container that moveAsync has returned. */
     void set(IMotionContainer accepted) {
         boolean late;
         synchronized (this) {
@@ -57,21 +57,21 @@ class SunriseJob implements Job, IMotionContainerListener {
     }
 
     void fail(String text) {
-        String why = text == null ? "the cabinet gives no reason" : text;
-        end(Ended.FAILED, code(why), why);
+        String why = text == null ? "the cabinet reports no reason" : text;
+        end(Outcome.FAILED, code(why), why);
     }
 
-    private void end(Ended how, int code, String text) {
+    private void end(Outcome outcome, int code, String text) {
         synchronized (this) {
             if (ended) {
                 return;
             }
             ended = true;
         }
-        listener.finished(how, code, text);
+        listener.finished(outcome, code, text);
     }
 
-    /** The cabinet speaks in texts only. */
+    /** The code of a failure: the cabinet reports texts only. */
     static int code(String text) {
         if (text.indexOf("safety stop") >= 0) {
             return Code.SAFETY_STOP;
@@ -96,17 +96,17 @@ class SunriseJob implements Job, IMotionContainerListener {
             fail(finished.getErrorMessage());
             return;
         }
-        boolean wanted;
+        boolean wasCancelled;
         synchronized (this) {
-            wanted = cancelled;
+            wasCancelled = cancelled;
         }
         if (finished.getFiredBreakConditionInfo() != null) {
             if (until != null) {
-                until.tell(finished, listener);
+                until.report(finished, listener);
             }
-            end(Ended.CONDITION, 0, "");
+            end(Outcome.CONDITION, 0, "");
         } else {
-            end(wanted ? Ended.CANCELLED : Ended.DONE, 0, "");
+            end(wasCancelled ? Outcome.CANCELLED : Outcome.DONE, 0, "");
         }
     }
 

@@ -4,62 +4,72 @@ import com.kuka.roboticsAPI.applicationModel.IApplicationData;
 import com.kuka.roboticsAPI.persistenceModel.PersistenceException;
 import com.kuka.roboticsAPI.persistenceModel.processDataModel.IProcessData;
 
-import heptarm.core.Refusal;
+import heptarm.core.CommandRejected;
+import heptarm.core.Log;
+import heptarm.core.robot.PanelPort;
 import heptarm.wire.Code;
 import heptarm.wire.SetKey;
 
-/** What a cabinet offers besides its robot: signals, user keys, process data; as far as the application was given them. */
-final class CabinetPanel {
-    /** None: of an application that does without. */
-    final IoSignals signals;
+/** The smartPAD and the process data of the project. */
+final class SunrisePanel implements PanelPort {
+    private static final int INFO = 0;
+
     private final IApplicationData data;
+    private final Log log;
     private volatile UserKeys keys;
 
-    CabinetPanel(IoSignals signals, IApplicationData data) {
-        this.signals = signals;
+    SunrisePanel(IApplicationData data, Log log) {
         this.data = data;
+        this.log = log;
     }
 
-    void show(UserKeys published) {
+    /** Use published user keys from now on. */
+    void use(UserKeys published) {
         keys = published;
     }
 
-    void setKey(SetKey key) throws Refusal {
+    public void setKey(SetKey key) throws CommandRejected {
         UserKeys published = keys;
         if (published == null) {
-            throw new Refusal(Code.UNSUPPORTED, "this cabinet has no user keys");
+            throw new CommandRejected(Code.UNSUPPORTED, "this cabinet has no user keys; its Sunrise version is too old");
         }
         published.set(key);
     }
 
-    String processData(String name) throws Refusal {
+    public String processData(String name) throws CommandRejected {
         Object value = find(name).getValue();
         return value == null ? "" : value.toString();
     }
 
-    void setProcessData(String name, String text) throws Refusal {
+    public void setProcessData(String name, String text) throws CommandRejected {
         IProcessData found = find(name);
         Object old = found.getValue();
         try {
             found.setValue(like(old, text));
         } catch (RuntimeException e) {
             String type = old == null ? "text" : old.getClass().getSimpleName();
-            throw new Refusal(Code.OUT_OF_RANGE, "value", text, type, name + " cannot become " + text + ": " + e.getMessage());
+            throw new CommandRejected(Code.OUT_OF_RANGE, "value", text, type, name + " must be of type " + type + ", got " + text + " (" + e.getMessage() + ")");
         }
     }
 
-    private IProcessData find(String name) throws Refusal {
+    public void show(int severity, String text) {
+        if (severity == INFO) {
+            log.info(text);
+        } else {
+            log.warn(text);
+        }
+    }
+
+    private IProcessData find(String name) throws CommandRejected {
         try {
-            if (data != null) {
-                return data.getProcessData(name);
-            }
+            return data.getProcessData(name);
         } catch (PersistenceException e) {
-            throw new Refusal(Code.UNKNOWN_NAME, "name", name, "", "the project has no process data " + name);
+            throw new CommandRejected(Code.UNKNOWN_NAME, "name", name, "",
+                    "the project has no process data " + name + "; add it in Sunrise Workbench");
         }
-        throw new Refusal(Code.UNSUPPORTED, "this application has no process data");
     }
 
-    /** A text as a value of another's type. */
+    /** Parse a text as a value of the old value's type. */
     private static Object like(Object old, String text) {
         if (old instanceof Integer) {
             return Integer.valueOf(text.trim());
@@ -69,7 +79,7 @@ final class CabinetPanel {
         }
         if (old instanceof Boolean) {
             if (!"true".equals(text.trim()) && !"false".equals(text.trim())) {
-                throw new IllegalArgumentException("true or false is wanted");
+                throw new IllegalArgumentException("true or false expected");
             }
             return Boolean.valueOf(text.trim());
         }

@@ -8,34 +8,32 @@ import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseExecutionService;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseSafetyState;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 
-import heptarm.core.Insight;
-import heptarm.core.Refusal;
+import heptarm.core.CommandRejected;
+import heptarm.core.robot.SafetyPort;
+import heptarm.core.robot.SimulatorProbe;
 import heptarm.wire.Code;
 import heptarm.wire.OperationMode;
 import heptarm.wire.SafetyBits;
 import heptarm.wire.SafetyState;
 
-/** The safety state of Sunrise on the wire's terms, and what an application may do after a stop. */
-final class SunriseSafety {
+/** The safety state of Sunrise behind the core's port, and what an application may do after a stop. */
+final class SunriseSafety implements SafetyPort {
     private final LBR lbr;
     private final SunriseExecutionService execution;
-    private final Insight insight;
-    private volatile IRecovery recovery;
+    private final IRecovery recovery;
+    private final SimulatorProbe probe;
 
-    /** Without a simulator's insight nothing is known of the brakes. */
-    SunriseSafety(LBR lbr, SunriseExecutionService execution, Insight insight) {
+    /** Probe: null on a real robot, whose brakes are then unknown. */
+    SunriseSafety(LBR lbr, SunriseExecutionService execution, IRecovery recovery, SimulatorProbe probe) {
         this.lbr = lbr;
         this.execution = execution;
-        this.insight = insight;
+        this.recovery = recovery;
+        this.probe = probe;
     }
 
-    void heed(IRecovery told) {
-        recovery = told;
-    }
-
-    SafetyState read(long stamp) {
+    public SafetyState read(long stamp) {
         ISafetyState safety = lbr.getSafetyState();
-        int bits = insight == null ? 0 : insight.safetyBits();
+        int bits = probe == null ? 0 : probe.safetyBits();
         bits |= lbr.isReadyToMove() ? SafetyBits.READY_TO_MOVE : 0;
         bits |= execution.isPaused() ? SafetyBits.PAUSED : 0;
         bits |= lbr.hasActiveMotionCommand() ? SafetyBits.MOVING : 0;
@@ -51,8 +49,7 @@ final class SunriseSafety {
                 ? SafetyBits.HAND_GUIDING_SWITCH : 0;
         bits |= safety.areAllAxesGMSReferenced() ? SafetyBits.TORQUE_REFERENCED : 0;
         bits |= safety.areAllAxesPositionReferenced() ? SafetyBits.POSITION_REFERENCED : 0;
-        IRecovery told = recovery;
-        bits |= told != null && told.isRecoveryRequired() ? SafetyBits.RECOVERY_REQUIRED : 0;
+        bits |= recovery != null && recovery.isRecoveryRequired() ? SafetyBits.RECOVERY_REQUIRED : 0;
         return new SafetyState(stamp, bits, mode(lbr.getOperationMode()));
     }
 
@@ -63,8 +60,8 @@ final class SunriseSafety {
         return mode == com.kuka.roboticsAPI.deviceModel.OperationMode.T2 ? OperationMode.T2 : OperationMode.T1;
     }
 
-    /** Acknowledges errors and lets execution go on along the path; the cabinet brings a displaced arm back to it. */
-    void recover() throws Refusal {
+    /** Acknowledges errors and resumes on the path; the cabinet moves a displaced arm back to it. */
+    public void recover() throws CommandRejected {
         try {
             if (lbr.getController() instanceof SunriseController) {
                 ((SunriseController) lbr.getController()).acknowledgeError();
@@ -73,8 +70,8 @@ final class SunriseSafety {
                 execution.resumeExecution(ResumeMode.OnPath);
             }
         } catch (RuntimeException e) {
-            throw new Refusal(Code.NEEDS_OPERATOR, "the cabinet does not go on: " + e.getMessage()
-                    + "; do what the smartPAD shows, and press Start");
+            throw new CommandRejected(Code.NEEDS_OPERATOR, "the cabinet does not resume: " + e.getMessage()
+                    + "; follow the instructions on the smartPAD, then press Start");
         }
     }
 }

@@ -12,45 +12,46 @@ import com.kuka.roboticsAPI.geometricModel.math.Vector;
 import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
 import com.kuka.roboticsAPI.sensorModel.ForceSensorData;
 
-import heptarm.core.Insight;
-import heptarm.core.Refusal;
+import heptarm.core.CommandRejected;
+import heptarm.core.robot.Sensors;
+import heptarm.core.robot.SimulatorProbe;
 import heptarm.wire.PoseState;
 import heptarm.wire.Redundancy;
 import heptarm.wire.WrenchState;
 
-/** What the robot measures and is led by. */
-final class Readings {
+/** Sensors of Sunrise behind the core's port. */
+final class SunriseSensors implements Sensors {
     private final LBR lbr;
-    private final Tools tools;
-    private final Insight insight;
+    private final SunriseTools tools;
+    private final SimulatorProbe probe;
 
-    /** Insight: what only a simulator knows; null on a cabinet. */
-    Readings(LBR lbr, Tools tools, Insight insight) {
+    /** Probe: null on a real robot. */
+    SunriseSensors(LBR lbr, SunriseTools tools, SimulatorProbe probe) {
         this.lbr = lbr;
         this.tools = tools;
-        this.insight = insight;
+        this.probe = probe;
     }
 
-    void joints(double[] q, double[] commanded) {
+    public void readJoints(double[] q, double[] commanded) {
         System.arraycopy(lbr.getCurrentJointPosition().getInternalArray(), 0, q, 0, q.length);
         System.arraycopy(lbr.getCommandedJointPosition().getInternalArray(), 0, commanded, 0, q.length);
     }
 
-    void torques(double[] measured, double[] external, double[] commanded) {
+    public void readTorques(double[] measured, double[] external, double[] commanded) {
         System.arraycopy(lbr.getMeasuredTorque().getTorqueValues(), 0, measured, 0, measured.length);
         System.arraycopy(lbr.getExternalTorque().getTorqueValues(), 0, external, 0, external.length);
-        if (insight != null) {
-            insight.readTorques(commanded);
+        if (probe != null) {
+            probe.readTorques(commanded);
         } else {
             Arrays.fill(commanded, Double.NaN);
         }
     }
 
-    PoseState pose(long stamp) {
-        // relative to the robot's own base: the world's axes are others when it hangs from a wall
-        ObjectFrame moved = tools.moved();
-        Frame measured = lbr.getCurrentCartesianPosition(moved, lbr.getRootFrame());
-        Frame commanded = lbr.getCommandedCartesianPosition(moved, lbr.getRootFrame());
+    public PoseState readPose(long stamp) {
+        // relative to the robot's own base: the axes of the world differ for a robot on a wall
+        ObjectFrame frame = tools.motionFrame();
+        Frame measured = lbr.getCurrentCartesianPosition(frame, lbr.getRootFrame());
+        Frame commanded = lbr.getCommandedCartesianPosition(frame, lbr.getRootFrame());
         IRedundancyCollection collection = measured.getRedundancyInformationForDevice(lbr);
         Redundancy redundancy = new Redundancy(Double.NaN, -1, -1);
         if (collection instanceof LBRE1Redundancy) {
@@ -58,30 +59,30 @@ final class Readings {
             redundancy = new Redundancy(e1.getE1(), e1.getStatus(), e1.getTurn());
         }
         Transformation pose = measured.getTransformationFromParent();
-        Transformation wanted = commanded.getTransformationFromParent();
-        return new PoseState(stamp, Convert.xyz(pose), Convert.quaternion(pose), Convert.xyz(wanted), Convert.quaternion(wanted),
+        Transformation target = commanded.getTransformationFromParent();
+        return new PoseState(stamp, Convert.xyz(pose), Convert.quaternion(pose), Convert.xyz(target), Convert.quaternion(target),
                 redundancy);
     }
 
-    WrenchState wrench(long stamp) {
-        ForceSensorData data = lbr.getExternalForceTorque(tools.moved(), lbr.getRootFrame());
+    public WrenchState readWrench(long stamp) {
+        ForceSensorData data = lbr.getExternalForceTorque(tools.motionFrame(), lbr.getRootFrame());
         return wrench(data, stamp);
     }
 
-    WrenchState wrench(String axes, long stamp) {
-        AbstractFrame turned;
+    public WrenchState readWrench(String axes, long stamp) {
+        AbstractFrame reference;
         try {
-            turned = tools.reference(axes);
-        } catch (Refusal e) {
+            reference = tools.reference(axes);
+        } catch (CommandRejected e) {
             throw new IllegalArgumentException(e.getMessage());
         }
-        ForceSensorData data = lbr.getExternalForceTorque(tools.moved(), turned == null ? tools.moved() : turned);
+        ForceSensorData data = lbr.getExternalForceTorque(tools.motionFrame(), reference == null ? tools.motionFrame() : reference);
         return wrench(data, stamp);
     }
 
-    void progress(double[] progressAndRemaining) {
-        if (insight != null) {
-            insight.readProgress(progressAndRemaining);
+    public void readProgress(double[] progressAndRemaining) {
+        if (probe != null) {
+            probe.readProgress(progressAndRemaining);
         }
     }
 

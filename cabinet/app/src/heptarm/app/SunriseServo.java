@@ -12,8 +12,8 @@ import com.kuka.roboticsAPI.geometricModel.Frame;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 
-import heptarm.core.Refusal;
-import heptarm.core.Servo;
+import heptarm.core.CommandRejected;
+import heptarm.core.robot.ServoJob;
 import heptarm.wire.Code;
 import heptarm.wire.Mode;
 import heptarm.wire.Pose;
@@ -21,28 +21,28 @@ import heptarm.wire.PositionMode;
 import heptarm.wire.ServoEngine;
 import heptarm.wire.ServoOpen;
 
-/** A servo motion of Sunrise. Only this class names the option's classes, so that a cabinet without it still runs. */
-final class SunriseServo implements Servo {
+/** A servo motion of Sunrise. Only this class refers to the option's classes, so a cabinet without it still works. */
+final class SunriseServo implements ServoJob {
     private final LBR robot;
-    private final Tools tools;
+    private final ControlModes modes;
     private final ObjectFrame moved;
     private final SunriseJob job;
     private final ServoMotion<?> motion;
     private final boolean isStraight;
-    private boolean passes;
+    private boolean hasVelocities;
 
-    private SunriseServo(LBR robot, Tools tools, ObjectFrame moved, SunriseJob job, ServoMotion<?> motion, boolean isStraight) {
+    private SunriseServo(LBR robot, ControlModes modes, ObjectFrame moved, SunriseJob job, ServoMotion<?> motion, boolean isStraight) {
         this.robot = robot;
-        this.tools = tools;
+        this.modes = modes;
         this.moved = moved;
         this.job = job;
         this.motion = motion;
         this.isStraight = isStraight;
     }
 
-    /** A servo motion at the present position. */
-    static SunriseServo of(ServoOpen open, LBR robot, Tools tools, SunriseJob job) throws Refusal {
-        ServoMotion<?> motion = open.engine == ServoEngine.LIN ? SunriseLin.of(open, robot, tools) : joints(open, robot);
+    /** Build a servo motion at the current position. */
+    static SunriseServo of(ServoOpen open, LBR robot, SunriseTools tools, ControlModes modes, SunriseJob job) throws CommandRejected {
+        ServoMotion<?> motion = open.engine == ServoEngine.LIN ? SunriseServoLin.of(open, robot, tools) : joints(open, robot);
         motion.setMinimumTrajectoryExecutionTime(open.min_trajectory_time);
         motion.setTimeoutAfterGoalReach(open.goal_timeout);
         if (open.engine == ServoEngine.SMART) {
@@ -50,12 +50,12 @@ final class SunriseServo implements Servo {
         }
         if (open.mode != null && !(open.mode instanceof PositionMode)) {
             if (!ServoMotion.validateForImpedanceMode(tools.carrier())) {
-                throw new Refusal(Code.NOT_READY, "impedance control cannot begin: the arm has to rest, away from a singularity,"
-                        + " with nothing pushing it and the load data right (less than 10 Nm external torque in every joint)");
+                throw new CommandRejected(Code.NOT_READY, "impedance control cannot start; the arm must rest away from a singularity"
+                        + " with less than 10 Nm external torque in every joint: check contacts and load data");
             }
-            motion.setMode(new Modes(tools).of(open.mode));
+            motion.setMode(modes.of(open.mode));
         }
-        return new SunriseServo(robot, tools, tools.moved(open.frame), job, motion, open.engine == ServoEngine.LIN);
+        return new SunriseServo(robot, modes, tools.motionFrame(open.frame), job, motion, open.engine == ServoEngine.LIN);
     }
 
     private static ServoMotion<?> joints(ServoOpen open, LBR robot) {
@@ -66,7 +66,7 @@ final class SunriseServo implements Servo {
         return motion;
     }
 
-    /** Begins it. */
+    /** Start the motion. */
     IMotionContainer start() {
         return moved.moveAsync(motion, job);
     }
@@ -75,7 +75,7 @@ final class SunriseServo implements Servo {
         job.cancel();
     }
 
-    public void follow(double[] q, double[] velocity) throws Refusal {
+    public void follow(double[] q, double[] velocity) throws CommandRejected {
         try {
             IServoRuntime runtime = motion.getRuntime();
             if (motion instanceof DirectServo) {
@@ -84,9 +84,9 @@ final class SunriseServo implements Servo {
                 ((ISmartServoRuntime) runtime).setDestination(new JointPosition(q));
             } else {
                 ISmartServoRuntime smart = (ISmartServoRuntime) runtime;
-                if (!passes) { // once, with the first target that has a velocity
+                if (!hasVelocities) { // once, with the first target that has a velocity
                     smart.activateVelocityPlanning(true);
-                    passes = true;
+                    hasVelocities = true;
                 }
                 smart.setDestination(new JointPosition(q), new JointPosition(velocity));
             }
@@ -95,11 +95,11 @@ final class SunriseServo implements Servo {
         }
     }
 
-    public void followPose(double[] xyz, double[] quat) throws Refusal {
+    public void followPose(double[] xyz, double[] quat) throws CommandRejected {
         try {
             Frame target = new Frame(robot.getRootFrame(), Convert.transformation(new Pose(xyz, quat)));
             if (isStraight) {
-                SunriseLin.follow(motion, target);
+                SunriseServoLin.follow(motion, target);
             } else if (motion instanceof DirectServo) {
                 ((IDirectServoRuntime) motion.getRuntime()).setDestination(target);
             } else {
@@ -110,8 +110,7 @@ final class SunriseServo implements Servo {
         }
     }
 
-    public void change(Mode mode) throws Refusal {
-        Modes modes = new Modes(tools);
+    public void changeMode(Mode mode) throws CommandRejected {
         modes.check(mode, moved, "mode.");
         try {
             motion.getRuntime().changeControlModeSettings(modes.of(mode));
@@ -120,8 +119,8 @@ final class SunriseServo implements Servo {
         }
     }
 
-    private static Refusal refusal(RuntimeException error) {
+    private static CommandRejected refusal(RuntimeException error) {
         String text = String.valueOf(error.getMessage());
-        return new Refusal(SunriseJob.code(text), text);
+        return new CommandRejected(SunriseJob.code(text), text);
     }
 }

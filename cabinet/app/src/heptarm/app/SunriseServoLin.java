@@ -5,36 +5,36 @@ import com.kuka.connectivity.motionModel.smartServoLIN.SmartServoLIN;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.Frame;
 
-import heptarm.core.Refusal;
+import heptarm.core.CommandRejected;
 import heptarm.wire.CartesianDynamics;
 import heptarm.wire.ServoOpen;
 
-/** Straight servo motions. Only this class names that option's classes, so that a cabinet without it still has the others. */
-final class SunriseLin {
-    private SunriseLin() {
+/** Cartesian servo motions. Only this class refers to that option's classes, so a cabinet without it still has the others. */
+final class SunriseServoLin {
+    private SunriseServoLin() {
     }
 
-    /** What a cabinet with this option can do; a LinkageError where it is not installed. */
+    /** Capability that the option adds; a LinkageError if it is not installed. */
     static String capability() {
         return SmartServoLIN.class == null ? "" : "servo_lin";
     }
 
-    /** A servo motion at the present position; its limits hold along the axes of the base. */
-    static ServoMotion<?> of(ServoOpen open, LBR robot, Tools tools) throws Refusal {
-        SmartServoLIN motion = new SmartServoLIN(robot.getCurrentCartesianPosition(tools.moved(open.frame)));
+    /** Build a servo motion at the current position; its limits apply along the axes of the base. */
+    static ServoMotion<?> of(ServoOpen open, LBR robot, SunriseTools tools) throws CommandRejected {
+        SmartServoLIN motion = new SmartServoLIN(robot.getCurrentCartesianPosition(tools.motionFrame(open.frame)));
         motion.setReferenceFrame(robot.getRootFrame());
-        CartesianDynamics most = open.linear;
-        if (!Double.isNaN(most.velocity)) {
-            motion.setMaxTranslationVelocity(each(Convert.toMillimetres(most.velocity)));
+        CartesianDynamics limits = open.linear;
+        if (!Double.isNaN(limits.velocity)) {
+            motion.setMaxTranslationVelocity(each(Convert.toMillimetres(limits.velocity)));
         }
-        if (!Double.isNaN(most.acceleration)) {
-            motion.setMaxTranslationAcceleration(each(Convert.toMillimetres(most.acceleration)));
+        if (!Double.isNaN(limits.acceleration)) {
+            motion.setMaxTranslationAcceleration(each(Convert.toMillimetres(limits.acceleration)));
         }
-        if (!Double.isNaN(most.orientation_velocity)) {
-            motion.setMaxOrientationVelocity(each(most.orientation_velocity));
+        if (!Double.isNaN(limits.orientation_velocity)) {
+            motion.setMaxOrientationVelocity(each(limits.orientation_velocity));
         }
-        if (!Double.isNaN(most.orientation_acceleration)) {
-            motion.setMaxOrientationAcceleration(each(most.orientation_acceleration));
+        if (!Double.isNaN(limits.orientation_acceleration)) {
+            motion.setMaxOrientationAcceleration(each(limits.orientation_acceleration));
         }
         return motion;
     }

@@ -13,15 +13,16 @@ import com.kuka.roboticsAPI.geometricModel.Workpiece;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.persistenceModel.PersistenceException;
 
+import heptarm.core.CommandRejected;
 import heptarm.core.Log;
-import heptarm.core.Refusal;
+import heptarm.core.robot.ToolPort;
 import heptarm.wire.Code;
 import heptarm.wire.FrameInfo;
 import heptarm.wire.Pose;
 import heptarm.wire.ToolInfo;
 
-/** What hangs on the flange, and the frames by their names. The core has checked the names. */
-final class Tools {
+/** Tools, workpieces and frames of Sunrise behind the core's port; the core has checked the names. */
+final class SunriseTools implements ToolPort {
     private final LBR robot;
     private final IApplicationData data;
     private final Map<String, Tool> templates = new LinkedHashMap<String, Tool>();
@@ -31,21 +32,21 @@ final class Tools {
     private Workpiece workpiece;
     private Map<String, ObjectFrame> toolFrames = new LinkedHashMap<String, ObjectFrame>();
     private Map<String, ObjectFrame> pieceFrames = new LinkedHashMap<String, ObjectFrame>();
-    private volatile ObjectFrame moved;
+    private volatile ObjectFrame motionFrame;
 
     /**
-     * @param data of the project; null: its templates and frames are not asked for
-     * @param listed names of the project's tool templates, with commas between them
-     * @param frames paths of the project's taught frames, likewise
+     * @param data application data of the project
+     * @param listed names of the project's tool templates, separated by commas
+     * @param frames paths of the project's taught frames, separated by commas
      */
-    Tools(LBR robot, IApplicationData data, String listed, String frames, Log log) {
+    SunriseTools(LBR robot, IApplicationData data, String listed, String frames, Log log) {
         this.robot = robot;
         this.data = data;
         this.listed = names(listed);
-        this.moved = robot.getFlange();
+        this.motionFrame = robot.getFlange();
         for (int i = 0; i < this.listed.length; i++) {
             if (template(this.listed[i]) == null) {
-                log.warn("the process data heptarm.tools names " + this.listed[i] + ", but the project has no such tool template");
+                log.warn("the process data heptarm.tools names " + this.listed[i] + ", but the project has no such tool template; add it in Sunrise Workbench");
             }
         }
         String[] paths = names(frames);
@@ -53,7 +54,7 @@ final class Tools {
             try {
                 taught.put(paths[i], data.getFrame(paths[i]));
             } catch (PersistenceException e) {
-                log.warn("the process data heptarm.frames names " + paths[i] + ", but the project has no such frame");
+                log.warn("the process data heptarm.frames names " + paths[i] + ", but the project has no such frame; teach it at the smartPAD");
             }
         }
     }
@@ -62,7 +63,7 @@ final class Tools {
         return list.trim().length() == 0 ? new String[0] : list.trim().split("\\s*,\\s*");
     }
 
-    synchronized ToolInfo[] templates() {
+    public synchronized ToolInfo[] templates() {
         ToolInfo[] all = new ToolInfo[templates.size()];
         int i = 0;
         for (Map.Entry<String, Tool> one : templates.entrySet()) {
@@ -71,14 +72,13 @@ final class Tools {
         return all;
     }
 
-    FrameInfo[] taught() {
+    public FrameInfo[] frames() {
         return describe(robot.getRootFrame(), taught);
     }
 
-    /** The tool of a template; null if the project has none of that name. */
-    synchronized ToolInfo template(String name) {
+        public synchronized ToolInfo template(String name) {
         Tool made = templates.get(name);
-        if (made == null && data != null) {
+        if (made == null) {
             try {
                 Object any = data.<Object>createFromTemplate(name);
                 made = any instanceof Tool ? (Tool) any : null;
@@ -107,7 +107,7 @@ final class Tools {
         return all;
     }
 
-    /** Frames of a tool of the project: the one that its motions move, then those at its root. */
+    /** Frames of a tool of the project: its default motion frame, then the children of its root. */
     private static Map<String, ObjectFrame> frames(Tool tool) {
         Map<String, ObjectFrame> all = new LinkedHashMap<String, ObjectFrame>();
         ObjectFrame main = tool.getDefaultMotionFrame();
@@ -124,22 +124,22 @@ final class Tools {
 
     // ------------------------------------------------------------------------------------ on the flange
 
-    synchronized void attach(ToolInfo info, String movedName) throws Refusal {
+    public synchronized void attach(ToolInfo info, String frame) throws CommandRejected {
         Tool next = null;
         Map<String, ObjectFrame> frames = new LinkedHashMap<String, ObjectFrame>();
         if (info != null && templates.containsKey(info.name)) {
             next = templates.get(info.name);
             frames = frames(next);
         } else if (info != null) {
-            next = new Tool(info.name, Loads.of(info, "tool."));
+            next = new Tool(info.name, LoadConversion.of(info, "tool."));
             frames = add(next, info);
         }
-        ObjectFrame main = frames.containsKey(movedName) ? frames.get(movedName)
+        ObjectFrame main = frames.containsKey(frame) ? frames.get(frame)
                 : next == null ? robot.getFlange() : next.getRootFrame();
         Tool before = tool;
         try {
-            take(workpiece);
-            take(before);
+            detach(workpiece);
+            detach(before);
             if (next != null) {
                 next.attachTo(robot.getFlange());
             }
@@ -147,34 +147,34 @@ final class Tools {
             if (before != null) {
                 before.attachTo(robot.getFlange());
             }
-            throw new Refusal(Code.EXECUTION_FAILED, "the cabinet does not take the tool: " + e.getMessage());
+            throw new CommandRejected(Code.EXECUTION_FAILED, "the cabinet refuses the tool: " + e.getMessage());
         }
         tool = next;
         toolFrames = frames;
         workpiece = null;
         pieceFrames = new LinkedHashMap<String, ObjectFrame>();
-        moved = main;
+        motionFrame = main;
     }
 
-    synchronized void load(ToolInfo info) throws Refusal {
+    public synchronized void load(ToolInfo info) throws CommandRejected {
         Map<String, ObjectFrame> frames = new LinkedHashMap<String, ObjectFrame>();
         Workpiece next = null;
         try {
             if (info != null) {
-                next = new Workpiece(info.name, Loads.of(info, "load."));
+                next = new Workpiece(info.name, LoadConversion.of(info, "load."));
                 frames = add(next, info);
-                next.attachTo(moved);
+                next.attachTo(motionFrame);
             } else {
-                take(workpiece);
+                detach(workpiece);
             }
         } catch (RuntimeException e) {
-            throw new Refusal(Code.EXECUTION_FAILED, "the cabinet does not take the workpiece: " + e.getMessage());
+            throw new CommandRejected(Code.EXECUTION_FAILED, "the cabinet refuses the workpiece: " + e.getMessage());
         }
         workpiece = next;
         pieceFrames = frames;
     }
 
-    private static void take(PhysicalObject object) {
+    private static void detach(PhysicalObject object) {
         if (object instanceof Tool) {
             ((Tool) object).detach();
         } else if (object instanceof Workpiece) {
@@ -193,7 +193,7 @@ final class Tools {
         return frames;
     }
 
-    /** What carries the load: Sunrise validates impedance control for the tool where there is one. */
+    /** The object whose load Sunrise validates for impedance control: the tool if there is one. */
     synchronized PhysicalObject carrier() {
         return tool == null ? robot : tool;
     }
@@ -201,33 +201,33 @@ final class Tools {
     // ------------------------------------------------------------------------------------------ frames
 
     /** The frame that motions move. */
-    ObjectFrame moved() {
-        return moved;
+    ObjectFrame motionFrame() {
+        return motionFrame;
     }
 
-    /** A frame that can be moved; an empty name is the one that motions move. */
-    ObjectFrame moved(String name) throws Refusal {
+    /** A frame that motions can move; an empty name is the current motion frame. */
+    ObjectFrame motionFrame(String name) throws CommandRejected {
         ObjectFrame found = own(name);
         if (found == null) {
-            throw new Refusal(Code.UNKNOWN_NAME, "frame", name, "", "no frame " + name + " can be moved here");
+            throw new CommandRejected(Code.UNKNOWN_NAME, "frame", name, "", "unknown frame " + name + "; motions move a frame of the attached tool or workpiece, or the flange");
         }
         return found;
     }
 
-    /** A frame that gives axes; null for those of the moved frame. */
-    AbstractFrame reference(String name) throws Refusal {
+    /** A frame that provides axes; null for the motion frame. */
+    AbstractFrame reference(String name) throws CommandRejected {
         if (name.length() == 0 || "tool".equals(name)) {
             return null;
         }
         if ("base".equals(name)) {
             return robot.getRootFrame();
         }
-        return taught.containsKey(name) ? taught.get(name) : moved(name);
+        return taught.containsKey(name) ? taught.get(name) : motionFrame(name);
     }
 
     private synchronized ObjectFrame own(String name) {
         if (name.length() == 0 || "tool".equals(name)) {
-            return moved;
+            return motionFrame;
         }
         if ("flange".equals(name)) {
             return robot.getFlange();
@@ -249,12 +249,12 @@ final class Tools {
         return frames.get(name.substring(owner.getName().length() + 1));
     }
 
-    /** Refuses a mode whose directions would turn otherwise than the moved frame does. */
-    void checkAxes(String name, ObjectFrame motionMoves, String path) throws Refusal {
+    /** Refuses axes that would rotate differently from the motion frame. */
+    void checkAxes(String name, ObjectFrame moved, String path) throws CommandRejected {
         AbstractFrame axes = reference(name);
-        if (axes != null && axes != motionMoves && !"base".equals(name) && !taught.containsKey(name)) {
-            throw new Refusal(Code.UNSUPPORTED, path, name, "tool, base, a taught frame", "the directions of a control mode are those"
-                    + " of the moved frame or of a frame that rests, not of " + name);
+        if (axes != null && axes != moved && !"base".equals(name) && !taught.containsKey(name)) {
+            throw new CommandRejected(Code.UNSUPPORTED, path, name, "tool, base, a taught frame", "a control mode must use the axes"
+                    + " of the motion frame, the base or a taught frame, got " + name);
         }
     }
 }

@@ -4,12 +4,12 @@ import com.kuka.task.ITaskLogger;
 
 import heptarm.core.Log;
 
-/** The core's log on the cabinet's. */
+/** Writes the core's log to the cabinet's. */
 final class TaskLog implements Log {
     private final ITaskLogger logger;
     private final boolean quiet;
 
-    /** A quiet one shows warnings and errors only at the smartPAD; the rest goes to the cabinet's log file. */
+    /** Quiet: the smartPAD shows warnings and errors only; the rest goes to the cabinet's log file. */
     TaskLog(ITaskLogger logger, boolean quiet) {
         this.logger = logger;
         this.quiet = quiet;

@@ -10,13 +10,13 @@ import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyLED;
 import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyLEDSize;
 
 import heptarm.core.Log;
-import heptarm.core.Server;
+import heptarm.core.session.CabinetServer;
 import heptarm.wire.KeyLed;
 import heptarm.wire.SetKey;
 
 /**
- * Keys at the smartPAD for a person beside the robot: stop what moves, take control away from whoever has it; and a bar of four
- * for clients, who say what is on them and hear when they are pressed.
+ * User keys at the smartPAD: stop the robot, take control away from the controller; and a bar of four keys for clients, which set
+ * their text and LED and receive their events.
  */
 final class UserKeys {
     private static final String BAR = "heptarm";
@@ -25,7 +25,7 @@ final class UserKeys {
 
     private final IUserKey[] forClients = new IUserKey[SLOTS];
 
-    private UserKeys(RoboticsAPIApplication application, final Server server, final Log log) {
+    private UserKeys(RoboticsAPIApplication application, final CabinetServer server, final Log log) {
         IUserKeyBar bar = application.getApplicationUI().createUserKeyBar(CLIENT_BAR);
         for (int i = 0; i < SLOTS; i++) {
             final int slot = i;
@@ -42,12 +42,12 @@ final class UserKeys {
         bar.publish();
     }
 
-    /** What a client wants on a key. */
-    void set(SetKey wish) {
-        IUserKey key = forClients[wish.slot];
-        key.setText(UserKeyAlignment.TopMiddle, wish.text);
-        key.setLED(UserKeyAlignment.BottomMiddle, led(wish.led), UserKeyLEDSize.Small);
-        key.setEnabled(wish.enabled);
+    /** Set text and LED of a key for clients. */
+    void set(SetKey request) {
+        IUserKey key = forClients[request.slot];
+        key.setText(UserKeyAlignment.TopMiddle, request.text);
+        key.setLED(UserKeyAlignment.BottomMiddle, led(request.led), UserKeyLEDSize.Small);
+        key.setEnabled(request.enabled);
     }
 
     private static UserKeyLED led(KeyLed led) {
@@ -60,7 +60,7 @@ final class UserKeys {
         return led == KeyLed.RED ? UserKeyLED.Red : UserKeyLED.Grey;
     }
 
-    static UserKeys publish(RoboticsAPIApplication application, final Server server, final Log log) {
+    static UserKeys publish(RoboticsAPIApplication application, final CabinetServer server, final Log log) {
         IUserKeyBar bar = application.getApplicationUI().createUserKeyBar(BAR);
         add(bar, 0, "stop", UserKeyLED.Red, log, new Runnable() {
             public void run() {
@@ -88,7 +88,7 @@ final class UserKeys {
         key.setLED(UserKeyAlignment.BottomMiddle, led, UserKeyLEDSize.Small);
     }
 
-    /** In a thread of its own: a listener that takes its time upsets the cabinet. */
+    /** Run the action in a thread of its own: a cabinet does not accept slow listeners. */
     private static void act(final Runnable action, final Log log) {
         Thread thread = new Thread(new Runnable() {
             public void run() {
