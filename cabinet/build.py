@@ -30,7 +30,7 @@ import toolchain  # noqa: E402
 
 ROOT = HERE.parent
 OUT = ROOT / "build" / "cabinet"
-JARS = ROOT / "src" / "heptarm" / "virtual" / "jars"
+JARS = ROOT / "src" / "heptarm" / "sim" / "jars"
 _WARNING = "Test doubles for a virtual robot on a workstation. Never deploy this jar to a robot controller."
 
 
@@ -180,7 +180,7 @@ def _lock() -> Iterator[None]:
 
 
 def main() -> int:
-    """Runs the build and says what there is."""
+    """Runs the build and lists the jars."""
     try:
         jars = build(force="--force" in sys.argv[1:])
     except (BuildFailed, toolchain.ToolMissing) as error:
