@@ -97,7 +97,7 @@ class Refusals:
         )
 
     def of(self, file: ClassFile) -> Iterator[str]:
-        """Yields one line for each thing that is wrong with a class."""
+        """One line for each violation in a class."""
         if file.version != JAVA_6:
             yield f"{file.name}: class version {file.version}, not {JAVA_6} (Java 6)"
         for name in sorted(file.classes):
