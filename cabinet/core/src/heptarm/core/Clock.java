@@ -1,17 +1,17 @@
 package heptarm.core;
 
-/** The cabinet's time. On a robot it is the machine's; in the virtual cabinet it is the simulated robot's. */
+/** The cabinet's time: the machine's on a real robot, the simulated robot's in the virtual cabinet. */
 public interface Clock {
-    /** Cabinet time [ns], never going back. */
+    /** Cabinet time [ns], monotonic. */
     long nanos();
 
     /**
      * Sleeps until a cabinet time.
      *
-     * @return the cabinet time [ns] for which the caller was woken, at least the one asked for
+     * @return the cabinet time of the wake-up [ns], at least the requested one
      */
     long sleepUntil(long nanos) throws InterruptedException;
 
-    /** Cabinet seconds per second of the world outside; time-outs of the link are scaled by it. */
+    /** Cabinet seconds per wall-clock second; scales time-outs of the link. */
     double rate();
 }

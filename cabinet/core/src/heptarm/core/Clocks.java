@@ -3,7 +3,7 @@ package heptarm.core;
 import java.util.Iterator;
 import java.util.ServiceLoader;
 
-/** Finds the clock: a provider on the class path (the virtual cabinet's), otherwise the machine's own. */
+/** Finds the clock: a provider on the class path (the virtual cabinet's), otherwise the machine's. */
 public final class Clocks {
     private Clocks() {
     }

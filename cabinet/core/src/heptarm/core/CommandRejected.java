@@ -1,7 +1,7 @@
 package heptarm.core;
 
-/** A request is refused; nothing has changed. Says what, why and what would be legal. */
-public final class Refusal extends Exception {
+/** A refused request; nothing has changed. Names the parameter, its value, the allowed range and the remedy. */
+public final class CommandRejected extends Exception {
     private static final long serialVersionUID = 1L;
 
     public final int code;
@@ -9,11 +9,11 @@ public final class Refusal extends Exception {
     public final String value;
     public final String allowed;
 
-    public Refusal(int code, String text) {
+    public CommandRejected(int code, String text) {
         this(code, "", "", "", text);
     }
 
-    public Refusal(int code, String parameter, String value, String allowed, String text) {
+    public CommandRejected(int code, String parameter, String value, String allowed, String text) {
         super(text);
         this.code = code;
         this.parameter = parameter;

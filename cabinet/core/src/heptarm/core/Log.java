@@ -1,6 +1,6 @@
 package heptarm.core;
 
-/** Where the core says what it does; never called on a hot path. */
+/** Log of the core; never called on a hot path. */
 public interface Log {
     void info(String text);
 

@@ -1,6 +1,6 @@
 package heptarm.core;
 
-/** The machine's own monotonic clock. */
+/** The machine's monotonic clock. */
 public final class RealClock implements Clock {
     public long nanos() {
         return System.nanoTime();

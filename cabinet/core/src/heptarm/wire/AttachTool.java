@@ -5,7 +5,7 @@ package heptarm.wire;
 public final class AttachTool extends Message {
     /** of a defined tool or of a template of the project */
     public final String name;
-    /** its default moved frame; empty: the first */
+    /** its default motion frame; empty: the first */
     public final String frame;
 
     public AttachTool(String name, String frame) {

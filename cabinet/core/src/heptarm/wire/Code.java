@@ -13,13 +13,13 @@ public final class Code {
     public static final int NOT_NORMALISED = 4;
     /** the nodes of a condition do not form one expression: build conditions with heptarm.when. */
     public static final int BAD_CONDITION = 5;
-    /** octets on the port are not a heptarm frame: check that the other side speaks heptarm. */
+    /** bytes on the port are not a heptarm frame: check that the other side speaks heptarm. */
     public static final int BAD_FRAME = 10;
     /** the body of a frame cannot be decoded: check that both sides have the same version. */
     public static final int BAD_BODY = 11;
     /** the message id is not known here: check that both sides have the same version. */
     public static final int UNKNOWN_MESSAGE = 12;
-    /** the message is not legal in this state of the session: say Hello first, and send each handshake message once. */
+    /** the message is not legal in this state of the session: send Hello first, and send each handshake message once. */
     public static final int UNEXPECTED_MESSAGE = 13;
     /** the major versions of the protocol differ: install matching versions: pip install heptarm, then heptarm install-cabinet. */
     public static final int WRONG_VERSION = 14;
@@ -29,9 +29,9 @@ public final class Code {
     public static final int NOT_ALLOWED = 16;
     /** the cabinet serves as many clients as it can: close another client. */
     public static final int TOO_MANY_CLIENTS = 17;
-    /** the client does not read what it asked for: subscribe at a lower rate or read faster. */
+    /** the client does not read its subscribed state fast enough: subscribe at a lower rate or read faster. */
     public static final int TOO_SLOW = 18;
-    /** nothing was heard from the other side within the heartbeat time: check the network and the load of both machines. */
+    /** nothing was received from the other side within the heartbeat time: check the network and the load of both machines. */
     public static final int SILENT = 19;
     /** the cabinet application ends: start it again on the smartPAD. */
     public static final int SHUTTING_DOWN = 20;
@@ -61,7 +61,7 @@ public final class Code {
     public static final int EXECUTION_FAILED = 53;
     /** the robot is not ready to move: see the safety state. */
     public static final int NOT_READY = 60;
-    /** a person at the smartPAD has to act: follow the steps in the message. */
+    /** the operator has to act at the smartPAD: follow the steps in the message. */
     public static final int NEEDS_OPERATOR = 61;
     /** a safety function stopped the robot: clear its cause, then recover. */
     public static final int SAFETY_STOP = 62;
@@ -69,7 +69,7 @@ public final class Code {
     public static final int CONTROLLER_LOST = 63;
     /** no servo target arrived within its watchdog time: send targets more often, or allow a longer watchdog time. */
     public static final int STARVED = 64;
-    /** the cabinet application met an error that it did not expect: report it with the cabinet's log. */
+    /** the cabinet application met an unexpected error: report it with the cabinet's log. */
     public static final int INTERNAL = 70;
 
     private Code() {

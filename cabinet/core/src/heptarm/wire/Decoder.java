@@ -19,19 +19,19 @@ public final class Decoder {
         this.end = offset + length;
     }
 
-    private int take(int octets) throws WireException {
-        if (octets < 0 || octets > end - pos) {
-            throw new WireException("body is cut: " + octets + " octets wanted, " + (end - pos) + " left");
+    private int take(int bytes) throws WireException {
+        if (bytes < 0 || bytes > end - pos) {
+            throw new WireException("body is cut: " + bytes + " bytes wanted, " + (end - pos) + " left");
         }
         int at = pos;
-        pos += octets;
+        pos += bytes;
         return at;
     }
 
     /** The body must end here. */
     public void end() throws WireException {
         if (pos != end) {
-            throw new WireException((end - pos) + " octets behind the end");
+            throw new WireException((end - pos) + " bytes behind the end");
         }
     }
 
@@ -55,7 +55,7 @@ public final class Decoder {
     public int getCount() throws WireException {
         int count = getU16();
         if (count > end - pos) {
-            throw new WireException("a list of " + count + " entries in " + (end - pos) + " octets");
+            throw new WireException("a list of " + count + " entries in " + (end - pos) + " bytes");
         }
         return count;
     }
@@ -100,7 +100,7 @@ public final class Decoder {
     public byte[] getBytes() throws WireException {
         long length = getU32();
         if (length > end - pos) {
-            throw new WireException("body is cut: " + length + " octets wanted, " + (end - pos) + " left");
+            throw new WireException("body is cut: " + length + " bytes wanted, " + (end - pos) + " left");
         }
         int at = take((int) length);
         byte[] value = new byte[(int) length];

@@ -2,7 +2,7 @@ package heptarm.wire;
 
 import java.io.UnsupportedEncodingException;
 
-/** Big-endian octets into a growing buffer. NaN is written in its canonical form. */
+/** Big-endian bytes into a growing buffer. NaN is written in its canonical form. */
 public final class Encoder {
     private byte[] data;
     private int size;
@@ -41,14 +41,14 @@ public final class Encoder {
         return result;
     }
 
-    private int grow(int octets) {
-        if (size + octets > data.length) {
-            byte[] larger = new byte[Math.max(data.length * 2, size + octets)];
+    private int grow(int bytes) {
+        if (size + bytes > data.length) {
+            byte[] larger = new byte[Math.max(data.length * 2, size + bytes)];
             System.arraycopy(data, 0, larger, 0, size);
             data = larger;
         }
         int at = size;
-        size += octets;
+        size += bytes;
         return at;
     }
 
@@ -108,16 +108,16 @@ public final class Encoder {
     }
 
     public void putStr(String value) {
-        byte[] octets = utf8(value);
-        int length = octets.length;
+        byte[] bytes = utf8(value);
+        int length = bytes.length;
         if (length > 65535) {
             length = 65535;
-            while (length > 0 && (octets[length] & 0xC0) == 0x80) {
+            while (length > 0 && (bytes[length] & 0xC0) == 0x80) {
                 length--; // never cut inside a character
             }
         }
         putU16(length);
-        put(octets, length);
+        put(bytes, length);
     }
 
     public void putBytes(byte[] value) {
@@ -125,8 +125,8 @@ public final class Encoder {
         put(value, value.length);
     }
 
-    private void put(byte[] octets, int length) {
+    private void put(byte[] bytes, int length) {
         int at = grow(length);
-        System.arraycopy(octets, 0, data, at, length);
+        System.arraycopy(bytes, 0, data, at, length);
     }
 }

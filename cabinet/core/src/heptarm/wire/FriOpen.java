@@ -13,7 +13,7 @@ public final class FriOpen extends Message {
     public final Mode mode;
     /** for the client to answer [s] */
     public final double timeout;
-    /** names of signals that the session carries: inputs for the client to read, outputs also to write; boolean, unsigned or analog, of at most 63 octets */
+    /** names of the signals of the session: inputs for the client to read, outputs also to write; boolean, unsigned or analog, of at most 63 bytes */
     public final String[] io;
 
     public FriOpen(String host, int port, double period, int receive_multiplier, FriCommandMode command, Mode mode, double timeout, String[] io) {

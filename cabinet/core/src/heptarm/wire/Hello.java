@@ -5,7 +5,7 @@ package heptarm.wire;
 public final class Hello extends Message {
     public final int major;
     public final int minor;
-    /** who is calling, shown to others */
+    /** name of the client, shown to others */
     public final String name;
     /** version of the client's software */
     public final String version;

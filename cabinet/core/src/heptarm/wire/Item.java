@@ -4,7 +4,7 @@ package heptarm.wire;
 /** One motion of a program with all that belongs to it. */
 public final class Item {
     public final Motion motion;
-    /** the moved frame; "": the attached tool's, without a tool the flange */
+    /** the motion frame; "": the attached tool's, without a tool the flange */
     public final String frame;
     /** absent: the session's mode */
     public final Mode mode;

@@ -10,7 +10,7 @@ public final class ModeState {
     public final String tool;
     /** attached workpiece; empty: none */
     public final String workpiece;
-    /** what motions move unless they say another: a frame of the tool's, or flange */
+    /** default motion frame: a frame of the tool, or flange */
     public final String frame;
 
     public ModeState(long stamp, Mode mode, String tool, String workpiece, String frame) {

@@ -6,11 +6,11 @@ public final class ToolInfo {
     public final String name;
     /** [kg] */
     public final double mass;
-    /** centre of mass; a tool's in the flange frame, a workpiece's in the frame that it hangs on; zeros where the cabinet does not tell [m] */
+    /** centre of mass; a tool's in the flange frame, a workpiece's in the frame to which it is attached; zeros if the cabinet does not report it [m] */
     public final double[] com;
     /** xx yy zz xy xz yz about the centre of mass [kg m²] */
     public final double[] inertia;
-    /** in the same frame; the first is the default moved frame; no name is tool, flange or base, none has a / */
+    /** in the same frame; the first is the default motion frame; no name is tool, flange or base, none has a / */
     public final FrameInfo[] frames;
 
     public ToolInfo(String name, double mass, double[] com, double[] inertia, FrameInfo[] frames) {

@@ -9,7 +9,7 @@ public final class TorqueState {
     public final double[] tau;
     /** external load acting on the robot [Nm] */
     public final double[] tau_ext;
-    /** commanded; NaN where the cabinet does not tell [Nm] */
+    /** commanded; NaN if the cabinet does not report it [Nm] */
     public final double[] tau_cmd;
 
     public TorqueState(long stamp, double[] tau, double[] tau_ext, double[] tau_cmd) {

@@ -1,6 +1,6 @@
 package heptarm.wire;
 
-/** Octets that are not what they claim to be. */
+/** Bytes that are not what they claim to be. */
 public final class WireException extends Exception {
     private static final long serialVersionUID = 1L;
 

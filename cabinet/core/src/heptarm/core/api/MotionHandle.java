@@ -1,57 +1,58 @@
-package heptarm.core;
+package heptarm.core.api;
 
+import heptarm.core.CommandRejected;
 import heptarm.wire.Code;
 import heptarm.wire.MotionFinished;
 
-/** Motions that were started, and how they ended. */
-public final class Handle {
+/** A running program of motions, and its result. */
+public final class MotionHandle {
     public final long id;
     private final Arm arm;
-    private MotionFinished end;
+    private MotionFinished result;
 
-    Handle(Arm arm, long id) {
+    MotionHandle(Arm arm, long id) {
         this.arm = arm;
         this.id = id;
     }
 
-    synchronized void end(MotionFinished how) {
-        end = how;
+    synchronized void end(MotionFinished finished) {
+        result = finished;
         notifyAll();
     }
 
     public synchronized boolean isFinished() {
-        return end != null;
+        return result != null;
     }
 
-    /** Waits for the end, and says how it was: the cause, the joints, the residual. */
+    /** Wait for the end; returns its cause, the joints and the residual. */
     public synchronized MotionFinished await() throws InterruptedException {
-        while (end == null) {
+        while (result == null) {
             wait();
         }
-        return end;
+        return result;
     }
 
-    /** The same for at most so many seconds; null: it has not ended by then. */
+    /** Wait at most this long [s]; null: it has not ended by then. */
     public synchronized MotionFinished await(double seconds) throws InterruptedException {
         long deadline = System.nanoTime() + (long) (seconds * 1e9);
-        while (end == null) {
+        while (result == null) {
             long left = deadline - System.nanoTime();
             if (left <= 0) {
                 return null;
             }
             java.util.concurrent.TimeUnit.NANOSECONDS.timedWait(this, left);
         }
-        return end;
+        return result;
     }
 
-    /** Brakes on the path; one that has ended already is left alone. */
-    public void cancel() throws Refusal {
+    /** Brake on the path; no effect after the end. */
+    public void cancel() throws CommandRejected {
         try {
             if (!isFinished()) {
                 arm.cancel(id);
             }
-        } catch (Refusal e) {
-            if (e.code != Code.UNKNOWN_MOTION) { // it has just ended by itself
+        } catch (CommandRejected e) {
+            if (e.code != Code.UNKNOWN_MOTION) { // it has just ended
                 throw e;
             }
         }

@@ -1,4 +1,4 @@
-package heptarm.core;
+package heptarm.core.api;
 
 import heptarm.wire.Action;
 import heptarm.wire.Blending;
@@ -31,7 +31,7 @@ import heptarm.wire.Spline;
 import heptarm.wire.SplineSegment;
 import heptarm.wire.Trigger;
 
-/** A motion for {@link Arm}, in SI. Every method gives a new one, so that a motion can be kept and used again. */
+/** A motion for {@link Arm}, in SI units. Immutable: every method returns a new one, so a motion can be reused. */
 public final class Move implements Cloneable {
     private static final int JOINTS = 7;
     private static final double NAN = Double.NaN;
@@ -65,190 +65,191 @@ public final class Move implements Cloneable {
         this.duration = duration;
     }
 
-    /** To seven joint positions [rad]. */
+    /** Point to point to seven joint positions [rad]. */
     public static Move ptp(double... q) {
         return new Move(Kind.PTP, q.clone(), null, null, 0.0);
     }
 
-    /** To the home position of the cabinet's project: all zeros unless that says otherwise. */
+    /** Point to point to the home position of the cabinet's project, by default all zeros. */
     public static Move home() {
         return new Move(Kind.PTP_HOME, null, null, null, 0.0);
     }
 
-    /** To a pose of the moved frame in the base, by the joints. */
+    /** Point to point to a pose of the motion frame in the base. */
     public static Move ptp(Pose target) {
         return new Move(Kind.PTP_POSE, null, target, null, 0.0);
     }
 
-    /** To a pose of the moved frame in the base, on a straight line. */
+    /** Straight line to a pose of the motion frame in the base. */
     public static Move lin(Pose target) {
         return new Move(Kind.LIN, null, target, null, 0.0);
     }
 
-    /** On a straight line by so much [m], along the moved frame's own axes, or those of {@link #along}. */
+    /** Straight line by an offset [m] along the motion frame's own axes, or those of {@link #along}. */
     public static Move linRel(double x, double y, double z) {
         return new Move(Kind.LIN_REL, null, pose(x, y, z), null, 0.0);
     }
 
-    /** The same, and a turn about these axes. */
+    /** Straight line by an offset and a rotation about the same axes. */
     public static Move linRel(Pose offset) {
         return new Move(Kind.LIN_REL, null, offset, null, 0.0);
     }
 
-    /** On an arc through one pose to another. */
+    /** Arc through one pose to another. */
     public static Move circ(Pose via, Pose target) {
         return new Move(Kind.CIRC, null, target, via, 0.0);
     }
 
-    /** A curved segment of a {@link #spline} to a pose. */
+    /** Curved segment of a {@link #spline} to a pose. */
     public static Move spl(Pose target) {
         return new Move(Kind.SPL, null, target, null, 0.0);
     }
 
-    /** A curve through poses: of {@link #spl}, {@link #lin} and {@link #circ}, each with limits of its own if it says so. */
+    /** Curve through poses, of {@link #spl}, {@link #lin} and {@link #circ} segments, each with optional limits of its own. */
     public static Move spline(Move... segments) {
         for (Move one : segments) {
             if (one.kind != Kind.SPL && one.kind != Kind.LIN && one.kind != Kind.CIRC) {
-                throw new IllegalArgumentException("a spline consists of spl, lin and circ, not of " + one.kind);
+                throw new IllegalArgumentException("a segment of a spline must be spl, lin or circ, got " + one.kind);
             }
         }
         return new Move(Kind.SPLINE, null, null, null, 0.0, segments.clone());
     }
 
-    /** A curve through joint positions, each a {@link #ptp}. */
+    /** Curve through joint positions, each a {@link #ptp}. */
     public static Move splineJoints(Move... points) {
         for (Move one : points) {
             if (one.kind != Kind.PTP) {
-                throw new IllegalArgumentException("a joint spline consists of ptp to joint positions, not of " + one.kind);
+                throw new IllegalArgumentException("a point of a joint spline must be a ptp to joint positions, got " + one.kind);
             }
         }
         return new Move(Kind.SPLINE_JOINTS, null, null, null, 0.0, points.clone());
     }
 
-    /** Holds the position for a time [s]; NaN: until it is cancelled. */
+    /** Hold the position for a time [s]; NaN: until it is cancelled. */
     public static Move hold(double duration) {
         return new Move(Kind.HOLD, null, null, null, duration);
     }
 
     /**
-     * A person leads the arm while the switch of the hand guiding device is held, no faster than {@link #velocity}; it ends when
-     * the switch is let go.
+     * Hand guiding, at most as fast as {@link #velocity}: a person moves the arm while holding the switch of the hand guiding
+     * device; releasing the switch ends it.
      */
     public static Move handGuide() {
         return new Move(Kind.HAND_GUIDE, null, null, null, 0.0);
     }
 
-    /** A pose that is not turned: at a place in the base [m]. */
+    /** A pose without rotation, at a position in the base [m]. */
     public static Pose pose(double x, double y, double z) {
         return new Pose(new double[] {x, y, z}, new double[] {0.0, 0.0, 0.0, 1.0});
     }
 
-    /** No axis is faster than this fraction of its maximum, (0, 1]; one for all or seven. */
+    /** Limit the joint velocities to fractions of their maxima, in (0, 1]; one for all or seven. */
     public Move speed(double... fractions) {
         Move copy = copy();
         copy.joints = new JointDynamics(each(fractions), joints.acceleration, joints.jerk);
         return copy;
     }
 
-    /** No axis accelerates harder than this fraction of its maximum, (0, 1]; one for all or seven. */
+    /** Limit the joint accelerations to fractions of their maxima, in (0, 1]; one for all or seven. */
     public Move acceleration(double... fractions) {
         Move copy = copy();
         copy.joints = new JointDynamics(joints.velocity, each(fractions), joints.jerk);
         return copy;
     }
 
-    /** No axis jerks harder than this fraction of its maximum, (0, 1]; one for all or seven. */
+    /** Limit the joint jerks to fractions of their maxima, in (0, 1]; one for all or seven. */
     public Move jerk(double... fractions) {
         Move copy = copy();
         copy.joints = new JointDynamics(joints.velocity, joints.acceleration, each(fractions));
         return copy;
     }
 
-    /** Along the path [m/s]. */
+    /** Limit the velocity along the path [m/s]. */
     public Move velocity(double metresPerSecond) {
-        return along(metresPerSecond, path.acceleration, path.jerk);
+        return cartesian(metresPerSecond, path.acceleration, path.jerk);
     }
 
-    /** Along the path [m/s, m/s², m/s³]; NaN: as the cabinet has it. */
-    public Move along(double velocity, double acceleration, double jerk) {
+    /** Limit velocity, acceleration and jerk along the path [m/s, m/s², m/s³]; NaN: the cabinet's default. */
+    public Move cartesian(double velocity, double acceleration, double jerk) {
         Move copy = copy();
         copy.path = new CartesianDynamics(velocity, acceleration, jerk, path.orientation_velocity, path.orientation_acceleration,
                 path.orientation_jerk);
         return copy;
     }
 
-    /** Of the rotation along the path [rad/s]. */
-    public Move turning(double radiansPerSecond) {
-        return turning(radiansPerSecond, path.orientation_acceleration, path.orientation_jerk);
+    /** Limit the rotational velocity along the path [rad/s]. */
+    public Move rotational(double radiansPerSecond) {
+        return rotational(radiansPerSecond, path.orientation_acceleration, path.orientation_jerk);
     }
 
-    /** Of the rotation along the path [rad/s, rad/s², rad/s³]; NaN: as the cabinet has it. */
-    public Move turning(double velocity, double acceleration, double jerk) {
+    /** Limit rotational velocity, acceleration and jerk [rad/s, rad/s², rad/s³]; NaN: the cabinet's default. */
+    public Move rotational(double velocity, double acceleration, double jerk) {
         Move copy = copy();
         copy.path = new CartesianDynamics(path.velocity, path.acceleration, path.jerk, velocity, acceleration, jerk);
         return copy;
     }
 
-    /** How the orientation is led along the path, and relative to what. */
+    /** Set how the orientation changes along the path, and relative to what. */
     public Move orientation(OrientationType type, OrientationReference reference) {
         Move copy = copy();
         copy.orientation = new Orientation(type, reference);
         return copy;
     }
 
-    /** Within this distance [m] of its end it may turn into the motion behind it. */
+    /** Blend into the next motion within this distance of the end [m]. */
     public Move blending(double metres) {
         return blending(0.0, metres, 0.0);
     }
 
-    /** The same as a fraction of its path, as a distance [m] and as a rotation [rad]; 0: not said. */
+    /** Blend into the next motion within a fraction of the path, a distance [m] and a rotation [rad]; 0: unset. */
     public Move blending(double fraction, double metres, double radians) {
         Move copy = copy();
         copy.blending = new Blending(fraction, metres, radians);
         return copy;
     }
 
-    /** KUKA's arm angle [rad], status and turn at the end. */
+    /** Set the redundancy at the end: arm angle E1 [rad], status and turn. */
     public Move redundancy(double e1, int status, int turn) {
         Move copy = copy();
         copy.redundancy = new Redundancy(e1, status, turn);
         return copy;
     }
 
-    /** Whose axes a relative motion follows: "base", or "" for the moved frame's own. */
+    /** Set the axes of a relative motion: "base", or "" for the motion frame's own. */
     public Move along(String axes) {
         Move copy = copy();
         copy.reference = axes;
         return copy;
     }
 
-    /** The moved frame; "": the attached tool's, without a tool the flange. */
+    /** Set the motion frame; "": the attached tool's, without a tool the flange. */
     public Move frame(String name) {
         Move copy = copy();
         copy.frame = name;
         return copy;
     }
 
-    /** The control mode. */
+    /** Set the control mode. */
     public Move mode(Mode newMode) {
         Move copy = copy();
         copy.mode = newMode;
         return copy;
     }
 
-    /** Ends early when this comes true. */
+    /** End the motion early when a condition becomes true. */
     public Move until(Condition condition) {
         Move copy = copy();
         copy.until = condition;
         return copy;
     }
 
-    public Move until(Until condition) {
+    /** End the motion early when a condition becomes true. */
+    public Move until(StopCondition condition) {
         return until(condition.condition());
     }
 
-    /** Sets an output or sends an event when a condition comes true, without stopping. */
-    public Move trigger(Until condition, Action action) {
+    /** Set an output or send an event when a condition becomes true, without stopping. */
+    public Move trigger(StopCondition condition, Action action) {
         Move copy = copy();
         copy.triggers = java.util.Arrays.copyOf(triggers, triggers.length + 1);
         copy.triggers[triggers.length] = new Trigger(condition.condition(), action);
@@ -290,7 +291,7 @@ public final class Move implements Cloneable {
             case HOLD:
                 return new Hold(duration);
             default:
-                throw new IllegalStateException("a curved segment belongs into a spline");
+                throw new IllegalStateException("a spl segment must be part of a spline");
         }
     }
 
@@ -315,7 +316,7 @@ public final class Move implements Cloneable {
 
     private static double[] each(double[] values) {
         if (values.length != 1 && values.length != JOINTS) {
-            throw new IllegalArgumentException("one fraction or seven are wanted, not " + values.length);
+            throw new IllegalArgumentException("speed, acceleration and jerk take 1 or " + JOINTS + " fractions, got " + values.length);
         }
         double[] result = new double[JOINTS];
         for (int i = 0; i < JOINTS; i++) {

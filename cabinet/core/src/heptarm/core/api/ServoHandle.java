@@ -1,5 +1,6 @@
-package heptarm.core;
+package heptarm.core.api;
 
+import heptarm.core.CommandRejected;
 import heptarm.wire.Code;
 import heptarm.wire.Mode;
 import heptarm.wire.MotionFinished;
@@ -7,50 +8,50 @@ import heptarm.wire.ServoJoints;
 import heptarm.wire.ServoJointsVelocity;
 import heptarm.wire.ServoPose;
 
-/** A stream of targets that the arm follows; the newest counts. */
-public final class Steering {
+/** A stream of targets that the arm follows; the newest replaces the previous one. */
+public final class ServoHandle {
     private final Arm arm;
-    private final Handle handle;
+    private final MotionHandle handle;
     private final double watchdog;
 
-    Steering(Arm arm, Handle handle, double watchdog) {
+    ServoHandle(Arm arm, MotionHandle handle, double watchdog) {
         this.arm = arm;
         this.handle = handle;
         this.watchdog = watchdog;
     }
 
     /** Follow joint positions [rad]. */
-    public void follow(double... q) throws Refusal {
+    public void follow(double... q) throws CommandRejected {
         arm.follow(new ServoJoints(handle.id, watchdog, q));
     }
 
-    /** Follow a pose of the moved frame in the base: x y z [m] and a unit quaternion x y z w. */
-    public void follow(double[] xyz, double[] quat) throws Refusal {
+    /** Follow a pose of the motion frame in the base: x y z [m] and a unit quaternion x y z w. */
+    public void follow(double[] xyz, double[] quat) throws CommandRejected {
         arm.follow(new ServoPose(handle.id, watchdog, xyz, quat));
     }
 
-    /** Pass joint positions [rad] at a velocity [rad/s]. */
-    public void pass(double[] q, double[] velocity) throws Refusal {
+    /** Follow joint positions [rad] with a velocity at the target [rad/s]. */
+    public void followVelocity(double[] q, double[] velocity) throws CommandRejected {
         arm.follow(new ServoJointsVelocity(handle.id, watchdog, q, velocity));
     }
 
-    /** Changes the parameters, not the kind, of the control mode. */
-    public void change(Mode mode) throws Refusal {
-        arm.change(handle.id, mode);
+    /** Change the parameters, not the kind, of the control mode. */
+    public void changeMode(Mode mode) throws CommandRejected {
+        arm.changeMode(handle.id, mode);
     }
 
     public boolean isFinished() {
         return handle.isFinished();
     }
 
-    /** Ends at rest. */
-    public MotionFinished close() throws Refusal, InterruptedException {
+    /** Brake to a stop and end the servo motion. */
+    public MotionFinished close() throws CommandRejected, InterruptedException {
         try {
             if (!handle.isFinished()) {
-                arm.close(handle.id);
+                arm.closeServo(handle.id);
             }
-        } catch (Refusal e) {
-            if (e.code != Code.UNKNOWN_MOTION) { // it has just ended by itself
+        } catch (CommandRejected e) {
+            if (e.code != Code.UNKNOWN_MOTION) { // it has just ended
                 throw e;
             }
         }

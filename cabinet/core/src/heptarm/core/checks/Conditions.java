@@ -1,8 +1,10 @@
-package heptarm.core;
+package heptarm.core.checks;
 
 import java.util.ArrayList;
 import java.util.List;
 
+import heptarm.core.CommandRejected;
+import heptarm.core.state.SignalTable;
 import heptarm.wire.AllOf;
 import heptarm.wire.AnyOf;
 import heptarm.wire.Code;
@@ -22,16 +24,16 @@ import heptarm.wire.SignalIs;
 import heptarm.wire.SignalOutside;
 import heptarm.wire.TorqueOutside;
 
-/** Conditions as trees, and what has to hold between their fields; the ranges of single fields are checked before. */
+/** Conditions as trees, and checks between their fields; the generated code checks the range of each field. */
 public final class Conditions {
     private static final Tree[] NONE = new Tree[0];
 
     private Conditions() {
     }
 
-    /** A node with what it combines. */
+    /** A node with its operands. */
     public static final class Tree {
-        /** Its place in the postfix list, which names it when it fires. */
+        /** Index in the postfix list; identifies the node when it fires. */
         public final int index;
         public final ConditionNode node;
         public final Tree[] parts;
@@ -43,7 +45,7 @@ public final class Conditions {
         }
     }
 
-    /** The trees of which one that holds fires the condition: the parts of an AnyOf at the root, otherwise the root. */
+    /** The trees of which any true one fires the condition: the operands of an AnyOf at the root, otherwise the root. */
     public static Tree[] alternatives(Condition condition) {
         List<Tree> found = new ArrayList<Tree>();
         if (condition.nodes.length > 0) {
@@ -62,7 +64,7 @@ public final class Conditions {
         }
     }
 
-    /** Whether a leaf of some kind is in it. */
+    /** Whether a condition contains a node of a kind. */
     public static boolean contains(Condition condition, Class<? extends ConditionNode> kind) {
         for (ConditionNode node : condition.nodes) {
             if (kind.isInstance(node)) {
@@ -72,7 +74,7 @@ public final class Conditions {
         return false;
     }
 
-    /** The whole of a condition that has nodes. */
+    /** The tree of a condition with at least one node. */
     public static Tree tree(Condition condition) {
         List<Tree> stack = new ArrayList<Tree>();
         for (int i = 0; i < condition.nodes.length; i++) {
@@ -93,27 +95,27 @@ public final class Conditions {
         return node instanceof AnyOf ? ((AnyOf) node).n : node instanceof Inverted ? 1 : 0;
     }
 
-    /** Refuses a condition that is none, or asks for what is not there. */
-    static void check(Condition condition, String path, SignalInfo[] signals) throws Refusal {
-        int held = 0;
+    /** Refuses a condition that is malformed, or refers to an unknown signal. */
+    public static void check(Condition condition, String path, SignalInfo[] signals) throws CommandRejected {
+        int results = 0;
         for (int i = 0; i < condition.nodes.length; i++) {
             String at = path + ".nodes[" + i + "]";
             ConditionNode node = condition.nodes[i];
-            if (arity(node) > held) {
-                throw new Refusal(Code.BAD_CONDITION, at, node.getClass().getSimpleName() + " of " + arity(node),
-                        "at most " + held, "it combines " + arity(node) + " results, but there are " + held);
+            if (arity(node) > results) {
+                throw new CommandRejected(Code.BAD_CONDITION, at, node.getClass().getSimpleName() + " of " + arity(node),
+                        "at most " + results, "it combines " + arity(node) + " results, but there are only " + results);
             }
-            held += 1 - arity(node);
+            results += 1 - arity(node);
             check(node, at, signals);
         }
-        if (condition.nodes.length > 0 && held != 1) {
-            throw new Refusal(Code.BAD_CONDITION, path + ".nodes", Integer.toString(held), "1",
-                    "the nodes leave " + held + " results; they have to leave one");
+        if (condition.nodes.length > 0 && results != 1) {
+            throw new CommandRejected(Code.BAD_CONDITION, path + ".nodes", Integer.toString(results), "1",
+                    "the nodes must leave 1 result, got " + results + "; combine them with AllOf or AnyOf");
         }
     }
 
-    /** Name of the frame whose axes a leaf means; empty where it means none, or the moved frame's. */
-    static String frame(ConditionNode node) {
+    /** Name of the frame whose axes a leaf uses; empty for the motion frame's, or for none. */
+    public static String frame(ConditionNode node) {
         if (node instanceof ForceAbove) {
             return ((ForceAbove) node).frame;
         }
@@ -129,7 +131,7 @@ public final class Conditions {
         return node instanceof TorqueOutside ? ((TorqueOutside) node).frame : "";
     }
 
-    private static void check(ConditionNode node, String at, SignalInfo[] signals) throws Refusal {
+    private static void check(ConditionNode node, String at, SignalInfo[] signals) throws CommandRejected {
         if (node instanceof ForceOutside) {
             band(((ForceOutside) node).low, ((ForceOutside) node).high, at);
         } else if (node instanceof TorqueOutside) {
@@ -138,28 +140,29 @@ public final class Conditions {
             band(((JointTorqueOutside) node).low, ((JointTorqueOutside) node).high, at);
         } else if (node instanceof SignalOutside) {
             band(((SignalOutside) node).low, ((SignalOutside) node).high, at);
-            Signals.of(((SignalOutside) node).signal, signals, at + ".signal");
+            SignalTable.index(((SignalOutside) node).signal, signals, at + ".signal");
         } else if (node instanceof SignalIs) {
-            SignalInfo info = signals[Signals.of(((SignalIs) node).signal, signals, at + ".signal")];
+            SignalInfo info = signals[SignalTable.index(((SignalIs) node).signal, signals, at + ".signal")];
             if (info.type != IoType.BOOLEAN) {
-                throw new Refusal(Code.BAD_CONDITION, at + ".signal", info.name, "a boolean signal",
-                        info.name + " is a number; compare it, as in io[\"" + info.name + "\"] > 5");
+                throw new CommandRejected(Code.BAD_CONDITION, at + ".signal", info.name, "a boolean signal",
+                        info.name + " is a number signal; compare it, as in io[\"" + info.name + "\"] > 5");
             }
         } else if (node instanceof PathReached) {
             PathReached point = (PathReached) node;
             boolean fromStart = point.reference == PathReference.START;
             if (fromStart ? point.distance < 0 : point.distance > 0) {
-                throw new Refusal(Code.OUT_OF_RANGE, at + ".distance", Double.toString(point.distance),
-                        fromStart ? "[0.0, 100.0] m" : "[-100.0, 0.0] m", "a point on the path lies behind the start and"
-                                + " before the destination");
+                throw new CommandRejected(Code.OUT_OF_RANGE, at + ".distance", Double.toString(point.distance),
+                        fromStart ? "[0.0, 100.0] m" : "[-100.0, 0.0] m",
+                        "distance must be " + (fromStart ? "0 m or more from the start" : "0 m or less from the destination") + ", got "
+                                + point.distance + " m");
             }
         }
     }
 
-    private static void band(double low, double high, String at) throws Refusal {
+    private static void band(double low, double high, String at) throws CommandRejected {
         if (!(low < high)) {
-            throw new Refusal(Code.OUT_OF_RANGE, at + ".low", Double.toString(low), "below " + high,
-                    "low is " + low + ", high is " + high + "; low has to be below high");
+            throw new CommandRejected(Code.OUT_OF_RANGE, at + ".low", Double.toString(low), "below " + high,
+                    "low must be below high (" + high + "), got " + low);
         }
     }
 }

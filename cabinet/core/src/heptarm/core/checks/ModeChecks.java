@@ -1,19 +1,20 @@
-package heptarm.core;
+package heptarm.core.checks;
 
+import heptarm.core.CommandRejected;
 import heptarm.wire.CartesianImpedance;
 import heptarm.wire.Code;
 import heptarm.wire.Mode;
 import heptarm.wire.SineImpedance;
 
-/** What has to hold between the fields of a control mode; the ranges of single fields are checked before. */
-final class ModeRules {
-    /** Largest stiffness about an axis [Nm/rad]. */
-    private static final double STIFFEST_ROTATION = 300.0;
+/** Checks between the fields of a control mode; the generated code checks the range of each field. */
+public final class ModeChecks {
+    /** Largest rotational stiffness [Nm/rad]. */
+    private static final double MAX_ROTATIONAL_STIFFNESS = 300.0;
 
-    private ModeRules() {
+    private ModeChecks() {
     }
 
-    static void check(Mode mode, String path) throws Refusal {
+    public static void check(Mode mode, String path) throws CommandRejected {
         if (mode instanceof CartesianImpedance) {
             check((CartesianImpedance) mode, path);
         } else if (mode instanceof SineImpedance) {
@@ -23,12 +24,12 @@ final class ModeRules {
         }
     }
 
-    private static void check(CartesianImpedance spring, String path) throws Refusal {
+    private static void check(CartesianImpedance spring, String path) throws CommandRejected {
         for (int i = 3; i < spring.stiffness.length; i++) {
-            if (spring.stiffness[i] > STIFFEST_ROTATION) {
-                throw new Refusal(Code.OUT_OF_RANGE, path + "stiffness[" + i + "]", Double.toString(spring.stiffness[i]),
-                        "[0.0, " + STIFFEST_ROTATION + "] Nm/rad", "the stiffness about an axis is " + spring.stiffness[i]
-                                + " Nm/rad; it may be " + STIFFEST_ROTATION + " at most");
+            if (spring.stiffness[i] > MAX_ROTATIONAL_STIFFNESS) {
+                throw new CommandRejected(Code.OUT_OF_RANGE, path + "stiffness[" + i + "]", Double.toString(spring.stiffness[i]),
+                        "[0.0, " + MAX_ROTATIONAL_STIFFNESS + "] Nm/rad", "the rotational stiffness must be in [0, "
+                                + MAX_ROTATIONAL_STIFFNESS + "] Nm/rad, got " + spring.stiffness[i]);
             }
         }
         boolean limited = false;
@@ -36,26 +37,26 @@ final class ModeRules {
             limited |= !Double.isNaN(spring.max_force[i]);
         }
         if (spring.max_force_stops && !limited) {
-            throw new Refusal(Code.OUT_OF_RANGE, path + "max_force_stops", "true", "false",
-                    "max_force_stops is given without a max_force");
+            throw new CommandRejected(Code.OUT_OF_RANGE, path + "max_force_stops", "true", "false",
+                    "max_force_stops needs a max_force; set max_force, or leave max_force_stops out");
         }
     }
 
-    private static void check(SineImpedance pattern, String path) throws Refusal {
+    private static void check(SineImpedance pattern, String path) throws CommandRejected {
         double ramps = pattern.rise_time + pattern.fall_time;
         if (ramps > pattern.total_time) {
-            throw new Refusal(Code.OUT_OF_RANGE, path + "total_time", Double.toString(pattern.total_time),
-                    "at least " + ramps + " s", "rise_time and fall_time take " + ramps + " s; total_time is "
-                            + pattern.total_time + " s");
+            throw new CommandRejected(Code.OUT_OF_RANGE, path + "total_time", Double.toString(pattern.total_time),
+                    "at least " + ramps + " s", "total_time must be at least rise_time + fall_time = "
+                            + ramps + " s, got " + pattern.total_time + " s");
         }
         if (pattern.stay_active && Double.isNaN(pattern.total_time) && Double.isNaN(pattern.hold_time)) {
-            throw new Refusal(Code.OUT_OF_RANGE, path + "stay_active", "true", "false",
-                    "stay_active waits for a pattern without an end");
+            throw new CommandRejected(Code.OUT_OF_RANGE, path + "stay_active", "true", "false",
+                    "stay_active needs a pattern that ends; set total_time or hold_time");
         }
     }
 
-    /** Whose axes a mode's directions are; "tool" for the moved frame and for modes without directions. */
-    static String frame(Mode mode) {
+    /** Name of the frame whose axes a mode uses; "tool" for the motion frame and for modes without directions. */
+    public static String frame(Mode mode) {
         String name = "tool";
         if (mode instanceof CartesianImpedance) {
             name = ((CartesianImpedance) mode).frame;

@@ -1,53 +1,60 @@
-package heptarm.core;
+package heptarm.core.motion;
 
+import java.util.concurrent.TimeUnit;
+
+import heptarm.core.CommandRejected;
+import heptarm.core.Log;
+import heptarm.core.robot.FriSession;
+import heptarm.core.robot.MotionJob;
+import heptarm.core.robot.MotionPort;
 import heptarm.wire.Code;
 import heptarm.wire.FriChanged;
-import heptarm.wire.FriCommandMode;
 import heptarm.wire.FriOpen;
 import heptarm.wire.FriQuality;
 import heptarm.wire.FriSessionState;
+import heptarm.wire.Mode;
 
-/** One FRI session, from its opening to its end; with an overlay it is a program's activity, without one it only monitors. */
-final class FriRun implements Activity, Fri.Listener {
-    final FriOpen open;
-    private final Server server;
+/** One FRI session, from open to close: an activity if its client commands the robot; otherwise it only monitors. */
+final class FriActivity implements Activity, FriSession.Listener {
+    private final FriOpen open;
+    private final MotionPort port;
+    private final MotionReporter reporter;
+    private final Log log;
     private long deadline;
     private long id;
-    private Fri fri;
+    private FriSession session;
     private FriSessionState state = FriSessionState.IDLE;
     private FriQuality quality = FriQuality.POOR;
-    private boolean stood;
+    private boolean wasReady;
     private boolean closed;
 
-    FriRun(Server server, FriOpen open) {
-        this.server = server;
+    FriActivity(FriOpen open, MotionPort port, MotionReporter reporter, Log log) {
         this.open = open;
-        this.deadline = patience();
+        this.port = port;
+        this.reporter = reporter;
+        this.log = log;
+        this.deadline = newDeadline();
     }
 
-    /** Until when its client may stay away; the client's seconds, not a simulator's. */
-    private long patience() {
+    /** When the client must have answered; in the client's seconds, not a simulator's. */
+    private long newDeadline() {
         return System.nanoTime() + (long) (open.timeout * 1e9);
-    }
-
-    boolean onlyMonitors() {
-        return open.command == FriCommandMode.MONITOR;
     }
 
     public void number(long accepted) {
         id = accepted;
     }
 
-    public heptarm.wire.Mode mode() {
+    public Mode mode() {
         return open.mode;
     }
 
-    /** Opens the session. */
-    void start() throws Refusal {
-        Fri opened = server.robot.fri(open, this);
+    /** Open the session. */
+    void start() throws CommandRejected {
+        FriSession opened = port.openFri(open, this);
         boolean late;
         synchronized (this) {
-            fri = opened;
+            session = opened;
             late = closed;
         }
         if (late) {
@@ -59,26 +66,26 @@ final class FriRun implements Activity, Fri.Listener {
         try {
             start();
             if (awaitReady()) {
-                program.adopt(fri.command(program.listener(0)));
+                program.adopt(session.command(program.listener(0)));
             } else if (program.cause() == null) {
-                program.fail(0, Code.NOT_READY, silence());
+                program.fail(0, Code.NOT_READY, noAnswer());
             } else {
                 program.skip(0);
             }
-        } catch (Refusal e) {
+        } catch (CommandRejected e) {
             program.fail(0, e.code, e.getMessage());
         }
         program.await(0);
         finish(program.code, program.text);
     }
 
-    private synchronized String silence() {
-        if (stood) {
+    private synchronized String noAnswer() {
+        if (wasReady) {
             return "the FRI client at " + open.host + ":" + open.port + " has not answered well for " + open.timeout
-                    + " s: the session fell to " + state + ", its quality is " + quality;
+                    + " s: the session fell back to " + state + " with quality " + quality;
         }
         return "no FRI client answered from " + open.host + ":" + open.port + " within " + open.timeout
-                + " s, or not well enough: the session is in " + state + ", its quality " + quality
+                + " s, or not well enough: the session is in " + state + " with quality " + quality
                 + "; check address, port and firewall, and that both sides have the same FRI version";
     }
 
@@ -88,13 +95,13 @@ final class FriRun implements Activity, Fri.Listener {
             if (left <= 0) {
                 return false;
             }
-            java.util.concurrent.TimeUnit.NANOSECONDS.timedWait(this, left);
+            TimeUnit.NANOSECONDS.timedWait(this, left);
         }
         return !closed;
     }
 
-    /** Ends a session that only monitors when nobody answers it in time; false when it has ended. */
-    boolean look() {
+    /** Closes a monitoring session whose client does not answer in time; false if the session is closed. */
+    boolean checkClient() {
         synchronized (this) {
             if (closed) {
                 return false;
@@ -103,16 +110,16 @@ final class FriRun implements Activity, Fri.Listener {
                 return true;
             }
         }
-        finish(Code.NOT_READY, silence());
+        finish(Code.NOT_READY, noAnswer());
         return false;
     }
 
-    /** Closes the session and tells that it is over. */
+    /** Close the session and report its end. */
     void finish(int code, String text) {
-        Fri opened;
+        FriSession opened;
         synchronized (this) {
-            opened = fri;
-            fri = null;
+            opened = session;
+            session = null;
             closed = true;
             notifyAll();
         }
@@ -120,10 +127,10 @@ final class FriRun implements Activity, Fri.Listener {
             try {
                 opened.close();
             } catch (RuntimeException e) {
-                server.log.error("closing FRI session " + id, e);
+                log.error("closing FRI session " + id, e);
             }
         }
-        server.broadcast(new FriChanged(id, FriSessionState.IDLE, quality, code, text));
+        reporter.publish(new FriChanged(id, FriSessionState.IDLE, quality, code, text));
     }
 
     public synchronized void close() {
@@ -131,25 +138,25 @@ final class FriRun implements Activity, Fri.Listener {
         notifyAll();
     }
 
-    public void begun() {
+    public void started() {
     }
 
-    public void over(Job.Ended how) {
+    public void ended(MotionJob.Outcome outcome) {
     }
 
     public void changed(FriSessionState newState, FriQuality newQuality) {
         synchronized (this) {
-            // IDLE is told by `finish`; one from before the session began may come late
+            // `finish` reports IDLE; one from before the session began may arrive late
             if (closed || newState == FriSessionState.IDLE || newState == state && newQuality == quality) {
                 return;
             }
-            if (stood && newState != state && newState == FriSessionState.MONITORING_WAIT) {
-                deadline = patience();
+            if (wasReady && newState != state && newState == FriSessionState.MONITORING_WAIT) {
+                deadline = newDeadline();
             }
-            stood |= newState == FriSessionState.MONITORING_READY;
+            wasReady |= newState == FriSessionState.MONITORING_READY;
             state = newState;
             quality = newQuality;
-            server.broadcast(new FriChanged(id, newState, newQuality, 0, "")); // before anybody acts on it: in order
+            reporter.publish(new FriChanged(id, newState, newQuality, 0, "")); // before a waiting thread acts: keeps the order
             notifyAll();
         }
     }

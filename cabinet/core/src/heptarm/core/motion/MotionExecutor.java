@@ -1,71 +1,93 @@
-package heptarm.core;
+package heptarm.core.motion;
 
 import java.util.ArrayDeque;
 import java.util.ArrayList;
+import java.util.Arrays;
 import java.util.List;
 
+import heptarm.core.Clock;
+import heptarm.core.CommandRejected;
+import heptarm.core.Log;
+import heptarm.core.Threads;
+import heptarm.core.robot.MotionJob;
+import heptarm.core.robot.MotionPort;
+import heptarm.core.safety.SafetyMonitor;
+import heptarm.core.state.MotionStatus;
 import heptarm.wire.Cause;
 import heptarm.wire.Code;
 import heptarm.wire.Condition;
+import heptarm.wire.FriOpen;
 import heptarm.wire.HandGuide;
+import heptarm.wire.Item;
 import heptarm.wire.Mode;
-import heptarm.wire.MotionFinished;
-import heptarm.wire.MotionStarted;
 import heptarm.wire.PositionMode;
 import heptarm.wire.Run;
+import heptarm.wire.ServoOpen;
 import heptarm.wire.StopKind;
 import heptarm.wire.When;
 
-/** Carries out programs one after the other, each as one batch of jobs, and tells everybody what becomes of them. */
-final class Executor {
+/** Executes programs one after the other and reports their outcome. */
+public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatus.Source {
     private static final int MAX_QUEUED = 1000;
     private static final int MAX_ITEMS = 20000;
 
-    private final Server server;
+    private final MotionPort port;
+    private final ConditionWatcher watcher;
+    private final MotionReporter reporter;
+    private final TriggerActions triggers;
+    private final SafetyMonitor safety;
+    private final Clock clock;
+    private final Log log;
     private final ArrayDeque<Program> queue = new ArrayDeque<Program>();
     private Program running;
     private long lastId;
     private boolean closed;
     private Thread thread;
 
-    Executor(Server server) {
-        this.server = server;
+    public MotionExecutor(MotionPort port, ConditionWatcher watcher, MotionReporter reporter, TriggerActions triggers,
+            SafetyMonitor safety, Clock clock, Log log) {
+        this.port = port;
+        this.watcher = watcher;
+        this.reporter = reporter;
+        this.triggers = triggers;
+        this.safety = safety;
+        this.clock = clock;
+        this.log = log;
     }
 
-    void start() {
-        thread = new Thread(new Runnable() {
+    public void start() {
+        thread = Threads.start("ha-motion", new Runnable() {
             public void run() {
                 work();
             }
-        }, "ha-motion");
-        thread.setDaemon(true);
-        thread.start();
+        });
     }
 
-    // ------------------------------------------------------------------------------- requests, from readers
+    // ------------------------------------------------------------------------------- requests, from any thread
 
-    long add(Run run) throws Refusal {
+    /** Queue a program; returns its id. */
+    public long add(Run run) throws CommandRejected {
         List<Program> replaced = new ArrayList<Program>();
         Program program;
         synchronized (this) {
             if (closed) {
-                throw new Refusal(Code.SHUTTING_DOWN, "the cabinet application ends");
+                throw new CommandRejected(Code.SHUTTING_DOWN, "the cabinet application is closing");
             }
             boolean busy = running != null || !queue.isEmpty();
             if (run.when == When.REJECT && busy) {
-                throw new Refusal(Code.BUSY, "when", "reject", "", "motion " + (running != null ? running.id : queue.peek().id)
+                throw new CommandRejected(Code.BUSY, "when", "reject", "", "motion " + (running != null ? running.id : queue.peek().id)
                         + " is running; wait for it, or use when=\"queue\" or when=\"replace\"");
             }
             if (queue.size() >= MAX_QUEUED) {
-                throw new Refusal(Code.QUEUE_FULL, MAX_QUEUED + " programs are waiting already");
+                throw new CommandRejected(Code.QUEUE_FULL, "at most " + MAX_QUEUED + " programs may wait; wait until one has started");
             }
             int items = run.items.length;
             for (Program waiting : queue) {
                 items += waiting.size();
             }
             if (items > MAX_ITEMS && run.when != When.REPLACE) {
-                throw new Refusal(Code.QUEUE_FULL, "items", Integer.toString(run.items.length), "",
-                        "at most " + MAX_ITEMS + " motions may wait; with these there would be " + items);
+                throw new CommandRejected(Code.QUEUE_FULL, "items", Integer.toString(run.items.length), "",
+                        "at most " + MAX_ITEMS + " motions may wait, got " + items + " with these; send them in several programs");
             }
             if (run.when == When.REPLACE) {
                 replaced.addAll(queue);
@@ -76,121 +98,145 @@ final class Executor {
             }
             program = queue(run, null);
         }
-        end(replaced, Cause.REPLACED, "motion " + program.id + " took its place");
+        end(replaced, Cause.REPLACED, "motion " + program.id + " replaced it");
         return program.id;
     }
 
-    /** The next number of a motion or a session. */
-    synchronized long number() {
+    /** The next id of a motion or an FRI session. */
+    public synchronized long number() {
         lastId = lastId % 0xFFFFFFFFL + 1;
         return lastId;
     }
 
     private Program queue(Run run, Activity activity) {
-        Program program = new Program(server, number(), run, activity);
+        Program program = new Program(number(), run, activity, reporter, triggers, safety, log);
         queue.add(program);
         notifyAll();
         return program;
     }
 
-    /** Begins an activity; nothing else may be under way, since it starts where the arm is now. */
-    synchronized long open(Activity activity) throws Refusal {
+    /** Start a servo motion; returns its id. */
+    public long open(ServoOpen open) throws CommandRejected {
+        return open(new ServoStream(open, port, watcher, reporter, clock));
+    }
+
+    /** Start an FRI session that commands the robot; returns its id. */
+    public long open(FriOpen open) throws CommandRejected {
+        return open(new FriActivity(open, port, reporter, log));
+    }
+
+    /** No other motion may be running or waiting, since an activity starts at the current position. */
+    private synchronized long open(Activity activity) throws CommandRejected {
         if (closed) {
-            throw new Refusal(Code.SHUTTING_DOWN, "the cabinet application ends");
+            throw new CommandRejected(Code.SHUTTING_DOWN, "the cabinet application is closing");
         }
         if (running != null || !queue.isEmpty()) {
-            throw new Refusal(Code.BUSY, "motion " + (running != null ? running.id : queue.peek().id)
-                    + " is running; wait for it or stop it before the robot is led from outside");
+            throw new CommandRejected(Code.BUSY, "motion " + (running != null ? running.id : queue.peek().id)
+                    + " is running; wait for it or stop it before you open a servo motion or an FRI session");
         }
         Program program = queue(null, activity);
         activity.number(program.id);
         return program.id;
     }
 
-    /** Something that must not happen while the arm moves. */
-    interface Change {
-        void make() throws Refusal;
+    /** A change that must not happen while the arm moves. */
+    public interface Change {
+        void make() throws CommandRejected;
     }
 
-    /** Makes a change while nothing runs or waits, and keeps anything from beginning meanwhile. */
-    synchronized void whileIdle(Change change) throws Refusal {
+    /** Makes a change while no motion is running or waiting; none starts meanwhile. */
+    public synchronized void whileIdle(Change change) throws CommandRejected {
         if (running != null || !queue.isEmpty()) {
-            throw new Refusal(Code.BUSY, "motion " + (running != null ? running.id : queue.peek().id)
-                    + " is running; wait for it or stop it before the load changes");
+            throw new CommandRejected(Code.BUSY, "motion " + (running != null ? running.id : queue.peek().id)
+                    + " is running; wait for it or stop it before you change the load");
         }
         change.make();
     }
 
-    /** Control mode of what runs; position control while nothing does. */
-    synchronized Mode mode() {
+    private Mode mode() {
         Mode mode = null;
         if (running != null && running.activity != null) {
             mode = running.activity.mode();
         } else if (running != null) {
             mode = running.run.items[running.item].mode;
         }
-        return mode == null ? new PositionMode() : mode;
+        return orPosition(mode);
     }
 
-    /** The activity that runs or is about to under a number; null if there is none. */
-    synchronized Activity activity(long id) {
+    /** The servo motion with an id that is running or about to; null if there is none. */
+    public ServoStream servo(long id) {
+        Activity activity = activity(id);
+        return activity instanceof ServoStream ? (ServoStream) activity : null;
+    }
+
+    /** Whether an id is that of an FRI session that commands the robot. */
+    public boolean isFri(long id) {
+        return activity(id) instanceof FriActivity;
+    }
+
+    private synchronized Activity activity(long id) {
         Program program = running != null ? running : queue.peek();
         return program != null && program.id == id ? program.activity : null;
     }
 
-    void cancel(long id) throws Refusal {
+    /** Cancel a motion; id 0: all. */
+    public void cancel(long id) throws CommandRejected {
         List<Program> chosen = take(id);
         if (id != 0 && chosen.isEmpty()) {
-            throw new Refusal(Code.UNKNOWN_MOTION, "id", Long.toString(id), "", "motion " + id + " is neither running nor waiting");
+            throw new CommandRejected(Code.UNKNOWN_MOTION, "id", Long.toString(id), "", "motion " + id + " is neither running nor waiting; it has ended, or its id is wrong");
         }
         end(chosen, Cause.CANCELLED, "");
     }
 
-    void stop(StopKind kind) {
+    public void stop(StopKind kind) {
         if (kind == StopKind.AFTER_MOTION) {
             List<Program> waiting;
             synchronized (this) {
                 waiting = new ArrayList<Program>(queue);
                 queue.clear();
             }
-            end(waiting, Cause.STOPPED, "a stop was commanded");
+            end(waiting, Cause.STOPPED, "stopped by command");
             return;
         }
-        endAll(Cause.STOPPED, "a stop was commanded");
+        endAll(Cause.STOPPED, "stopped by command");
         if (kind == StopKind.FAST) {
-            server.robot.stopFast();
+            port.stopFast();
         } else {
-            server.robot.stop();
+            port.stop();
         }
     }
 
-    void endAll(Cause cause, String why) {
+    public void endAll(Cause cause, String why) {
         endAll(cause, 0, why);
     }
 
-    void endAll(Cause cause, int code, String why) {
+    private void endAll(Cause cause, int code, String why) {
         end(take(0), cause, code, why);
     }
 
-    /** Ends what was accepted but has not begun to move; what waits behind it is dropped. */
-    void endUnmoved(int code, String why) {
+    /** Ends a program that was accepted but has not moved; the following ones are dropped. */
+    public void blocked(String steps) {
         Program program;
         synchronized (this) {
             program = running != null ? running : queue.peek();
         }
         if (program != null && !program.moved) {
-            program.end(Cause.FAILED, code, why);
+            program.end(Cause.FAILED, Code.NEEDS_OPERATOR, steps);
         }
     }
 
-    /** Ends what runs if it is led from outside. */
-    void endActivity(Cause cause, int code, String why) {
+    public void stopped(String reason) {
+        endAll(Cause.SAFETY, Code.SAFETY_STOP, reason);
+    }
+
+    /** Ends a motion that follows external targets. */
+    public void notEnabled(String reason) {
         Program program;
         synchronized (this) {
             program = running;
         }
         if (program != null && program.activity != null) {
-            program.end(cause, code, why);
+            program.end(Cause.SAFETY, Code.SAFETY_STOP, reason);
         }
     }
 
@@ -220,22 +266,21 @@ final class Executor {
                 waiting = program != running;
             }
             if (waiting && program.began == 0) {
-                tell(program, false);
+                reporter.finished(program, false);
             }
         }
     }
 
-    /** Id of what runs (0: nothing), its item, and the number of programs that wait. */
-    synchronized long[] status() {
-        return new long[] {running == null ? 0 : running.id, running == null ? 0 : running.item, queue.size()};
+    public synchronized MotionStatus status() {
+        return new MotionStatus(running == null ? 0 : running.id, running == null ? 0 : running.item, queue.size(), mode());
     }
 
-    void close() {
+    public void close() {
         synchronized (this) {
             closed = true;
             notifyAll();
         }
-        endAll(Cause.STOPPED, "the cabinet application ends");
+        endAll(Cause.STOPPED, "the cabinet application is closing");
         Threads.join(thread);
     }
 
@@ -253,15 +298,15 @@ final class Executor {
                         return;
                     }
                     program = queue.poll();
-                    program.began = server.clock.nanos();
+                    program.began = clock.nanos();
                     running = program;
                 }
                 try {
-                    carryOut(program);
+                    execute(program);
                 } catch (InterruptedException e) {
                     throw e;
-                } catch (Throwable e) { // also a class that this cabinet lacks: the next program will want this thread
-                    server.log.error("motion " + program.id, e);
+                } catch (Throwable e) { // also a class that this cabinet lacks: the next program needs this thread
+                    log.error("motion " + program.id, e);
                     synchronized (program) {
                         program.cause = Cause.FAILED;
                         program.code = Code.INTERNAL;
@@ -269,23 +314,23 @@ final class Executor {
                     }
                     program.end(Cause.FAILED, "");
                 }
-                List<Program> behind = new ArrayList<Program>();
+                List<Program> following = new ArrayList<Program>();
                 synchronized (this) {
                     running = null;
-                    if (program.cause == Cause.FAILED) { // the robot is not where what waits would begin
-                        behind.addAll(queue);
+                    if (program.cause == Cause.FAILED) { // the robot is not where the next program starts
+                        following.addAll(queue);
                         queue.clear();
                     }
                 }
-                tell(program, true);
-                end(behind, Cause.DROPPED, "motion " + program.id + " before it failed");
+                reporter.finished(program, true);
+                end(following, Cause.DROPPED, "motion " + program.id + " before it failed");
             }
         } catch (InterruptedException e) {
             Thread.currentThread().interrupt();
         }
     }
 
-    private void carryOut(Program program) throws InterruptedException {
+    private void execute(Program program) throws InterruptedException {
         if (program.activity != null) {
             program.activity.perform(program);
             return;
@@ -295,9 +340,9 @@ final class Executor {
                 program.skip(i);
                 continue;
             }
-            int together = Batches.length(program.run.items, i);
+            int together = BlendedBatches.length(program.run.items, i);
             if (together > 1) {
-                Batches.start(server, program, i, together);
+                start(program, i, together);
                 i += together - 1;
                 if (program.run.items[i].until.nodes.length > 0) {
                     watch(program, i);
@@ -305,17 +350,16 @@ final class Executor {
                 continue;
             }
             try {
-                Job job = server.robot.start(program.run.items[i],
-                        program.run.items[i].mode == null ? new PositionMode() : program.run.items[i].mode, program.listener(i));
-                program.adopt(job);
-            } catch (Refusal e) {
-                program.listener(i).finished(Job.Ended.FAILED, e.code, e.getMessage());
+                Item item = program.run.items[i];
+                program.adopt(port.start(item, orPosition(item.mode), program.listener(i)));
+            } catch (CommandRejected e) {
+                program.listener(i).finished(MotionJob.Outcome.FAILED, e.code, e.getMessage());
             }
-            if (program.run.items[i].until.nodes.length > 0) { // nothing begins behind a motion that a condition may end
+            if (program.run.items[i].until.nodes.length > 0) { // nothing starts after a motion that a condition may end
                 watch(program, i);
             }
         }
-        for (int i = 0; i < program.ended.length; i++) {
+        for (int i = 0; i < program.outcomes.length; i++) {
             program.await(i);
             if (program.cause() != null) {
                 program.end(program.cause, program.why);
@@ -323,49 +367,41 @@ final class Executor {
         }
     }
 
-    /** Waits for the end of a motion with a break condition; watches the condition if the robot does not. */
-    private void watch(Program program, int item) throws InterruptedException {
-        Condition until = program.run.items[item].until;
-        // the robot's API does not say that hand guiding has break conditions
-        if (!(program.run.items[item].motion instanceof HandGuide) && server.robot.watches(until)) {
-            program.await(item);
-            return;
+    /** Hands a batch to the robot. */
+    private void start(Program program, int first, int count) {
+        Item[] items = Arrays.copyOfRange(program.run.items, first, first + count);
+        MotionJob.Listener[] listeners = new MotionJob.Listener[count];
+        for (int i = 0; i < count; i++) {
+            listeners[i] = program.listener(first + i);
         }
-        Guard guard = new Guard(server, program, item, until);
-        guard.start();
         try {
-            program.await(item);
-        } finally {
-            guard.close();
+            program.adopt(port.start(items, orPosition(items[0].mode), listeners));
+        } catch (CommandRejected e) {
+            for (int i = 1; i < count; i++) {
+                program.skip(first + i);
+            }
+            listeners[0].finished(MotionJob.Outcome.FAILED, e.code, e.getMessage());
         }
     }
 
-    private void tell(Program program, boolean moved) {
-        double[] q = new double[7];
-        double[] commanded = new double[7];
-        double residual = moved ? 0.0 : Double.NaN;
+    private static Mode orPosition(Mode mode) {
+        return mode == null ? new PositionMode() : mode;
+    }
+
+    /** Waits for the end of a motion with a break condition; monitors the condition if the robot does not. */
+    private void watch(Program program, int item) throws InterruptedException {
+        Condition until = program.run.items[item].until;
+        // the robot's API documents no break conditions for hand guiding
+        if (!(program.run.items[item].motion instanceof HandGuide) && port.monitors(until)) {
+            program.await(item);
+            return;
+        }
+        ConditionWatcher.Watch watch = watcher.watch(program, item, until);
+        watch.start();
         try {
-            server.robot.readJoints(q, commanded);
-            for (int i = 0; moved && i < 7; i++) {
-                residual = Math.max(residual, Math.abs(q[i] - commanded[i]));
-            }
-        } catch (RuntimeException e) { // the end is told in any case
-            server.log.error("reading the joints at the end of motion " + program.id, e);
-            java.util.Arrays.fill(q, Double.NaN);
-            residual = Double.NaN;
+            program.await(item);
+        } finally {
+            watch.close();
         }
-        Cause cause;
-        String text;
-        synchronized (program) {
-            cause = program.cause;
-            if (cause == null) {
-                Job.Ended last = program.ended[program.ended.length - 1];
-                cause = last == Job.Ended.DONE ? Cause.FINISHED : last == Job.Ended.CONDITION ? Cause.CONDITION : Cause.STOPPED;
-            }
-            text = program.text.length() > 0 ? program.text : program.why;
-        }
-        double duration = program.began == 0 ? 0.0 : (server.clock.nanos() - program.began) * 1e-9;
-        int fired = cause == Cause.CONDITION ? program.fired : -1;
-        server.broadcast(new MotionFinished(program.id, program.item, cause, fired, residual, duration, q, program.code, text));
     }
 }

@@ -1,22 +1,24 @@
-package heptarm.core;
+package heptarm.core.motion;
 
 import java.util.ArrayList;
 import java.util.List;
 
+import heptarm.core.Log;
+import heptarm.core.robot.MotionJob;
+import heptarm.core.safety.SafetyMonitor;
 import heptarm.wire.Cause;
 import heptarm.wire.Code;
-import heptarm.wire.ConditionFired;
 import heptarm.wire.ItemReached;
 import heptarm.wire.MotionStarted;
 import heptarm.wire.Run;
 import heptarm.wire.SegmentReached;
 
-/** A program, either a run of motions or an activity, and what becomes of it. Guarded by itself. */
+/** A program, either a run of motions or an activity, and its state. Guarded by its own lock. */
 final class Program {
     final long id;
     final Run run;
     final Activity activity;
-    final Job.Ended[] ended;
+    final MotionJob.Outcome[] outcomes;
     int item;
     Cause cause;
     String why = "";
@@ -26,36 +28,42 @@ final class Program {
     volatile boolean moved;
     int fired = -1;
     private int firedItem;
-    private boolean isFiringTold;
-    private final Server server;
-    private final List<Job> jobs = new ArrayList<Job>();
+    private boolean isFiringReported;
+    private final MotionReporter reporter;
+    private final TriggerActions triggers;
+    private final SafetyMonitor safety;
+    private final Log log;
+    private final List<MotionJob> jobs = new ArrayList<MotionJob>();
 
-    Program(Server server, long id, Run run, Activity activity) {
-        this.server = server;
+    Program(long id, Run run, Activity activity, MotionReporter reporter, TriggerActions triggers, SafetyMonitor safety, Log log) {
         this.id = id;
         this.run = run;
         this.activity = activity;
-        this.ended = new Job.Ended[size()];
+        this.reporter = reporter;
+        this.triggers = triggers;
+        this.safety = safety;
+        this.log = log;
+        this.outcomes = new MotionJob.Outcome[size()];
     }
 
     int size() {
         return run == null ? 1 : run.items.length;
     }
 
-    /** Ends it for a cause; the first cause counts. */
+    /** End the program for a cause; the first cause counts. */
     void end(Cause newCause, String newWhy) {
         end(newCause, 0, newWhy);
     }
 
     void end(Cause newCause, int newCode, String newWhy) {
-        List<Job> all;
+        List<MotionJob> all;
         synchronized (this) {
             if (cause == null) {
                 cause = newCause;
                 code = newCode;
                 why = newWhy;
             }
-            all = new ArrayList<Job>(jobs);
+            all = new ArrayList<MotionJob>(jobs);
             notifyAll();
         }
         if (activity != null) {
@@ -63,29 +71,29 @@ final class Program {
         }
         for (int i = all.size() - 1; i >= 0; i--) {
             try {
-                all.get(i).cancel(); // from the last, so that none of them begins while the others are cancelled
+                all.get(i).cancel(); // from the last, so that none starts while the others are cancelled
             } catch (RuntimeException e) {
-                server.log.error("cancelling item " + i + " of motion " + id, e);
+                log.error("cancelling item " + i + " of motion " + id, e);
             }
         }
     }
 
-    /** It fails; a cause that it ended for before counts. */
+    /** An item has failed; an earlier cause of the program's end counts. */
     synchronized void fail(int index, int failureCode, String failure) {
-        ended[index] = Job.Ended.FAILED;
+        outcomes[index] = MotionJob.Outcome.FAILED;
         if (cause == null) {
-            boolean stopped = failureCode == Code.SAFETY_STOP || server.warden.isStopped();
+            boolean stopped = failureCode == Code.SAFETY_STOP || safety.isStopped();
             cause = stopped ? Cause.SAFETY : Cause.FAILED;
             code = stopped ? Code.SAFETY_STOP : failureCode;
             text = failure;
         } else if (cause == Cause.SAFETY) {
-            text = failure; // the robot's own words say more
+            text = failure; // the robot's own text is more precise
         }
         notifyAll();
     }
 
-    /** Notes a job; one that comes too late is cancelled. */
-    void adopt(Job job) {
+    /** Add a job; cancels it if the program has ended already. */
+    void adopt(MotionJob job) {
         boolean late;
         synchronized (this) {
             jobs.add(job);
@@ -100,17 +108,17 @@ final class Program {
         return cause;
     }
 
-    /** An item begins anew. */
-    synchronized void renew(int index) {
-        ended[index] = null;
+    /** An item restarts. */
+    synchronized void restart(int index) {
+        outcomes[index] = null;
     }
 
-    /** An item that never began has ended. */
+    /** An item ends without having started. */
     synchronized void skip(int index) {
-        ended[index] = Job.Ended.CANCELLED;
+        outcomes[index] = MotionJob.Outcome.CANCELLED;
     }
 
-    /** A break condition has fired; the first time counts. */
+    /** A break condition has fired; the first one counts. */
     synchronized void fired(int index, int node) {
         if (fired < 0) {
             fired = node;
@@ -119,73 +127,64 @@ final class Program {
         }
     }
 
-    /** Waits for the end of an item; tells meanwhile where the robot was when a break condition fired. */
-    Job.Ended await(int index) throws InterruptedException {
+    /** Wait for the end of an item; meanwhile report the robot's state when a break condition fires. */
+    MotionJob.Outcome await(int index) throws InterruptedException {
         while (true) {
             synchronized (this) {
-                while (ended[index] == null && (fired < 0 || isFiringTold)) {
+                while (outcomes[index] == null && (fired < 0 || isFiringReported)) {
                     wait();
                 }
-                if (fired < 0 || isFiringTold) {
-                    return ended[index];
+                if (fired < 0 || isFiringReported) {
+                    return outcomes[index];
                 }
-                isFiringTold = true;
+                isFiringReported = true;
             }
-            tellFiring();
+            reporter.conditionFired(id, firedItem, fired);
         }
     }
 
-    private void tellFiring() {
-        try {
-            server.broadcast(new ConditionFired(id, firedItem, fired, server.sampler.joints(), server.sampler.torques(),
-                    server.robot.readPose(server.clock.nanos()), server.robot.readWrench(server.clock.nanos())));
-        } catch (RuntimeException e) { // the end will be told in any case
-            server.log.error("reading the robot when a condition of motion " + id + " fired", e);
-        }
-    }
-
-    Job.Listener listener(final int index) {
-        return new Job.Listener() {
+    MotionJob.Listener listener(final int index) {
+        return new MotionJob.Listener() {
             public void started() {
                 moved = true;
                 synchronized (Program.this) {
                     item = index;
                 }
                 if (activity != null) {
-                    activity.begun(); // before anybody hears of it: what a client orders then finds it running
+                    activity.started(); // before the event: a client that reacts to it finds the activity running
                 }
-                server.broadcast(new MotionStarted(id, index));
+                reporter.publish(new MotionStarted(id, index));
             }
 
             public void reached(int segment) {
-                server.broadcast(new SegmentReached(id, index, segment));
+                reporter.publish(new SegmentReached(id, index, segment));
             }
 
             public void triggered(int trigger) {
-                Triggers.act(server, Program.this, index, trigger);
+                triggers.execute(Program.this, index, trigger);
             }
 
             public void fired(int node) {
                 Program.this.fired(index, node);
             }
 
-            public void finished(Job.Ended how, int failureCode, String failure) {
-                if (how == Job.Ended.FAILED) {
+            public void finished(MotionJob.Outcome outcome, int failureCode, String failure) {
+                if (outcome == MotionJob.Outcome.FAILED) {
                     fail(index, failureCode, failure);
                 } else {
-                    if (how == Job.Ended.DONE && index + 1 < ended.length) {
-                        server.broadcast(new ItemReached(id, index));
+                    if (outcome == MotionJob.Outcome.DONE && index + 1 < outcomes.length) {
+                        reporter.publish(new ItemReached(id, index));
                     }
-                    if (how == Job.Ended.CONDITION) {
-                        end(Cause.CONDITION, ""); // what is behind it does not begin
+                    if (outcome == MotionJob.Outcome.CONDITION) {
+                        end(Cause.CONDITION, ""); // the following items must not start
                     }
                     synchronized (Program.this) {
-                        ended[index] = how;
+                        outcomes[index] = outcome;
                         Program.this.notifyAll();
                     }
                 }
                 if (activity != null) {
-                    activity.over(how);
+                    activity.ended(outcome);
                 }
             }
         };

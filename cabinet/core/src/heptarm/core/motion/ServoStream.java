@@ -1,34 +1,43 @@
-package heptarm.core;
+package heptarm.core.motion;
 
 import java.util.Arrays;
+import java.util.concurrent.TimeUnit;
 
+import heptarm.core.Clock;
+import heptarm.core.CommandRejected;
+import heptarm.core.checks.ModeChecks;
+import heptarm.core.checks.ServoChecks;
+import heptarm.core.robot.MotionJob;
+import heptarm.core.robot.MotionPort;
+import heptarm.core.robot.ServoJob;
 import heptarm.wire.Cause;
 import heptarm.wire.Code;
+import heptarm.wire.Mode;
 import heptarm.wire.ServoOpen;
 import heptarm.wire.ServoStatus;
 
 /**
- * Targets of a servo motion between the reader that brings them and the motion thread that applies them: the newest wins,
- * and each brings the time within which the next one has to come.
+ * A servo motion with its stream of targets. The readers of the connections offer targets, the motion thread applies them: the
+ * newest replaces a waiting one, and each carries the time within which the next must arrive.
  */
-final class Stream implements Activity {
+public final class ServoStream implements Activity {
     private static final int AGES = 4096;
     private static final double STATUS_PERIOD = 1.0;
-    /** An older target was sent by a client that does not know the cabinet's clock. */
-    private static final double CREDIBLE = 60.0;
-    /** A wait that lasts so much longer than it should says that this machine stood still meanwhile. */
+    /** The client of an older target does not know the cabinet's clock [s]. */
+    private static final double MAX_AGE = 60.0;
+    /** A wait that takes so much too long means that this machine stood still meanwhile. */
     private static final long OVERSLEPT_NS = 5000000L;
 
-    /** One target. Either joints or a pose. */
-    static final class Target {
-        final double[] q;
-        final double[] velocity;
+    /** One target: either joints or a pose. */
+    public static final class Target {
+        public final double[] q;
+        public final double[] velocity;
         final double[] xyz;
         final double[] quat;
         final double watchdog;
         final long sent;
 
-        Target(double[] q, double[] velocity, double[] xyz, double[] quat, double watchdog, long sent) {
+        public Target(double[] q, double[] velocity, double[] xyz, double[] quat, double watchdog, long sent) {
             this.q = q;
             this.velocity = velocity;
             this.xyz = xyz;
@@ -37,7 +46,7 @@ final class Stream implements Activity {
             this.sent = sent;
         }
 
-        private void apply(Servo servo) throws Refusal {
+        private void apply(ServoJob servo) throws CommandRejected {
             if (q != null) {
                 servo.follow(q, velocity);
             } else {
@@ -46,28 +55,34 @@ final class Stream implements Activity {
         }
     }
 
-    final ServoOpen open;
-    private final Server server;
+    private final ServoOpen open;
+    private final MotionPort port;
+    private final ConditionWatcher watcher;
+    private final MotionReporter reporter;
+    private final Clock clock;
     private final double[] ages = new double[AGES];
     private long id;
-    private Servo servo;
+    private ServoJob servo;
     private Target pending;
-    private heptarm.wire.Mode mode;
+    private Mode mode;
     private double watchdog;
-    private boolean started;
-    private Job.Ended ended;
+    private boolean isStarted;
+    private MotionJob.Outcome outcome;
     private boolean closed;
     private long targets;
     private long applied;
-    private long refused;
+    private long rejected;
     private long late;
     private int code;
     private String text = "";
-    private long told;
+    private long reported;
 
-    Stream(Server server, ServoOpen open) {
-        this.server = server;
+    ServoStream(ServoOpen open, MotionPort port, ConditionWatcher watcher, MotionReporter reporter, Clock clock) {
         this.open = open;
+        this.port = port;
+        this.watcher = watcher;
+        this.reporter = reporter;
+        this.clock = clock;
         this.mode = open.mode;
         this.watchdog = open.watchdog;
     }
@@ -76,168 +91,173 @@ final class Stream implements Activity {
         id = accepted;
     }
 
-    public synchronized heptarm.wire.Mode mode() {
+    public synchronized Mode mode() {
         return mode;
     }
 
-    // -------------------------------------------------------------------------------------- from the readers
+    // ------------------------------------------------------------------------------------------- any thread
 
-    /** Leaves a target; one that has not been applied yet is forgotten. */
-    synchronized void offer(Target target) {
+    /** Check a target and queue it; it replaces one that has not been applied yet. */
+    public void offer(Target target) throws CommandRejected {
+        ServoChecks.check(open.engine, target.q != null, target.velocity != null);
+        queue(target);
+    }
+
+    private synchronized void queue(Target target) {
         targets++;
         pending = target;
         notifyAll();
     }
 
-    /** Counts a target that may not be applied. It does not count as a sign of life. */
-    synchronized void refuse(Refusal why) {
+    /** Count a rejected target. It does not reset the watchdog. */
+    public synchronized void reject(CommandRejected why) {
         targets++;
         note(why);
     }
 
-    private void note(Refusal why) {
-        refused++;
+    private void note(CommandRejected why) {
+        rejected++;
         code = why.code;
         text = why.getMessage();
     }
 
-    void change(heptarm.wire.Mode newer) throws Refusal {
-        Servo running;
+    /** Change the parameters of the control mode. */
+    public void changeMode(Mode newer) throws CommandRejected {
+        ServoJob running;
         synchronized (this) {
-            running = started && ended == null ? servo : null;
+            running = isStarted && outcome == null ? servo : null;
         }
         String kind = open.mode == null ? "PositionMode" : open.mode.getClass().getSimpleName();
         if (!newer.getClass().getSimpleName().equals(kind)) {
-            throw new Refusal(Code.MODE_CONFLICT, "mode", newer.getClass().getSimpleName(), kind,
-                    "a running servo motion keeps the kind of its control mode; close it and open another one");
+            throw new CommandRejected(Code.MODE_CONFLICT, "mode", newer.getClass().getSimpleName(), kind,
+                    "a servo motion cannot change the kind of its control mode; close it and open another one");
         }
-        if (!ModeRules.frame(newer).equals(ModeRules.frame(open.mode))) {
-            throw new Refusal(Code.MODE_CONFLICT, "mode.frame", ModeRules.frame(newer), ModeRules.frame(open.mode),
-                    "a running servo motion keeps the frame of its control mode; close it and open another one");
+        if (!ModeChecks.frame(newer).equals(ModeChecks.frame(open.mode))) {
+            throw new CommandRejected(Code.MODE_CONFLICT, "mode.frame", ModeChecks.frame(newer), ModeChecks.frame(open.mode),
+                    "a servo motion cannot change the frame of its control mode; close it and open another one");
         }
         if (running == null) {
-            throw new Refusal(Code.MODE_CONFLICT, "servo", Long.toString(id), "", "servo motion " + id + " is not running");
+            throw new CommandRejected(Code.MODE_CONFLICT, "servo", Long.toString(id), "", "servo motion " + id + " is not running; open one first");
         }
-        running.change(newer);
+        running.changeMode(newer);
         synchronized (this) {
             mode = newer;
         }
     }
 
-    // ------------------------------------------------------------------------------------- from the listeners
+    // ----------------------------------------------------------------------------------- threads of the robot
 
-    public synchronized void begun() {
-        started = true;
+    public synchronized void started() {
+        isStarted = true;
         notifyAll();
     }
 
-    public synchronized void over(Job.Ended how) {
-        ended = how;
+    public synchronized void ended(MotionJob.Outcome how) {
+        outcome = how;
         notifyAll();
     }
 
-    /** The program has ended: whoever waits here need not. */
     public synchronized void close() {
         closed = true;
         notifyAll();
     }
 
-    // ---------------------------------------------------------------------------------- by the motion thread
+    // ----------------------------------------------------------------------------------- the motion thread
 
-    /** Lets a servo motion follow the targets; one that ended because none came for long is begun anew with the next. */
+    /** Follows the targets; if the robot's servo motion timed out without one, starts it again with the next. */
     public void perform(Program program) throws InterruptedException {
-        Guard guard = new Guard(server, program, 0, open.until);
+        ConditionWatcher.Watch watch = watcher.watch(program, 0, open.until);
         try {
-            carryOut(program, guard);
+            follow(program, watch);
         } finally {
-            guard.close();
+            watch.close();
         }
-        tell();
+        report();
     }
 
-    private void carryOut(Program program, Guard guard) throws InterruptedException {
+    private void follow(Program program, ConditionWatcher.Watch watch) throws InterruptedException {
         String starved = "";
         boolean goesOn = true;
         while (goesOn) {
             prepare();
-            program.renew(0);
+            program.restart(0);
             try {
-                Servo next = server.robot.servo(open, program.listener(0));
+                ServoJob next = port.openServo(open, program.listener(0));
                 adopt(next);
                 program.adopt(next);
                 if (awaitStart()) {
-                    guard.start();
-                    starved = follow();
+                    watch.start();
+                    starved = applyTargets();
                 }
-            } catch (Refusal e) {
+            } catch (CommandRejected e) {
                 program.fail(0, e.code, e.getMessage());
             }
             if (starved.length() > 0) {
                 program.end(Cause.STARVED, starved);
             }
-            goesOn = program.await(0) == Job.Ended.DONE && program.cause() == null;
+            goesOn = program.await(0) == MotionJob.Outcome.DONE && program.cause() == null;
             if (goesOn && !awaitNext()) {
-                program.end(Cause.STARVED, "no target came for so long that the servo motion ended");
+                program.end(Cause.STARVED, "no target arrived for " + watchdog + " s after the servo motion timed out");
                 goesOn = false;
             }
         }
     }
 
-    /** A motion is about to start; what is known of one before it does not count any more. */
-    private synchronized void adopt(Servo next) {
+    private synchronized void adopt(ServoJob next) {
         servo = next;
     }
 
+    /** Clear what is known of a previous motion. */
     private synchronized void prepare() {
-        started = false;
-        ended = null;
+        isStarted = false;
+        outcome = null;
     }
 
-    /** Waits for the start of the motion; false if it ended before. */
+    /** Wait for the start of the motion; false if it ended before. */
     private synchronized boolean awaitStart() throws InterruptedException {
-        while (!started && ended == null && !closed) {
+        while (!isStarted && outcome == null && !closed) {
             wait();
         }
-        return started && ended == null && !closed;
+        return isStarted && outcome == null && !closed;
     }
 
-    /** Applies targets until the motion or the program ends, or until none came in time; then it returns why in words. */
-    private String follow() throws InterruptedException {
+    /** Apply targets until the motion or the program ends (returns ""), or until none arrives in time (returns the reason). */
+    private String applyTargets() throws InterruptedException {
         while (true) {
             Target next;
             synchronized (this) {
                 next = await();
-                if (closed || ended != null) {
+                if (closed || outcome != null) {
                     return "";
                 }
                 pending = null;
                 if (next == null) {
                     late++;
-                    return "no target came within " + Math.round(watchdog * 1000) + " ms";
+                    return "no target arrived within " + Math.round(watchdog * 1000) + " ms";
                 }
                 watchdog = next.watchdog;
             }
             apply(next);
-            if (server.clock.nanos() - told > STATUS_PERIOD * 1e9) {
-                tell();
+            if (clock.nanos() - reported > STATUS_PERIOD * 1e9) {
+                report();
             }
         }
     }
 
-    /** Waits for a target after a motion that ended by itself; null if none came in time. */
+    /** Wait for a target after the robot's servo motion timed out; false if none arrives in time. */
     private synchronized boolean awaitNext() throws InterruptedException {
-        ended = null;
+        outcome = null;
         return await() != null && !closed;
     }
 
-    /** Under the lock: the next target; null when the watchdog's time is over, or something has ended. */
+    /** Under the lock: wait for the next target; null when the watchdog expires, or the motion or the program has ended. */
     private Target await() throws InterruptedException {
         long period = (long) (watchdog * 1e9); // the client's seconds, not a simulator's
         long deadline = System.nanoTime() + period;
         boolean overslept = false;
-        while (pending == null && ended == null && !closed) {
+        while (pending == null && outcome == null && !closed) {
             long left = deadline - System.nanoTime();
-            if (left < -OVERSLEPT_NS && !overslept) { // this machine stood still, and what came meanwhile is not read yet
+            if (left < -OVERSLEPT_NS && !overslept) { // this machine stood still; what arrived meanwhile is not read yet
                 overslept = true;
                 left = period;
                 deadline = System.nanoTime() + period;
@@ -245,7 +265,7 @@ final class Stream implements Activity {
             if (left <= 0) {
                 return null;
             }
-            java.util.concurrent.TimeUnit.NANOSECONDS.timedWait(this, left);
+            TimeUnit.NANOSECONDS.timedWait(this, left);
         }
         return pending;
     }
@@ -253,22 +273,22 @@ final class Stream implements Activity {
     private void apply(Target target) {
         try {
             target.apply(servo);
-            double age = (server.clock.nanos() - target.sent) * 1e-9;
+            double age = (clock.nanos() - target.sent) * 1e-9;
             synchronized (this) {
-                ages[(int) (applied++ % AGES)] = Math.abs(age) < CREDIBLE ? age : Double.NaN;
+                ages[(int) (applied++ % AGES)] = Math.abs(age) < MAX_AGE ? age : Double.NaN;
             }
-        } catch (Refusal e) {
+        } catch (CommandRejected e) {
             synchronized (this) {
-                if (!closed && ended == null) { // one that came too late was not refused
+                if (!closed && outcome == null) { // one that came too late was not rejected
                     note(e);
                 }
             }
         }
     }
 
-    /** Tells everybody what was seen of the stream. */
-    private void tell() {
-        told = server.clock.nanos();
+    /** Publish the statistics of the stream. */
+    private void report() {
+        reported = clock.nanos();
         ServoStatus status;
         synchronized (this) {
             double[] sorted = Arrays.copyOf(ages, (int) Math.min(applied, AGES));
@@ -279,8 +299,8 @@ final class Stream implements Activity {
             }
             double median = size == 0 ? Double.NaN : sorted[size / 2];
             double p99 = size == 0 ? Double.NaN : sorted[(int) (size * 0.99)];
-            status = new ServoStatus(id, targets, applied, refused, late, median, p99, code, text);
+            status = new ServoStatus(id, targets, applied, rejected, late, median, p99, code, text);
         }
-        server.broadcast(status);
+        reporter.publish(status);
     }
 }

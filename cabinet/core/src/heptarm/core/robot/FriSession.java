@@ -1,17 +1,17 @@
-package heptarm.core;
+package heptarm.core.robot;
 
+import heptarm.core.CommandRejected;
 import heptarm.wire.FriQuality;
 import heptarm.wire.FriSessionState;
 
 /** An open FRI session of the robot. */
-public interface Fri {
-    /** Holds the position with an overlay that the session's client commands; until it is cancelled. */
-    Job command(Job.Listener listener) throws Refusal;
+public interface FriSession {
+    /** Starts a position hold with an overlay that the FRI client commands; it lasts until it is cancelled. */
+    MotionJob command(MotionJob.Listener listener) throws CommandRejected;
 
-    /** Ends the session. */
     void close();
 
-    /** Hears of a session. Called from threads of the robot; must not block. */
+    /** Receives changes of a session in the robot's threads; must not block. */
     interface Listener {
         void changed(FriSessionState state, FriQuality quality);
     }

@@ -1,4 +1,4 @@
-package heptarm.core;
+package heptarm.core.session;
 
 import java.io.IOException;
 import java.io.InputStream;
@@ -6,29 +6,37 @@ import java.io.OutputStream;
 import java.net.Socket;
 import java.util.ArrayDeque;
 
+import heptarm.core.Clock;
+import heptarm.core.Log;
+import heptarm.core.Threads;
+import heptarm.core.state.StateSampler;
 import heptarm.wire.Code;
 import heptarm.wire.Goodbye;
 import heptarm.wire.Message;
 import heptarm.wire.Protocol;
+import heptarm.wire.State;
 
 /**
  * One connection: a reader thread that answers requests, and a writer thread with an outbox for everything else.
  *
- * <p>Whoever has an event or a state for the client leaves it in the outbox and goes on; a client that does not read can
- * therefore hold up nobody. Of states that pile up the oldest are dropped; a client that lets events pile up is closed.
+ * <p>Events and states go into the outbox without waiting, so a client that does not read delays nobody. When states pile up,
+ * the oldest are dropped; a connection whose events pile up is closed.
  */
-final class Client {
+final class ClientConnection implements ControlAuthority.Controller, StateSampler.Subscriber {
     private static final int MAX_EVENTS = 4096;
     private static final int MAX_STATES = 64;
     private static final long LINGER_MS = 500;
-    private static final int SEQ = 10;
-    /** What waits unread excuses no more silence than this [client's ns]: a reader that is stuck must not hide a dead client. */
+    /** Most silence that unread bytes excuse [client's ns]: a stuck reader must not hide a dead client. */
     private static final double UNREAD_NS = 1e9;
 
-    final int session;
-    private final Server server;
+    private final int session;
     private final Socket socket;
     private final Handshake handshake;
+    private final RequestDispatcher dispatcher;
+    private final Owner owner;
+    private final FrameEncoder frames;
+    private final Clock clock;
+    private final Log log;
     private final InputStream in;
     private final OutputStream out;
 
@@ -42,23 +50,37 @@ final class Client {
     private int seq;
     private Thread reader;
     private Thread writer;
-    private final long born;
+    private final long connected;
     private volatile boolean gone;
-    private volatile long heard;
+    private volatile long lastReceived;
     private long silenceBefore;
-    private volatile long sent;
+    private volatile long lastSent;
     private volatile long writeBegan;
 
-    Client(Server server, Socket socket, int session) throws IOException {
-        this.server = server;
+    /** Receives the end of a connection. */
+    interface Owner {
+        /** The client receives no more states and events, and controls nothing any more. */
+        void ending(ClientConnection client, String why);
+
+        /** The connection is closed. */
+        void closed(ClientConnection client, String why);
+    }
+
+    ClientConnection(Socket socket, int session, CabinetIdentity identity, RequestDispatcher dispatcher, Owner owner, FrameEncoder frames,
+            Clock clock, Log log) throws IOException {
+        this.dispatcher = dispatcher;
+        this.owner = owner;
+        this.frames = frames;
+        this.clock = clock;
+        this.log = log;
         this.socket = socket;
         this.session = session;
         this.in = socket.getInputStream();
         this.out = socket.getOutputStream();
-        this.handshake = new Handshake(server, this);
-        this.born = server.clock.nanos();
-        this.heard = born;
-        this.sent = born;
+        this.handshake = new Handshake(identity, this);
+        this.connected = clock.nanos();
+        this.lastReceived = connected;
+        this.lastSent = connected;
     }
 
     void start() {
@@ -82,47 +104,51 @@ final class Client {
         return thread;
     }
 
-    String name() {
+    public String name() {
         return handshake.name();
     }
 
-    boolean isOpen() {
+    public int session() {
+        return session;
+    }
+
+    public boolean isOpen() {
         return handshake.isOpen() && !ending && !gone;
     }
 
-    /** Whether the client has not said who it is yet. */
+    /** Whether the handshake is not complete yet. */
     boolean isNew() {
         return !handshake.isOpen() && !ending;
     }
 
     /** Cabinet time at which the client connected. */
-    long born() {
-        return born;
+    long connected() {
+        return connected;
     }
 
-    /** Cabinet time of the last octets from the client. */
-    long heard() {
-        return heard;
+    /** Cabinet time of the last bytes from the client. */
+    long lastReceived() {
+        return lastReceived;
     }
 
-    /** For how long it has said nothing [ns], as two looks found: a machine held up may not have read its words yet. */
+    /** Silence of the client [ns], confirmed by two calls: a busy machine may not have read its bytes yet. */
     long silence() {
         double excused = 0.0;
         try {
-            excused = in.available() > 0 ? UNREAD_NS * server.clock.rate() : 0.0;
-        } catch (IOException e) { // the reader finds out why
+            excused = in.available() > 0 ? UNREAD_NS * clock.rate() : 0.0;
+        } catch (IOException e) { // the reader reports it
         }
         long before = silenceBefore;
-        silenceBefore = server.clock.nanos() - heard - (long) excused;
+        silenceBefore = clock.nanos() - lastReceived - (long) excused;
         return Math.min(silenceBefore, before);
     }
 
     /** Cabinet time of the last frame to the client. */
-    long sent() {
-        return sent;
+    long lastSent() {
+        return lastSent;
     }
 
-    /** Cabinet time at which the write under way began; 0: none is under way. */
+    /** Cabinet time at which the current write began; 0: none. */
     long writeBegan() {
         return writeBegan;
     }
@@ -148,9 +174,9 @@ final class Client {
                 if (count < 0) {
                     break;
                 }
-                heard = server.clock.nanos();
+                lastReceived = clock.nanos();
                 filled += count;
-                int used = frames(buffer, filled);
+                int used = handleFrames(buffer, filled);
                 filled -= used;
                 if (used > 0 && filled > 0) {
                     System.arraycopy(buffer, used, buffer, 0, filled);
@@ -160,24 +186,24 @@ final class Client {
             why = "the connection broke (" + e.getMessage() + ")";
         } catch (RuntimeException e) {
             why = "an error in the cabinet application: " + e;
-            server.log.error("serving " + address(), e);
+            log.error("serving " + address(), e);
         } finally {
             leave(why);
         }
     }
 
     /**
-     * Handles all whole frames of the buffer; returns the octets used.
+     * Handle all complete frames of the buffer; returns the bytes used.
      *
-     * <p>Of a connection that is ending all octets are read and thrown away: closing a socket with unread octets would
-     * throw away the last words to the client.
+     * <p>A connection that is ending reads and discards all bytes: closing a socket with unread bytes would discard the last
+     * frames to the client.
      */
-    private int frames(byte[] data, int filled) {
+    private int handleFrames(byte[] data, int filled) {
         int pos = 0;
         while (filled - pos >= Protocol.HEADER && !ending && !gone) {
             int length = int32(data, pos + 6);
             if (((data[pos] & 0xFF) << 8 | data[pos + 1] & 0xFF) != Protocol.MAGIC || length < 0 || length > Protocol.MAX_BODY) {
-                goodbye(Code.BAD_FRAME, "it sent octets that are not a heptarm frame");
+                goodbye(Code.BAD_FRAME, "it sent bytes that are not a heptarm frame");
                 return filled;
             }
             if (filled - pos < Protocol.HEADER + length) {
@@ -188,7 +214,7 @@ final class Client {
             long request = int32(data, pos + 14) & 0xFFFFFFFFL;
             if (handshake.isOpen()) {
                 long stamp = (long) int32(data, pos + 18) << 32 | int32(data, pos + 22) & 0xFFFFFFFFL;
-                server.dispatcher.handle(this, type, request, stamp, data, pos + Protocol.HEADER, length);
+                dispatcher.handle(this, type, request, stamp, data, pos + Protocol.HEADER, length);
             } else {
                 handshake.handle(version, type, data, pos + Protocol.HEADER, length);
             }
@@ -203,9 +229,9 @@ final class Client {
 
     // ------------------------------------------------------------------------------------------- writing
 
-    /** Sends an answer at once from the reader's thread if nothing is in the way, otherwise through the outbox. */
+    /** Send an answer at once in the reader's thread if the connection is free, otherwise through the outbox. */
     void answer(Message message, long request) {
-        byte[] frame = server.frame(message, request);
+        byte[] frame = frames.frame(message, request);
         boolean full = false;
         synchronized (outbox) {
             if (ending) {
@@ -227,10 +253,10 @@ final class Client {
             leave("it does not read its answers");
             return;
         }
-        writeClaimed(frame);
+        writeFrame(frame);
     }
 
-    /** Claims the connection: what others have for the client waits until {@link #writeClaimed}. False: it ends. */
+    /** Claim the connection: other frames wait until {@link #writeClaimed}. False: the connection is ending. */
     boolean claim() {
         synchronized (outbox) {
             if (writing || ending) {
@@ -241,8 +267,12 @@ final class Client {
         }
     }
 
-    /** Writes a frame over the claimed connection and gives it back. */
-    void writeClaimed(byte[] frame) {
+    /** Write a message over the claimed connection and free it. */
+    void writeClaimed(Message message) {
+        writeFrame(frames.frame(message, 0));
+    }
+
+    private void writeFrame(byte[] frame) {
         try {
             write(frame);
         } catch (IOException e) {
@@ -257,13 +287,13 @@ final class Client {
         }
     }
 
-    /** Leaves an event in the outbox. */
+    /** Queue an event. */
     void event(int type, byte[] body) {
         boolean full;
         synchronized (outbox) {
             full = events.size() >= MAX_EVENTS;
             if (!full && !ending) {
-                events.add(server.frame(type, body));
+                events.add(frames.frame(type, body));
                 outbox.notify();
             }
         }
@@ -272,8 +302,9 @@ final class Client {
         }
     }
 
-    /** Leaves a state in the outbox; the oldest is dropped when too many wait. */
-    void state(byte[] frame) {
+    /** Queue a state; drops the oldest when too many wait. */
+    public void receive(State state) {
+        byte[] frame = frames.frame(state, 0);
         synchronized (outbox) {
             if (states.size() >= MAX_STATES) {
                 states.poll();
@@ -284,26 +315,26 @@ final class Client {
         }
     }
 
-    /** Says why and ends the connection when that is written. */
+    /** Send a Goodbye with a reason, then end the connection. */
     void goodbye(int code, String text) {
         synchronized (outbox) {
             if (ending) {
                 return;
             }
-            events.add(server.frame(new Goodbye(code, text), 0));
+            events.add(frames.frame(new Goodbye(code, text), 0));
             ending = true;
             outbox.notify();
         }
-        server.retire(this, text);
+        owner.ending(this, text);
     }
 
-    /** Ends a connection that never became a session. */
+    /** Refuse a connection. */
     void refuse(int code, String text) {
         start(); // the writer sends the refusal, then closes
         handshake.refuse(code, text);
     }
 
-    /** Everything in the outbox is written, then the connection ends. */
+    /** End the connection after the outbox is written. */
     void endAfterWriting() {
         synchronized (outbox) {
             ending = true;
@@ -340,11 +371,11 @@ final class Client {
         } catch (IOException e) {
             leave("the connection broke (" + e.getMessage() + ")");
         } catch (InterruptedException e) {
-            leave("the cabinet application ends");
+            leave("the cabinet application is closing");
         }
     }
 
-    /** Says that nothing more comes, and waits a while for the client to end its side. */
+    /** Close the sending side, and wait briefly for the client to close its side. */
     private void linger() throws IOException, InterruptedException {
         if (gone) {
             return;
@@ -358,21 +389,17 @@ final class Client {
     }
 
     private void write(byte[] frame) throws IOException {
-        int number = seq++; // only the one that holds `writing` comes here
-        frame[SEQ] = (byte) (number >>> 24);
-        frame[SEQ + 1] = (byte) (number >>> 16);
-        frame[SEQ + 2] = (byte) (number >>> 8);
-        frame[SEQ + 3] = (byte) number;
-        long now = server.clock.nanos();
+        FrameEncoder.putInt(frame, FrameEncoder.SEQUENCE, seq++); // only the thread that holds `writing` gets here
+        long now = clock.nanos();
         writeBegan = now;
         out.write(frame);
-        sent = now;
+        lastSent = now;
         writeBegan = 0;
     }
 
     // ------------------------------------------------------------------------------------------- the end
 
-    /** Ends the connection at once. */
+    /** End the connection at once. */
     void leave(String why) {
         synchronized (outbox) {
             if (gone) {
@@ -384,17 +411,17 @@ final class Client {
         try {
             socket.close();
         } catch (IOException e) {
-            server.log.warn("closing " + address() + ": " + e);
+            log.warn("closing " + address() + ": " + e);
         }
-        server.left(this, why);
+        owner.closed(this, why);
         if (dropped > 0) {
-            server.log.info(dropped + " states were dropped for " + name() + ", who read too slowly");
+            log.info(dropped + " states were dropped for " + name() + ", which reads too slowly");
         }
     }
 
     void join() {
         Threads.join(writer);
-        leave("the cabinet application ends");
+        leave("the cabinet application is closing");
         Threads.join(reader);
     }
 }

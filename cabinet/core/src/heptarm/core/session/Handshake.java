@@ -1,4 +1,4 @@
-package heptarm.core;
+package heptarm.core.session;
 
 import java.security.GeneralSecurityException;
 import java.security.MessageDigest;
@@ -7,113 +7,123 @@ import java.security.SecureRandom;
 import javax.crypto.Mac;
 import javax.crypto.spec.SecretKeySpec;
 
+import heptarm.core.CommandRejected;
 import heptarm.wire.Challenge;
 import heptarm.wire.Code;
 import heptarm.wire.Encoder;
-import heptarm.wire.Groups;
 import heptarm.wire.Hello;
 import heptarm.wire.Message;
 import heptarm.wire.Messages;
 import heptarm.wire.Proof;
 import heptarm.wire.Protocol;
+import heptarm.wire.Refusal;
+import heptarm.wire.SessionState;
+import heptarm.wire.SessionTransitions;
 import heptarm.wire.Violation;
-import heptarm.wire.FrameInfo;
-import heptarm.wire.RobotInfo;
-import heptarm.wire.SignalInfo;
-import heptarm.wire.ToolInfo;
 import heptarm.wire.Welcome;
 import heptarm.wire.WireException;
 
-/** The first frames of a connection: versions, the key, the welcome. */
+/** The first frames of a connection: versions, the key, the Welcome. The schema's table lists which message is legal when. */
 final class Handshake {
+    private static final String HMAC = "HmacSHA256";
+    private static final int NONCE = 32;
     private static final SecureRandom RANDOM = new SecureRandom();
-    private static final int ALL_GROUPS = Groups.JOINTS | Groups.TORQUES | Groups.POSE | Groups.WRENCH | Groups.MOTION
-            | Groups.SAFETY | Groups.IO | Groups.MODE;
 
-    private final Server server;
-    private final Client client;
-    private volatile boolean open;
+    private final CabinetIdentity identity;
+    private final ClientConnection client;
+    private volatile SessionState state = SessionState.START;
     private String name = "a client";
     private Hello hello;
     private byte[] nonce;
 
-    Handshake(Server server, Client client) {
-        this.server = server;
+    Handshake(CabinetIdentity identity, ClientConnection client) {
+        this.identity = identity;
         this.client = client;
     }
 
     boolean isOpen() {
-        return open;
+        return state == SessionState.OPEN;
     }
 
     String name() {
         return name;
     }
 
-    /** One frame before the session stands; anything but the right one ends the connection with a reason. */
+    /** Handle one frame of a session that is not open yet; an illegal one ends the connection with a reason. */
     void handle(int version, int type, byte[] data, int offset, int length) {
         try {
             step(version, type, data, offset, length);
-        } catch (Refusal e) {
+        } catch (CommandRejected e) {
             refuse(e.code, e.getMessage());
         }
     }
 
-    private void step(int version, int type, byte[] data, int offset, int length) throws Refusal {
+    private void step(int version, int type, byte[] data, int offset, int length) throws CommandRejected {
         if (version != Protocol.MAJOR) {
-            throw new Refusal(Code.WRONG_VERSION, versions(version + ".x"));
+            throw new CommandRejected(Code.WRONG_VERSION, versions(version + ".x"));
         }
-        Message message;
+        Message message = read(type, data, offset, length);
+        SessionState next = SessionTransitions.next(state, type);
+        if (next == null || !Messages.fromClient(type)) {
+            throw new CommandRejected(Code.UNEXPECTED_MESSAGE,
+                    "message " + type + " is illegal in session state " + state + "; send Hello first");
+        }
+        state = next;
+        if (message instanceof Hello) {
+            greet((Hello) message);
+        } else if (message instanceof Proof) {
+            verify((Proof) message);
+        } else {
+            client.leave("it said goodbye");
+        }
+    }
+
+    private static Message read(int type, byte[] data, int offset, int length) throws CommandRejected {
         try {
-            message = Messages.read(type, data, offset, length);
+            Message message = Messages.read(type, data, offset, length);
             if (message != null) {
                 message.validate("");
             }
+            return message;
         } catch (WireException e) {
-            throw new Refusal(Code.BAD_BODY, "message " + type + ": " + e.getMessage());
+            throw new CommandRejected(Code.BAD_BODY, "message " + type + ": " + e.getMessage());
         } catch (Violation e) {
-            throw new Refusal(e.code, e.getMessage());
-        }
-        if (message instanceof Hello && hello == null) {
-            greet((Hello) message);
-        } else if (message instanceof Proof && nonce != null) {
-            prove((Proof) message);
-        } else {
-            throw new Refusal(Code.UNEXPECTED_MESSAGE, "message " + type + " before the session stands; say Hello first");
+            throw new CommandRejected(e.code, e.getMessage());
         }
     }
 
-    private void greet(Hello message) throws Refusal {
+    private void greet(Hello message) throws CommandRejected {
         hello = message;
         name = message.name.length() == 0 ? "a client" : message.name;
         if (message.major != Protocol.MAJOR) {
-            throw new Refusal(Code.WRONG_VERSION, versions(message.major + "." + message.minor));
+            throw new CommandRejected(Code.WRONG_VERSION, versions(message.major + "." + message.minor));
         }
-        if (server.config.key.length() == 0) {
-            welcome();
+        if (identity.key().length() == 0) {
+            welcome(new byte[0]);
             return;
         }
-        nonce = new byte[32];
+        nonce = new byte[NONCE];
         RANDOM.nextBytes(nonce);
+        sent(Challenge.TYPE);
         client.answer(new Challenge(nonce), 0);
     }
 
-    private void prove(Proof proof) throws Refusal {
+    private void verify(Proof proof) throws CommandRejected {
         if (!MessageDigest.isEqual(mac(nonce, hello.nonce), proof.mac)) {
-            throw new Refusal(Code.WRONG_KEY, "the pre-shared key is wrong");
+            throw new CommandRejected(Code.WRONG_KEY, "the pre-shared key is wrong; use the one in the process data heptarm.key");
         }
-        welcome();
+        welcome(mac(hello.nonce, nonce));
     }
 
     private static String versions(String theirs) {
         return "the client speaks protocol " + theirs + ", this cabinet " + Protocol.MAJOR + "." + Protocol.MINOR
-                + " (heptarm " + Config.VERSION + "); install matching versions on both";
+                + " (heptarm " + ServerSettings.VERSION + "); install matching versions on both";
     }
 
     private byte[] mac(byte[] first, byte[] second) {
         try {
-            Mac mac = Mac.getInstance("HmacSHA256");
-            mac.init(new SecretKeySpec(Encoder.utf8(server.config.key), "HmacSHA256"));
+            Mac mac = Mac.getInstance(HMAC);
+            mac.init(new SecretKeySpec(Encoder.utf8(identity.key()), HMAC));
             mac.update(first);
             return mac.doFinal(second);
         } catch (GeneralSecurityException e) {
@@ -121,27 +131,23 @@ final class Handshake {
         }
     }
 
-    private void welcome() {
-        Robot robot = server.robot;
-        byte[] proof = nonce == null ? new byte[0] : mac(hello.nonce, nonce);
-        RobotInfo info = robot.info();
-        String cabinet = robot.cabinet();
-        String[] capabilities = robot.capabilities();
-        ToolInfo[] tools = server.rack.known();
-        FrameInfo[] frames = robot.frames();
-        SignalInfo[] signals = robot.signals();
-        boolean isVirtual = robot.isVirtual();
+    private void welcome(byte[] proof) {
         if (!client.claim()) {
-            return; // the cabinet application ends
+            return; // the cabinet application is closing
         }
-        open = true; // events of others gather from here on; the welcome still comes first and knows all before them
-        client.writeClaimed(server.frame(new Welcome(Protocol.MAJOR, Protocol.MINOR, client.session, Config.VERSION, cabinet,
-                isVirtual, info, capabilities, tools, frames, signals, ALL_GROUPS, server.config.maxRate,
-                server.config.heartbeat, server.authority.name(), proof), 0));
+        sent(Welcome.TYPE); // events are queued from here on; the Welcome goes out first and reflects all earlier ones
+        client.writeClaimed(identity.welcome(client.session(), proof));
     }
 
     void refuse(int code, String text) {
-        client.answer(new heptarm.wire.Refusal(code, text, Protocol.MAJOR, Protocol.MINOR), 0);
+        sent(Refusal.TYPE);
+        client.answer(new Refusal(code, text, Protocol.MAJOR, Protocol.MINOR), 0);
         client.endAfterWriting();
+    }
+
+    /** This side sends a message of the handshake. */
+    private void sent(int type) {
+        SessionState next = SessionTransitions.next(state, type);
+        state = next == null ? SessionState.CLOSED : next;
     }
 }

@@ -1,5 +1,8 @@
-package heptarm.core;
+package heptarm.core.session;
 
+import heptarm.core.CommandRejected;
+import heptarm.core.robot.PanelPort;
+import heptarm.core.state.SignalTable;
 import heptarm.wire.Accepted;
 import heptarm.wire.Code;
 import heptarm.wire.GetProcessData;
@@ -11,38 +14,44 @@ import heptarm.wire.SetSignals;
 import heptarm.wire.ShowMessage;
 
 /** Requests that concern the cabinet's signals, its smartPAD and its process data. */
-final class Panel {
+final class PanelRequests {
     private static final String OWN = "heptarm.";
     private static final String SECRET = "heptarm.key";
 
-    private Panel() {
+    private final SignalTable signals;
+    private final PanelPort panel;
+
+    PanelRequests(SignalTable signals, PanelPort panel) {
+        this.signals = signals;
+        this.panel = panel;
     }
 
-    static boolean concerns(Message message) {
+    static boolean handles(Message message) {
         return message instanceof SetSignals || message instanceof SetKey || message instanceof ShowMessage
                 || message instanceof GetProcessData || message instanceof SetProcessData;
     }
 
-    /** Carries one out; returns its answer. */
-    static Message answer(Server server, Message message) throws Refusal {
+    /** Execute a request; returns its answer. */
+    Message execute(Message message) throws CommandRejected {
         if (message instanceof SetSignals) {
-            server.signals.write((SetSignals) message);
+            signals.write((SetSignals) message);
         } else if (message instanceof SetKey) {
-            server.robot.setKey((SetKey) message);
+            panel.setKey((SetKey) message);
         } else if (message instanceof ShowMessage) {
-            server.robot.show(((ShowMessage) message).severity.value(), ((ShowMessage) message).text);
+            panel.show(((ShowMessage) message).severity.value(), ((ShowMessage) message).text);
         } else if (message instanceof SetProcessData) {
-            SetProcessData wish = (SetProcessData) message;
-            if (wish.name.startsWith(OWN)) {
-                throw new Refusal(Code.UNSUPPORTED, "name", wish.name, "", "settings of heptarm itself are made at the smartPAD");
+            SetProcessData request = (SetProcessData) message;
+            if (request.name.startsWith(OWN)) {
+                throw new CommandRejected(Code.UNSUPPORTED, "name", request.name, "",
+                        request.name + " is a setting of heptarm itself; change it at the smartPAD");
             }
-            server.robot.setProcessData(wish.name, wish.value);
+            panel.setProcessData(request.name, request.value);
         } else {
             String name = ((GetProcessData) message).name;
             if (SECRET.equals(name)) {
-                throw new Refusal(Code.UNSUPPORTED, "name", name, "", "the key is told to nobody");
+                throw new CommandRejected(Code.UNSUPPORTED, "name", name, "", "the pre-shared key cannot be read; look at the smartPAD");
             }
-            return new ProcessData(name, server.robot.processData(name));
+            return new ProcessData(name, panel.processData(name));
         }
         return new Accepted(0);
     }

@@ -1,7 +1,7 @@
-package heptarm.core;
+package heptarm.core.session;
 
-/** Settings of the server; they come from the cabinet's process data. */
-public final class Config {
+/** Settings of the server, from the cabinet's process data. */
+public final class ServerSettings {
     public static final String VERSION = "0.1.0";
 
     /** Address to listen on. */
@@ -10,14 +10,14 @@ public final class Config {
     public final int port;
     /** Pre-shared key; empty: none. */
     public final String key;
-    /** Addresses that may connect, separated by blanks or commas; empty: all. */
+    /** Addresses that may connect, separated by spaces or commas; empty: all. */
     public final String allow;
     /** Both sides send something at least this often [s]. */
     public final double heartbeat;
-    /** Fastest state rate [Hz]. */
+    /** Highest state rate [Hz]. */
     public final double maxRate;
 
-    public Config(String bind, int port, String key, String allow, double heartbeat, double maxRate) {
+    public ServerSettings(String bind, int port, String key, String allow, double heartbeat, double maxRate) {
         this.bind = bind;
         this.port = port;
         this.key = key;

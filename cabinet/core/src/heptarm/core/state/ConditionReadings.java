@@ -1,8 +1,11 @@
-package heptarm.core;
+package heptarm.core.state;
 
 import java.util.HashMap;
 import java.util.Map;
 
+import heptarm.core.checks.Conditions;
+import heptarm.core.robot.Sensors;
+import heptarm.core.robot.SignalPort;
 import heptarm.wire.AllOf;
 import heptarm.wire.AnyOf;
 import heptarm.wire.Axis;
@@ -19,19 +22,21 @@ import heptarm.wire.SignalOutside;
 import heptarm.wire.TorqueOutside;
 import heptarm.wire.WrenchState;
 
-/** What the robot says at one moment, read only as far as a condition asks for it, and each thing once. */
-public final class Readings {
-    private final Robot robot;
+/** Evaluates conditions at one moment; reads only what a condition needs, and each value once. */
+public final class ConditionReadings {
+    private final Sensors sensors;
+    private final SignalPort signals;
     private final long stamp;
     private final Map<String, WrenchState> wrenches = new HashMap<String, WrenchState>();
     private double[] external;
 
-    public Readings(Robot robot, long stamp) {
-        this.robot = robot;
+    public ConditionReadings(Sensors sensors, SignalPort signals, long stamp) {
+        this.sensors = sensors;
+        this.signals = signals;
         this.stamp = stamp;
     }
 
-    /** The first of the trees that holds; null if none does. */
+    /** The first tree that is true; null if none is. */
     public Conditions.Tree first(Conditions.Tree[] trees) {
         for (Conditions.Tree tree : trees) {
             if (holds(tree)) {
@@ -91,13 +96,13 @@ public final class Readings {
         if (node instanceof SignalOutside) {
             return outside(signal(((SignalOutside) node).signal), ((SignalOutside) node).low, ((SignalOutside) node).high);
         }
-        return false; // a point on a path: that only the robot itself knows
+        return false; // a point on the path: only the robot itself knows it
     }
 
     private WrenchState wrench(String frame) {
         WrenchState seen = wrenches.get(frame);
         if (seen == null) {
-            seen = robot.readWrench(frame, stamp);
+            seen = sensors.readWrench(frame, stamp);
             wrenches.put(frame, seen);
         }
         return seen;
@@ -106,17 +111,17 @@ public final class Readings {
     private double[] external() {
         if (external == null) {
             external = new double[7];
-            robot.readTorques(new double[7], external, new double[7]);
+            sensors.readTorques(new double[7], external, new double[7]);
         }
         return external;
     }
 
     private double signal(String name) {
-        SignalInfo[] all = robot.signals();
+        SignalInfo[] all = signals.signals();
         for (int i = 0; i < all.length; i++) {
             if (all[i].name.equals(name)) {
                 double[] value = new double[all.length];
-                robot.readSignals(value, i, 1);
+                signals.read(value, i, 1);
                 return value[i];
             }
         }
@@ -127,7 +132,7 @@ public final class Readings {
         return !(value >= low && value <= high);
     }
 
-    /** Whether an estimate is less accurate than is accepted. */
+    /** Whether an estimate is less accurate than the tolerance. */
     private static boolean vague(double[] inaccuracy, double tolerance) {
         return Math.max(Math.max(inaccuracy[0], inaccuracy[1]), inaccuracy[2]) > tolerance;
     }

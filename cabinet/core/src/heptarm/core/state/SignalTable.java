@@ -1,5 +1,7 @@
-package heptarm.core;
+package heptarm.core.state;
 
+import heptarm.core.CommandRejected;
+import heptarm.core.robot.SignalPort;
 import heptarm.wire.Code;
 import heptarm.wire.IoDirection;
 import heptarm.wire.IoState;
@@ -9,33 +11,34 @@ import heptarm.wire.SetSignals;
 import heptarm.wire.SignalInfo;
 import heptarm.wire.SignalValue;
 
-/** Signals of the cabinet's IO groups: found by name, written all or none, read a few at a time. */
-final class Signals {
-    /** So many are read before looking at the time: on a cabinet each one takes some 2 ms. */
+/** Signals of the cabinet's IO groups: finds them by name, writes all or none, reads a few at a time. */
+public final class SignalTable {
+    /** Signals to read between checks of the time: on a cabinet each one takes about 2 ms. */
     private static final int SLICE = 2;
     private static final long PATIENCE_NS = 300000L;
 
-    private final Robot robot;
+    private final SignalPort port;
     private final SignalInfo[] known;
     private final double[] values;
     private int next;
     private boolean complete;
     private long began;
 
-    Signals(Robot robot) {
-        this.robot = robot;
-        this.known = robot.signals();
+    public SignalTable(SignalPort port) {
+        this.port = port;
+        this.known = port.signals();
         this.values = new double[known.length];
     }
 
-    /** Place of a signal in the robot's list. */
-    static int of(String name, SignalInfo[] signals, String parameter) throws Refusal {
+    /** Index of a signal in a list. */
+    public static int index(String name, SignalInfo[] signals, String parameter) throws CommandRejected {
         for (int i = 0; i < signals.length; i++) {
             if (signals[i].name.equals(name)) {
                 return i;
             }
         }
-        throw new Refusal(Code.UNKNOWN_NAME, parameter, name, names(signals), "no signal " + name);
+        throw new CommandRejected(Code.UNKNOWN_NAME, parameter, name, names(signals),
+                "unknown signal " + name + "; known signals: " + names(signals) + " (process data heptarm.io)");
     }
 
     private static String names(SignalInfo[] signals) {
@@ -43,44 +46,44 @@ final class Signals {
         for (SignalInfo one : signals) {
             text.append(text.length() == 0 ? "" : ", ").append(one.name);
         }
-        return text.length() == 0 ? "this cabinet has none (process data heptarm.io)" : text.toString();
+        return text.length() == 0 ? "none" : text.toString();
     }
 
-    /** Writes outputs that a client wants, if all of them can be what they shall be. */
-    void write(SetSignals wish) throws Refusal {
-        int[] places = new int[wish.values.length];
-        double[] wanted = new double[places.length];
+    /** Writes outputs after checking all of them. */
+    public void write(SetSignals request) throws CommandRejected {
+        int[] places = new int[request.values.length];
+        double[] targets = new double[places.length];
         for (int i = 0; i < places.length; i++) {
-            places[i] = check(wish.values[i], "values[" + i + "]");
-            wanted[i] = wish.values[i].value;
+            places[i] = check(request.values[i], "values[" + i + "]");
+            targets[i] = request.values[i].value;
         }
-        robot.writeSignals(places, wanted);
+        port.write(places, targets);
     }
 
-    /** Writes one output. */
-    void write(SetSignal wish) throws Refusal {
-        robot.writeSignals(new int[] {check(wish, "")}, new double[] {wish.value});
+    /** Writes one output after checking it. */
+    public void write(SetSignal request) throws CommandRejected {
+        port.write(new int[] {check(request, "")}, new double[] {request.value});
     }
 
-    /** Place of an output that may have a value. */
-    int check(SetSignal one, String path) throws Refusal {
-        int place = of(one.signal, known, path + ".signal");
+    /** Index of an output, after checking that it may take the value. */
+    public int check(SetSignal one, String path) throws CommandRejected {
+        int place = index(one.signal, known, path + ".signal");
         SignalInfo info = known[place];
         if (info.direction != IoDirection.OUTPUT) {
-            throw new Refusal(Code.UNSUPPORTED, path + ".signal", info.name, "an output",
-                    info.name + " is an input of the cabinet; only outputs can be written");
+            throw new CommandRejected(Code.UNSUPPORTED, path + ".signal", info.name, "an output",
+                    info.name + " is an input of the cabinet; write an output instead");
         }
         boolean whole = info.type == IoType.ANALOG || one.value == Math.rint(one.value);
         if (!(one.value >= info.low && one.value <= info.high) || !whole) {
             String allowed = info.type == IoType.BOOLEAN ? "0 (false) or 1 (true)"
                     : (info.type == IoType.ANALOG ? "" : "a whole number in ") + "[" + info.low + ", " + info.high + "]";
-            throw new Refusal(Code.OUT_OF_RANGE, path + ".value", Double.toString(one.value), allowed,
-                    info.name + " cannot be " + one.value);
+            throw new CommandRejected(Code.OUT_OF_RANGE, path + ".value", Double.toString(one.value), allowed,
+                    info.name + " must be " + allowed + ", got " + one.value);
         }
         return place;
     }
 
-    /** Reads some of them, all the first time and where that is quick; by the sampler. The stamp is that of the oldest value. */
+    /** Reads some of the signals; all of them the first time, and when that is quick. The stamp is that of the oldest value. One thread. */
     IoState read(long now) {
         long started = System.nanoTime();
         do {
@@ -88,17 +91,17 @@ final class Signals {
                 began = now;
             }
             int count = Math.min(SLICE, known.length - next);
-            robot.readSignals(values, next, count);
+            port.read(values, next, count);
             next += count;
             if (next >= known.length) {
                 next = 0;
                 complete = true;
             }
         } while (!complete || next != 0 && System.nanoTime() - started < PATIENCE_NS);
-        SignalValue[] told = new SignalValue[known.length];
-        for (int i = 0; i < told.length; i++) {
-            told[i] = new SignalValue(i, values[i]);
+        SignalValue[] result = new SignalValue[known.length];
+        for (int i = 0; i < result.length; i++) {
+            result[i] = new SignalValue(i, values[i]);
         }
-        return new IoState(began, told);
+        return new IoState(began, result);
     }
 }

@@ -1,16 +1,16 @@
-package heptarm.core;
+package heptarm.core.tools;
 
-/** Principal moments of a symmetric matrix and their axes, by Jacobi's rotations. */
-public final class Principal {
+/** Principal moments and axes of an inertia tensor, by Jacobi rotations. */
+public final class PrincipalAxes {
     private static final int SWEEPS = 50;
 
-    /** Moments, in the order of the axes. */
+    /** Moments, in the order of the axes [kg m²]. */
     public final double[] moments = new double[3];
-    /** Axes as the columns of a rotation, right-handed. */
+    /** Axes as the columns of a rotation matrix, right-handed. */
     public final double[][] axes = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
 
-    /** Of xx yy zz xy xz yz. */
-    public Principal(double[] entries) {
+    /** Of a tensor with the entries xx yy zz xy xz yz. */
+    public PrincipalAxes(double[] entries) {
         double[][] a = {{entries[0], entries[3], entries[4]}, {entries[3], entries[1], entries[5]},
             {entries[4], entries[5], entries[2]}};
         for (int sweep = 0; sweep < SWEEPS && Math.abs(a[0][1]) + Math.abs(a[0][2]) + Math.abs(a[1][2]) > 0.0; sweep++) {
@@ -23,7 +23,7 @@ public final class Principal {
         }
     }
 
-    /** One rotation in the plane of two axes that takes their product away; turns keep the axes right-handed. */
+    /** Rotate in the plane of two axes so that their product of inertia vanishes. */
     private void rotate(double[][] a, int p, int q) {
         if (a[p][q] == 0.0) {
             return;

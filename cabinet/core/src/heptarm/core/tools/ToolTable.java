@@ -1,37 +1,40 @@
-package heptarm.core;
+package heptarm.core.tools;
 
 import java.util.LinkedHashMap;
 import java.util.Map;
 
+import heptarm.core.CommandRejected;
+import heptarm.core.checks.ToolChecks;
+import heptarm.core.robot.ToolPort;
 import heptarm.wire.Code;
 import heptarm.wire.FrameInfo;
 import heptarm.wire.ToolInfo;
 
 /**
- * The tools that are known, what hangs on the flange, and the names of all frames.
+ * The known tools, the attached tool and workpiece, and the names of all frames.
  *
- * <p>A tool is known because a client has defined it, or because the project has a template of its name. Its frames go by
- * their names; "name/frame" also tells a workpiece's frame from one of the tool's.
+ * <p>A tool is known because a client has defined it, or because the project has a template with its name. Frames are found by
+ * name; "name/frame" distinguishes a workpiece's frame from one of the tool's.
  */
-final class Rack {
+public final class ToolTable {
     private static final String FLANGE = "flange";
     private static final String BASE = "base";
     private static final String TOOL = "tool";
 
-    private final Robot robot;
+    private final ToolPort port;
     private final Map<String, ToolInfo> defined = new LinkedHashMap<String, ToolInfo>();
     private ToolInfo tool;
     private ToolInfo workpiece;
-    private String moved = FLANGE;
+    private String motionFrame = FLANGE;
 
-    Rack(Robot robot) {
-        this.robot = robot;
+    public ToolTable(ToolPort port) {
+        this.port = port;
     }
 
-    /** Templates of the project as far as their names are known, then what clients have defined. */
-    synchronized ToolInfo[] known() {
+    /** Templates of the project whose names are known, then the tools that clients have defined. */
+    public synchronized ToolInfo[] known() {
         Map<String, ToolInfo> all = new LinkedHashMap<String, ToolInfo>();
-        ToolInfo[] templates = robot.tools();
+        ToolInfo[] templates = port.templates();
         for (int i = 0; i < templates.length; i++) {
             all.put(templates[i].name, templates[i]);
         }
@@ -39,32 +42,32 @@ final class Rack {
         return all.values().toArray(new ToolInfo[all.size()]);
     }
 
-    /** Names of tool, workpiece (empty: none) and moved frame. */
-    synchronized String[] fitted() {
-        return new String[] {tool == null ? "" : tool.name, workpiece == null ? "" : workpiece.name, moved};
+    /** Names of tool, workpiece (empty: none) and motion frame. */
+    public synchronized String[] attached() {
+        return new String[] {tool == null ? "" : tool.name, workpiece == null ? "" : workpiece.name, motionFrame};
     }
 
-    synchronized void define(ToolInfo newer, String path) throws Refusal {
-        ToolRules.check(newer, path);
-        if (robot.template(newer.name) != null) {
-            throw new Refusal(Code.OUT_OF_RANGE, path + "name", newer.name, "a name that no template has",
-                    "the project has a template " + newer.name + "; attach that, or choose another name");
+    synchronized void define(ToolInfo newer, String path) throws CommandRejected {
+        ToolChecks.check(newer, path);
+        if (port.template(newer.name) != null) {
+            throw new CommandRejected(Code.OUT_OF_RANGE, path + "name", newer.name, "a name that no template has",
+                    "the project already has a tool template " + newer.name + "; attach it, or choose another name");
         }
-        boolean attached = tool != null && tool.name.equals(newer.name);
-        if (attached) {
-            fit(newer, has(newer, moved) ? moved : "");
+        boolean isAttached = tool != null && tool.name.equals(newer.name);
+        if (isAttached) {
+            exchange(newer, has(newer, motionFrame) ? motionFrame : "");
         }
         defined.put(newer.name, newer);
     }
 
-    synchronized void attach(String name, String frame) throws Refusal {
+    synchronized void attach(String name, String frame) throws CommandRejected {
         if (name.length() == 0) {
-            fit(null, "");
+            exchange(null, "");
             return;
         }
         ToolInfo chosen = defined.get(name);
         if (chosen == null) {
-            chosen = robot.template(name);
+            chosen = port.template(name);
         }
         if (chosen == null) {
             StringBuilder names = new StringBuilder();
@@ -72,59 +75,59 @@ final class Rack {
             for (int i = 0; i < all.length; i++) {
                 names.append(i == 0 ? "" : ", ").append(all[i].name);
             }
-            throw new Refusal(Code.UNKNOWN_NAME, "name", name, names.toString(), "no tool " + name
+            throw new CommandRejected(Code.UNKNOWN_NAME, "name", name, names.toString(), "no tool " + name
                     + " is defined, and the project has no template of that name");
         }
         if (frame.length() > 0 && !has(chosen, frame)) {
-            throw new Refusal(Code.UNKNOWN_NAME, "frame", frame, names(chosen), "the tool " + name + " has no frame " + frame);
+            throw new CommandRejected(Code.UNKNOWN_NAME, "frame", frame, names(chosen), "the tool " + name + " has no frame " + frame);
         }
-        fit(chosen, frame);
+        exchange(chosen, frame);
     }
 
-    /** The robot first: if it refuses, nothing has changed here. */
-    private void fit(ToolInfo chosen, String frame) throws Refusal {
+    /** Changes the robot first: if it refuses, nothing has changed here. */
+    private void exchange(ToolInfo chosen, String frame) throws CommandRejected {
         String main = frame;
         if (main.length() == 0) {
             main = chosen == null || chosen.frames.length == 0 ? FLANGE : chosen.frames[0].name;
         }
-        robot.attach(chosen, main);
+        port.attach(chosen, main);
         tool = chosen;
-        moved = main;
+        motionFrame = main;
         workpiece = null;
     }
 
-    synchronized void load(ToolInfo newer, boolean attached, String path) throws Refusal {
-        ToolRules.check(newer, path);
+    synchronized void load(ToolInfo newer, boolean attached, String path) throws CommandRejected {
+        ToolChecks.check(newer, path);
         String present = workpiece == null ? "" : workpiece.name;
         if (!attached) {
             if (!newer.name.equals(present)) {
-                throw new Refusal(Code.UNKNOWN_NAME, path + "name", newer.name, present, "no workpiece " + newer.name + " is attached");
+                throw new CommandRejected(Code.UNKNOWN_NAME, path + "name", newer.name, present, "workpiece " + newer.name + " is not attached; attached: " + (present.length() == 0 ? "none" : present));
             }
-            robot.load(null);
+            port.load(null);
             workpiece = null;
             return;
         }
         if (workpiece != null) {
-            throw new Refusal(Code.BUSY, path + "name", newer.name, "", "the workpiece " + present + " is attached; detach it first");
+            throw new CommandRejected(Code.BUSY, path + "name", newer.name, "", "workpiece " + present + " is attached; detach it first");
         }
-        robot.load(newer);
+        port.load(newer);
         workpiece = newer;
     }
 
-    /** Refuses the name of a frame that cannot be moved. */
-    synchronized void checkMoved(String name, String path) throws Refusal {
-        if (!moves(name)) {
+    /** Refuses a frame name that cannot be a motion frame. */
+    public synchronized void checkMotionFrame(String name, String path) throws CommandRejected {
+        if (!isMotionFrame(name)) {
             throw unknown(name, path, "");
         }
     }
 
-    /** Refuses the name of a frame that gives no axes. */
-    synchronized void checkReference(String name, String path) throws Refusal {
-        if (moves(name) || BASE.equals(name)) {
+    /** Refuses a frame name that cannot provide axes. */
+    public synchronized void checkReference(String name, String path) throws CommandRejected {
+        if (isMotionFrame(name) || BASE.equals(name)) {
             return;
         }
         StringBuilder more = new StringBuilder(", " + BASE);
-        FrameInfo[] taught = robot.frames();
+        FrameInfo[] taught = port.frames();
         for (int i = 0; i < taught.length; i++) {
             if (taught[i].name.equals(name)) {
                 return;
@@ -134,11 +137,11 @@ final class Rack {
         throw unknown(name, path, more.toString());
     }
 
-    private boolean moves(String name) {
+    private boolean isMotionFrame(String name) {
         return name.length() == 0 || TOOL.equals(name) || FLANGE.equals(name) || belongs(tool, name) || belongs(workpiece, name);
     }
 
-    private Refusal unknown(String name, String path, String more) {
+    private CommandRejected unknown(String name, String path, String more) {
         StringBuilder all = new StringBuilder(TOOL + ", " + FLANGE);
         if (tool != null && tool.frames.length > 0) {
             all.append(", ").append(names(tool));
@@ -146,8 +149,8 @@ final class Rack {
         if (workpiece != null && workpiece.frames.length > 0) {
             all.append(", ").append(names(workpiece));
         }
-        return new Refusal(Code.UNKNOWN_NAME, path, name, all.append(more).toString(), "no frame " + name + " is known here"
-                + (tool == null ? "; no tool is attached" : "; the tool " + tool.name + " is attached"));
+        return new CommandRejected(Code.UNKNOWN_NAME, path, name, all.append(more).toString(), "unknown frame " + name + " ("
+                + (tool == null ? "no tool is attached" : "tool " + tool.name + " is attached") + "); known frames: " + all);
     }
 
     private static boolean belongs(ToolInfo owner, String name) {

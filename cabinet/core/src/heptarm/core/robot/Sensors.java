@@ -1,0 +1,25 @@
+package heptarm.core.robot;
+
+import heptarm.wire.PoseState;
+import heptarm.wire.WrenchState;
+
+/** Measured and commanded state of the robot, in SI units. A reading may take milliseconds; any thread may make one. */
+public interface Sensors {
+    /** Read measured and commanded joint positions [rad]. */
+    void readJoints(double[] q, double[] commanded);
+
+    /** Read measured, external and commanded torques [Nm]; NaN where the robot provides none. */
+    void readTorques(double[] measured, double[] external, double[] commanded);
+
+    /** Read the pose of the motion frame in the robot's base. */
+    PoseState readPose(long stamp);
+
+    /** Read the external wrench at the motion frame, in the axes of the base. */
+    WrenchState readWrench(long stamp);
+
+    /** Read it in the axes of another frame: "" or "tool" (the motion frame), "flange", "base" or a frame's name. */
+    WrenchState readWrench(String axes, long stamp);
+
+    /** Read the progress of the current motion in [0, 1] and its remaining time [s]; NaN where the robot provides none. */
+    void readProgress(double[] progressAndRemaining);
+}

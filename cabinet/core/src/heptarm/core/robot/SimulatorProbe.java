@@ -1,0 +1,16 @@
+package heptarm.core.robot;
+
+/** What a simulated robot provides and the cabinet's API does not. Found on the class path; absent on a real robot. */
+public interface SimulatorProbe {
+    /** Read commanded torques [Nm]. */
+    void readTorques(double[] commanded);
+
+    /** Read the progress of the current motion in [0, 1] and its remaining time [s]. */
+    void readProgress(double[] progressAndRemaining);
+
+    /** Bits of the safety state that the API does not provide: the brakes. */
+    int safetyBits();
+
+    /** Cancels everything; every axis brakes at its limit. */
+    void stopFast();
+}

@@ -1,0 +1,140 @@
+package heptarm.core.session;
+
+import heptarm.core.CommandRejected;
+import heptarm.core.EventBus;
+import heptarm.core.Log;
+import heptarm.core.motion.FriMonitors;
+import heptarm.core.motion.MotionExecutor;
+import heptarm.core.robot.MotionPort;
+import heptarm.core.safety.SafetyMonitor;
+import heptarm.wire.Cause;
+import heptarm.wire.Code;
+import heptarm.wire.ControlChanged;
+import heptarm.wire.OnLost;
+
+/** Who controls the robot: one client at most. A controller that is lost or silent loses control, and the arm stops. */
+public final class ControlAuthority {
+    private final MotionPort port;
+    private final MotionExecutor executor;
+    private final FriMonitors monitors;
+    private final SafetyMonitor safety;
+    private final EventBus events;
+    private final Log log;
+    private Controller controller;
+    private double watchdog;
+    private OnLost onLost;
+    private boolean leaving;
+
+    /** A session that may control the robot. */
+    interface Controller {
+        String name();
+
+        int session();
+
+        boolean isOpen();
+    }
+
+    ControlAuthority(MotionPort port, MotionExecutor executor, FriMonitors monitors, SafetyMonitor safety, EventBus events, Log log) {
+        this.port = port;
+        this.executor = executor;
+        this.monitors = monitors;
+        this.safety = safety;
+        this.events = events;
+        this.log = log;
+    }
+
+    synchronized void take(Controller client, double watchdogSeconds, OnLost whenLost) throws CommandRejected {
+        if (!client.isOpen()) {
+            throw new CommandRejected(Code.NOT_IN_CONTROL, "the connection of " + client.name() + " has ended; connect again");
+        }
+        if (controller != null && (controller != client || leaving)) {
+            throw new CommandRejected(Code.CONTROL_TAKEN, "controller", controller.name(), "",
+                    controller.name() + " (session " + controller.session() + ") controls this robot; wait until it releases control");
+        }
+        boolean changed = controller == null;
+        if (changed && executor.status().id == 0) {
+            // a pause and the speed override belong to a controller; the next one starts without them
+            if (!safety.isHolding()) { // a stop must stay
+                port.resume();
+            }
+            port.setOverride(1.0);
+        }
+        controller = client;
+        watchdog = watchdogSeconds;
+        onLost = whenLost;
+        if (changed) {
+            events.publish(new ControlChanged(client.name(), client.session(), "took control"));
+        }
+    }
+
+    void release(Controller client, String why) {
+        synchronized (this) {
+            if (controller != client || leaving) {
+                return;
+            }
+            leaving = true;
+        }
+        try {
+            executor.endAll(Cause.STOPPED, why);
+            monitors.closeAll();
+        } finally {
+            free(why);
+        }
+    }
+
+    /** Takes control away from the controller, if there is one. */
+    void revoke(String why) {
+        Controller holder;
+        synchronized (this) {
+            holder = controller;
+        }
+        if (holder != null) {
+            release(holder, why);
+        }
+    }
+
+    /** Frees control after everything of the controller has ended: nothing of the next one's may end with it. */
+    private synchronized void free(String why) {
+        events.publish(new ControlChanged("", 0, why));
+        controller = null;
+        leaving = false;
+    }
+
+    /** The controller is gone or silent. */
+    void lost(Controller client, String why) {
+        OnLost action;
+        synchronized (this) {
+            if (controller != client || leaving) {
+                return;
+            }
+            leaving = true;
+            action = onLost;
+        }
+        log.warn(client.name() + " lost control: " + why);
+        try {
+            if (action == OnLost.STOP) {
+                executor.endAll(Cause.LOST, client.name() + " was lost: " + why);
+                port.stop();
+            }
+            monitors.closeAll();
+        } catch (RuntimeException e) {
+            log.error("stopping the robot", e);
+        } finally {
+            free(client.name() + " was lost: " + why);
+        }
+    }
+
+    synchronized boolean isController(Controller client) {
+        return controller == client && !leaving;
+    }
+
+    /** Name of the controller; empty: none. */
+    public synchronized String name() {
+        return controller == null ? "" : controller.name();
+    }
+
+    /** Silence [s] after which the controller counts as lost. */
+    synchronized double watchdog() {
+        return watchdog;
+    }
+}

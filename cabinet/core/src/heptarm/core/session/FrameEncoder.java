@@ -1,0 +1,59 @@
+package heptarm.core.session;
+
+import heptarm.core.Clock;
+import heptarm.wire.Encoder;
+import heptarm.wire.Message;
+import heptarm.wire.Protocol;
+
+/** Encodes frames; the connection that sends one fills in its sequence number. */
+final class FrameEncoder {
+    /** Offset of the sequence number in the header. */
+    static final int SEQUENCE = 10;
+    private static final int LENGTH = 6;
+    /** Initial buffer size [bytes]; most frames fit into it. */
+    private static final int CAPACITY = 1024;
+
+    private final Clock clock;
+
+    FrameEncoder(Clock clock) {
+        this.clock = clock;
+    }
+
+    byte[] frame(Message message, long request) {
+        Encoder out = header(message.type(), request, CAPACITY);
+        message.write(out);
+        return withLength(out.toBytes());
+    }
+
+    /** A frame with a body that was encoded once for many clients. */
+    byte[] frame(int type, byte[] body) {
+        byte[] whole = new byte[Protocol.HEADER + body.length];
+        System.arraycopy(header(type, 0, Protocol.HEADER).data(), 0, whole, 0, Protocol.HEADER);
+        System.arraycopy(body, 0, whole, Protocol.HEADER, body.length);
+        return withLength(whole);
+    }
+
+    private Encoder header(int type, long request, int capacity) {
+        Encoder out = new Encoder(capacity);
+        out.putU16(Protocol.MAGIC);
+        out.putU8(Protocol.MAJOR);
+        out.putU8(0);
+        out.putU16(type);
+        out.putU32(0);
+        out.putU32(0);
+        out.putU32(request);
+        out.putI64(clock.nanos());
+        return out;
+    }
+
+    private static byte[] withLength(byte[] frame) {
+        putInt(frame, LENGTH, frame.length - Protocol.HEADER);
+        return frame;
+    }
+
+    static void putInt(byte[] data, int at, int value) {
+        for (int i = 0; i < 4; i++) {
+            data[at + i] = (byte) (value >>> 24 - 8 * i);
+        }
+    }
+}

@@ -1,0 +1,53 @@
+package heptarm.core.session;
+
+import java.util.List;
+
+import heptarm.core.Clock;
+import heptarm.core.safety.Watchdog;
+import heptarm.wire.Code;
+import heptarm.wire.Ping;
+
+/** Checks the connections: silent clients, stuck connections, and heartbeats that are due. */
+final class LinkWatchdog implements Watchdog.Check {
+    /** Longest write to a client [s]. */
+    private static final double MAX_WRITE = 2.0;
+    /** Time for the handshake [s]. */
+    private static final double MAX_HANDSHAKE = 5.0;
+    private static final int SILENT_HEARTBEATS = 5;
+
+    private final List<ClientConnection> clients;
+    private final ControlAuthority authority;
+    private final double heartbeat;
+    private final Clock clock;
+
+    LinkWatchdog(List<ClientConnection> clients, ControlAuthority authority, double heartbeat, Clock clock) {
+        this.clients = clients;
+        this.authority = authority;
+        this.heartbeat = heartbeat;
+        this.clock = clock;
+    }
+
+    public void check() {
+        long now = clock.nanos();
+        double scale = 1e-9 / clock.rate(); // time-outs of the link are in the client's seconds
+        for (ClientConnection client : clients) {
+            double silence = client.silence() * scale;
+            long writing = client.writeBegan();
+            if (writing != 0 && (now - writing) * scale > MAX_WRITE) {
+                client.leave("it does not read what it subscribed to");
+            } else if (client.isNew()) {
+                if ((now - client.connected()) * scale > MAX_HANDSHAKE) { // from the connection on: single bytes are no Hello
+                    client.leave("it did not send Hello within " + Math.round(MAX_HANDSHAKE) + " s");
+                }
+            } else if (silence > SILENT_HEARTBEATS * heartbeat) {
+                client.goodbye(Code.SILENT, "silent for " + Math.round(silence * 1000) + " ms, at most "
+                        + Math.round(SILENT_HEARTBEATS * heartbeat * 1000) + " ms are allowed");
+            } else if (authority.isController(client) && silence > authority.watchdog()) {
+                authority.lost(client, "silent for " + Math.round(silence * 1000) + " ms, its watchdog time is "
+                        + Math.round(authority.watchdog() * 1000) + " ms");
+            } else if ((now - client.lastSent()) * scale > heartbeat) {
+                client.event(Ping.TYPE, new Ping(now).body());
+            }
+        }
+    }
+}

@@ -1,0 +1,111 @@
+package heptarm.core.session;
+
+import heptarm.core.CommandRejected;
+import heptarm.core.Log;
+import heptarm.core.state.StateSampler;
+import heptarm.wire.Accepted;
+import heptarm.wire.Code;
+import heptarm.wire.Message;
+import heptarm.wire.Messages;
+import heptarm.wire.Ping;
+import heptarm.wire.Pong;
+import heptarm.wire.Rejected;
+import heptarm.wire.ReleaseControl;
+import heptarm.wire.SessionState;
+import heptarm.wire.SessionTransitions;
+import heptarm.wire.Subscribe;
+import heptarm.wire.TakeControl;
+import heptarm.wire.WireException;
+
+/** Dispatches the messages of open sessions, and answers every refused request with the reason. */
+final class RequestDispatcher {
+    private final ControlAuthority authority;
+    private final CommandHandler commands;
+    private final StateSampler sampler;
+    private final double maxRate;
+    private final Log log;
+
+    RequestDispatcher(ControlAuthority authority, CommandHandler commands, StateSampler sampler, double maxRate, Log log) {
+        this.authority = authority;
+        this.commands = commands;
+        this.sampler = sampler;
+        this.maxRate = maxRate;
+        this.log = log;
+    }
+
+    /** Handle one frame in the client's reader thread. Nothing that a client sends causes an exception beyond this method. */
+    void handle(ClientConnection client, int type, long request, long sent, byte[] data, int offset, int length) {
+        try {
+            Message message = Messages.read(type, data, offset, length);
+            if (message == null || !Messages.fromClient(type)) {
+                throw new CommandRejected(Code.UNKNOWN_MESSAGE, "message " + type + " is unknown here; update heptarm on the cabinet");
+            }
+            SessionState next = SessionTransitions.next(SessionState.OPEN, type);
+            if (next == null) {
+                throw new CommandRejected(Code.UNEXPECTED_MESSAGE, "message " + type + " is illegal in an open session");
+            }
+            if (next == SessionState.CLOSED) {
+                client.leave("it said goodbye");
+                return;
+            }
+            if (message instanceof Ping) {
+                client.answer(new Pong(((Ping) message).sent, client.lastReceived()), 0);
+                return;
+            }
+            if (message instanceof Pong) {
+                return;
+            }
+            if (Messages.needsControl(type) && !authority.isController(client)) {
+                String controller = authority.name();
+                throw new CommandRejected(Code.NOT_IN_CONTROL, "controller", controller, client.name(),
+                        controller.length() == 0 ? "nobody controls the robot; take control first"
+                                : controller.equals(client.name()) ? "another client named " + controller
+                                        + " controls the robot; take control first, and give each client a name of its own"
+                                : controller + " controls the robot, not " + client.name() + "; take control first");
+            }
+            if (CommandHandler.isTarget(type)) {
+                commands.stream(message, sent);
+                return;
+            }
+            CommandHandler.validate(message);
+            client.answer(answer(client, message), request);
+        } catch (WireException e) {
+            reject(client, request, new CommandRejected(Code.BAD_BODY, "message " + type + ": " + e.getMessage()));
+        } catch (CommandRejected e) {
+            reject(client, request, e);
+        } catch (RuntimeException e) {
+            fail(client, type, request, e);
+        } catch (LinkageError e) { // a class that this cabinet lacks
+            fail(client, type, request, e);
+        }
+    }
+
+    private Message answer(ClientConnection client, Message message) throws CommandRejected {
+        if (message instanceof Subscribe) {
+            Subscribe request = (Subscribe) message;
+            if (request.rate > maxRate) {
+                throw new CommandRejected(Code.OUT_OF_RANGE, "rate", Double.toString(request.rate), "[0, " + maxRate + "] Hz",
+                        "rate must be in [0, " + maxRate + "] Hz on this cabinet, got " + request.rate
+                                + " Hz; raise the process data heptarm.max_rate, or ask for less");
+            }
+            sampler.subscribe(client, request.groups, request.rate);
+        } else if (message instanceof TakeControl) {
+            TakeControl request = (TakeControl) message;
+            authority.take(client, request.watchdog, request.on_lost);
+        } else if (message instanceof ReleaseControl) {
+            authority.release(client, client.name() + " released control");
+        } else {
+            return commands.answer(message);
+        }
+        return new Accepted(0);
+    }
+
+    private void fail(ClientConnection client, int type, long request, Throwable e) {
+        log.error("message " + type + " of " + client.name(), e);
+        reject(client, request, new CommandRejected(Code.INTERNAL, String.valueOf(e)));
+    }
+
+    private static void reject(ClientConnection client, long request, CommandRejected why) {
+        client.answer(new Rejected(why.code, why.parameter, why.value, why.allowed, why.getMessage()), request);
+    }
+}

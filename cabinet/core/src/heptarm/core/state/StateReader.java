@@ -1,0 +1,89 @@
+package heptarm.core.state;
+
+import java.util.Arrays;
+
+import heptarm.core.Clock;
+import heptarm.core.robot.Sensors;
+import heptarm.wire.JointState;
+import heptarm.wire.PoseState;
+import heptarm.wire.TorqueState;
+import heptarm.wire.WrenchState;
+
+/** Reads the robot's state with the current time as its stamp; joints come with a filtered velocity. */
+public final class StateReader {
+    /** Time constant of the low-pass filter of the velocity [s]. */
+    private static final double FILTER = 0.01;
+    private static final int JOINTS = 7;
+
+    private final Sensors sensors;
+    private final Clock clock;
+    private final double[] last = new double[JOINTS];
+    private final double[] velocity = new double[JOINTS];
+    private long lastStamp;
+    private volatile JointState newest;
+
+    public StateReader(Sensors sensors, Clock clock) {
+        this.sensors = sensors;
+        this.clock = clock;
+    }
+
+    /** The current joints, with the newest known velocity. Any thread. */
+    public JointState joints() {
+        double[] q = new double[JOINTS];
+        double[] commanded = new double[JOINTS];
+        long now = clock.nanos();
+        sensors.readJoints(q, commanded);
+        JointState sampled = newest;
+        double[] unknown = new double[JOINTS];
+        Arrays.fill(unknown, Double.NaN);
+        return new JointState(now, q, commanded, sampled == null ? unknown : sampled.dq);
+    }
+
+    /** The current torques. Any thread. */
+    public TorqueState torques() {
+        return torques(clock.nanos());
+    }
+
+    /** The current pose of the motion frame. Any thread. */
+    public PoseState pose() {
+        return sensors.readPose(clock.nanos());
+    }
+
+    /** The current external wrench in the axes of the base. Any thread. */
+    public WrenchState wrench() {
+        return sensors.readWrench(clock.nanos());
+    }
+
+    TorqueState torques(long stamp) {
+        double[] measured = new double[JOINTS];
+        double[] external = new double[JOINTS];
+        double[] commanded = new double[JOINTS];
+        sensors.readTorques(measured, external, commanded);
+        return new TorqueState(stamp, measured, external, commanded);
+    }
+
+    /** A sample for the velocity filter, a low-pass filtered difference: the cabinet provides none. One thread only. */
+    JointState sampleJoints(long stamp) {
+        double[] q = new double[JOINTS];
+        double[] commanded = new double[JOINTS];
+        sensors.readJoints(q, commanded);
+        double dt = (stamp - lastStamp) * 1e-9;
+        double[] dq = new double[JOINTS];
+        if (lastStamp == 0 || dt > 1.0) {
+            Arrays.fill(velocity, 0.0);
+            Arrays.fill(dq, lastStamp == 0 ? Double.NaN : 0.0);
+        } else if (dt > 0.0) {
+            double gain = 1.0 - Math.exp(-dt / FILTER);
+            for (int i = 0; i < JOINTS; i++) {
+                velocity[i] += gain * ((q[i] - last[i]) / dt - velocity[i]);
+                dq[i] = velocity[i];
+            }
+        } else {
+            System.arraycopy(velocity, 0, dq, 0, JOINTS);
+        }
+        System.arraycopy(q, 0, last, 0, JOINTS);
+        lastStamp = stamp;
+        newest = new JointState(stamp, q, commanded, dq);
+        return newest;
+    }
+}
