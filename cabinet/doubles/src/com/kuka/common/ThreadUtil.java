@@ -1,6 +1,6 @@
 package com.kuka.common;
 
-import heptarm.doubles.Station;
+import heptarm.doubles.runtime.Station;
 
 /** Sleeping without a checked exception. */
 public final class ThreadUtil {

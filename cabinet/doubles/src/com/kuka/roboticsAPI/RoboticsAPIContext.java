@@ -5,7 +5,7 @@ import java.util.Collections;
 
 import com.kuka.roboticsAPI.controllerModel.Controller;
 
-import heptarm.doubles.Station;
+import heptarm.doubles.runtime.Station;
 
 /** Cabinets and devices of the project: here one of each. */
 public class RoboticsAPIContext {

@@ -1,6 +1,6 @@
 package com.kuka.task;
 
-import heptarm.doubles.Station;
+import heptarm.doubles.runtime.Station;
 
 /** Makes monitors of task functions. */
 public final class TaskFunctionMonitor {

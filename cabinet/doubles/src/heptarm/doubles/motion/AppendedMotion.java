@@ -1,15 +1,18 @@
-package heptarm.doubles;
+package heptarm.doubles.motion;
 
 import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 
-/** A motion that was put behind a container's own; what becomes of it is told to the container. */
-public final class Appended implements MotionListener {
+import heptarm.doubles.plant.MotionListener;
+import heptarm.doubles.seam.EndCause;
+
+/** A motion appended to a running container; forwards its events to that container. */
+public final class AppendedMotion implements MotionListener {
     final long id;
     final IMotion motion;
-    private final Container container;
+    private final MotionContainer container;
 
-    Appended(Container container, long id, IMotion motion) {
+    AppendedMotion(MotionContainer container, long id, IMotion motion) {
         this.container = container;
         this.id = id;
         this.motion = motion;
@@ -17,7 +20,7 @@ public final class Appended implements MotionListener {
 
     @Override
     public void started() {
-        container.begins(this);
+        container.appendedStarted(this);
     }
 
     @Override
@@ -26,11 +29,11 @@ public final class Appended implements MotionListener {
 
     @Override
     public void fired(int part, boolean breaks, int index) {
-        container.fired(part < 0 ? (RobotMotion<?>) motion : Orders.parts(motion).get(part), breaks, index);
+        container.fired(part < 0 ? (RobotMotion<?>) motion : MotionTranslator.parts(motion).get(part), breaks, index);
     }
 
     @Override
-    public void finished(String cause, String text) {
-        container.finished(this, cause, text);
+    public void finished(int cause, String text) {
+        container.finished(this, EndCause.of(cause), text);
     }
 }

@@ -1,4 +1,4 @@
-package heptarm.doubles;
+package heptarm.doubles.motion;
 
 import java.util.List;
 
@@ -9,29 +9,33 @@ import com.kuka.roboticsAPI.geometricModel.SceneGraphObject;
 import com.kuka.roboticsAPI.geometricModel.math.Matrix;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 
-/** The load of all that hangs on a flange, as one body. */
-public final class Burden {
+import heptarm.doubles.seam.AttachedLoad;
+
+/** Combines the load data of everything attached to a flange into one body. */
+public final class AttachedLoadCalculator {
     private static final double MM = 1e-3;
 
     private double mass;
     private final double[] moment = new double[3]; // mass times centre [kg m]
     private final double[][] inertia = new double[3][3]; // about the flange's origin [kg m²]
 
-    private Burden() {
+    private AttachedLoadCalculator() {
     }
 
-    /** Mass [kg], centre of mass [m], inertia xx yy zz xy xz yz about it [kg m²], in the flange's axes. */
-    public static double[] of(ObjectFrame flange, List<SceneGraphObject> attached) {
-        Burden all = new Burden();
-        all.add(flange, attached);
-        double[] c = new double[3];
+    /** The payload in the flange's axes. */
+    public static AttachedLoad of(ObjectFrame flange, List<SceneGraphObject> attached) {
+        AttachedLoadCalculator total = new AttachedLoadCalculator();
+        total.add(flange, attached);
+        AttachedLoad load = new AttachedLoad();
+        load.mass = total.mass;
         for (int i = 0; i < 3; i++) {
-            c[i] = all.mass > 0 ? all.moment[i] / all.mass : 0.0;
+            load.centre[i] = total.mass > 0 ? total.moment[i] / total.mass : 0.0;
         }
-        double[][] own = steiner(all.mass, c);
-        double[][] i = all.inertia;
-        return new double[] {all.mass, c[0], c[1], c[2], i[0][0] - own[0][0], i[1][1] - own[1][1], i[2][2] - own[2][2],
-            i[0][1] - own[0][1], i[0][2] - own[0][2], i[1][2] - own[1][2]};
+        double[][] own = steiner(total.mass, load.centre);
+        double[][] i = total.inertia;
+        load.inertia = new double[] {i[0][0] - own[0][0], i[1][1] - own[1][1], i[2][2] - own[2][2], i[0][1] - own[0][1],
+            i[0][2] - own[0][2], i[1][2] - own[1][2]};
+        return load;
     }
 
     private void add(ObjectFrame flange, List<SceneGraphObject> objects) {
@@ -61,7 +65,7 @@ public final class Burden {
         }
     }
 
-    /** Inertia of a point of mass about the origin. */
+    /** Inertia of a point mass about the origin (parallel axis theorem). */
     private static double[][] steiner(double mass, double[] c) {
         double square = c[0] * c[0] + c[1] * c[1] + c[2] * c[2];
         double[][] result = new double[3][3];

@@ -1,15 +1,16 @@
-package heptarm.doubles;
+package heptarm.doubles.motion;
 
 import com.kuka.roboticsAPI.geometricModel.math.Matrix;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 
+import heptarm.doubles.seam.RobotDescription;
+
 /** Forward kinematics of the robot: Rz(A1) Ry(A2) Rz(A3) Ry(-A4) Rz(A5) Ry(A6) Rz(A7), all offsets along z. */
-public final class Arm {
+public final class ForwardKinematics {
     private final double[] links;
 
-    /** Lengths base-shoulder, shoulder-elbow, elbow-wrist, wrist-flange [m]. */
-    public Arm(double[] links) {
-        this.links = links.clone();
+    public ForwardKinematics(RobotDescription robot) {
+        links = new double[] {robot.dBs, robot.dSe, robot.dEw, robot.dWf};
     }
 
     /** Pose of the flange in the base (millimetres) for joint positions [rad]. */
@@ -18,7 +19,7 @@ public final class Arm {
                 .compose(up(links[2])).compose(z(q[4])).compose(y(q[5])).compose(up(links[3])).compose(z(q[6]));
     }
 
-    /** Origin [m] and direction of each axis in the base, seven rows of six; the directions' signs are left open. */
+    /** Origin [m] and direction of each axis in the base, seven rows of six; the sign of a direction is arbitrary. */
     double[][] axes(double[] q) {
         double[][] found = new double[7][];
         Transformation here = Transformation.IDENTITY;

@@ -1,4 +1,4 @@
-package heptarm.doubles;
+package heptarm.doubles.motion;
 
 import java.util.Collections;
 import java.util.IdentityHashMap;
@@ -23,11 +23,16 @@ import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
 import com.kuka.roboticsAPI.motionModel.MotionBatch;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 
-/** A motion that the cabinet has accepted, and what becomes of it. */
-public final class Container implements IMotionContainer, MotionListener {
-    /** Called on the dispatch thread when the container has ended. */
+import heptarm.doubles.plant.MotionListener;
+import heptarm.doubles.runtime.ApplicationServices;
+import heptarm.doubles.runtime.Station;
+import heptarm.doubles.seam.EndCause;
+
+/** A motion that the cabinet has accepted: its state, its result, and the dispatch of its events. */
+public final class MotionContainer implements IMotionContainer, MotionListener {
+    /** Receives, on the dispatch thread, the end of a container. */
     public interface Ending {
-        void ended(Container container);
+        void ended(MotionContainer container);
     }
 
     final long id;
@@ -36,7 +41,7 @@ public final class Container implements IMotionContainer, MotionListener {
     private final Station station;
     private final IMotionContainerListener listener;
     private final Ending ending;
-    private final List<Appended> appended = new CopyOnWriteArrayList<>();
+    private final List<AppendedMotion> appended = new CopyOnWriteArrayList<>();
     private volatile Consumer<IMotion> appender;
     private volatile IMotion latest;
     private volatile boolean firstEnded;
@@ -47,37 +52,37 @@ public final class Container implements IMotionContainer, MotionListener {
     private ExecutionState state = ExecutionState.Scheduled;
     private String error;
 
-    public Container(long id, IMotion motion, Station station, IMotionContainerListener listener, Ending ending) {
+    public MotionContainer(long id, IMotion motion, Station station, IMotionContainerListener listener, Ending ending) {
         this.id = id;
         this.motion = motion;
-        this.parts = Orders.parts(motion);
+        this.parts = MotionTranslator.parts(motion);
         this.station = station;
         this.listener = listener;
         this.ending = ending;
     }
 
-    /** Whoever waits for the activation of a servo motion hears of it here. */
-    public void serve(ServoRuntime runtime) {
+    /** Attaches the runtime of a servo motion, which waits for activation. */
+    public void attach(ServoRuntime runtime) {
         servo = runtime;
     }
 
-    /** How a motion is put behind this one; for the robot. */
-    public void appendBy(Consumer<IMotion> way) {
-        appender = way;
+    /** Sets how a motion is appended to this one; called by the robot. */
+    public void appendBy(Consumer<IMotion> submitter) {
+        appender = submitter;
     }
 
-    /** The listener of a motion that is put behind; for the robot. */
-    public synchronized Appended add(long number, IMotion more) {
+    /** Registers an appended motion and returns its listener; called by the robot. */
+    public synchronized AppendedMotion add(long number, IMotion more) {
         if (isFinished()) {
-            throw new IllegalStateException("the motion has ended; nothing can be appended");
+            throw new IllegalStateException("cannot append a motion: the container has ended; command a new motion");
         }
-        Appended one = new Appended(this, number, more);
+        AppendedMotion one = new AppendedMotion(this, number, more);
         appended.add(one);
         return one;
     }
 
-    /** It could not be planned after all; for the robot. */
-    public void without(Appended one) {
+    /** Withdraws an appended motion that could not be planned; called by the robot. */
+    public void remove(AppendedMotion one) {
         appended.remove(one);
     }
 
@@ -86,23 +91,23 @@ public final class Container implements IMotionContainer, MotionListener {
         appender.accept(more);
     }
 
-    /** An appended motion begins. */
-    void begins(Appended one) {
+    /** An appended motion starts. */
+    void appendedStarted(AppendedMotion one) {
         if (listener != null) {
-            tellFinished();
-            tell(() -> listener.motionStarted(one.motion));
+            notifyMotionFinished();
+            dispatch(() -> listener.motionStarted(one.motion));
         }
         latest = one.motion;
     }
 
-    /** The end of the motion that ran, before that the end of its last segment. */
-    private void tellFinished() {
+    /** Reports the end of the running motion, after the end of its last segment. */
+    private void notifyMotionFinished() {
         if (latest == null && !isWhole()) {
             IMotion segment = part(part);
-            tell(() -> listener.motionFinished(segment));
+            dispatch(() -> listener.motionFinished(segment));
         }
         IMotion ended = getLastExecutedMotion();
-        tell(() -> listener.motionFinished(ended));
+        dispatch(() -> listener.motionFinished(ended));
     }
 
     private void activate() {
@@ -113,7 +118,7 @@ public final class Container implements IMotionContainer, MotionListener {
     }
 
     /** Whether this one was accepted before another. */
-    public boolean precedes(Container other) {
+    public boolean precedes(MotionContainer other) {
         return id < other.id;
     }
 
@@ -122,11 +127,11 @@ public final class Container implements IMotionContainer, MotionListener {
         change(ExecutionState.Executing, null);
         activate();
         if (listener != null) {
-            tell(() -> listener.onStateChanged(this, ExecutionState.Executing));
+            dispatch(() -> listener.onStateChanged(this, ExecutionState.Executing));
             if (!isWhole()) {
-                tell(() -> listener.motionStarted(motion));
+                dispatch(() -> listener.motionStarted(motion));
             }
-            tell(() -> listener.motionStarted(part(0)));
+            dispatch(() -> listener.motionStarted(part(0)));
         }
     }
 
@@ -138,30 +143,38 @@ public final class Container implements IMotionContainer, MotionListener {
             for (int i = before; i < next; i++) {
                 IMotion done = part(i);
                 IMotion begun = part(i + 1);
-                tell(() -> listener.motionFinished(done));
-                tell(() -> listener.motionStarted(begun));
+                dispatch(() -> listener.motionFinished(done));
+                dispatch(() -> listener.motionStarted(begun));
             }
         }
     }
 
-    /** A motion of the batch or segment of the spline; a motion by itself is its only part. */
+    /** A motion of a batch or a segment of a spline; a single motion is its only part. */
     private IMotion part(int index) {
         return parts.isEmpty() ? motion : parts.get(index);
     }
 
-    /** Whether its parts are all that it is: a batch's are motions, those of a spline belong to one. */
+    /** Whether no motion besides the parts is reported: the parts of a batch are motions, those of a spline belong to one. */
     private boolean isWhole() {
         return parts.isEmpty() || motion instanceof MotionBatch;
     }
 
     @Override
-    public void finished(String cause, String text) {
-        ExecutionState last = "done".equals(cause) || "condition".equals(cause) ? ExecutionState.Finished
-                : "cancelled".equals(cause) ? ExecutionState.Cancelled : ExecutionState.Error;
+    public void finished(int cause, String text) {
+        finished(EndCause.of(cause), text);
+    }
+
+    /** The motion has ended, or was refused; for the robot. */
+    public void finished(EndCause cause, String text) {
+        ExecutionState last = switch (cause) {
+            case DONE, CONDITION -> ExecutionState.Finished;
+            case CANCELLED -> ExecutionState.Cancelled;
+            case ERROR -> ExecutionState.Error;
+        };
         synchronized (this) {
             firstEnded = true;
             if (last == ExecutionState.Finished && !appended.isEmpty()) {
-                return; // the last of the appended ones ends it
+                return; // the last appended motion ends the container
             }
             if (!change(last, last == ExecutionState.Error ? text : null)) {
                 return;
@@ -169,36 +182,36 @@ public final class Container implements IMotionContainer, MotionListener {
         }
         dropAppended();
         activate();
-        tell(() -> ending.ended(this));
+        dispatch(() -> ending.ended(this));
         if (listener != null) {
-            tellFinished();
-            tell(() -> listener.onStateChanged(this, last));
-            tell(() -> listener.containerFinished(this));
+            notifyMotionFinished();
+            dispatch(() -> listener.onStateChanged(this, last));
+            dispatch(() -> listener.containerFinished(this));
         }
     }
 
     /** An appended motion has ended. */
-    void finished(Appended one, String cause, String text) {
+    void finished(AppendedMotion one, EndCause cause, String text) {
         appended.remove(one);
-        if (firstEnded) { // otherwise it was cancelled before its time, with all that is to come
+        if (firstEnded) { // otherwise it was cancelled together with everything that follows
             finished(cause, text);
         }
     }
 
-    /** What was appended does not run after an end before its time. */
+    /** Cancels the appended motions after an early end. */
     private void dropAppended() {
-        for (Appended one : appended) {
+        for (AppendedMotion one : appended) {
             station.dispatch.execute(() -> station.plant.cancel(one.id));
         }
     }
 
-    /** An exception of the application's listener must not keep others from being told. */
-    private void tell(Runnable news) {
+    /** An exception in one listener of the application must not keep the others from being called. */
+    private void dispatch(Runnable event) {
         station.dispatch.execute(() -> {
             try {
-                news.run();
+                event.run();
             } catch (RuntimeException e) {
-                Desk.current().logger.error("a listener ended with an error", e);
+                ApplicationServices.current().logger.error("a listener ended with an error", e);
             }
         });
     }
@@ -236,7 +249,7 @@ public final class Container implements IMotionContainer, MotionListener {
     @Override
     public void cancel() {
         if (!isFinished()) {
-            for (Appended one : appended) { // before the first, so that none of them begins
+            for (AppendedMotion one : appended) { // before the first, so that none of them begins
                 station.plant.cancel(one.id);
             }
             station.plant.cancel(id);
@@ -262,7 +275,7 @@ public final class Container implements IMotionContainer, MotionListener {
             while (!isFinished()) {
                 long left = deadline - System.nanoTime();
                 if (left <= 0) {
-                    throw new TimeoutException("the motion has not ended within " + time + " " + unit);
+                    throw new TimeoutException("the motion did not end within " + time + " " + unit);
                 }
                 TimeUnit.NANOSECONDS.timedWait(this, left);
             }
@@ -287,7 +300,7 @@ public final class Container implements IMotionContainer, MotionListener {
         fired(of < 0 ? (RobotMotion<?>) motion : parts.get(of), breaks, index);
     }
 
-    /** A condition of the motion, of a part of it, or of one that was appended, has fired. */
+    /** A condition of the motion, of one of its parts, or of an appended motion has fired. */
     void fired(RobotMotion<?> watched, boolean breaks, int index) {
         ICondition condition = breaks ? watched.breakConditions().get(index) : watched.triggerConditions().get(index);
         synchronized (this) {
@@ -297,7 +310,7 @@ public final class Container implements IMotionContainer, MotionListener {
         if (!breaks) {
             ITriggerAction action = watched.action(index);
             if (action instanceof ICallbackAction) {
-                tell(() -> ((ICallbackAction) action).onTriggerFired(() -> this));
+                dispatch(() -> ((ICallbackAction) action).onTriggerFired(() -> this));
             }
         }
     }
@@ -307,7 +320,7 @@ public final class Container implements IMotionContainer, MotionListener {
         return fired.contains(condition);
     }
 
-    /** What ended the motion; null while it runs, and if no condition did. */
+    /** The break condition that ended the motion; null while it runs or if none did. */
     @Override
     public synchronized IFiredConditionInfo getFiredBreakConditionInfo() {
         ICondition condition = broken;

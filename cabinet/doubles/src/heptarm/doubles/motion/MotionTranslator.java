@@ -1,4 +1,4 @@
-package heptarm.doubles;
+package heptarm.doubles.motion;
 
 import java.util.List;
 
@@ -7,7 +7,6 @@ import com.kuka.connectivity.motionModel.directServo.DirectServo;
 import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
 import com.kuka.connectivity.motionModel.smartServo.SmartServo;
 import com.kuka.connectivity.motionModel.smartServoLIN.SmartServoLIN;
-import com.kuka.roboticsAPI.conditionModel.ICondition;
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
@@ -37,11 +36,18 @@ import com.kuka.roboticsAPI.motionModel.Spline;
 import com.kuka.roboticsAPI.motionModel.SplineJP;
 import com.kuka.roboticsAPI.motionModel.SplineMotionCP;
 
-/** Turns motions of the Sunrise API (millimetres) into the plant's orders (SI). */
-public final class Orders {
+import heptarm.doubles.seam.Blending;
+import heptarm.doubles.seam.CartesianDynamics;
+import heptarm.doubles.seam.FriOverlay;
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.seam.Redundancy;
+
+/** Translates motions of the Sunrise API (mm) into orders for the plant (SI). */
+public final class MotionTranslator {
     private static final double MM = 1e-3;
 
-    private Orders() {
+    private MotionTranslator() {
     }
 
     /** The order for a motion of a frame on the robot. */
@@ -52,9 +58,9 @@ public final class Orders {
         order.parts = new MotionOrder[parts.size()];
         for (int i = 0; i < order.parts.length; i++) {
             order.parts[i] = of(id, parts.get(i), moved, robot);
-            inherit(order.parts[i], motion);
+            parametrize(order.parts[i], (RobotMotion<?>) motion); // what a part leaves open
             if (order.parts[i].breaks.length > 0) {
-                throw new IllegalArgumentException("the virtual cabinet watches break conditions of a whole batch or spline only");
+                throw new IllegalArgumentException("break conditions of single parts are not supported: set them on the whole batch or spline");
             }
         }
         if (motion instanceof RelativeLIN) {
@@ -62,15 +68,15 @@ public final class Orders {
         }
         if (motion instanceof RobotMotion) {
             parametrize(order, (RobotMotion<?>) motion);
-            order.breaks = conditions(((RobotMotion<?>) motion).breakConditions(), robot);
-            order.triggers = conditions(((RobotMotion<?>) motion).triggerConditions(), robot);
+            order.breaks = AbstractCondition.translate(((RobotMotion<?>) motion).breakConditions(), robot);
+            order.triggers = AbstractCondition.translate(((RobotMotion<?>) motion).triggerConditions(), robot);
             overlay(order, ((RobotMotion<?>) motion).overlay());
-            order.mode = Modes.of(((RobotMotion<?>) motion).getMode(), moved, robot);
+            order.mode = ControlModeTranslator.of(((RobotMotion<?>) motion).getMode(), moved, robot);
         }
         return order;
     }
 
-    /** An offset in the axes of another frame that moves along, in the moved frame's own: queued, the arm will be elsewhere. */
+    /** Converts an offset given in a frame that moves with the flange to the axes of the motion frame, since the arm will be elsewhere when it runs. */
     private static void turn(MotionOrder order, RelativeLIN motion, ObjectFrame moved, LBR robot) {
         for (AbstractFrame one = motion.getReference(); one != null; one = one.getParent()) {
             if (one == robot.getFlange()) {
@@ -80,14 +86,6 @@ public final class Orders {
                 order.reference = null;
             }
         }
-    }
-
-    private static double[][] conditions(List<ICondition> all, LBR robot) {
-        double[][] numbers = new double[all.size()][];
-        for (int i = 0; i < numbers.length; i++) {
-            numbers[i] = ConditionOrder.of(all.get(i), robot);
-        }
-        return numbers;
     }
 
     /** Motions of a batch, segments of a spline; none of others. */
@@ -101,89 +99,101 @@ public final class Orders {
         return motion instanceof SplineJP ? ((SplineJP) motion).segments() : List.of();
     }
 
-    /** What a part does not say, the whole says. */
-    private static void inherit(MotionOrder part, IMotion whole) {
-        parametrize(part, (RobotMotion<?>) whole);
-    }
-
-    /** Fills in what has not been said yet. */
+    /** Sets the parameters that have not been set yet. */
     private static void parametrize(MotionOrder order, RobotMotion<?> motion) {
-        fill(order.relative, motion.relativeParameters());
-        double[] blending = motion.blendingParameters();
-        blending[1] *= MM;
-        fill(order.blending, blending);
+        fill(order.jointDynamics.velocity, motion.jointDynamics().velocity);
+        fill(order.jointDynamics.acceleration, motion.jointDynamics().acceleration);
+        fill(order.jointDynamics.jerk, motion.jointDynamics().jerk);
+        Blending blending = order.blending;
+        blending.relative = first(blending.relative, motion.blending().relative);
+        blending.distance = first(blending.distance, motion.blending().distance);
+        blending.angle = first(blending.angle, motion.blending().angle);
         if (motion instanceof SplineMotionCP) {
-            double[] cartesian = ((SplineMotionCP<?>) motion).cartesianParameters();
-            for (int i = 0; i < 3; i++) {
-                cartesian[i] *= MM;
-            }
-            fill(order.cartesian, cartesian);
-            int[] orientation = ((SplineMotionCP<?>) motion).orientationParameters();
-            for (int i = 0; i < orientation.length; i++) {
-                order.orientation[i] = order.orientation[i] < 0 ? orientation[i] : order.orientation[i];
-            }
+            SplineMotionCP<?> path = (SplineMotionCP<?>) motion;
+            CartesianDynamics into = order.cartesianDynamics;
+            CartesianDynamics from = path.cartesianDynamics();
+            into.velocity = first(into.velocity, from.velocity);
+            into.acceleration = first(into.acceleration, from.acceleration);
+            into.jerk = first(into.jerk, from.jerk);
+            into.orientationVelocity = first(into.orientationVelocity, from.orientationVelocity);
+            into.orientationAcceleration = first(into.orientationAcceleration, from.orientationAcceleration);
+            into.orientationJerk = first(into.orientationJerk, from.orientationJerk);
+            order.orientationType = order.orientationType == null ? path.orientationType() : order.orientationType;
+            order.orientationReference =
+                    order.orientationReference == null ? path.orientationReference() : order.orientationReference;
         }
     }
 
     private static void fill(double[] gaps, double[] values) {
         for (int i = 0; i < gaps.length; i++) {
-            gaps[i] = Double.isNaN(gaps[i]) ? values[i] : gaps[i];
+            gaps[i] = first(gaps[i], values[i]);
         }
+    }
+
+    /** The first number that was set. */
+    private static double first(double value, double other) {
+        return Double.isNaN(value) ? other : value;
     }
 
     private static MotionOrder make(long id, IMotion motion, LBR robot) {
         MotionOrder order;
         if (motion instanceof PTP) {
-            order = new MotionOrder(id, "ptp");
+            order = order(id, MotionKind.PTP);
             order.joints = ((PTP) motion).getDestination().get();
         } else if (motion instanceof PTPHome) {
-            order = new MotionOrder(id, "ptp");
+            order = order(id, MotionKind.PTP);
             order.joints = robot.home() instanceof JointPosition ? ((JointPosition) robot.home()).get() : null;
             if (order.joints == null) {
                 target(order, (AbstractFrame) robot.home(), robot);
             }
         } else if (motion instanceof BrakeTest) {
-            order = new MotionOrder(id, "hold");
+            order = order(id, MotionKind.HOLD);
             order.duration = ((BrakeTest) motion).seconds();
         } else if (motion instanceof CartesianPTP) {
-            order = new MotionOrder(id, "ptp");
+            order = order(id, MotionKind.PTP);
             target(order, ((CartesianPTP) motion).getDestination(), robot);
         } else if (motion instanceof LIN) {
-            order = new MotionOrder(id, "lin");
+            order = order(id, MotionKind.LIN);
             target(order, ((LIN) motion).getDestination(), robot);
         } else if (motion instanceof CIRC) {
-            order = new MotionOrder(id, "circ");
+            order = order(id, MotionKind.CIRC);
             order.via = pose(((CIRC) motion).auxiliary().transformationFromWorld());
             target(order, ((CIRC) motion).getDestination(), robot);
         } else if (motion instanceof SPL) {
-            order = new MotionOrder(id, "spl");
+            order = order(id, MotionKind.SPL);
             target(order, ((SPL) motion).getDestination(), robot);
         } else if (motion instanceof MotionBatch || motion instanceof Spline || motion instanceof SplineJP) {
-            order = new MotionOrder(id,
-                    motion instanceof MotionBatch ? "batch" : motion instanceof Spline ? "spline" : "spline_joints");
+            order = order(id,
+                    motion instanceof MotionBatch ? MotionKind.BATCH : motion instanceof Spline ? MotionKind.SPLINE : MotionKind.SPLINE_JOINTS);
         } else if (motion instanceof RelativeLIN) {
             RelativeLIN relative = (RelativeLIN) motion;
-            order = new MotionOrder(id, "lin_rel");
+            order = order(id, MotionKind.LIN_REL);
             order.offset = pose(relative.getOffset());
             order.reference = axes(relative.getReference());
         } else if (motion instanceof PositionHold) {
-            order = new MotionOrder(id, "hold");
+            order = order(id, MotionKind.HOLD);
             order.duration = ((PositionHold) motion).seconds();
         } else if (motion instanceof HandGuidingMotion) {
-            order = new MotionOrder(id, "guide");
-            order.guiding = ((HandGuidingMotion) motion).terms();
-            order.guiding[15] *= MM;
+            order = order(id, MotionKind.GUIDE);
+            order.handGuiding = ((HandGuidingMotion) motion).settings();
         } else if (motion instanceof SmartServo || motion instanceof DirectServo) {
-            order = new MotionOrder(id, motion instanceof SmartServo ? "servo" : "direct");
-            order.timing = ((ServoMotion<?>) motion).timing();
+            order = order(id, motion instanceof SmartServo ? MotionKind.SERVO : MotionKind.DIRECT);
+            order.servoTiming = ((ServoMotion<?>) motion).timing();
         } else if (motion instanceof SmartServoLIN) {
-            order = new MotionOrder(id, "straight");
-            order.timing = ((SmartServoLIN) motion).timing();
-            order.straight = ((SmartServoLIN) motion).limits();
+            order = order(id, MotionKind.STRAIGHT);
+            order.servoTiming = ((SmartServoLIN) motion).timing();
+            order.straightLimits = ((SmartServoLIN) motion).limits();
             order.reference = axes(((SmartServoLIN) motion).reference());
         } else {
-            throw new IllegalArgumentException("the virtual cabinet cannot carry out a " + motion.getClass().getName());
+            throw new IllegalArgumentException("the virtual cabinet cannot execute a motion of class " + motion.getClass().getName());
         }
+        return order;
+    }
+
+    private static MotionOrder order(long id, MotionKind kind) {
+        MotionOrder order = new MotionOrder();
+        order.id = id;
+        order.kind = kind;
         return order;
     }
 
@@ -198,8 +208,9 @@ public final class Orders {
 
     private static void overlay(MotionOrder order, IMotionOverlay overlay) {
         if (overlay instanceof FRIJointOverlay) {
-            order.friSession = ((FRIJointOverlay) overlay).session().number();
-            order.friCommand = ((FRIJointOverlay) overlay).mode().ordinal();
+            order.friOverlay = new FriOverlay();
+            order.friOverlay.session = ((FRIJointOverlay) overlay).session().number();
+            order.friOverlay.command = ((FRIJointOverlay) overlay).mode().ordinal();
         } else if (overlay != null) {
             throw new IllegalArgumentException("the virtual cabinet has no overlay " + overlay.getClass().getName());
         }
@@ -210,18 +221,18 @@ public final class Orders {
         order.redundancy = redundancy(frame, robot);
     }
 
-    /** E1, status and turn of a frame; NaN and -1 where it says nothing. */
-    public static double[] redundancy(AbstractFrame frame, LBR robot) {
+    /** Redundancy of a frame. */
+    public static Redundancy redundancy(AbstractFrame frame, LBR robot) {
         IRedundancyCollection redundancy = frame.getRedundancyInformationForDevice(robot);
-        double[] numbers = {Double.NaN, -1, -1};
+        Redundancy found = new Redundancy();
         if (redundancy instanceof StatusTurnRedundancy) {
-            numbers[1] = ((StatusTurnRedundancy) redundancy).getStatus();
-            numbers[2] = ((StatusTurnRedundancy) redundancy).getTurn();
+            found.status = ((StatusTurnRedundancy) redundancy).getStatus();
+            found.turn = ((StatusTurnRedundancy) redundancy).getTurn();
         }
         if (redundancy instanceof LBRE1Redundancy) {
-            numbers[0] = ((LBRE1Redundancy) redundancy).getE1();
+            found.e1 = ((LBRE1Redundancy) redundancy).getE1();
         }
-        return numbers;
+        return found;
     }
 
     /** Metres and quaternion x y z w of a transformation. */
@@ -232,29 +243,29 @@ public final class Orders {
         return new double[] {t.getX() * MM, t.getY() * MM, t.getZ() * MM, q[0], q[1], q[2], q[3]};
     }
 
-    /** The largest component leads, so that it is accurate everywhere. */
+    /** Computes the largest component first, so that the result is accurate everywhere. */
     private static double[] quaternion(Matrix r) {
         double trace = r.get(0, 0) + r.get(1, 1) + r.get(2, 2);
         double[] q = new double[4];
-        int lead = 3;
+        int largest = 3;
         double most = trace;
         for (int i = 0; i < 3; i++) {
             if (r.get(i, i) > most) {
                 most = r.get(i, i);
-                lead = i;
+                largest = i;
             }
         }
-        if (lead == 3) {
+        if (largest == 3) {
             q[0] = r.get(2, 1) - r.get(1, 2);
             q[1] = r.get(0, 2) - r.get(2, 0);
             q[2] = r.get(1, 0) - r.get(0, 1);
             q[3] = 1.0 + trace;
         } else {
-            int j = (lead + 1) % 3;
-            int k = (lead + 2) % 3;
-            q[lead] = 1.0 + r.get(lead, lead) - r.get(j, j) - r.get(k, k);
-            q[j] = r.get(j, lead) + r.get(lead, j);
-            q[k] = r.get(k, lead) + r.get(lead, k);
+            int j = (largest + 1) % 3;
+            int k = (largest + 2) % 3;
+            q[largest] = 1.0 + r.get(largest, largest) - r.get(j, j) - r.get(k, k);
+            q[j] = r.get(j, largest) + r.get(largest, j);
+            q[k] = r.get(k, largest) + r.get(largest, k);
             q[3] = r.get(k, j) - r.get(j, k);
         }
         double norm = Math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
@@ -264,7 +275,7 @@ public final class Orders {
         return q;
     }
 
-    /** Millimetres of metres and a quaternion. */
+    /** Transformation [mm] of a pose [m] and quaternion. */
     public static Transformation transformation(double[] pose) {
         double x = pose[3];
         double y = pose[4];

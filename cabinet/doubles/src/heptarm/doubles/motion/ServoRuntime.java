@@ -1,4 +1,4 @@
-package heptarm.doubles;
+package heptarm.doubles.motion;
 
 import java.util.concurrent.CountDownLatch;
 
@@ -15,19 +15,20 @@ import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
 
+import heptarm.doubles.runtime.Station;
+import heptarm.doubles.seam.StateWords;
+
 /**
- * A servo motion under way. Destinations go into the ring's box, where the plant takes the newest at its next tick;
- * only Cartesian ones ask Python for the joints.
+ * Runtime of a running servo motion. Destinations go into the servo target of the shared memory, from which the plant takes
+ * the newest at its next tick; only Cartesian destinations call Python, for the inverse kinematics.
  */
 public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRuntime, ISmartServoLINRuntime {
-    /** Remaining time when none is known. */
+    /** Remaining time while none is available. */
     private static final double UNKNOWN = -999.0;
-
-    private static final double[] FREE = {Double.NaN, -1, -1};
 
     private final Station station;
     private final LBR robot;
-    private final Container container;
+    private final MotionContainer container;
     private final ObjectFrame moved;
     private final IMotionControlMode mode;
     private final boolean isStraight;
@@ -35,9 +36,9 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
     private JointPosition destination;
     private IServoOnGoalReachedEvent handler;
     private int targets;
-    private int told;
+    private int reported;
 
-    public ServoRuntime(Station station, LBR robot, Container container, ObjectFrame moved, IMotionControlMode mode,
+    public ServoRuntime(Station station, LBR robot, MotionContainer container, ObjectFrame moved, IMotionControlMode mode,
             boolean isStraight) {
         this.station = station;
         this.robot = robot;
@@ -48,7 +49,7 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
         this.destination = robot.getCommandedJointPosition();
     }
 
-    /** The motion runs or has ended. */
+    /** Releases waiting threads: the motion runs or has ended. */
     void activate() {
         activated.countDown();
     }
@@ -74,18 +75,18 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
 
     @Override
     public long setDestination(AbstractFrame wanted) {
-        // the moved frame's target, seen from the base, then the flange's
+        // target of the motion frame in the base, then of the flange
         Transformation flange = wanted.transformationFromWorld().compose(robot.getFlange().transformationTo(moved).invert());
         double[] near;
         synchronized (this) {
             near = destination.get();
         }
-        double[] joints = station.plant.inverse(Orders.pose(flange), FREE, near);
+        double[] joints = station.plant.inverse(MotionTranslator.pose(flange), Double.NaN, -1, near);
         if (joints == null) {
             throw new CommandInvalidException("Can not plan motion: the destination of the servo motion is not reachable");
         }
         JointPosition reached = new JointPosition(joints);
-        return isStraight ? post(reached, Orders.pose(wanted.transformationFromWorld()), null) : post(reached, null);
+        return isStraight ? post(reached, MotionTranslator.pose(wanted.transformationFromWorld()), null) : post(reached, null);
     }
 
     @Override
@@ -97,35 +98,35 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
         return post(wanted, wanted.get(), velocity);
     }
 
-    /** What the plant is told: the joints; on straight lines the pose of the moved frame. */
-    private long post(JointPosition wanted, double[] told, double[] velocity) {
+    /** Sends the joints or, for straight lines, the pose of the motion frame. */
+    private long post(JointPosition wanted, double[] target, double[] velocity) {
         if (container.isFinished()) {
-            throw new CommandInvalidException("the servo motion has ended; command a new one");
+            throw new CommandInvalidException("cannot set a destination: the servo motion has ended; command a new one");
         }
         robot.checkLimits(wanted);
         synchronized (this) {
             destination = new JointPosition(wanted);
             targets++;
         }
-        station.ring.post(container.id, told, velocity);
+        station.sharedState.postTarget(container.id, target, velocity);
         return System.currentTimeMillis();
     }
 
     @Override
     public long updateWithRealtimeSystem() {
-        IServoOnGoalReachedEvent listening = null;
+        IServoOnGoalReachedEvent notified = null;
         int target;
         synchronized (this) {
             target = targets;
-            if (handler != null && told < targets && isDestinationReached()) {
-                told = targets;
-                listening = handler;
+            if (handler != null && reported < targets && isDestinationReached()) {
+                reported = targets;
+                notified = handler;
             }
         }
-        if (listening != null) {
-            IServoOnGoalReachedEvent one = listening;
-            double[] here = robot.getCurrentJointPosition().get();
-            station.dispatch.execute(() -> one.onGoalReachedEvent("GOAL_REACHED", here, new int[] {0, 0}, target));
+        if (notified != null) {
+            IServoOnGoalReachedEvent one = notified;
+            double[] position = robot.getCurrentJointPosition().get();
+            station.dispatch.execute(() -> one.onGoalReachedEvent("GOAL_REACHED", position, new int[] {0, 0}, target));
         }
         return System.currentTimeMillis();
     }
@@ -143,22 +144,22 @@ public final class ServoRuntime implements ISmartServoRuntime, IDirectServoRunti
 
     @Override
     public double getRemainingTime() {
-        double left = station.ring.number(Ring.REMAINING);
+        double left = station.sharedState.number(StateWords.REMAINING);
         return Double.isNaN(left) || container.isFinished() ? UNKNOWN : left;
     }
 
     @Override
     public boolean isDestinationReached() {
-        return station.ring.number(Ring.REMAINING) <= 0.0;
+        return station.sharedState.number(StateWords.REMAINING) <= 0.0;
     }
 
-    /** Takes other parameters of the same kind of mode. */
+    /** Changes the parameters of the control mode; its kind stays. */
     @Override
     public void changeControlModeSettings(IMotionControlMode settings) {
         if (mode == null || mode.getClass() != settings.getClass()) {
-            throw new CommandInvalidException("the control mode of a running servo motion cannot become another kind");
+            throw new CommandInvalidException("cannot change the kind of control mode of a running servo motion; command a new motion");
         }
-        station.plant.changeMode(container.id, Modes.of(settings, moved, robot));
+        station.plant.changeMode(container.id, ControlModeTranslator.of(settings, moved, robot));
     }
 
     @Override

@@ -1,28 +1,28 @@
-package heptarm.doubles;
+package heptarm.doubles.motion;
 
 import com.kuka.roboticsAPI.geometricModel.math.Matrix;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 
-/** How far the estimate of an external force may be off: the torque sensors' inaccuracy, as the posture passes it on. */
-public final class Estimate {
-    /** Inaccuracy of a joint's external torque [Nm]. */
+/** Uncertainty of the estimated external wrench: the inaccuracy of the joint torque sensors, propagated through the Jacobian. */
+public final class WrenchUncertainty {
+    /** Inaccuracy of one joint's external torque [Nm]. */
     private static final double SENSOR = 0.5;
-    /** Keeps it finite at a singularity. */
+    /** Damping that keeps the result finite at a singularity. */
     private static final double DAMPED = 1e-6;
     private static final int SIZE = 6;
 
-    private Estimate() {
+    private WrenchUncertainty() {
     }
 
     /**
-     * Of force [N] and torque [Nm], six numbers.
+     * Inaccuracy of force [N] and torque [Nm], six numbers.
      *
-     * @param at point of the estimate in the base
-     * @param seenFrom axes of the numbers in the base
+     * @param at measuring point in the base
+     * @param axes axes of the result in the base
      */
-    public static double[] inaccuracy(Arm arm, double[] q, Transformation at, Matrix seenFrom) {
+    public static double[] inaccuracy(ForwardKinematics kinematics, double[] q, Transformation at, Matrix axes) {
         double[][] a = new double[SIZE][SIZE];
-        for (double[] axis : arm.axes(q)) {
+        for (double[] axis : kinematics.axes(q)) {
             double x = at.getX() * 1e-3 - axis[0];
             double y = at.getY() * 1e-3 - axis[1];
             double z = at.getZ() * 1e-3 - axis[2];
@@ -30,8 +30,8 @@ public final class Estimate {
             double[] column = new double[SIZE];
             for (int i = 0; i < 3; i++) {
                 for (int k = 0; k < 3; k++) {
-                    column[i] += seenFrom.get(k, i) * push[k];
-                    column[3 + i] += seenFrom.get(k, i) * axis[3 + k];
+                    column[i] += axes.get(k, i) * push[k];
+                    column[3 + i] += axes.get(k, i) * axis[3 + k];
                 }
             }
             for (int i = 0; i < SIZE; i++) {
@@ -47,7 +47,7 @@ public final class Estimate {
         return result;
     }
 
-    /** By Cholesky: the matrix is symmetric and, damped, positive. */
+    /** Diagonal of the inverse by Cholesky factorisation: the damped matrix is symmetric and positive definite. */
     private static double[] diagonalOfInverse(double[][] a) {
         double[][] l = new double[SIZE][SIZE];
         for (int i = 0; i < SIZE; i++) {

@@ -1,4 +1,4 @@
-package heptarm.doubles;
+package heptarm.doubles.pad;
 
 import java.util.ArrayList;
 import java.util.List;
@@ -14,8 +14,8 @@ import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyEvent;
 import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyLED;
 import com.kuka.roboticsAPI.uiModel.userKeys.UserKeyLEDSize;
 
-/** The smartPAD's user keys, pressed by whoever plays the operator. */
-public final class Pad implements IApplicationUI {
+/** User keys and dialogs of the smartPAD, operated by the simulated operator. */
+public final class SmartPad implements IApplicationUI {
     private static final int SLOTS = 4;
     private static final UserKeyEvent[] SINGLE = {UserKeyEvent.KeyDown, UserKeyEvent.KeyUp};
     private static final UserKeyEvent[] FIRST = {UserKeyEvent.FirstKeyDown, UserKeyEvent.FirstKeyUp};
@@ -23,7 +23,7 @@ public final class Pad implements IApplicationUI {
 
     private final List<Bar> bars = new CopyOnWriteArrayList<>();
 
-    public final Dialogs dialogs = new Dialogs();
+    public final DialogQueue dialogs = new DialogQueue();
 
     @Override
     public int displayModalDialog(ApplicationDialogType type, String text, String... buttons) {
@@ -35,7 +35,7 @@ public final class Pad implements IApplicationUI {
         return new Bar(name);
     }
 
-    /** Presses and releases a key of a published bar, from 4 on its second half; false if there is none, or it is disabled. */
+    /** Presses and releases a key of a published bar; slots from 4 are second halves of double keys. False if the key is missing or disabled. */
     public boolean press(String bar, int slot) {
         for (Bar one : bars) {
             if (one.name.equals(bar)) {
@@ -45,13 +45,13 @@ public final class Pad implements IApplicationUI {
         return false;
     }
 
-    /** What stands on a key of a published bar; null if there is none. */
+    /** Text on a key of a published bar; null if there is no such key. */
     public String text(String bar, int slot) {
         Key key = find(bar, slot);
         return key == null ? null : key.text;
     }
 
-    /** Colour of a key's lamp; null if it has none, or there is no such key. */
+    /** LED of a key; null if it has none or there is no such key. */
     public UserKeyLED led(String bar, int slot) {
         Key key = find(bar, slot);
         return key == null ? null : key.led;
@@ -79,10 +79,10 @@ public final class Pad implements IApplicationUI {
         @Override
         public IUserKey addUserKey(int slot, IUserKeyListener listener, boolean ignoreEvents) {
             if (slot < 0 || slot >= SLOTS) {
-                throw new IllegalArgumentException("slot " + slot + " of a user key bar; there are " + SLOTS);
+                throw new IllegalArgumentException("slot must be in [0, " + (SLOTS - 1) + "], got " + slot);
             }
             if (bars.contains(this)) {
-                throw new IllegalStateException("the bar " + name + " is published already");
+                throw new IllegalStateException("cannot add a key: bar " + name + " is already published; add keys before publish()");
             }
             Key key = new Key(slot, listener);
             keys.add(key);

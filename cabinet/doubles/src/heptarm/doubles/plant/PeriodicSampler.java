@@ -1,23 +1,26 @@
-package heptarm.doubles;
+package heptarm.doubles.plant;
 
 import java.util.function.LongConsumer;
 
-/** A thread that looks at the plant at equal intervals of its time. What it is woken for it sees as it was at that tick. */
-public final class Sampling {
+import heptarm.doubles.runtime.Station;
+import heptarm.doubles.seam.Seam;
+
+/** Samples the plant at a fixed period of simulation time; each sample reads the state of exactly the tick that is due. */
+public final class PeriodicSampler {
     private final Station station;
     private final long period;
-    private final LongConsumer look;
+    private final LongConsumer sample;
     private final Thread thread;
     private volatile boolean stopped;
 
     /**
      * @param period [ns]
-     * @param look called with the time since the first look [ns]
+     * @param sample called with the time since the first sample [ns]
      */
-    public Sampling(Station station, long period, LongConsumer look) {
+    public PeriodicSampler(Station station, long period, LongConsumer sample) {
         this.station = station;
         this.period = period;
-        this.look = look;
+        this.sample = sample;
         this.thread = new Thread(this::run, "sampling");
         thread.setDaemon(true);
     }
@@ -28,20 +31,20 @@ public final class Sampling {
 
     private void run() {
         PlantClock clock = new PlantClock();
-        long first = station.ring.newest() * Ring.TICK_NS;
+        long first = station.sharedState.newest() * Seam.TICK_NS;
         long next = first;
         try {
             while (!stopped) {
                 long now = clock.sleepUntil(next);
-                look.accept(now - first);
+                sample.accept(now - first);
                 next += period;
             }
         } catch (InterruptedException e) {
-            Thread.currentThread().interrupt(); // told to stop
+            Thread.currentThread().interrupt(); // stop() was called
         }
     }
 
-    /** Ends it, and waits for that: nothing is looked at any more. */
+    /** Stops sampling and waits for the end of the thread. */
     public void stop() {
         stopped = true;
         thread.interrupt();

@@ -1,31 +1,33 @@
-package heptarm.doubles;
+package heptarm.doubles.plant;
 
 import java.util.concurrent.atomic.AtomicLong;
 
 import heptarm.core.Clock;
+import heptarm.doubles.runtime.Station;
+import heptarm.doubles.seam.Seam;
 
-/** The plant's time as the cabinet's clock. A thread that it wakes sees the robot as it was at the tick it was woken for. */
+/** Simulation time as the clock of the cabinet. A thread that it wakes reads the robot state of the tick it was woken for. */
 public final class PlantClock implements Clock {
-    private static final long AHEAD_NS = 20 * Ring.TICK_NS;
+    private static final long AHEAD_NS = 20 * Seam.TICK_NS;
     private static final double FREE_RUN = 100.0;
 
-    private final Ring ring;
-    private final TickHub hub;
+    private final SharedState sharedState;
+    private final TimerQueue timers;
     private final AtomicLong latest = new AtomicLong();
 
     public PlantClock() {
         Station station = Station.current();
-        ring = station.ring;
-        hub = station.hub;
+        sharedState = station.sharedState;
+        timers = station.timers;
     }
 
     @Override
     public long nanos() {
-        double rate = ring.rate();
-        long newest = ring.newest() * Ring.TICK_NS;
+        double rate = sharedState.rate();
+        long newest = sharedState.newest() * Seam.TICK_NS;
         long now = newest;
         if (rate > 0.0) {
-            long wall = (long) ((System.nanoTime() - ring.anchor()) * rate);
+            long wall = (long) ((System.nanoTime() - sharedState.anchor()) * rate);
             now = Math.max(newest, Math.min(wall, newest + AHEAD_NS));
         }
         long before = latest.get();
@@ -37,18 +39,18 @@ public final class PlantClock implements Clock {
 
     @Override
     public long sleepUntil(long nanos) throws InterruptedException {
-        long tick = Math.max(0, (nanos + Ring.TICK_NS - 1) / Ring.TICK_NS);
-        if (ring.newest() < tick) {
-            hub.sleep(tick * Ring.TICK_NS);
+        long tick = Math.max(0, (nanos + Seam.TICK_NS - 1) / Seam.TICK_NS);
+        if (sharedState.newest() < tick) {
+            timers.sleep(tick * Seam.TICK_NS);
         } else if (Thread.interrupted()) {
             throw new InterruptedException();
         }
-        return ring.view(tick) * Ring.TICK_NS;
+        return sharedState.view(tick) * Seam.TICK_NS;
     }
 
     @Override
     public double rate() {
-        double rate = ring.rate();
+        double rate = sharedState.rate();
         return rate > 0.0 ? rate : FREE_RUN;
     }
 }

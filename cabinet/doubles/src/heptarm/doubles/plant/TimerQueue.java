@@ -1,12 +1,14 @@
-package heptarm.doubles;
+package heptarm.doubles.plant;
 
 import java.util.ArrayList;
 import java.util.Iterator;
 import java.util.List;
 import java.util.concurrent.locks.LockSupport;
 
-/** Wakes threads that sleep for plant time; the plant calls {@link #tick} only when somebody's time has come. */
-public final class TickHub {
+import heptarm.doubles.seam.Seam;
+
+/** Threads that sleep in simulation time; the plant calls {@link #tick} only when at least one of them is due. */
+public final class TimerQueue {
     private static final class Sleeper {
         final Thread thread = Thread.currentThread();
         final long until;
@@ -17,14 +19,14 @@ public final class TickHub {
         }
     }
 
-    private final Ring ring;
+    private final SharedState sharedState;
     private final List<Sleeper> sleepers = new ArrayList<>();
 
-    public TickHub(Ring ring) {
-        this.ring = ring;
+    public TimerQueue(SharedState sharedState) {
+        this.sharedState = sharedState;
     }
 
-    /** Called by the plant's thread after a tick. */
+    /** Called by the realtime thread of the plant after a tick. */
     public synchronized void tick(long nanos) {
         Iterator<Sleeper> all = sleepers.iterator();
         while (all.hasNext()) {
@@ -35,39 +37,39 @@ public final class TickHub {
                 LockSupport.unpark(one.thread);
             }
         }
-        announce();
+        publishNextWakeUp();
     }
 
-    private void announce() {
+    private void publishNextWakeUp() {
         long earliest = Long.MAX_VALUE;
         for (Sleeper one : sleepers) {
             earliest = Math.min(earliest, one.until);
         }
-        ring.wakeAt(earliest);
+        sharedState.setWakeTime(earliest);
     }
 
-    /** Sleeps until the plant's time has reached {@code nanos}. */
-    void sleep(long nanos) throws InterruptedException {
-        Sleeper me = new Sleeper(nanos);
+    /** Sleeps until the simulation time has reached {@code nanos}. */
+    public void sleep(long nanos) throws InterruptedException {
+        Sleeper own = new Sleeper(nanos);
         synchronized (this) {
-            sleepers.add(me);
-            announce();
+            sleepers.add(own);
+            publishNextWakeUp();
         }
-        // the tick may have passed while we got ready: then nobody will wake us for it
-        while (!me.awake && ring.newest() * Ring.TICK_NS < nanos) {
+        // the tick may have passed before the timer was registered: then no wake-up follows
+        while (!own.awake && sharedState.newest() * Seam.TICK_NS < nanos) {
             LockSupport.park(this);
             if (Thread.interrupted()) {
-                forget(me);
+                remove(own);
                 throw new InterruptedException();
             }
         }
-        if (!me.awake) {
-            forget(me);
+        if (!own.awake) {
+            remove(own);
         }
     }
 
-    private synchronized void forget(Sleeper one) {
+    private synchronized void remove(Sleeper one) {
         sleepers.remove(one);
-        announce();
+        publishNextWakeUp();
     }
 }

@@ -1,4 +1,4 @@
-package heptarm.doubles;
+package heptarm.doubles.runtime;
 
 import java.util.ArrayList;
 import java.util.List;
@@ -7,9 +7,9 @@ import java.util.logging.Logger;
 
 import com.kuka.roboticsAPI.applicationModel.IApplicationControl;
 import com.kuka.roboticsAPI.applicationModel.IApplicationData;
+import com.kuka.roboticsAPI.conditionModel.ObserverManager;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.World;
-import com.kuka.roboticsAPI.conditionModel.ObserverManager;
 import com.kuka.roboticsAPI.motionModel.ErrorHandlingAction;
 import com.kuka.roboticsAPI.motionModel.IErrorHandler;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
@@ -17,57 +17,59 @@ import com.kuka.roboticsAPI.persistenceModel.PersistenceException;
 import com.kuka.roboticsAPI.persistenceModel.processDataModel.IProcessData;
 import com.kuka.task.ITaskLogger;
 
-/** What the cabinet offers to the one application that runs: its data, its control, its log. */
-public final class Desk implements IApplicationData, IApplicationControl {
-    /** That of the application; others are those of background tasks. */
-    private static volatile Desk application;
-    private static final InheritableThreadLocal<Desk> OWN = new InheritableThreadLocal<>();
+import heptarm.doubles.pad.SmartPad;
+
+/** Application data, application control, observers and logger that the cabinet provides to one task. */
+public final class ApplicationServices implements IApplicationData, IApplicationControl {
+    /** Services of the application; background tasks have their own. */
+    private static volatile ApplicationServices application;
+    private static final InheritableThreadLocal<ApplicationServices> OWN = new InheritableThreadLocal<>();
 
     public final ITaskLogger logger = new JulLogger();
-    public final Pad pad;
+    public final SmartPad pad;
     public final ObserverManager observers = new ObserverManager();
     private final Station station;
     private final Runnable terminate;
     private volatile IErrorHandler errorHandler;
     private volatile double override = 1.0;
 
-    Desk(Station station, Runnable terminate) {
+    ApplicationServices(Station station, Runnable terminate) {
         this.station = station;
         this.terminate = terminate;
         this.pad = station.pad;
     }
 
-    public static Desk ofApplication() {
+    public static ApplicationServices ofApplication() {
         return application;
     }
 
-    /** The errors of asynchronous motions go to this one. */
-    void leads() {
+    /** Makes these the services of the application, which receive the errors of asynchronous motions. */
+    void becomeApplication() {
         application = this;
     }
 
-    /** The calling thread, and those that it makes, work for this one; returns for whom it did before. */
-    Desk enter() {
-        Desk before = OWN.get();
+    /** Binds the calling thread, and threads that it starts, to these services; returns the previous ones. */
+    ApplicationServices enter() {
+        ApplicationServices previous = OWN.get();
         OWN.set(this);
-        return before;
+        return previous;
     }
 
-    static void leave(Desk before) {
-        OWN.set(before);
+    static void leave(ApplicationServices previous) {
+        OWN.set(previous);
     }
 
-    /** That of the task whose thread this is; of a thread of the cabinet that of the application. */
-    public static Desk current() {
-        Desk own = OWN.get();
+    /** Services of the task that owns the calling thread; for threads of the cabinet those of the application. */
+    public static ApplicationServices current() {
+        ApplicationServices own = OWN.get();
         return own == null ? application : own;
     }
 
-    /** An asynchronous motion has failed; called on the dispatch thread, for the application. */
+    /** An asynchronous motion of the application has failed; called on the dispatch thread. */
     public void failed(IMotionContainer container, List<IMotionContainer> cancelled) {
         IErrorHandler handler = errorHandler;
         if (handler == null) {
-            logger.error("an asynchronous motion failed and no handler is registered, the application ends: "
+            logger.error("an asynchronous motion failed and no error handler is registered; the application ends: "
                     + container.getErrorMessage());
             terminate.run();
             return;
@@ -93,23 +95,23 @@ public final class Desk implements IApplicationData, IApplicationControl {
     @Override
     public void setApplicationOverride(double value) {
         if (!(value >= 0.0 && value <= 1.0)) {
-            throw new IllegalArgumentException("the application override is " + value + "; it has to be in [0, 1]");
+            throw new IllegalArgumentException("application override must be in [0, 1], got " + value);
         }
         override = value;
-        station.ring.setOverride(value);
+        station.sharedState.setOverride(value);
     }
 
     @Override
-    public void clipApplicationOverride(double most) {
-        setApplicationOverride(Math.min(override, most));
+    public void clipApplicationOverride(double limit) {
+        setApplicationOverride(Math.min(override, limit));
     }
 
     @Override
-    public void clipManualOverride(double most) {
-        if (!(most >= 0.0 && most <= 1.0)) {
-            throw new IllegalArgumentException("the manual override would be clipped at " + most + "; it has to be in [0, 1]");
+    public void clipManualOverride(double limit) {
+        if (!(limit >= 0.0 && limit <= 1.0)) {
+            throw new IllegalArgumentException("limit of the manual override must be in [0, 1], got " + limit);
         }
-        station.plant.clipManualOverride(most);
+        station.plant.clipManualOverride(limit);
     }
 
     @Override
@@ -125,9 +127,9 @@ public final class Desk implements IApplicationData, IApplicationControl {
     @Override
     @SuppressWarnings("unchecked")
     public <T> T createFromTemplate(String name) {
-        Template template = station.templates.get(name);
+        ObjectTemplate template = station.templates.get(name);
         if (template == null) {
-            throw new PersistenceException("no template " + name);
+            throw new PersistenceException("no object template " + name + " in the project");
         }
         return (T) template.make(name);
     }
@@ -139,7 +141,7 @@ public final class Desk implements IApplicationData, IApplicationControl {
             found = part.length() == 0 || found == null ? found : found.getChild(part);
         }
         if (found == null || found == World.Current.getRootFrame()) {
-            throw new PersistenceException("no frame " + path);
+            throw new PersistenceException("no frame " + path + " in the project");
         }
         return found;
     }
@@ -147,7 +149,7 @@ public final class Desk implements IApplicationData, IApplicationControl {
     @Override
     public IProcessData getProcessData(final String id) {
         if (!station.processData.containsKey(id)) {
-            throw new PersistenceException("no process data " + id);
+            throw new PersistenceException("no process data " + id + " in the project");
         }
         return new IProcessData() {
             @Override
@@ -168,7 +170,7 @@ public final class Desk implements IApplicationData, IApplicationControl {
         };
     }
 
-    /** The application's log goes to java.util.logging; the host decides where that ends. */
+    /** Forwards the task's log to java.util.logging; Python configures its handlers. */
     private static final class JulLogger implements ITaskLogger {
         private static final Logger LOG = Logger.getLogger("heptarm.cabinet");
 

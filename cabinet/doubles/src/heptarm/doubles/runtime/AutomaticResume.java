@@ -1,42 +1,44 @@
-package heptarm.doubles;
+package heptarm.doubles.runtime;
 
 import com.kuka.roboticsAPI.annotations.AutomaticResumeManager;
 import com.kuka.roboticsAPI.annotations.ResumeAfterPauseEvent;
 
-/** Lets the application go on after a stop, if it has asked for that; not after the operator's pause. */
-public final class Resuming {
+import heptarm.doubles.seam.SafetyFlags;
+
+/** Resumes a paused application after a stop if its annotation requests that; never after the operator's pause. */
+public final class AutomaticResume {
     public final AutomaticResumeManager manager = new AutomaticResumeManager();
     private final Station station;
     private boolean stopped;
 
-    Resuming(Station station) {
+    AutomaticResume(Station station) {
         this.station = station;
     }
 
-    /** The flags have changed; called on the dispatch thread. */
+    /** The safety flags have changed; called on the dispatch thread. */
     void changed(long flags) {
-        boolean paused = (flags & Ring.PAUSED) != 0;
-        boolean ready = (flags & Ring.READY) != 0;
+        boolean paused = (flags & SafetyFlags.PAUSED) != 0;
+        boolean ready = (flags & SafetyFlags.READY) != 0;
         if (paused && ready && stopped) {
-            goOn();
+            resumeAfterDelay();
         }
         stopped = paused && !ready;
     }
 
-    private void goOn() {
+    private void resumeAfterDelay() {
         Class<?> application = station.tasks.application();
-        ResumeAfterPauseEvent wish = application == null ? null : application.getAnnotation(ResumeAfterPauseEvent.class);
-        if (wish == null || !manager.mayResume(application)) {
+        ResumeAfterPauseEvent requested = application == null ? null : application.getAnnotation(ResumeAfterPauseEvent.class);
+        if (requested == null || !manager.mayResume(application)) {
             return;
         }
         Thread waiting = new Thread(() -> {
             try {
-                station.sleep(wish.delay() * 1000000L);
-                station.plant.resume(); // a stop demanded meanwhile keeps it from going on
+                station.sleep(requested.delay() * 1000000L);
+                station.plant.resume(); // has no effect if another stop was requested meanwhile
             } catch (InterruptedException e) {
                 Thread.currentThread().interrupt();
             }
-        }, "resuming");
+        }, "automatic-resume");
         waiting.setDaemon(true);
         waiting.start();
     }

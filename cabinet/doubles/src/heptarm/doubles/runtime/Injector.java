@@ -1,4 +1,4 @@
-package heptarm.doubles;
+package heptarm.doubles.runtime;
 
 import java.lang.annotation.Annotation;
 import java.lang.reflect.Constructor;
@@ -9,6 +9,7 @@ import java.lang.reflect.Modifier;
 import java.util.HashMap;
 import java.util.Map;
 
+import javax.annotation.PostConstruct;
 import javax.inject.Inject;
 import javax.inject.Named;
 import javax.inject.Singleton;
@@ -27,24 +28,38 @@ import com.kuka.roboticsAPI.uiModel.IApplicationUI;
 import com.kuka.task.ITaskLogger;
 import com.kuka.task.ITaskManager;
 
-/** Fills what a task wants filled: the cabinet's objects, process data, tools by their templates, classes of the project. */
+/** Injects objects of the cabinet, process data, tools by template name and classes of the project into a task. */
 final class Injector {
-    private final Desk desk;
+    private final ApplicationServices services;
     private final Object[] offers;
     private final Class<?>[] types = {SunriseLBR.class, SunriseController.class, Controller.class, IApplicationData.class,
         ITaskLogger.class, IApplicationUI.class, ObserverManager.class, IApplicationControl.class, RoboticsAPIContext.class,
         ITaskManager.class, AutomaticResumeManager.class};
     private final Map<Class<?>, Object> singletons = new HashMap<>();
 
-    Injector(Desk desk, Station station) {
-        this.desk = desk;
-        this.offers = new Object[] {station.robot, station.controller, station.controller, desk, desk.logger, desk.pad,
-            desk.observers, desk, station.context, station.tasks, station.resuming.manager};
+    Injector(ApplicationServices services, Station station) {
+        this.services = services;
+        this.offers = new Object[] {station.robot, station.controller, station.controller, services, services.logger, services.pad,
+            services.observers, services, station.context, station.tasks, station.automaticResume.manager};
     }
 
-    /** Fills an object's fields, then calls its marked methods; those of its super classes first, up to one of the cabinet's. */
+    /** Injects into annotated fields and methods; superclasses first, up to the first class of the cabinet. */
     void fill(Object target) throws ReflectiveOperationException {
         fill(target, target.getClass());
+        construct(target, target.getClass());
+    }
+
+    private void construct(Object target, Class<?> c) throws ReflectiveOperationException {
+        if (c == null || isForeign(c)) {
+            return;
+        }
+        construct(target, c.getSuperclass());
+        for (Method method : c.getDeclaredMethods()) {
+            if (method.isAnnotationPresent(PostConstruct.class)) {
+                method.setAccessible(true);
+                method.invoke(target);
+            }
+        }
     }
 
     private void fill(Object target, Class<?> c) throws ReflectiveOperationException {
@@ -68,10 +83,10 @@ final class Injector {
 
     private Object find(Class<?> type, Named named, String where) throws ReflectiveOperationException {
         if (named != null && PhysicalObject.class.isAssignableFrom(type)) {
-            return desk.createFromTemplate(named.value());
+            return services.createFromTemplate(named.value());
         }
         if (named != null && type == IProcessData.class) {
-            return desk.getProcessData(named.value());
+            return services.getProcessData(named.value());
         }
         for (int i = 0; i < types.length; i++) {
             if (type.isAssignableFrom(types[i])) {

@@ -1,4 +1,4 @@
-package heptarm.doubles;
+package heptarm.doubles.runtime;
 
 import java.util.LinkedHashMap;
 import java.util.Map;
@@ -12,41 +12,41 @@ import com.kuka.roboticsAPI.geometricModel.Workpiece;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.persistenceModel.PersistenceException;
 
-/** A tool or a workpiece of the project, to be made as often as an application asks. */
-public final class Template {
+/** A tool or workpiece template of the project; creates an instance at each request. */
+public final class ObjectTemplate {
     private final boolean isTool;
     private final double mass;
     private final double[] centre;
     private final double[] inertia;
-    private final String moved;
+    private final String motionFrame;
     private String type = "";
     private final Map<String, double[]> frames = new LinkedHashMap<>();
 
     /**
      * @param isTool otherwise a workpiece
-     * @param centre of mass and its axes: x y z [mm], a b c [rad]
-     * @param inertia about those axes [kg m²]
-     * @param moved path of the default motion frame; empty: the root
+     * @param centre centre of mass and principal axes: x y z [mm], a b c [rad]
+     * @param inertia about the principal axes [kg m²]
+     * @param motionFrame path of the default motion frame; empty: the root
      */
-    public Template(boolean isTool, double mass, double[] centre, double[] inertia, String moved) {
+    public ObjectTemplate(boolean isTool, double mass, double[] centre, double[] inertia, String motionFrame) {
         this.isTool = isTool;
         this.mass = mass;
         this.centre = centre.clone();
         this.inertia = inertia.clone();
-        this.moved = moved;
+        this.motionFrame = motionFrame;
     }
 
-    /** A frame by its path, parents first, as seen from its parent: x y z [mm], a b c [rad]. */
+    /** Adds a frame by its path, parents first; placed in its parent: x y z [mm], a b c [rad]. */
     public void addFrame(String path, double[] fromParent) {
         frames.put(path, fromParent.clone());
     }
 
-    /** The project's own class of tools or workpieces, made by its name; empty: the usual. */
+    /** Sets the project's own class of the tool or workpiece; empty: Tool or Workpiece. */
     public void setType(String className) {
         type = className;
     }
 
-    private PhysicalObject bare(String name, LoadData load) {
+    private PhysicalObject instantiate(String name, LoadData load) {
         if (type.isEmpty()) {
             return isTool ? new Tool(name, load) : new Workpiece(name, load);
         }
@@ -55,20 +55,20 @@ public final class Template {
             made.getLoadData().take(load);
             return made;
         } catch (ReflectiveOperationException | ClassCastException e) {
-            throw new PersistenceException("template " + name + ": " + type + " cannot be made: " + e);
+            throw new PersistenceException("cannot create template " + name + " of class " + type + ": " + e);
         }
     }
 
     PhysicalObject make(String name) {
         LoadData load = new LoadData(mass, transformation(centre), Inertia.of(inertia[0], inertia[1], inertia[2]));
-        PhysicalObject made = bare(name, load);
+        PhysicalObject made = instantiate(name, load);
         for (Map.Entry<String, double[]> frame : frames.entrySet()) {
             int cut = frame.getKey().lastIndexOf('/');
             ObjectFrame parent = made.getFrame(cut < 0 ? "" : frame.getKey().substring(0, cut));
             parent.add(frame.getKey().substring(cut + 1), transformation(frame.getValue()));
         }
-        if (moved.length() > 0) {
-            made.setDefaultMotionFrame(made.getFrame(moved));
+        if (motionFrame.length() > 0) {
+            made.setDefaultMotionFrame(made.getFrame(motionFrame));
         }
         return made;
     }

@@ -1,4 +1,4 @@
-package heptarm.doubles;
+package heptarm.doubles.runtime;
 
 import java.util.List;
 import java.util.concurrent.CopyOnWriteArrayList;
@@ -10,64 +10,71 @@ import com.kuka.roboticsAPI.controllerModel.sunrise.ResumeMode;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseSafetyState;
 import com.kuka.roboticsAPI.deviceModel.OperationMode;
 
-/** Tells listeners of changes of the safety state, of readiness and of pauses, on the dispatch thread. */
-public final class SafetyNews {
-    private static final long SAFETY = Ring.EMERGENCY_STOP | Ring.EXTERNAL_STOP | Ring.SAFEGUARD_OPEN | Ring.PROTECTIVE_STOP
-            | Ring.DRIVE_ERROR | Ring.ENABLED | Ring.HAND_GUIDING;
+import heptarm.doubles.seam.SafetyFlags;
+
+/** Dispatches changes of the safety state, of readiness and of pauses to listeners, on the dispatch thread. */
+public final class SafetyEvents {
+    private static final long SAFETY = SafetyFlags.EMERGENCY_STOP | SafetyFlags.EXTERNAL_STOP | SafetyFlags.SAFEGUARD_OPEN | SafetyFlags.PROTECTIVE_STOP
+            | SafetyFlags.DRIVE_ERROR | SafetyFlags.ENABLED | SafetyFlags.HAND_GUIDING;
 
     public final List<IControllerStateListener> states = new CopyOnWriteArrayList<>();
     public final List<IExecutionListener> executions = new CopyOnWriteArrayList<>();
     private final Station station;
-    private long flags = Ring.READY;
-    private long mode = OperationMode.AUT.ordinal();
+    private long flags = SafetyFlags.READY;
+    private long mode = heptarm.doubles.seam.OperationMode.AUT.value();
 
-    SafetyNews(Station station) {
+    SafetyEvents(Station station) {
         this.station = station;
     }
 
-    /** Something has changed; called by the plant's thread, must not block. */
-    void changed(long newFlags, long newMode) {
-        station.dispatch.execute(() -> tell(newFlags, newMode));
+    /** The operation mode of the plant in Sunrise's terms. */
+    public static OperationMode operationMode(long mode) {
+        return OperationMode.valueOf(heptarm.doubles.seam.OperationMode.of(mode).name());
     }
 
-    private void tell(long newFlags, long newMode) {
+    /** Flags or operation mode have changed; called on the realtime thread of the plant, must not block. */
+    void changed(long newFlags, long newMode) {
+        station.dispatch.execute(() -> dispatch(newFlags, newMode));
+    }
+
+    private void dispatch(long newFlags, long newMode) {
         long changed = flags ^ newFlags;
         boolean modeChanged = mode != newMode;
         flags = newFlags;
         mode = newMode;
-        station.resuming.changed(newFlags);
-        SunriseSafetyState state = new SunriseSafetyState(newFlags, OperationMode.values()[(int) newMode]);
-        boolean ready = (newFlags & Ring.READY) != 0 && (newFlags & Ring.PAUSED) == 0;
+        station.automaticResume.changed(newFlags);
+        SunriseSafetyState state = new SunriseSafetyState(newFlags, operationMode(newMode));
+        boolean ready = (newFlags & SafetyFlags.READY) != 0 && (newFlags & SafetyFlags.PAUSED) == 0;
         for (IControllerStateListener one : states) {
             if (!(one instanceof ISunriseControllerStateListener)) {
                 continue;
             }
             ISunriseControllerStateListener listener = (ISunriseControllerStateListener) one;
             if ((changed & SAFETY) != 0 || modeChanged) {
-                careful(() -> listener.onSafetyStateChanged(station.robot, state));
+                callGuarded(() -> listener.onSafetyStateChanged(station.robot, state));
             }
-            if ((changed & (Ring.READY | Ring.PAUSED)) != 0) {
-                careful(() -> listener.onIsReadyToMoveChanged(station.robot, ready));
+            if ((changed & (SafetyFlags.READY | SafetyFlags.PAUSED)) != 0) {
+                callGuarded(() -> listener.onIsReadyToMoveChanged(station.robot, ready));
             }
         }
-        if ((changed & Ring.PAUSED) == 0) {
+        if ((changed & SafetyFlags.PAUSED) == 0) {
             return;
         }
         for (IExecutionListener one : executions) {
-            if ((newFlags & Ring.PAUSED) != 0) {
-                careful(() -> one.onExecutionPaused(station.controller));
+            if ((newFlags & SafetyFlags.PAUSED) != 0) {
+                callGuarded(() -> one.onExecutionPaused(station.controller));
             } else {
-                careful(() -> one.onExecutionResumed(station.controller, ResumeMode.OnPath));
+                callGuarded(() -> one.onExecutionResumed(station.controller, ResumeMode.OnPath));
             }
         }
     }
 
-    /** An exception of the application's listener must not keep others from being told. */
-    private static void careful(Runnable news) {
+    /** An exception in one listener of the application must not keep the others from being called. */
+    private static void callGuarded(Runnable event) {
         try {
-            news.run();
+            event.run();
         } catch (RuntimeException e) {
-            Desk.current().logger.error("a listener ended with an error", e);
+            ApplicationServices.current().logger.error("a listener ended with an error", e);
         }
     }
 }

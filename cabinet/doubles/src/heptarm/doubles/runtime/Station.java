@@ -1,4 +1,4 @@
-package heptarm.doubles;
+package heptarm.doubles.runtime;
 
 import java.nio.ByteBuffer;
 import java.util.Map;
@@ -15,38 +15,47 @@ import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.World;
 
-/** The one simulated cabinet of this JVM: plant, ring, robot, process data, and the thread that calls listeners. */
+import heptarm.doubles.pad.SmartPad;
+import heptarm.doubles.plant.Plant;
+import heptarm.doubles.plant.SharedState;
+import heptarm.doubles.plant.TimerQueue;
+import heptarm.doubles.seam.RobotDescription;
+import heptarm.doubles.seam.Seam;
+
+/** The virtual cabinet of this JVM: plant, shared state, robot, project data, and the dispatch thread of listeners. */
 public final class Station {
     private static volatile Station current;
 
     public final Plant plant;
-    public final Ring ring;
-    public final TickHub hub;
+    public final RobotDescription description;
+    public final SharedState sharedState;
+    public final TimerQueue timers;
     public final Map<String, Object> processData = new ConcurrentHashMap<>();
-    public final Map<String, Template> templates = new ConcurrentHashMap<>();
+    public final Map<String, ObjectTemplate> templates = new ConcurrentHashMap<>();
     public final ExecutorService dispatch;
     public final Controller controller;
     public final LBR robot;
-    public final SafetyNews safety = new SafetyNews(this);
+    public final SafetyEvents safetyEvents = new SafetyEvents(this);
     public final RoboticsAPIContext context = new RoboticsAPIContext(this);
-    public final Pad pad = new Pad();
-    public final Tasks tasks = new Tasks(this);
-    public final Resuming resuming = new Resuming(this);
+    public final SmartPad pad = new SmartPad();
+    public final TaskManager tasks = new TaskManager(this);
+    public final AutomaticResume automaticResume = new AutomaticResume(this);
 
     private Station(ByteBuffer memory, Plant plant) {
         this.plant = plant;
-        this.ring = new Ring(memory);
-        this.hub = new TickHub(ring);
+        this.description = RobotDescription.decode(plant.describe());
+        this.sharedState = new SharedState(memory);
+        this.timers = new TimerQueue(sharedState);
         this.dispatch = Executors.newSingleThreadExecutor(task -> {
             Thread thread = new Thread(task, "sunrise-dispatch");
             thread.setDaemon(true);
             return thread;
         });
         this.controller = new SunriseController("KUKA_Sunrise_Cabinet_1", this);
-        this.robot = new SunriseLBR(plant.title().replace(' ', '_') + "_1", controller, this);
+        this.robot = new SunriseLBR(description.title.replace(' ', '_') + "_1", controller, this);
     }
 
-    /** Sets the cabinet up; called once, before anything else. */
+    /** Creates the cabinet; called once, before anything else. */
     public static Station open(ByteBuffer memory, Plant plant) {
         current = new Station(memory, plant);
         return current;
@@ -54,31 +63,31 @@ public final class Station {
 
     public static Station current() {
         if (current == null) {
-            throw new IllegalStateException("no virtual cabinet is open");
+            throw new IllegalStateException("no virtual cabinet is open; call Station.open first");
         }
         return current;
     }
 
-    /** Sleeps for a time of the simulation [ns]. */
+    /** Sleeps for a duration in simulation time [ns]. */
     public void sleep(long nanos) throws InterruptedException {
-        hub.sleep(ring.newest() * Ring.TICK_NS + nanos);
+        timers.sleep(sharedState.newest() * Seam.TICK_NS + nanos);
     }
 
-    /** Waits until what was just told to the plant counts in its states. */
+    /** Waits until the last command to the plant shows in its published state. */
     public void settle() {
         try {
-            sleep(2 * Ring.TICK_NS);
+            sleep(2 * Seam.TICK_NS);
         } catch (InterruptedException e) {
             Thread.currentThread().interrupt();
         }
     }
 
-    /** A template of the project: frames by path, the transformation of each from its parent. */
-    public void addTemplate(String name, Template template) {
+    /** Adds a template of a tool or workpiece. */
+    public void addTemplate(String name, ObjectTemplate template) {
         templates.put(name, template);
     }
 
-    /** A taught frame of the project, by its path. */
+    /** Adds a taught frame by its path; placed in its parent: x y z [mm], a b c [rad]. */
     public void addFrame(String path, double[] fromParent) {
         ObjectFrame parent = World.Current.getRootFrame();
         String[] parts = path.split("/");
@@ -87,10 +96,10 @@ public final class Station {
                 parent = parent.getChild(parts[i]);
             }
         }
-        parent.add(parts[parts.length - 1], Template.transformation(fromParent));
+        parent.add(parts[parts.length - 1], ObjectTemplate.transformation(fromParent));
     }
 
-    /** The arm that a taught frame was taught with. */
+    /** Sets the redundancy that a taught frame was taught with. */
     public void setRedundancy(String path, double e1, int status, int turn) {
         ObjectFrame frame = World.Current.getRootFrame();
         for (String part : path.split("/")) {
@@ -99,9 +108,9 @@ public final class Station {
         frame.setRedundancyInformation(robot, new LBRE1Redundancy(e1, status, turn));
     }
 
-    /** The safety state has changed; called by the plant's thread. */
+    /** The safety state has changed; called on the realtime thread of the plant. */
     public void safetyChanged(long flags, long mode) {
-        safety.changed(flags, mode);
+        safetyEvents.changed(flags, mode);
     }
 
     public void setProcessData(String name, Object value) {

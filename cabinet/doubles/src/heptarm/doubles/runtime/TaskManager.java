@@ -1,4 +1,4 @@
-package heptarm.doubles;
+package heptarm.doubles.runtime;
 
 import java.lang.reflect.InvocationHandler;
 import java.lang.reflect.InvocationTargetException;
@@ -20,25 +20,25 @@ import com.kuka.task.ITaskInstance;
 import com.kuka.task.ITaskManager;
 import com.kuka.task.properties.TaskFunctionProvider;
 
-/** The tasks of the project: starts and stops them, and finds the functions that they provide to each other. */
-public final class Tasks implements ITaskManager {
+/** Starts and stops the tasks of the project and resolves the task functions that they provide to each other. */
+public final class TaskManager implements ITaskManager {
     private static final long POLL_MS = 5;
 
     private final Station station;
-    private final List<Host> hosts = new CopyOnWriteArrayList<>();
+    private final List<TaskRunner> hosts = new CopyOnWriteArrayList<>();
 
-    Tasks(Station station) {
+    TaskManager(Station station) {
         this.station = station;
     }
 
-    void add(Host host) {
+    void add(TaskRunner host) {
         hosts.removeIf(one -> !one.isAlive() && one.task().getClass() == host.task().getClass());
         hosts.add(host);
     }
 
-    /** The class of the application; null: none runs. */
+    /** Class of the running application; null: none runs. */
     Class<?> application() {
-        for (Host one : hosts) {
+        for (TaskRunner one : hosts) {
             if (one.task() instanceof RoboticsAPIApplication && one.isAlive()) {
                 return one.task().getClass();
             }
@@ -46,7 +46,7 @@ public final class Tasks implements ITaskManager {
         return null;
     }
 
-    /** Starts those of the background tasks that want it; returns whether that one does. */
+    /** Starts a background task whose category requests automatic start; returns whether it was started. */
     public boolean autoStart(String className) throws ReflectiveOperationException {
         Class<?> type = Class.forName(className);
         BackgroundTaskCategory category = type.getAnnotation(BackgroundTaskCategory.class);
@@ -57,18 +57,18 @@ public final class Tasks implements ITaskManager {
         return true;
     }
 
-    private Host start(Class<?> type) throws ReflectiveOperationException {
+    private TaskRunner start(Class<?> type) throws ReflectiveOperationException {
         if (!RoboticsAPIBackgroundTask.class.isAssignableFrom(type)) {
-            throw new IllegalStateException(type.getName() + " is no background task; an operator starts applications");
+            throw new IllegalStateException(type.getName() + " is not a background task; only the operator starts applications");
         }
-        Host host = new Host(type.getName(), station, false);
+        TaskRunner host = new TaskRunner(type.getName(), station, false);
         host.start();
         return host;
     }
 
-    /** The application has ended: so does all that runs beside it. */
+    /** Stops all background tasks after the end of the application. */
     public void stopBackground() throws InterruptedException {
-        for (Host one : hosts) {
+        for (TaskRunner one : hosts) {
             if (one.task() instanceof RoboticsAPIBackgroundTask && one.isAlive()) {
                 one.stop();
             }
@@ -83,14 +83,14 @@ public final class Tasks implements ITaskManager {
                 try {
                     return start(type);
                 } catch (ReflectiveOperationException e) {
-                    throw new IllegalStateException(type.getName() + " cannot be made", e);
+                    throw new IllegalStateException(type.getName() + " cannot be created", e);
                 }
             }
 
             @Override
             public Collection<ITaskInstance> getInstances() {
                 Collection<ITaskInstance> found = new ArrayList<>();
-                for (Host one : hosts) {
+                for (TaskRunner one : hosts) {
                     if (one.task().getClass() == type && one.isAlive()) {
                         found.add(one);
                     }
@@ -107,21 +107,21 @@ public final class Tasks implements ITaskManager {
         };
     }
 
-    /** A function as all tasks together provide it; who provides it is looked up at each call. */
+    /** A task function; its provider is looked up at each call. */
     public <T> T function(Class<T> type) {
         if (!type.isInterface()) {
-            throw new IllegalArgumentException("a task function is an interface, not " + type.getName());
+            throw new IllegalArgumentException("a task function must be an interface, got " + type.getName());
         }
-        return type.cast(Proxy.newProxyInstance(type.getClassLoader(), new Class<?>[] {type}, new Borrowed(type)));
+        return type.cast(Proxy.newProxyInstance(type.getClassLoader(), new Class<?>[] {type}, new FunctionProxy(type)));
     }
 
-    /** Whether somebody provides what {@link #function} has returned. */
+    /** Monitors whether a running task provides a function that {@link #function} returned. */
     public ITaskFunctionMonitor monitor(Object function) {
         InvocationHandler handler = Proxy.isProxyClass(function.getClass()) ? Proxy.getInvocationHandler(function) : null;
-        if (!(handler instanceof Borrowed)) {
-            throw new IllegalArgumentException("getTaskFunction() has not returned this: " + function);
+        if (!(handler instanceof FunctionProxy)) {
+            throw new IllegalArgumentException("not a task function of getTaskFunction(): " + function);
         }
-        Class<?> type = ((Borrowed) handler).type;
+        Class<?> type = ((FunctionProxy) handler).type;
         return new ITaskFunctionMonitor() {
             @Override
             public boolean isAvailable() {
@@ -140,14 +140,14 @@ public final class Tasks implements ITaskManager {
     }
 
     private Object provided(Class<?> type) {
-        for (Host one : hosts) {
+        for (TaskRunner one : hosts) {
             for (Method method : one.isAlive() ? one.task().getClass().getMethods() : new Method[0]) {
                 if (method.isAnnotationPresent(TaskFunctionProvider.class) && type.isAssignableFrom(method.getReturnType())) {
                     try {
                         method.setAccessible(true);
                         return method.invoke(one.task());
                     } catch (ReflectiveOperationException e) {
-                        throw new IllegalStateException(method + " does not provide its function", e);
+                        throw new IllegalStateException(method + " failed to provide its task function", e);
                     }
                 }
             }
@@ -155,10 +155,10 @@ public final class Tasks implements ITaskManager {
         return null;
     }
 
-    private final class Borrowed implements InvocationHandler {
+    private final class FunctionProxy implements InvocationHandler {
         private final Class<?> type;
 
-        Borrowed(Class<?> type) {
+        FunctionProxy(Class<?> type) {
             this.type = type;
         }
 
@@ -169,7 +169,7 @@ public final class Tasks implements ITaskManager {
             }
             Object provider = provided(type);
             if (provider == null) {
-                throw new IllegalStateException("no task that runs provides " + type.getName());
+                throw new IllegalStateException("no running task provides " + type.getName());
             }
             try {
                 return method.invoke(provider, arguments);

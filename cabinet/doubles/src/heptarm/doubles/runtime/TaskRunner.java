@@ -1,39 +1,41 @@
-package heptarm.doubles;
+package heptarm.doubles.runtime;
 
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplicationState;
 import com.kuka.roboticsAPI.applicationModel.tasks.RoboticsAPITask;
 import com.kuka.task.ITaskInstance;
 
-/** Runs one application or background task as the cabinet does: inject, initialize, run, and dispose whatever happens. */
-public final class Host implements ITaskInstance {
-    private static final long PATIENCE_MS = 5000;
+import heptarm.doubles.plant.Plant;
+
+/** Runs one application or background task as the cabinet does: inject, initialize, run, and always dispose. */
+public final class TaskRunner implements ITaskInstance {
+    private static final long STOP_TIMEOUT_MS = 5000;
 
     private final RoboticsAPITask task;
     private final Thread thread;
-    private final Desk desk;
+    private final ApplicationServices services;
     private final Plant plant;
     private volatile boolean stopping;
     private volatile Throwable failure;
 
-    /** Makes the application. */
-    public Host(String className) throws ReflectiveOperationException {
+    /** Creates the application. */
+    public TaskRunner(String className) throws ReflectiveOperationException {
         this(className, Station.current(), true);
     }
 
-    Host(String className, Station station, boolean leads) throws ReflectiveOperationException {
+    TaskRunner(String className, Station station, boolean isApplication) throws ReflectiveOperationException {
         plant = station.plant;
-        desk = new Desk(station, this::terminate);
-        if (leads) {
-            desk.leads();
+        services = new ApplicationServices(station, this::terminate);
+        if (isApplication) {
+            services.becomeApplication();
         }
-        Desk before = desk.enter();
+        ApplicationServices previous = services.enter();
         try {
             task = (RoboticsAPITask) Class.forName(className).getDeclaredConstructor().newInstance();
-            new Injector(desk, station).fill(task);
-            thread = new Thread(this::live, leads ? "application" : task.getClass().getSimpleName());
+            new Injector(services, station).fill(task);
+            thread = new Thread(this::runTask, isApplication ? "application" : task.getClass().getSimpleName());
         } finally {
-            Desk.leave(before);
+            ApplicationServices.leave(previous);
         }
         thread.setDaemon(true);
         station.tasks.add(this);
@@ -43,16 +45,16 @@ public final class Host implements ITaskInstance {
         thread.start();
     }
 
-    private void live() {
-        desk.enter();
+    private void runTask() {
+        services.enter();
         try {
             task.initialize();
             task.run();
-        } catch (Throwable e) { // as on the cabinet: whatever it was, the task is disposed
+        } catch (Throwable e) { // as on the cabinet, the task is disposed after any error
             boolean isApplication = task instanceof RoboticsAPIApplication;
             if (isApplication || !stopping) {
                 failure = e;
-                desk.logger.error("the " + (isApplication ? "application" : "background task") + " ended with an error", e);
+                services.logger.error("the " + (isApplication ? "application" : "background task") + " ended with an error", e);
             }
             if (isApplication) {
                 plant.cancelAll();
@@ -63,11 +65,11 @@ public final class Host implements ITaskInstance {
     }
 
     private void dispose() {
-        desk.observers.close();
+        services.observers.close();
         try {
             task.dispose();
         } catch (RuntimeException e) {
-            desk.logger.error("dispose() ended with an error", e);
+            services.logger.error("dispose() ended with an error", e);
             if (failure == null) {
                 failure = e;
             }
@@ -88,11 +90,11 @@ public final class Host implements ITaskInstance {
         }
     }
 
-    /** Deselects it, as a person at the smartPAD does, and waits for its end. */
+    /** Deselects the task, as an operator at the smartPAD does, and waits for its end. */
     @Override
     public void stop() throws InterruptedException {
         terminate();
-        thread.join(PATIENCE_MS);
+        thread.join(STOP_TIMEOUT_MS);
     }
 
     public boolean isAlive() {
@@ -108,7 +110,7 @@ public final class Host implements ITaskInstance {
         return task;
     }
 
-    /** What ended it; null if nothing did. */
+    /** The error that ended the task; null if there was none. */
     public String failure() {
         return failure == null ? null : failure.toString();
     }

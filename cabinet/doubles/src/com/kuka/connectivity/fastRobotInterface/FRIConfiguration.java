@@ -9,12 +9,13 @@ import com.kuka.roboticsAPI.deviceModel.Device;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.ioModel.AbstractIO;
 
-import heptarm.doubles.FriSignal;
+import heptarm.doubles.seam.FriSessionSettings;
+import heptarm.doubles.seam.FriSignal;
 
-/** Where an FRI session leads to and how often it sends. */
+/** Client, ports, rates, signals and frames of an FRI session. */
 public class FRIConfiguration {
     private static final int SLOWEST = 100;
-    private static final int ANY = -1;
+    private static final int ANY = 0;
     private static final int PORTS = 65535;
 
     private final Device device;
@@ -40,7 +41,7 @@ public class FRIConfiguration {
 
     private static int within(String name, int value, int low, int high) {
         if (value < low || value > high) {
-            throw new IllegalArgumentException(name + " is " + value + "; it has to be in [" + low + ", " + high + "]");
+            throw new IllegalArgumentException(name + " must be in [" + low + ", " + high + "], got " + value);
         }
         return value;
     }
@@ -64,12 +65,12 @@ public class FRIConfiguration {
     /** An input that the client sees, or an output that it sees and writes; at most ten. */
     public void registerIO(AbstractIO io) {
         if (io == null) {
-            throw new IllegalArgumentException("no signal is given");
+            throw new IllegalArgumentException("signal must not be null");
         }
         signals.add(io.forFri());
     }
 
-    /** A frame that the client leads; at most five. */
+    /** A frame that the client provides; at most five. */
     public void registerTransformationProvider(String name, AbstractFrame frame) {
         transformations.put(name, frame);
     }
@@ -95,18 +96,16 @@ public class FRIConfiguration {
         return device;
     }
 
-    /** Own port, -1: chosen by the cabinet; for the simulation. */
-    public int portOnController() {
-        return portOnController;
-    }
-
-    /** Signals that the client sees; for the simulation. */
-    public FriSignal[] signals() {
-        return signals.toArray(new FriSignal[0]);
-    }
-
-    /** Names of the frames that the client leads; for the simulation. */
-    public String[] transformationNames() {
-        return transformations.keySet().toArray(new String[0]);
+    /** The settings in the plant's terms; for the simulation. */
+    public FriSessionSettings settings() {
+        FriSessionSettings settings = new FriSessionSettings();
+        settings.host = host;
+        settings.sendPeriod = sendPeriod;
+        settings.receiveMultiplier = receiveMultiplier;
+        settings.remotePort = portOnRemote;
+        settings.localPort = portOnController;
+        settings.transformations = transformations.keySet().toArray(new String[0]);
+        settings.signals = signals.toArray(new FriSignal[0]);
+        return settings;
     }
 }

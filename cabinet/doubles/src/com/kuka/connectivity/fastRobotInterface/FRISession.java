@@ -8,9 +8,9 @@ import java.util.concurrent.TimeoutException;
 import com.kuka.connectivity.fastRobotInterface.FRIChannelInformation.FRIConnectionQuality;
 import com.kuka.connectivity.fastRobotInterface.FRIChannelInformation.FRISessionState;
 
-import heptarm.doubles.Desk;
-import heptarm.doubles.FriChannel;
-import heptarm.doubles.Station;
+import heptarm.doubles.plant.FriChannel;
+import heptarm.doubles.runtime.ApplicationServices;
+import heptarm.doubles.runtime.Station;
 
 /** An FRI session; it opens when it is made. */
 public class FRISession implements FriChannel {
@@ -24,10 +24,7 @@ public class FRISession implements FriChannel {
     private boolean closed;
 
     public FRISession(FRIConfiguration configuration) {
-        int[] settings = {configuration.getSendPeriodMilliSec(), configuration.getReceiveMultiplier(),
-            configuration.getPortOnRemote(), configuration.portOnController()};
-        number = station.plant.friOpen(configuration.getHostName(), settings, configuration.transformationNames(),
-                configuration.signals(), this);
+        number = station.plant.friOpen(configuration.settings(), this);
     }
 
     /** Waits until the client answers well enough for an overlay. */
@@ -90,7 +87,7 @@ public class FRISession implements FriChannel {
         }
     }
 
-    /** An exception of the application's listener must not keep others from being told. */
+    /** An exception in one listener of the application must not keep the others from being called. */
     private static void tell(IFRISessionListener listener, FRIChannelInformation now, boolean other) {
         try {
             if (other) {
@@ -99,7 +96,7 @@ public class FRISession implements FriChannel {
                 listener.onFRIConnectionQualityChanged(now);
             }
         } catch (RuntimeException e) {
-            Desk.current().logger.error("an FRI listener ended with an error", e);
+            ApplicationServices.current().logger.error("an FRI listener ended with an error", e);
         }
     }
 }

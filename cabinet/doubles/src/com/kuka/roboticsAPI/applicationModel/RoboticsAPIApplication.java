@@ -5,7 +5,7 @@ import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.deviceModel.Robot;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
-import heptarm.doubles.Station;
+import heptarm.doubles.runtime.Station;
 
 /** Base of applications. */
 public abstract class RoboticsAPIApplication extends RoboticsAPITask {

@@ -1,24 +1,30 @@
 package com.kuka.roboticsAPI.conditionModel;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.ioModel.AbstractIO;
 
-import heptarm.doubles.Criterion;
+import heptarm.doubles.motion.AbstractCondition;
+import heptarm.doubles.seam.Condition;
+import heptarm.doubles.seam.SignalIs;
 
 /** A boolean input or output has a value. */
-public class BooleanIOCondition extends Criterion {
+public class BooleanIOCondition extends AbstractCondition {
     private final AbstractIO signal;
     private final boolean value;
 
     public BooleanIOCondition(AbstractIO signal, boolean value) {
         if (signal == null) {
-            throw new IllegalArgumentException("a signal is wanted");
+            throw new IllegalArgumentException("signal must not be null");
         }
         this.signal = signal;
         this.value = value;
     }
 
-    /** Place of the signal and the value; for the simulation. */
-    public double[] numbers() {
-        return new double[] {signal.place(), value ? 1 : 0};
+    @Override
+    protected Condition forPlant(LBR robot) {
+        SignalIs is = new SignalIs();
+        is.place = signal.place();
+        is.value = value;
+        return is;
     }
 }

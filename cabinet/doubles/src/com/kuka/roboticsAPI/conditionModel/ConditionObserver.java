@@ -2,8 +2,9 @@ package com.kuka.roboticsAPI.conditionModel;
 
 import java.util.Date;
 
-import heptarm.doubles.ConditionListener;
-import heptarm.doubles.Station;
+import heptarm.doubles.plant.ConditionListener;
+import heptarm.doubles.runtime.Station;
+import heptarm.doubles.seam.Condition;
 
 /** Watches a condition, whether a motion runs or not. Made by an ObserverManager. */
 public class ConditionObserver {
@@ -13,12 +14,12 @@ public class ConditionObserver {
     }
 
     private final Station station;
-    private final double[] condition;
+    private final Condition condition;
     private final boolean onEnable;
     private final Hearer hearer;
     private long watch;
 
-    ConditionObserver(Station station, double[] condition, boolean onEnable, Hearer hearer) {
+    ConditionObserver(Station station, Condition condition, boolean onEnable, Hearer hearer) {
         this.station = station;
         this.condition = condition;
         this.onEnable = onEnable;

@@ -1,12 +1,15 @@
 package com.kuka.roboticsAPI.conditionModel;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.math.CoordinateAxis;
 
-import heptarm.doubles.Estimated;
+import heptarm.doubles.motion.WrenchCondition;
+import heptarm.doubles.seam.Condition;
+import heptarm.doubles.seam.ForceOutside;
 
 /** A component of the external force lies outside a band [N]. */
-public class ForceComponentCondition extends Estimated {
+public class ForceComponentCondition extends WrenchCondition {
     private final CoordinateAxis axis;
     private final double[] band;
 
@@ -30,8 +33,13 @@ public class ForceComponentCondition extends Estimated {
         tolerance(tolerance);
     }
 
-    /** Axis and band; for the simulation. */
-    public double[] numbers() {
-        return new double[] {axis.ordinal(), band[0], band[1]};
+    @Override
+    protected Condition forPlant(LBR robot) {
+        ForceOutside outside = new ForceOutside();
+        outside.frame = frame(robot);
+        outside.axis = axis(axis);
+        outside.low = band[0];
+        outside.high = band[1];
+        return outside;
     }
 }

@@ -1,14 +1,19 @@
 package com.kuka.roboticsAPI.conditionModel;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.math.CoordinateAxis;
 
-import heptarm.doubles.Estimated;
+import heptarm.doubles.motion.WrenchCondition;
+import heptarm.doubles.seam.Condition;
+import heptarm.doubles.seam.ForceAbove;
+import heptarm.doubles.seam.NormalForceAbove;
+import heptarm.doubles.seam.ShearForceAbove;
 
 /** The external force, all of it or its part along or across an axis, is above a threshold [N]. */
-public final class ForceCondition extends Estimated {
-    /** Which part of the force; for the simulation. */
-    public enum Part { SPATIAL, NORMAL, SHEAR }
+public final class ForceCondition extends WrenchCondition {
+    /** Which part of the force. */
+    private enum Part { SPATIAL, NORMAL, SHEAR }
 
     private static final double ANY = Double.MAX_VALUE;
 
@@ -84,13 +89,26 @@ public final class ForceCondition extends Estimated {
         return threshold;
     }
 
-    /** For the simulation. */
-    public Part part() {
-        return part;
-    }
-
-    /** Axis and threshold; for the simulation. */
-    public double[] numbers() {
-        return new double[] {axis.ordinal(), threshold};
+    @Override
+    protected Condition forPlant(LBR robot) {
+        switch (part) {
+            case NORMAL:
+                NormalForceAbove normal = new NormalForceAbove();
+                normal.frame = frame(robot);
+                normal.axis = axis(axis);
+                normal.threshold = threshold;
+                return normal;
+            case SHEAR:
+                ShearForceAbove shear = new ShearForceAbove();
+                shear.frame = frame(robot);
+                shear.axis = axis(axis);
+                shear.threshold = threshold;
+                return shear;
+            default:
+                ForceAbove force = new ForceAbove();
+                force.frame = frame(robot);
+                force.threshold = threshold;
+                return force;
+        }
     }
 }

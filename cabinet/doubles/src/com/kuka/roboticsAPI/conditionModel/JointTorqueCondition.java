@@ -3,10 +3,12 @@ package com.kuka.roboticsAPI.conditionModel;
 import com.kuka.roboticsAPI.deviceModel.JointEnum;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 
-import heptarm.doubles.Criterion;
+import heptarm.doubles.motion.AbstractCondition;
+import heptarm.doubles.seam.Condition;
+import heptarm.doubles.seam.JointTorqueOutside;
 
 /** The external torque of a joint lies outside a band [Nm]. */
-public class JointTorqueCondition extends Criterion {
+public class JointTorqueCondition extends AbstractCondition {
     private final JointEnum joint;
     private final double[] band;
 
@@ -22,8 +24,12 @@ public class JointTorqueCondition extends Criterion {
         this(joint, low, high);
     }
 
-    /** Number of the joint and the band; for the simulation. */
-    public double[] numbers() {
-        return new double[] {joint.ordinal(), band[0], band[1]};
+    @Override
+    protected Condition forPlant(LBR robot) {
+        JointTorqueOutside outside = new JointTorqueOutside();
+        outside.joint = joint.ordinal();
+        outside.low = band[0];
+        outside.high = band[1];
+        return outside;
     }
 }

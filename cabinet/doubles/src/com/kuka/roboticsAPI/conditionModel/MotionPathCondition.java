@@ -1,9 +1,14 @@
 package com.kuka.roboticsAPI.conditionModel;
 
-import heptarm.doubles.Criterion;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+
+import heptarm.doubles.motion.AbstractCondition;
+import heptarm.doubles.seam.Condition;
+import heptarm.doubles.seam.PathReached;
+import heptarm.doubles.seam.PathReference;
 
 /** A point on the path is reached: a distance [mm] from its start or, negative, before its destination; and a delay [ms]. */
-public class MotionPathCondition extends Criterion {
+public class MotionPathCondition extends AbstractCondition {
     private final ReferenceType reference;
     private final double distance;
     private final long delay;
@@ -17,8 +22,12 @@ public class MotionPathCondition extends Criterion {
         this.delay = delay;
     }
 
-    /** Reference, metres, seconds; for the simulation. */
-    public double[] numbers() {
-        return new double[] {reference.ordinal(), distance * 1e-3, delay * 1e-3};
+    @Override
+    protected Condition forPlant(LBR robot) {
+        PathReached reached = new PathReached();
+        reached.reference = reference == ReferenceType.START ? PathReference.START : PathReference.END;
+        reached.distance = distance * 1e-3;
+        reached.delay = delay * 1e-3;
+        return reached;
     }
 }

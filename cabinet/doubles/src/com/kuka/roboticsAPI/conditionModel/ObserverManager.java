@@ -5,9 +5,10 @@ import java.util.concurrent.CopyOnWriteArrayList;
 import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.TimeUnit;
 
-import heptarm.doubles.ConditionOrder;
-import heptarm.doubles.Desk;
-import heptarm.doubles.Station;
+import heptarm.doubles.motion.AbstractCondition;
+import heptarm.doubles.runtime.ApplicationServices;
+import heptarm.doubles.runtime.Station;
+import heptarm.doubles.seam.Condition;
 
 /** Watches conditions for an application. */
 public class ObserverManager {
@@ -36,12 +37,12 @@ public class ObserverManager {
 
     private ConditionObserver make(ICondition condition, NotificationType type, ConditionObserver.Hearer hearer) {
         boolean onEnable = type == NotificationType.OnEnable || type == NotificationType.All;
-        ConditionObserver made = new ConditionObserver(station, ConditionOrder.of(condition, station.robot), onEnable,
+        ConditionObserver made = new ConditionObserver(station, AbstractCondition.translate(condition, station.robot), onEnable,
                 (observer, time, value) -> {
                     try {
                         hearer.edge(observer, time, value);
                     } catch (RuntimeException e) {
-                        Desk.current().logger.error("an observer's listener ended with an error", e);
+                        ApplicationServices.current().logger.error("an observer's listener ended with an error", e);
                     }
                 });
         observers.add(made);
@@ -56,8 +57,8 @@ public class ObserverManager {
     /** Waits for it until some time has passed; false: it does not hold yet. */
     public boolean waitFor(ICondition condition, long time, TimeUnit unit) {
         CountDownLatch held = new CountDownLatch(1);
-        double[] numbers = ConditionOrder.of(condition, station.robot);
-        long watch = station.plant.watch(numbers, true, holds -> {
+        Condition translated = AbstractCondition.translate(condition, station.robot);
+        long watch = station.plant.watch(translated, true, holds -> {
             if (holds) {
                 held.countDown();
             }

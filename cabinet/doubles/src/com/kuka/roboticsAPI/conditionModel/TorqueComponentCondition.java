@@ -1,12 +1,15 @@
 package com.kuka.roboticsAPI.conditionModel;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.math.CoordinateAxis;
 
-import heptarm.doubles.Estimated;
+import heptarm.doubles.motion.WrenchCondition;
+import heptarm.doubles.seam.Condition;
+import heptarm.doubles.seam.TorqueOutside;
 
 /** A component of the external torque lies outside a band [Nm]. */
-public class TorqueComponentCondition extends Estimated {
+public class TorqueComponentCondition extends WrenchCondition {
     private final CoordinateAxis axis;
     private final double[] band;
 
@@ -30,8 +33,13 @@ public class TorqueComponentCondition extends Estimated {
         tolerance(tolerance);
     }
 
-    /** Axis and band; for the simulation. */
-    public double[] numbers() {
-        return new double[] {axis.ordinal(), band[0], band[1]};
+    @Override
+    protected Condition forPlant(LBR robot) {
+        TorqueOutside outside = new TorqueOutside();
+        outside.frame = frame(robot);
+        outside.axis = axis(axis);
+        outside.low = band[0];
+        outside.high = band[1];
+        return outside;
     }
 }

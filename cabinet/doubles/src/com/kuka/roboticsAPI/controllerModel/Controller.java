@@ -6,8 +6,8 @@ import java.util.Collections;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseExecutionService;
 import com.kuka.roboticsAPI.deviceModel.Device;
 
-import heptarm.doubles.Referencing;
-import heptarm.doubles.Station;
+import heptarm.doubles.runtime.Station;
+import heptarm.doubles.runtime.TorqueReferencing;
 
 /** The cabinet. */
 public class Controller {
@@ -20,7 +20,7 @@ public class Controller {
         this.name = name;
         this.station = station;
         this.execution = new SunriseExecutionService(station);
-        this.requests = new Referencing(station);
+        this.requests = new TorqueReferencing(station);
     }
 
     public String getName() {
@@ -32,11 +32,11 @@ public class Controller {
     }
 
     public void addControllerListener(IControllerStateListener listener) {
-        station.safety.states.add(listener);
+        station.safetyEvents.states.add(listener);
     }
 
     public void removeControllerListener(IControllerStateListener listener) {
-        station.safety.states.remove(listener);
+        station.safetyEvents.states.remove(listener);
     }
 
     public IExecutionService getExecutionService() {

@@ -1,7 +1,6 @@
 package com.kuka.roboticsAPI.deviceModel;
 
 import java.util.ArrayList;
-import java.util.Arrays;
 import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Map;
@@ -31,17 +30,21 @@ import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
 import com.kuka.roboticsAPI.sensorModel.ForceSensorData;
 import com.kuka.roboticsAPI.sensorModel.TorqueSensorData;
 
-import heptarm.doubles.Appended;
-import heptarm.doubles.Arm;
-import heptarm.doubles.Burden;
-import heptarm.doubles.Container;
-import heptarm.doubles.Desk;
-import heptarm.doubles.Estimate;
-import heptarm.doubles.MotionOrder;
-import heptarm.doubles.Orders;
-import heptarm.doubles.Ring;
-import heptarm.doubles.ServoRuntime;
-import heptarm.doubles.Station;
+import heptarm.doubles.motion.AppendedMotion;
+import heptarm.doubles.motion.ForwardKinematics;
+import heptarm.doubles.motion.MotionContainer;
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.motion.AttachedLoadCalculator;
+import heptarm.doubles.motion.ServoRuntime;
+import heptarm.doubles.motion.WrenchUncertainty;
+import heptarm.doubles.runtime.ApplicationServices;
+import heptarm.doubles.runtime.SafetyEvents;
+import heptarm.doubles.runtime.Station;
+import heptarm.doubles.seam.EndCause;
+import heptarm.doubles.seam.MotionOrder;
+import heptarm.doubles.seam.Redundancy;
+import heptarm.doubles.seam.SafetyFlags;
+import heptarm.doubles.seam.StateWords;
 
 /** The robot. Motions of the robot itself move its flange. */
 public abstract class LBR extends Robot {
@@ -56,29 +59,29 @@ public abstract class LBR extends Robot {
     private static final Pattern ESM_STATE = Pattern.compile("[1-9]|10");
 
     private final Station station;
-    private final Arm arm;
+    private final ForwardKinematics kinematics;
     private final ObjectFrame root;
     private final ObjectFrame flange;
     private volatile Object home = new JointPosition(AXES);
     private final AtomicLong ids = new AtomicLong();
-    private final Map<Container, Boolean> open = new LinkedHashMap<>(); // value: asynchronous
+    private final Map<MotionContainer, Boolean> open = new LinkedHashMap<>(); // value: asynchronous
 
     protected LBR(String name, Controller controller, Station station) {
         super(name, controller);
         this.station = station;
-        arm = new Arm(station.plant.links());
+        kinematics = new ForwardKinematics(station.description);
         root = getRootFrame();
-        flange = new ObjectFrame("Flange", this, () -> root, () -> Orders.transformation(numbers(Ring.POSE, 7)));
+        flange = new ObjectFrame("Flange", this, () -> root, () -> MotionTranslator.transformation(numbers(StateWords.POSE, 7)));
     }
 
     private double[] numbers(int word, int count) {
         double[] out = new double[count];
-        station.ring.read(word, out);
+        station.sharedState.read(word, out);
         return out;
     }
 
     private boolean flag(int bit) {
-        return (station.ring.integer(Ring.FLAGS) & bit) != 0;
+        return station.sharedState.flag(bit);
     }
 
     public ObjectFrame getFlange() {
@@ -118,16 +121,16 @@ public abstract class LBR extends Robot {
 
     /** Something was attached or detached: the controller takes the load over; for the simulation. */
     public void carries() {
-        station.plant.carries(Burden.of(flange, getChildren()));
+        station.plant.setAttachedLoad(AttachedLoadCalculator.of(flange, getChildren()));
         station.settle();
     }
 
     /** Chooses one of the safety states "1" to "10" of the project; the simulation monitors none of them. */
     public void setESMState(String state) {
         if (!ESM_STATE.matcher(state).matches()) {
-            throw new IllegalArgumentException("the safety state is " + state + "; it has to be 1 to 10");
+            throw new IllegalArgumentException("safety state must be 1 to 10, got " + state);
         }
-        Desk.current().logger.info("ESM state " + state);
+        ApplicationServices.current().logger.info("ESM state " + state);
     }
 
     /** Changes where a frame of the robot, or of what it carries, is seen from its parent. */
@@ -141,8 +144,9 @@ public abstract class LBR extends Robot {
      * @throws IllegalArgumentException there are none
      */
     public JointPosition getInverseKinematicFromFrameAndRedundancy(Frame frame) {
-        double[] found = station.plant.inverse(Orders.pose(frame.transformationFromWorld()), Orders.redundancy(frame, this),
-                numbers(Ring.Q_CMD, AXES));
+        Redundancy redundancy = MotionTranslator.redundancy(frame, this);
+        double[] found = station.plant.inverse(MotionTranslator.pose(frame.transformationFromWorld()), redundancy.e1,
+                redundancy.status, numbers(StateWords.Q_CMD, AXES));
         if (found == null) {
             throw new IllegalArgumentException("no joint positions bring the flange to " + frame.toStringInWorld());
         }
@@ -155,7 +159,7 @@ public abstract class LBR extends Robot {
 
     /** Whether drives are on and nobody demands a stop; a pause does not count. */
     public boolean isMotionEnabled() {
-        return flag(Ring.READY);
+        return flag(SafetyFlags.READY);
     }
 
     public int getJointCount() {
@@ -163,25 +167,23 @@ public abstract class LBR extends Robot {
     }
 
     public JointLimits getJointLimits() {
-        double[] limits = station.plant.limits();
-        return new JointLimits(new JointPosition(Arrays.copyOfRange(limits, 0, AXES)),
-                new JointPosition(Arrays.copyOfRange(limits, AXES, 2 * AXES)));
+        return new JointLimits(new JointPosition(station.description.qMin), new JointPosition(station.description.qMax));
     }
 
     public JointPosition getCurrentJointPosition() {
-        return new JointPosition(numbers(Ring.Q, AXES));
+        return new JointPosition(numbers(StateWords.Q, AXES));
     }
 
     public JointPosition getCommandedJointPosition() {
-        return new JointPosition(numbers(Ring.Q_CMD, AXES));
+        return new JointPosition(numbers(StateWords.Q_CMD, AXES));
     }
 
     public TorqueSensorData getMeasuredTorque() {
-        return new TorqueSensorData(numbers(Ring.TAU, AXES));
+        return new TorqueSensorData(numbers(StateWords.TAU, AXES));
     }
 
     public TorqueSensorData getExternalTorque() {
-        return new TorqueSensorData(numbers(Ring.TAU_EXT, AXES));
+        return new TorqueSensorData(numbers(StateWords.TAU_EXT, AXES));
     }
 
     /** Pose of a frame on the robot in the world, with the redundancy of the arm. */
@@ -190,10 +192,8 @@ public abstract class LBR extends Robot {
     }
 
     private Frame withRedundancy(Frame frame) {
-        double[] both = numbers(Ring.E1, 2);
-        long redundancy = Double.doubleToRawLongBits(both[1]);
-        frame.setRedundancyInformation(this,
-                new LBRE1Redundancy(both[0], (int) (redundancy & 0xFF), (int) (redundancy >> 8 & 0xFF)));
+        frame.setRedundancyInformation(this, new LBRE1Redundancy(station.sharedState.number(StateWords.E1),
+                (int) station.sharedState.integer(StateWords.STATUS), (int) station.sharedState.integer(StateWords.TURN)));
         return frame;
     }
 
@@ -207,7 +207,7 @@ public abstract class LBR extends Robot {
 
     /** Where a frame on the robot is when the joints are somewhere; for the simulation. */
     public Frame cartesian(JointPosition joints, ObjectFrame frameOnRobot) {
-        Transformation commanded = arm.flange(joints.get());
+        Transformation commanded = kinematics.flange(joints.get());
         return new Frame(frameOnRobot == flange ? commanded : commanded.compose(flange.transformationTo(frameOnRobot)));
     }
 
@@ -222,14 +222,14 @@ public abstract class LBR extends Robot {
 
     /** External wrench at the origin of a frame, in the axes of another (null: of the same). */
     public ForceSensorData getExternalForceTorque(AbstractFrame measureFrame, AbstractFrame orientationFrame) {
-        double[] wrench = numbers(Ring.WRENCH, 6);
+        double[] wrench = numbers(StateWords.WRENCH, 6);
         Transformation here = flange.transformationFromWorld();
         Transformation at = here.compose(flange.transformationTo(measureFrame));
         double[] lever = {(here.getX() - at.getX()) * 1e-3, (here.getY() - at.getY()) * 1e-3, (here.getZ() - at.getZ()) * 1e-3};
         double[] torque = {wrench[3] + lever[1] * wrench[2] - lever[2] * wrench[1],
             wrench[4] + lever[2] * wrench[0] - lever[0] * wrench[2], wrench[5] + lever[0] * wrench[1] - lever[1] * wrench[0]};
         Matrix axes = (orientationFrame == null ? at : orientationFrame.transformationFromWorld()).getRotationMatrix();
-        double[] off = Estimate.inaccuracy(arm, numbers(Ring.Q, AXES), at, axes);
+        double[] off = WrenchUncertainty.inaccuracy(kinematics, numbers(StateWords.Q, AXES), at, axes);
         return new ForceSensorData(seenFrom(axes, wrench[0], wrench[1], wrench[2]),
                 seenFrom(axes, torque[0], torque[1], torque[2]), Vector.of(off[0], off[1], off[2]), Vector.of(off[3], off[4], off[5]));
     }
@@ -241,31 +241,32 @@ public abstract class LBR extends Robot {
     }
 
     public boolean isReadyToMove() {
-        return flag(Ring.READY) && !flag(Ring.PAUSED);
+        return flag(SafetyFlags.READY) && !flag(SafetyFlags.PAUSED);
     }
 
     public boolean hasActiveMotionCommand() {
-        return flag(Ring.MOVING);
+        return flag(SafetyFlags.MOVING);
     }
 
     public boolean isMastered() {
-        return flag(Ring.MASTERED);
+        return flag(SafetyFlags.MASTERED);
     }
 
     public OperationMode getOperationMode() {
-        return OperationMode.values()[(int) station.ring.integer(Ring.MODE)];
+        return SafetyEvents.operationMode(station.sharedState.integer(StateWords.MODE));
     }
 
     public ISafetyState getSafetyState() {
-        return new SunriseSafetyState(station.ring.integer(Ring.FLAGS), getOperationMode());
+        return new SunriseSafetyState(station.sharedState.integer(StateWords.FLAGS), getOperationMode());
     }
 
     /** Refuses joint positions that the robot cannot have, in Sunrise's words; for the simulation. */
     public void checkLimits(JointPosition joints) {
-        double[] limits = station.plant.limits();
+        double[] low = station.description.qMin;
+        double[] high = station.description.qMax;
         for (int i = 0; i < AXES; i++) {
             double value = joints.get(i);
-            if (!(value >= limits[i] - ON_LIMIT && value <= limits[AXES + i] + ON_LIMIT)) {
+            if (!(value >= low[i] - ON_LIMIT && value <= high[i] + ON_LIMIT)) {
                 throw new CommandInvalidException("Command Position violates limit A" + (i + 1) + ": " + value + " rad");
             }
         }
@@ -273,19 +274,19 @@ public abstract class LBR extends Robot {
 
     /** Whether impedance control may begin: at rest, nothing pushes, not stretched out; for the simulation. */
     public boolean isFitForImpedance() {
-        double[] external = numbers(Ring.TAU_EXT, AXES);
-        double[] speed = numbers(Ring.DQ, AXES);
+        double[] external = numbers(StateWords.TAU_EXT, AXES);
+        double[] speed = numbers(StateWords.DQ, AXES);
         for (int i = 0; i < AXES; i++) {
             if (Math.abs(external[i]) >= LARGEST_EXTERNAL || Math.abs(speed[i]) > AT_REST) {
                 return false;
             }
         }
-        return Math.abs(numbers(Ring.Q, AXES)[3]) > SINGULAR;
+        return Math.abs(numbers(StateWords.Q, AXES)[3]) > SINGULAR;
     }
 
     /** Blocks until the motion has ended; an error is thrown. */
     public IMotionContainer moveFrame(ObjectFrame moved, IMotion motion, IMotionContainerListener listener) {
-        Container container = submit(moved, motion, listener, false);
+        MotionContainer container = submit(moved, motion, listener, false);
         container.await();
         if (container.hasError()) {
             throw new CommandInvalidException(container.getErrorMessage());
@@ -298,11 +299,10 @@ public abstract class LBR extends Robot {
         return submit(moved, motion, listener, true);
     }
 
-    private Container submit(ObjectFrame moved, IMotion motion, IMotionContainerListener listener, boolean asynchronous) {
+    private MotionContainer submit(ObjectFrame moved, IMotion motion, IMotionContainerListener listener, boolean asynchronous) {
         long id = ids.incrementAndGet();
-        MotionOrder order = Orders.of(id, motion, moved, this);
-        Container container = new Container(id, motion, station, listener, this::ended);
-        order.listener = container;
+        MotionOrder order = MotionTranslator.of(id, motion, moved, this);
+        MotionContainer container = new MotionContainer(id, motion, station, listener, this::ended);
         container.appendBy(more -> append(container, moved, more));
         if (motion instanceof ServoMotion) {
             serve((ServoMotion<?>) motion, container, moved);
@@ -312,7 +312,7 @@ public abstract class LBR extends Robot {
         }
         String error;
         try {
-            error = station.plant.submit(order);
+            error = station.plant.submit(order, container);
         } catch (RuntimeException e) {
             synchronized (open) {
                 open.remove(container);
@@ -320,36 +320,35 @@ public abstract class LBR extends Robot {
             throw e;
         }
         if (error != null) {
-            container.finished("error", error);
+            container.finished(EndCause.ERROR, error);
         }
         return container;
     }
 
-    private void append(Container container, ObjectFrame moved, IMotion motion) {
+    private void append(MotionContainer container, ObjectFrame moved, IMotion motion) {
         long id = ids.incrementAndGet();
-        MotionOrder order = Orders.of(id, motion, moved, this);
-        Appended appended = container.add(id, motion);
-        order.listener = appended;
-        String error = station.plant.submit(order);
+        MotionOrder order = MotionTranslator.of(id, motion, moved, this);
+        AppendedMotion appended = container.add(id, motion);
+        String error = station.plant.submit(order, appended);
         if (error != null) {
-            container.without(appended);
+            container.remove(appended);
             throw new CommandInvalidException(error);
         }
     }
 
-    private void serve(ServoMotion<?> motion, Container container, ObjectFrame moved) {
+    private void serve(ServoMotion<?> motion, MotionContainer container, ObjectFrame moved) {
         if (motion instanceof SmartServo) {
             checkLimits(((SmartServo) motion).getStart());
         } else if (motion instanceof DirectServo) {
             checkLimits(((DirectServo) motion).getStart());
         }
         ServoRuntime runtime = new ServoRuntime(station, this, container, moved, motion.getMode(), motion instanceof SmartServoLIN);
-        container.serve(runtime);
+        container.attach(runtime);
         motion.accepted(runtime);
     }
 
     /** A failed asynchronous motion takes those behind it with it. */
-    private void ended(Container container) {
+    private void ended(MotionContainer container) {
         Boolean asynchronous;
         List<IMotionContainer> tail = new ArrayList<>();
         synchronized (open) {
@@ -359,11 +358,11 @@ public abstract class LBR extends Robot {
             }
         }
         if (container.hasError() && Boolean.TRUE.equals(asynchronous)) {
-            tail.removeIf(other -> ((Container) other).precedes(container));
+            tail.removeIf(other -> ((MotionContainer) other).precedes(container));
             for (IMotionContainer other : tail) {
                 other.cancel();
             }
-            Desk.ofApplication().failed(container, tail);
+            ApplicationServices.ofApplication().failed(container, tail);
         }
     }
 
@@ -371,7 +370,7 @@ public abstract class LBR extends Robot {
     public int activeContainers() {
         int count = 0;
         synchronized (open) {
-            for (Container container : open.keySet()) {
+            for (MotionContainer container : open.keySet()) {
                 count += container.isFinished() ? 0 : 1;
             }
         }

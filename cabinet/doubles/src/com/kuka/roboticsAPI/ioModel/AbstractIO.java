@@ -1,7 +1,8 @@
 package com.kuka.roboticsAPI.ioModel;
 
-import heptarm.doubles.FriSignal;
-import heptarm.doubles.Station;
+import heptarm.doubles.runtime.Station;
+import heptarm.doubles.seam.FriSignal;
+import heptarm.doubles.seam.SignalType;
 
 /** An input or output of a group. */
 public abstract class AbstractIO {
@@ -25,7 +26,14 @@ public abstract class AbstractIO {
 
     /** With its group, its type, and the values that it can have; for the simulation. */
     public final FriSignal forFri() {
-        return new FriSignal(group + "." + name, type.ordinal(), this instanceof Output, place, low(), high());
+        FriSignal signal = new FriSignal();
+        signal.name = group + "." + name;
+        signal.type = SignalType.valueOf(type.name());
+        signal.isOutput = this instanceof Output;
+        signal.place = place;
+        signal.low = low();
+        signal.high = high();
+        return signal;
     }
 
     double low() {
@@ -45,10 +53,10 @@ public abstract class AbstractIO {
     }
 
     final double value() {
-        return station.ring.signal(place);
+        return station.sharedState.signal(place);
     }
 
     final void setValue(double value) {
-        station.ring.setSignal(place, value);
+        station.sharedState.setSignal(place, value);
     }
 }

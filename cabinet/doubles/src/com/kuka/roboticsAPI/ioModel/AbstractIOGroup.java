@@ -5,8 +5,9 @@ import java.util.Map;
 
 import com.kuka.roboticsAPI.controllerModel.Controller;
 
-import heptarm.doubles.Ring;
-import heptarm.doubles.Station;
+import heptarm.doubles.runtime.Station;
+import heptarm.doubles.seam.SafetyFlags;
+import heptarm.doubles.seam.StateWords;
 
 /** Inputs and outputs that belong together; a project's classes derive from it. The virtual cabinet has every group that is made. */
 public abstract class AbstractIOGroup {
@@ -70,8 +71,8 @@ public abstract class AbstractIOGroup {
 
     private static void write(Output output, double value) {
         output.check(value);
-        long flags = Station.current().ring.integer(Ring.FLAGS);
-        if ((flags & Ring.EMERGENCY_STOP) != 0) {
+        long flags = Station.current().sharedState.integer(StateWords.FLAGS);
+        if ((flags & SafetyFlags.EMERGENCY_STOP) != 0) {
             throw new IllegalStateException("outputs cannot be written during an emergency stop");
         }
         output.setValue(value);

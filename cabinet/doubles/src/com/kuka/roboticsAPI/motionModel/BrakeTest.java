@@ -3,8 +3,8 @@ package com.kuka.roboticsAPI.motionModel;
 import com.kuka.roboticsAPI.controllerModel.sunrise.brakeTest.BrakeState;
 import com.kuka.roboticsAPI.controllerModel.sunrise.brakeTest.BrakeTestResult;
 
-import heptarm.doubles.Container;
-import heptarm.doubles.Station;
+import heptarm.doubles.motion.MotionContainer;
+import heptarm.doubles.runtime.Station;
 
 /** Loads the brake of an axis, from 0, with a torque [Nm]. The simulated arm holds still meanwhile; its brakes hold what the axis can exert. */
 public class BrakeTest extends RobotMotion<BrakeTest> {
@@ -23,12 +23,12 @@ public class BrakeTest extends RobotMotion<BrakeTest> {
 
     /** What the test that has run found. */
     public static BrakeTestResult evaluateResult(IMotionContainer container) {
-        IMotion motion = ((Container) container).getLastExecutedMotion();
+        IMotion motion = ((MotionContainer) container).getLastExecutedMotion();
         if (!(motion instanceof BrakeTest)) {
             throw new IllegalArgumentException("this was no brake test but " + container.getCommand());
         }
         BrakeTest test = (BrakeTest) motion;
-        double most = Station.current().plant.limits()[3 * 7 + test.axis];
+        double most = Station.current().description.tauMax[test.axis];
         boolean ended = container.isFinished() && container.getErrorMessage() == null;
         BrakeState state = !ended ? BrakeState.NotTested : test.torque <= most ? BrakeState.Holds : BrakeState.Slips;
         return new BrakeTestResult(test.axis, state, test.torque, most);

@@ -2,9 +2,14 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.Arrays;
 
+import heptarm.doubles.seam.AtLimit;
+import heptarm.doubles.seam.HandGuiding;
+import heptarm.doubles.seam.OutsideLimit;
+
 /** A person leads the arm while the enabling switch of the hand guiding device is held; it ends when the switch is let go. */
 public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
     private static final int AXES = 7;
+    private static final double MM = 1e-3;
 
     private double[] lowest = every(-Math.PI);
     private double[] highest = every(Math.PI);
@@ -22,11 +27,11 @@ public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
 
     private static double[] seven(String name, double[] radians) {
         if (radians.length != AXES) {
-            throw new IllegalArgumentException(name + " takes " + AXES + " values, not " + radians.length);
+            throw new IllegalArgumentException(name + " must have " + AXES + " values, got " + radians.length);
         }
         for (double value : radians) {
             if (Double.isNaN(value) || Double.isInfinite(value)) {
-                throw new IllegalArgumentException(name + " is " + value + "; it has to be finite");
+                throw new IllegalArgumentException(name + " must be finite, got " + value);
             }
         }
         return radians.clone();
@@ -47,7 +52,7 @@ public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
     /** Which axes have limits of their own. */
     public HandGuidingMotion setJointLimitsEnabled(boolean... axes) {
         if (axes.length != AXES) {
-            throw new IllegalArgumentException("jointLimitsEnabled takes " + AXES + " values, not " + axes.length);
+            throw new IllegalArgumentException("jointLimitsEnabled must have " + AXES + " values, got " + axes.length);
         }
         enabled = axes.clone();
         return this;
@@ -97,23 +102,21 @@ public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
         return setJointLimitViolationFreezesAll(all);
     }
 
-    /**
-     * Lower limits, upper limits [rad], NaN where an axis has none of its own; joint velocity [rad/s], Cartesian velocity
-     * [mm/s], NaN: unlimited; 1 if a limit freezes all axes, 1 if it pulls back; for the simulation.
-     */
-    public double[] terms() {
-        double[] terms = new double[2 * AXES + 4];
+    /** The limits in the plant's terms; for the simulation. */
+    public HandGuiding settings() {
+        HandGuiding settings = new HandGuiding();
         for (int i = 0; i < AXES; i++) {
             if (enabled[i] && !(lowest[i] < highest[i])) {
-                throw new IllegalArgumentException("the lower limit of A" + (i + 1) + " is not below the upper one");
+                throw new IllegalArgumentException("the lower limit of A" + (i + 1) + " must be below the upper limit, got "
+                        + lowest[i] + " and " + highest[i] + " rad");
             }
-            terms[i] = enabled[i] ? lowest[i] : Double.NaN;
-            terms[AXES + i] = enabled[i] ? highest[i] : Double.NaN;
+            settings.qMin[i] = enabled[i] ? lowest[i] : Double.NaN;
+            settings.qMax[i] = enabled[i] ? highest[i] : Double.NaN;
         }
-        terms[14] = jointVelocity;
-        terms[15] = cartesianVelocity;
-        terms[16] = freezes ? 1 : 0;
-        terms[17] = pulls ? 1 : 0;
-        return terms;
+        settings.jointVelocity = jointVelocity;
+        settings.cartesianVelocity = MM * cartesianVelocity;
+        settings.atLimit = freezes ? AtLimit.ALL : AtLimit.AXIS;
+        settings.outside = pulls ? OutsideLimit.PULL : OutsideLimit.FREE;
+        return settings;
     }
 }

@@ -2,23 +2,33 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.Arrays;
 
+import heptarm.doubles.seam.Blending;
+import heptarm.doubles.seam.CartesianDynamics;
+import heptarm.doubles.seam.JointDynamics;
+
 /** A motion's parameters at one time, to be printed; NaN where nothing was set. */
 public final class MotionParameters {
-    private final RobotMotion<?> motion;
-    private final double[] relative;
-    private final double[] blending;
+    private static final double MM = 1e-3;
+
+    private final String text;
 
     MotionParameters(RobotMotion<?> motion) {
-        this.motion = motion;
-        relative = motion.relativeParameters();
-        blending = motion.blendingParameters();
+        JointDynamics joints = motion.jointDynamics();
+        Blending blending = motion.blending();
+        String cartesian = "";
+        if (motion instanceof SplineMotionCP) {
+            CartesianDynamics path = ((SplineMotionCP<?>) motion).cartesianDynamics();
+            cartesian = ", Cartesian velocity " + path.velocity / MM + " mm/s, acceleration " + path.acceleration / MM
+                    + " mm/s2, jerk " + path.jerk / MM + " mm/s3, orientation velocity " + path.orientationVelocity + " rad/s, acceleration "
+                    + path.orientationAcceleration + " rad/s2, jerk " + path.orientationJerk + " rad/s3";
+        }
+        text = motion.getClass().getSimpleName() + ", joint velocity " + Arrays.toString(joints.velocity) + ", acceleration "
+                + Arrays.toString(joints.acceleration) + ", jerk " + Arrays.toString(joints.jerk) + ", blending "
+                + blending.relative + ", " + blending.distance / MM + " mm, " + blending.angle + " rad" + cartesian;
     }
 
     @Override
     public String toString() {
-        String cartesian = motion instanceof SplineMotionCP
-                ? ", Cartesian " + Arrays.toString(((SplineMotionCP<?>) motion).cartesianParameters()) : "";
-        return motion.getClass().getSimpleName() + ", joints " + Arrays.toString(relative) + ", blending "
-                + Arrays.toString(blending) + cartesian;
+        return text;
     }
 }

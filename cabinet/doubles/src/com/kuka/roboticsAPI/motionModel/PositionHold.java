@@ -10,7 +10,7 @@ public class PositionHold extends RobotMotion<PositionHold> {
 
     public PositionHold(IMotionControlMode mode, long duration, TimeUnit unit) {
         if (duration == 0 || duration < -1) {
-            throw new IllegalArgumentException("the duration is " + duration + "; it has to be positive, or -1 for ever");
+            throw new IllegalArgumentException("duration must be positive, or -1 for ever, got " + duration);
         }
         seconds = duration < 0 ? Double.NaN : unit.toNanos(duration) * 1e-9;
         setMode(mode);

@@ -1,6 +1,5 @@
 package com.kuka.roboticsAPI.motionModel;
 
-import java.util.Arrays;
 import java.util.List;
 import java.util.concurrent.CopyOnWriteArrayList;
 
@@ -8,64 +7,64 @@ import com.kuka.roboticsAPI.conditionModel.ICondition;
 import com.kuka.roboticsAPI.conditionModel.ITriggerAction;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
 
+import heptarm.doubles.seam.Blending;
+import heptarm.doubles.seam.JointDynamics;
+
 /** A motion of a robot with the parameters that all of them share. */
 public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
     private static final int AXES = 7;
+    private static final double MM = 1e-3;
 
-    private final double[] relative = new double[3 * AXES];
-    private final double[] blending = {Double.NaN, Double.NaN, Double.NaN};
+    private final JointDynamics dynamics = new JointDynamics();
+    private final Blending blending = new Blending();
     private IMotionControlMode mode;
     private IMotionOverlay overlay;
     private final List<ICondition> breaks = new CopyOnWriteArrayList<>();
     private final List<ICondition> triggers = new CopyOnWriteArrayList<>();
     private final List<ITriggerAction> actions = new CopyOnWriteArrayList<>();
 
-    protected RobotMotion() {
-        Arrays.fill(relative, Double.NaN);
-    }
-
-    private T setRelative(int block, String name, double[] values) {
+    private T setRelative(double[] into, String name, double[] values) {
         if (values.length != 1 && values.length != AXES) {
-            throw new IllegalArgumentException(name + " takes one value or " + AXES + ", not " + values.length);
+            throw new IllegalArgumentException(name + " must have 1 or " + AXES + " values, got " + values.length);
         }
         for (double value : values) {
             if (!(value > 0.0 && value <= 1.0)) {
-                throw new IllegalArgumentException(name + " is " + value + "; it has to be in (0, 1]");
+                throw new IllegalArgumentException(name + " must be in (0, 1], got " + value);
             }
         }
         for (int i = 0; i < AXES; i++) {
-            relative[block * AXES + i] = values.length == 1 ? values[0] : values[i];
+            into[i] = values.length == 1 ? values[0] : values[i];
         }
         return self();
     }
 
     public T setJointVelocityRel(double... values) {
-        return setRelative(0, "jointVelocityRel", values);
+        return setRelative(dynamics.velocity, "jointVelocityRel", values);
     }
 
     public T setJointAccelerationRel(double... values) {
-        return setRelative(1, "jointAccelerationRel", values);
+        return setRelative(dynamics.acceleration, "jointAccelerationRel", values);
     }
 
     public T setJointJerkRel(double... values) {
-        return setRelative(2, "jointJerkRel", values);
+        return setRelative(dynamics.jerk, "jointJerkRel", values);
     }
 
     public T setBlendingRel(double value) {
         if (!(value >= 0.0 && value <= 1.0)) {
-            throw new IllegalArgumentException("blendingRel is " + value + "; it has to be in [0, 1]");
+            throw new IllegalArgumentException("blendingRel must be in [0, 1], got " + value);
         }
-        blending[0] = value;
+        blending.relative = value;
         return self();
     }
 
     public T setBlendingCart(double millimetres) {
-        blending[1] = notNegative("blendingCart", millimetres);
+        blending.distance = MM * notNegative("blendingCart", millimetres);
         return self();
     }
 
     public T setBlendingOri(double radians) {
-        blending[2] = notNegative("blendingOri", radians);
+        blending.angle = notNegative("blendingOri", radians);
         return self();
     }
 
@@ -121,26 +120,26 @@ public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
         return mode;
     }
 
-    /** Velocity, acceleration and jerk of each axis as fractions, 21 numbers, NaN where nothing was set; for the simulation. */
-    public double[] relativeParameters() {
-        return relative.clone();
+    /** For the simulation. */
+    public JointDynamics jointDynamics() {
+        return dynamics;
     }
 
-    /** Blending: relative, millimetres, radians; NaN where nothing was set; for the simulation. */
-    public double[] blendingParameters() {
-        return blending.clone();
+    /** For the simulation. */
+    public Blending blending() {
+        return blending;
     }
 
     protected static double notNegative(String name, double value) {
         if (!(value >= 0.0) || Double.isInfinite(value)) {
-            throw new IllegalArgumentException(name + " is " + value + "; it must not be negative");
+            throw new IllegalArgumentException(name + " must not be negative, got " + value);
         }
         return value;
     }
 
     protected static double positive(String name, double value) {
         if (!(value > 0.0) || Double.isInfinite(value)) {
-            throw new IllegalArgumentException(name + " is " + value + "; it has to be positive");
+            throw new IllegalArgumentException(name + " must be positive, got " + value);
         }
         return value;
     }

@@ -1,44 +1,45 @@
 package com.kuka.roboticsAPI.motionModel;
 
-import java.util.Arrays;
+import heptarm.doubles.seam.CartesianDynamics;
+import heptarm.doubles.seam.OrientationReference;
+import heptarm.doubles.seam.OrientationType;
 
 /** A motion planned in space. */
 public abstract class SplineMotionCP<T extends SplineMotionCP<T>> extends RobotMotion<T> {
-    private final double[] cartesian = new double[6];
+    private static final double MM = 1e-3;
+
+    private final CartesianDynamics dynamics = new CartesianDynamics();
     private SplineOrientationType type;
     private OrientationReferenceSystem reference;
 
-    protected SplineMotionCP() {
-        Arrays.fill(cartesian, Double.NaN);
-    }
-
-    private T set(int index, String name, double value) {
-        cartesian[index] = positive(name, value);
+    public T setCartVelocity(double mmPerSecond) {
+        dynamics.velocity = MM * positive("cartVelocity", mmPerSecond);
         return self();
     }
 
-    public T setCartVelocity(double mmPerSecond) {
-        return set(0, "cartVelocity", mmPerSecond);
-    }
-
     public T setCartAcceleration(double value) {
-        return set(1, "cartAcceleration", value);
+        dynamics.acceleration = MM * positive("cartAcceleration", value);
+        return self();
     }
 
     public T setCartJerk(double value) {
-        return set(2, "cartJerk", value);
+        dynamics.jerk = MM * positive("cartJerk", value);
+        return self();
     }
 
     public T setOrientationVelocity(double radPerSecond) {
-        return set(3, "orientationVelocity", radPerSecond);
+        dynamics.orientationVelocity = positive("orientationVelocity", radPerSecond);
+        return self();
     }
 
     public T setOrientationAcceleration(double value) {
-        return set(4, "orientationAcceleration", value);
+        dynamics.orientationAcceleration = positive("orientationAcceleration", value);
+        return self();
     }
 
     public T setOrientationJerk(double value) {
-        return set(5, "orientationJerk", value);
+        dynamics.orientationJerk = positive("orientationJerk", value);
+        return self();
     }
 
     public T setOrientationType(SplineOrientationType value) {
@@ -51,13 +52,29 @@ public abstract class SplineMotionCP<T extends SplineMotionCP<T>> extends RobotM
         return self();
     }
 
-    /** Type and reference of the orientation as their ordinals, -1 where nothing was set; for the simulation. */
-    public int[] orientationParameters() {
-        return new int[] {type == null ? -1 : type.ordinal(), reference == null ? -1 : reference.ordinal()};
+    /** For the simulation. */
+    public CartesianDynamics cartesianDynamics() {
+        return dynamics;
     }
 
-    /** Velocity, acceleration, jerk in mm, then in rad; NaN where nothing was set; for the simulation. */
-    public double[] cartesianParameters() {
-        return cartesian.clone();
+    /** Null: not set; for the simulation. */
+    public OrientationType orientationType() {
+        if (type == null) {
+            return null;
+        }
+        return switch (type) {
+            case Variable -> OrientationType.VARIABLE;
+            case Constant -> OrientationType.CONSTANT;
+            case Ignore -> OrientationType.IGNORE;
+            case OriJoint -> OrientationType.JOINT;
+        };
+    }
+
+    /** Null: not set; for the simulation. */
+    public OrientationReference orientationReference() {
+        if (reference == null) {
+            return null;
+        }
+        return reference == OrientationReferenceSystem.Path ? OrientationReference.PATH : OrientationReference.BASE;
     }
 }

@@ -20,8 +20,8 @@ import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.geometricModel.math.Vector;
 
-import heptarm.doubles.Sampling;
-import heptarm.doubles.Station;
+import heptarm.doubles.plant.PeriodicSampler;
+import heptarm.doubles.runtime.Station;
 
 /**
  * Records numbers of the robot into a text file: a line of names, then one of numbers for each sample, the time in seconds
@@ -42,7 +42,7 @@ public class DataRecorder {
     private long timeout = -1; // [ns]
     private int sampleInterval = 1; // [ms]
     private boolean enabled;
-    private Sampling sampling;
+    private PeriodicSampler sampling;
     private boolean begun;
     private PrintWriter out;
 
@@ -73,7 +73,7 @@ public class DataRecorder {
     public void setTimeout(long time, TimeUnit unit) {
         change();
         if (time == 0 || time < -1) {
-            throw new IllegalArgumentException("the time is " + time + "; it has to be positive, or -1 for no end");
+            throw new IllegalArgumentException("time must be positive, or -1 for no end, got " + time);
         }
         timeout = time < 0 ? -1 : unit.toNanos(time);
     }
@@ -197,7 +197,7 @@ public class DataRecorder {
             throw new IllegalStateException("cannot write " + file(), e);
         }
         out.println("time " + String.join(" ", names));
-        sampling = new Sampling(station, TimeUnit.MILLISECONDS.toNanos(sampleInterval), this::sample);
+        sampling = new PeriodicSampler(station, TimeUnit.MILLISECONDS.toNanos(sampleInterval), this::sample);
         sampling.start();
     }
 

@@ -2,9 +2,9 @@ package com.kuka.roboticsAPI.sensorModel;
 
 import com.kuka.roboticsAPI.deviceModel.LBR;
 
-import heptarm.doubles.Ring;
-import heptarm.doubles.Sampling;
-import heptarm.doubles.Station;
+import heptarm.doubles.plant.PeriodicSampler;
+import heptarm.doubles.runtime.Station;
+import heptarm.doubles.seam.StateWords;
 
 /** Finds the largest torque of each joint between two times; sampled every millisecond of the simulation. */
 public class TorqueEvaluator {
@@ -13,7 +13,7 @@ public class TorqueEvaluator {
     private final Station station = Station.current();
     private final double[] most;
     private boolean measured = true;
-    private Sampling sampling;
+    private PeriodicSampler sampling;
 
     public TorqueEvaluator(LBR robot) {
         most = new double[robot.getJointCount()];
@@ -29,10 +29,10 @@ public class TorqueEvaluator {
             throw new IllegalStateException("the evaluation runs already");
         }
         java.util.Arrays.fill(most, 0.0);
-        int word = measured ? Ring.TAU : Ring.TAU_CMD;
+        int word = measured ? StateWords.TAU : StateWords.TAU_CMD;
         double[] torques = new double[most.length];
-        sampling = new Sampling(station, PERIOD_NS, nanos -> {
-            station.ring.read(word, torques);
+        sampling = new PeriodicSampler(station, PERIOD_NS, nanos -> {
+            station.sharedState.read(word, torques);
             for (int i = 0; i < most.length; i++) {
                 most[i] = Math.max(most[i], Math.abs(torques[i]));
             }

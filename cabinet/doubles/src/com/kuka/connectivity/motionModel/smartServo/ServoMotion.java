@@ -6,17 +6,12 @@ import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 
-import heptarm.doubles.ServoRuntime;
+import heptarm.doubles.motion.ServoRuntime;
+import heptarm.doubles.seam.ServoTiming;
 
 /** A motion that follows destinations given while it runs; {@code T} is its own type, so that setters chain. */
 public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<T> {
-    private static final double EXECUTION_TIME = 0.02;
-    private static final double GOAL_TIMEOUT = 30.0;
-    private static final double SPEED_TIMEOUT = 0.1;
-
-    private double minimumTrajectoryExecutionTime = EXECUTION_TIME;
-    private double timeoutAfterGoalReach = GOAL_TIMEOUT;
-    private double speedTimeoutAfterGoalReach = SPEED_TIMEOUT;
+    private final ServoTiming timing = new ServoTiming();
     private ServoRuntime runtime;
 
     /** Whether a servo motion under impedance control may begin now: at rest, nothing pushes, not singular, the load data right. */
@@ -29,12 +24,12 @@ public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<
     }
 
     public T setMinimumTrajectoryExecutionTime(double seconds) {
-        minimumTrajectoryExecutionTime = positive("minimumTrajectoryExecutionTime", seconds);
+        timing.minimumTime = positive("minimumTrajectoryExecutionTime", seconds);
         return self();
     }
 
     public T setTimeoutAfterGoalReach(double seconds) {
-        timeoutAfterGoalReach = positive("timeoutAfterGoalReach", seconds);
+        timing.goalTimeout = positive("timeoutAfterGoalReach", seconds);
         return self();
     }
 
@@ -43,7 +38,7 @@ public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<
     }
 
     public T setSpeedTimeoutAfterGoalReach(double seconds) {
-        speedTimeoutAfterGoalReach = positive("speedTimeoutAfterGoalReach", seconds);
+        timing.speedTimeout = positive("speedTimeoutAfterGoalReach", seconds);
         return self();
     }
 
@@ -83,9 +78,9 @@ public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<
         return accepted;
     }
 
-    /** Execution time, time-out after the goal, time-out of its speed [s]; for the simulation. */
-    public double[] timing() {
-        return new double[] {minimumTrajectoryExecutionTime, timeoutAfterGoalReach, speedTimeoutAfterGoalReach};
+    /** For the simulation. */
+    public ServoTiming timing() {
+        return timing;
     }
 
     /** The cabinet has accepted the motion; for the simulation. */

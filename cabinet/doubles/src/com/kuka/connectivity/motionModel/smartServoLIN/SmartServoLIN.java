@@ -1,9 +1,9 @@
 package com.kuka.connectivity.motionModel.smartServoLIN;
 
-import java.util.Arrays;
-
 import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+
+import heptarm.doubles.seam.StraightLimits;
 
 /** Follows destinations on straight lines; begins at a frame that has to be where the moved frame is. */
 public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
@@ -11,12 +11,11 @@ public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
     private static final double MM = 1e-3;
 
     private final AbstractFrame start;
-    private final double[] limits = new double[4 * AXES];
+    private final StraightLimits limits = new StraightLimits();
     private AbstractFrame reference;
 
     public SmartServoLIN(AbstractFrame start) {
         this.start = start;
-        Arrays.fill(limits, Double.NaN);
     }
 
     /** Along whose axes the limits hold; without it the world's. */
@@ -27,22 +26,22 @@ public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
 
     /** Along x, y, z [mm/s]. */
     public SmartServoLIN setMaxTranslationVelocity(double[] millimetresPerSecond) {
-        return limit("maxTranslationVelocity", millimetresPerSecond, 0, MM);
+        return limit("maxTranslationVelocity", millimetresPerSecond, limits.velocity, 0, MM);
     }
 
     /** Along x, y, z [mm/s²]. */
     public SmartServoLIN setMaxTranslationAcceleration(double[] millimetresPerSecondSquared) {
-        return limit("maxTranslationAcceleration", millimetresPerSecondSquared, 2 * AXES, MM);
+        return limit("maxTranslationAcceleration", millimetresPerSecondSquared, limits.acceleration, 0, MM);
     }
 
     /** About x, y, z [rad/s]. */
     public SmartServoLIN setMaxOrientationVelocity(double[] radiansPerSecond) {
-        return limit("maxOrientationVelocity", radiansPerSecond, AXES, 1.0);
+        return limit("maxOrientationVelocity", radiansPerSecond, limits.velocity, AXES, 1.0);
     }
 
     /** About x, y, z [rad/s²]. */
     public SmartServoLIN setMaxOrientationAcceleration(double[] radiansPerSecondSquared) {
-        return limit("maxOrientationAcceleration", radiansPerSecondSquared, 3 * AXES, 1.0);
+        return limit("maxOrientationAcceleration", radiansPerSecondSquared, limits.acceleration, AXES, 1.0);
     }
 
     /** The simulated arm keeps its arm angle, so that nothing moves in the null space. */
@@ -57,15 +56,15 @@ public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
         return this;
     }
 
-    private SmartServoLIN limit(String name, double[] values, int at, double unit) {
+    private SmartServoLIN limit(String name, double[] values, double[] into, int at, double unit) {
         if (values.length != AXES) {
-            throw new IllegalArgumentException(name + " takes " + AXES + " values, not " + values.length);
+            throw new IllegalArgumentException(name + " must have " + AXES + " values, got " + values.length);
         }
         double[] checked = new double[AXES];
         for (int i = 0; i < AXES; i++) {
             checked[i] = positive(name, values[i]) * unit;
         }
-        System.arraycopy(checked, 0, limits, at, AXES);
+        System.arraycopy(checked, 0, into, at, AXES);
         return this;
     }
 
@@ -83,9 +82,9 @@ public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
         return start;
     }
 
-    /** Velocity x y z, about x y z, then acceleration, in SI; NaN where nothing was said; for the simulation. */
-    public double[] limits() {
-        return limits.clone();
+    /** For the simulation. */
+    public StraightLimits limits() {
+        return limits;
     }
 
     /** For the simulation; null: the world. */

@@ -6,7 +6,7 @@ import java.util.concurrent.Future;
 import java.util.concurrent.FutureTask;
 import java.util.concurrent.TimeUnit;
 
-import heptarm.doubles.PlantClock;
+import heptarm.doubles.plant.PlantClock;
 
 /** A background task that is called again and again; times are those of the simulation. An exception of a cycle ends it. */
 public abstract class RoboticsAPICyclicBackgroundTask extends RoboticsAPIBackgroundTask {

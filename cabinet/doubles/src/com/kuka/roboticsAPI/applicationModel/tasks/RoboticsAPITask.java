@@ -11,12 +11,12 @@ import com.kuka.roboticsAPI.uiModel.IApplicationUI;
 import com.kuka.task.ITaskLogger;
 import com.kuka.task.ITaskManager;
 
-import heptarm.doubles.Desk;
-import heptarm.doubles.Station;
+import heptarm.doubles.runtime.ApplicationServices;
+import heptarm.doubles.runtime.Station;
 
 /** Base of all that the cabinet runs, applications and background tasks: initialize, run, dispose. */
 public abstract class RoboticsAPITask {
-    private final Desk desk = Desk.current();
+    private final ApplicationServices desk = ApplicationServices.current();
 
     public void initialize() {
     }

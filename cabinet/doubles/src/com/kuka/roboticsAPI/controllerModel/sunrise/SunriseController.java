@@ -2,7 +2,7 @@ package com.kuka.roboticsAPI.controllerModel.sunrise;
 
 import com.kuka.roboticsAPI.controllerModel.Controller;
 
-import heptarm.doubles.Station;
+import heptarm.doubles.runtime.Station;
 
 /** The cabinet of an LBR. */
 public class SunriseController extends Controller {

@@ -3,8 +3,9 @@ package com.kuka.roboticsAPI.controllerModel.sunrise;
 import com.kuka.roboticsAPI.controllerModel.IExecutionListener;
 import com.kuka.roboticsAPI.controllerModel.IExecutionService;
 
-import heptarm.doubles.Ring;
-import heptarm.doubles.Station;
+import heptarm.doubles.runtime.Station;
+import heptarm.doubles.seam.SafetyFlags;
+import heptarm.doubles.seam.StateWords;
 
 /** Pausing, resuming and cancelling what the cabinet executes. */
 public final class SunriseExecutionService implements IExecutionService {
@@ -17,17 +18,17 @@ public final class SunriseExecutionService implements IExecutionService {
     }
 
     private long flags() {
-        return station.ring.integer(Ring.FLAGS);
+        return station.sharedState.integer(StateWords.FLAGS);
     }
 
     public boolean isPaused() {
-        return (flags() & Ring.PAUSED) != 0;
+        return (flags() & SafetyFlags.PAUSED) != 0;
     }
 
     /** Whether execution is paused and the arm rests. */
     public boolean isPausedAndStopped() {
         double[] speed = new double[7];
-        station.ring.read(Ring.DQ, speed);
+        station.sharedState.read(StateWords.DQ, speed);
         for (double one : speed) {
             if (Math.abs(one) > AT_REST) {
                 return false;
@@ -37,11 +38,11 @@ public final class SunriseExecutionService implements IExecutionService {
     }
 
     public void addExecutionListener(IExecutionListener listener) {
-        station.safety.executions.add(listener);
+        station.safetyEvents.executions.add(listener);
     }
 
     public void removeExecutionListener(IExecutionListener listener) {
-        station.safety.executions.remove(listener);
+        station.safetyEvents.executions.remove(listener);
     }
 
     public void clearExecutionContainerQueues() {

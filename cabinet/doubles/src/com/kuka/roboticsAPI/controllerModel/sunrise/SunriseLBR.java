@@ -3,7 +3,7 @@ package com.kuka.roboticsAPI.controllerModel.sunrise;
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 
-import heptarm.doubles.Station;
+import heptarm.doubles.runtime.Station;
 
 /** The robot of a cabinet. */
 public final class SunriseLBR extends LBR {

@@ -2,7 +2,7 @@ package com.kuka.roboticsAPI.controllerModel.sunrise;
 
 import com.kuka.roboticsAPI.deviceModel.OperationMode;
 
-import heptarm.doubles.Ring;
+import heptarm.doubles.seam.SafetyFlags;
 
 /** A snapshot of the safety state. */
 public final class SunriseSafetyState implements ISafetyState {
@@ -38,33 +38,33 @@ public final class SunriseSafetyState implements ISafetyState {
 
     @Override
     public EmergencyStop getEmergencyStopInt() {
-        return has(Ring.EMERGENCY_STOP) ? EmergencyStop.ACTIVE : EmergencyStop.INACTIVE;
+        return has(SafetyFlags.EMERGENCY_STOP) ? EmergencyStop.ACTIVE : EmergencyStop.INACTIVE;
     }
 
     @Override
     public EmergencyStop getEmergencyStopEx() {
-        return has(Ring.EXTERNAL_STOP) ? EmergencyStop.ACTIVE : EmergencyStop.INACTIVE;
+        return has(SafetyFlags.EXTERNAL_STOP) ? EmergencyStop.ACTIVE : EmergencyStop.INACTIVE;
     }
 
     @Override
     public SafetyStopType getSafetyStopSignal() {
-        if (has(Ring.DRIVE_ERROR)) {
+        if (has(SafetyFlags.DRIVE_ERROR)) {
             return SafetyStopType.STOP0;
         }
-        return has(Ring.PROTECTIVE_STOP) ? SafetyStopType.STOP1 : SafetyStopType.NOSTOP;
+        return has(SafetyFlags.PROTECTIVE_STOP) ? SafetyStopType.STOP1 : SafetyStopType.NOSTOP;
     }
 
     @Override
     public OperatorSafety getOperatorSafetyState() {
-        return has(Ring.SAFEGUARD_OPEN) ? OperatorSafety.OPERATOR_SAFETY_OPEN : OperatorSafety.OPERATOR_SAFETY_CLOSED;
+        return has(SafetyFlags.SAFEGUARD_OPEN) ? OperatorSafety.OPERATOR_SAFETY_OPEN : OperatorSafety.OPERATOR_SAFETY_CLOSED;
     }
 
     @Override
     public EnablingDeviceState getEnablingDeviceState() {
-        if (has(Ring.HAND_GUIDING)) {
+        if (has(SafetyFlags.HAND_GUIDING)) {
             return EnablingDeviceState.HANDGUIDING;
         }
-        return has(Ring.ENABLED) ? EnablingDeviceState.NORMAL : EnablingDeviceState.NONE;
+        return has(SafetyFlags.ENABLED) ? EnablingDeviceState.NORMAL : EnablingDeviceState.NONE;
     }
 
     @Override
@@ -74,11 +74,11 @@ public final class SunriseSafetyState implements ISafetyState {
 
     @Override
     public boolean areAllAxesGMSReferenced() {
-        return has(Ring.MASTERED);
+        return has(SafetyFlags.MASTERED);
     }
 
     @Override
     public boolean areAllAxesPositionReferenced() {
-        return has(Ring.MASTERED);
+        return has(SafetyFlags.MASTERED);
     }
 }

@@ -103,7 +103,7 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
 
     static double within(String name, double value, double low, double high) {
         if (!(value >= low && value <= high)) {
-            throw new IllegalArgumentException(name + " is " + value + "; it has to be in [" + low + ", " + high + "]");
+            throw new IllegalArgumentException(name + " must be in [" + low + ", " + high + "], got " + value);
         }
         return value;
     }
@@ -120,7 +120,7 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
         for (double value : values) {
             notNegative(name, value);
             if (value == 0.0 && !zero) {
-                throw new IllegalArgumentException(name + " is 0; it has to be positive");
+                throw new IllegalArgumentException(name + " must be positive, got 0");
             }
         }
         return values;

@@ -3,6 +3,9 @@ package com.kuka.roboticsAPI.motionModel.controlModeModel;
 import com.kuka.roboticsAPI.geometricModel.CartDOF;
 import com.kuka.roboticsAPI.geometricModel.CartPlane;
 
+import heptarm.doubles.motion.ControlModeTranslator;
+import heptarm.doubles.seam.SineImpedance;
+
 /** Cartesian impedance with a force laid over it: a constant part and a sine in each direction, risen and fallen. */
 public class CartesianSineImpedanceControlMode extends CartesianImpedanceControlMode {
     private static final double FASTEST = 15.0;
@@ -170,14 +173,24 @@ public class CartesianSineImpedanceControlMode extends CartesianImpedanceControl
         return this;
     }
 
-    /** Amplitude, frequency, phase [deg], bias, force limit, position limit, in the directions; for the simulation. */
-    public double[][] waves() {
-        return new double[][] {amplitude.clone(), frequency.clone(), phaseDeg.clone(), bias.clone(), forceLimit.clone(),
-            positionLimit.clone()};
-    }
-
-    /** Total, rise, hold, fall time [s] (NaN: not given), and 1 if the motion waits for the pattern; for the simulation. */
-    public double[] times() {
-        return new double[] {totalTime, riseTime, holdTime, fallTime, stayActive ? 1 : 0};
+    /** The pattern in the plant's terms, without its base; for the simulation. */
+    public SineImpedance pattern() {
+        SineImpedance pattern = new SineImpedance();
+        pattern.amplitude = ControlModeTranslator.directions(amplitude);
+        pattern.frequency = ControlModeTranslator.directions(frequency);
+        double[] phase = new double[DIRECTIONS];
+        for (int i = 0; i < DIRECTIONS; i++) {
+            phase[i] = Math.toRadians(phaseDeg[i] % 360.0);
+        }
+        pattern.phase = ControlModeTranslator.directions(phase);
+        pattern.bias = ControlModeTranslator.directions(bias);
+        pattern.forceLimit = ControlModeTranslator.forceLimits(forceLimit);
+        pattern.positionLimit = ControlModeTranslator.motionLimits(positionLimit);
+        pattern.totalTime = totalTime;
+        pattern.riseTime = riseTime;
+        pattern.holdTime = holdTime;
+        pattern.fallTime = fallTime;
+        pattern.stayActive = stayActive;
+        return pattern;
     }
 }

@@ -33,7 +33,7 @@ public class JointImpedanceControlMode extends AbstractMotionControlMode {
         }
         for (double value : values) {
             if (!(value >= 0.0 && value <= high)) {
-                throw new IllegalArgumentException(name + " is " + value + "; it has to be in [0, " + high + "]");
+                throw new IllegalArgumentException(name + " must be in [0, " + high + "], got " + value);
             }
         }
         System.arraycopy(values, 0, into, 0, into.length);

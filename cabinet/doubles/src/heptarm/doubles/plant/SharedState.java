@@ -1,0 +1,152 @@
+package heptarm.doubles.plant;
+
+import java.lang.invoke.MethodHandles;
+import java.lang.invoke.VarHandle;
+import java.nio.ByteBuffer;
+import java.nio.ByteOrder;
+
+import heptarm.doubles.seam.HeaderWords;
+import heptarm.doubles.seam.ImageWords;
+import heptarm.doubles.seam.SafetyFlags;
+import heptarm.doubles.seam.Seam;
+import heptarm.doubles.seam.StateWords;
+import heptarm.doubles.seam.TargetKind;
+import heptarm.doubles.seam.TargetWords;
+
+/**
+ * Reads the last states of the plant from memory shared with Python, and writes servo targets, outputs and the override into it.
+ *
+ * <p>A thread that a {@link PlantClock} has woken for a tick reads the state of exactly that tick as long as it is kept;
+ * all other threads read the newest state.
+ */
+public final class SharedState {
+    private static final int WORD = Long.BYTES;
+    private static final int TARGET = WORD * TargetWords.START;
+    /** A state further back than this [ticks] may be overwritten while it is read. */
+    private static final int OLDEST = 200;
+    /** A thread that wakes later than this [ticks] reads the newest state, so that it has time to read before its state is overwritten. */
+    private static final int FAR = OLDEST / 2;
+
+    private static final VarHandle LONGS =
+            MethodHandles.byteBufferViewVarHandle(long[].class, ByteOrder.nativeOrder());
+
+    private final ByteBuffer memory;
+    private final ThreadLocal<long[]> views = ThreadLocal.withInitial(() -> new long[] {-1});
+
+    public SharedState(ByteBuffer memory) {
+        this.memory = memory.order(ByteOrder.nativeOrder());
+        if (memory.capacity() != WORD * Seam.MEMORY_WORDS) {
+            throw new IllegalStateException("shared memory must have " + WORD * Seam.MEMORY_WORDS + " bytes, got "
+                    + memory.capacity() + "; compile the cabinet again");
+        }
+    }
+
+    /** A word of the memory. */
+    private long word(int index) {
+        return (long) LONGS.getAcquire(memory, WORD * index);
+    }
+
+    private void setWord(int index, long value) {
+        LONGS.setRelease(memory, WORD * index, value);
+    }
+
+    /** Number of the newest tick. */
+    public long newest() {
+        return word(HeaderWords.START + HeaderWords.NEWEST);
+    }
+
+    long anchor() {
+        return word(HeaderWords.START + HeaderWords.ANCHOR);
+    }
+
+    double rate() {
+        return Double.longBitsToDouble(word(HeaderWords.START + HeaderWords.RATE));
+    }
+
+    void setWakeTime(long nanos) {
+        setWord(HeaderWords.START + HeaderWords.WAKE, nanos);
+    }
+
+    /** Factor on every programmed speed. */
+    public void setOverride(double value) {
+        setWord(HeaderWords.START + HeaderWords.OVERRIDE, Double.doubleToRawLongBits(value));
+    }
+
+    /** Writes a servo target, which replaces the previous one at the plant's next tick. For straight lines q is a pose. */
+    public synchronized void postTarget(long order, double[] q, double[] velocity) {
+        long seq = word(TargetWords.START + TargetWords.SEQ);
+        setWord(TargetWords.START + TargetWords.SEQ, seq + 1);
+        VarHandle.storeStoreFence();
+        memory.putLong(TARGET + WORD * TargetWords.ORDER, order);
+        memory.putLong(TARGET + WORD * TargetWords.KIND,
+                (velocity == null ? TargetKind.POSITION : TargetKind.POSITION_WITH_VELOCITY).value());
+        for (int i = 0; i < q.length; i++) {
+            memory.putDouble(TARGET + WORD * (TargetWords.Q + i), q[i]);
+            memory.putDouble(TARGET + WORD * (TargetWords.DQ + i), velocity == null ? 0.0 : velocity[i]);
+        }
+        setWord(TargetWords.START + TargetWords.SEQ, seq + 2);
+    }
+
+    /** Selects the tick that the calling thread reads from now on, or the newest if that tick is too old; returns the selected tick. */
+    long view(long tick) {
+        long newest = newest();
+        long seen = newest - tick > FAR ? newest : tick;
+        views.get()[0] = seen;
+        return seen;
+    }
+
+    private long tick() {
+        long newest = newest();
+        long view = views.get()[0];
+        return view < 0 || newest - view > OLDEST ? newest : view;
+    }
+
+    /** Value of a signal of the IO image. */
+    public double signal(int place) {
+        return Double.longBitsToDouble(word(ImageWords.START + place));
+    }
+
+    public void setSignal(int place, double value) {
+        setWord(ImageWords.START + place, Double.doubleToRawLongBits(value));
+    }
+
+    /** Copies the doubles of an array of a state, see {@link StateWords}. */
+    public void read(int word, double[] out) {
+        read(word, out, 0, out.length);
+    }
+
+    /** Copies {@code count} doubles of a state from {@code word} on. */
+    public void read(int word, double[] out, int at, int count) {
+        while (true) {
+            long tick = tick();
+            int base = StateWords.START + (int) (tick % Seam.SLOTS) * StateWords.SIZE;
+            if (word(base + StateWords.SEQ) == 2 * tick + 2) {
+                for (int i = 0; i < count; i++) {
+                    out[at + i] = memory.getDouble(WORD * (base + word + i));
+                }
+                VarHandle.loadLoadFence();
+                if (word(base + StateWords.SEQ) == 2 * tick + 2) {
+                    return;
+                }
+            }
+            Thread.onSpinWait();
+        }
+    }
+
+    /** One double of a state. */
+    public double number(int word) {
+        double[] out = new double[1];
+        read(word, out);
+        return out[0];
+    }
+
+    /** Whether a bit of {@link SafetyFlags} is set. */
+    public boolean flag(int bit) {
+        return (integer(StateWords.FLAGS) & bit) != 0;
+    }
+
+    /** One integer of a state. */
+    public long integer(int word) {
+        return Double.doubleToRawLongBits(number(word));
+    }
+}
