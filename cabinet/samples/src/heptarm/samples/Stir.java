@@ -6,11 +6,11 @@ import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 
 import heptarm.app.CabinetArm;
-import heptarm.core.Arm;
-import heptarm.core.Move;
-import heptarm.core.Refusal;
-import heptarm.core.Spring;
-import heptarm.core.Steering;
+import heptarm.core.CommandRejected;
+import heptarm.core.api.Arm;
+import heptarm.core.api.Impedance;
+import heptarm.core.api.Move;
+import heptarm.core.api.ServoHandle;
 import heptarm.wire.CartesianDynamics;
 import heptarm.wire.FrameInfo;
 import heptarm.wire.JointImpedance;
@@ -19,7 +19,7 @@ import heptarm.wire.PoseState;
 import heptarm.wire.SafetyBits;
 import heptarm.wire.ToolInfo;
 
-/** Stirs with a spoon: a servo motion along a circle, soft joints, then straight lines that yield. Everything in SI. */
+/** Stirs with a spoon: a servo motion along a circle, compliant joints, then straight lines with Cartesian compliance. Everything in SI. */
 public class Stir extends RoboticsAPIApplication {
     private static final double RADIUS = 0.03;
     private static final double PERIOD = 2.0;
@@ -44,7 +44,7 @@ public class Stir extends RoboticsAPIApplication {
         arm.define(SPOON);
         arm.attach(SPOON.name);
         arm.write("MediaFlange.LEDGreen", 1);
-        getLogger().info("tool = " + arm.fitted()[0] + ", moving its " + arm.fitted()[2]);
+        getLogger().info("tool = " + arm.attached()[0] + ", moving its " + arm.attached()[2]);
         stir(new JointImpedance(STIFFNESS, DAMPING));
         scrape();
         arm.write("MediaFlange.LEDGreen", 0);
@@ -52,10 +52,10 @@ public class Stir extends RoboticsAPIApplication {
         getLogger().info("ready = " + ((arm.safety().bits & SafetyBits.READY_TO_MOVE) != 0));
     }
 
-    private void stir(JointImpedance soft) throws Refusal, InterruptedException {
+    private void stir(JointImpedance compliant) throws CommandRejected, InterruptedException {
         PoseState start = arm.pose();
         double farthest = 0.0;
-        Steering stream = arm.servo(0.5, 0.5, 0.5, soft);
+        ServoHandle stream = arm.servo(0.5, 0.5, 0.5, compliant);
         long began = System.nanoTime();
         for (double t = 0.0; t < 2 * PERIOD && !stream.isFinished(); t = (System.nanoTime() - began) * 1e-9) {
             double angle = 2 * Math.PI * t / PERIOD;
@@ -70,18 +70,18 @@ public class Stir extends RoboticsAPIApplication {
         getLogger().info("stirred = " + end.cause + ", " + Math.round(1000 * farthest) + " mm to the side");
     }
 
-    /** Along the edge of the bowl and back: straight lines, yielding downwards, more and more so. */
-    private void scrape() throws Refusal, InterruptedException {
+    /** Along the edge of the bowl and back: straight lines, compliant downwards, with decreasing stiffness. */
+    private void scrape() throws CommandRejected, InterruptedException {
         PoseState start = arm.pose();
-        Spring soft = Spring.of(2000, 2000, 800, 200, 200, 200).damping(0.8).along("base");
+        Impedance compliant = Impedance.cartesian(2000, 2000, 800, 200, 200, 200).damping(0.8).along("base");
         double[] corner = start.xyz.clone();
         corner[1] += RADIUS;
         double nan = Double.NaN;
-        Steering line = arm.servoLin(new CartesianDynamics(0.1, 0.5, nan, 0.5, 2.0, nan), 0.5, soft.mode());
+        ServoHandle line = arm.servoLin(new CartesianDynamics(0.1, 0.5, nan, 0.5, 2.0, nan), 0.5, compliant.mode());
         for (int i = 0; i < 150 && !line.isFinished(); i++) {
             line.follow(i < 75 ? corner : start.xyz, start.quat);
             if (i == 75) {
-                line.change(Spring.of(2000, 2000, 400, 200, 200, 200).damping(0.8).along("base").mode());
+                line.changeMode(Impedance.cartesian(2000, 2000, 400, 200, 200, 200).damping(0.8).along("base").mode());
             }
             Thread.sleep(10);
         }

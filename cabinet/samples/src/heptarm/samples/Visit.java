@@ -6,11 +6,11 @@ import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 
 import heptarm.app.CabinetArm;
-import heptarm.core.Arm;
-import heptarm.core.Handle;
-import heptarm.core.Move;
-import heptarm.core.Refusal;
-import heptarm.core.Until;
+import heptarm.core.CommandRejected;
+import heptarm.core.api.Arm;
+import heptarm.core.api.MotionHandle;
+import heptarm.core.api.Move;
+import heptarm.core.api.StopCondition;
 import heptarm.wire.Axis;
 import heptarm.wire.MotionFinished;
 import heptarm.wire.Pose;
@@ -40,7 +40,7 @@ public class Visit extends RoboticsAPIApplication {
     }
 
     /** Four motions as one program: the call returns when the last one has ended. */
-    private void square() throws Refusal, InterruptedException {
+    private void square() throws CommandRejected, InterruptedException {
         Move side = Move.linRel(0.1, 0.0, 0.0).along("base").velocity(0.2);
         MotionFinished end = arm.move(side, Move.linRel(0.0, 0.1, 0.0).along("base").velocity(0.2),
                 Move.linRel(-0.1, 0.0, 0.0).along("base").velocity(0.2), Move.linRel(0.0, -0.1, 0.0).along("base").velocity(0.2));
@@ -48,7 +48,7 @@ public class Visit extends RoboticsAPIApplication {
     }
 
     /** Three places that are passed without a stop, and back. */
-    private void curve() throws Refusal, InterruptedException {
+    private void curve() throws CommandRejected, InterruptedException {
         PoseState here = arm.pose();
         Pose start = new Pose(here.xyz, here.quat);
         MotionFinished end = arm.move(Move.spline(Move.spl(beside(start, 0.04, 0.03)), Move.spl(beside(start, 0.08, 0.0)).velocity(0.1),
@@ -60,18 +60,18 @@ public class Visit extends RoboticsAPIApplication {
         return new Pose(new double[] {place.xyz[0], place.xyz[1] + y, place.xyz[2] + z}, place.quat);
     }
 
-    /** A motion that ends at what it touches; here nothing stands in its way but the end of what it may go. */
-    private void touched() throws Refusal, InterruptedException {
-        Until touch = Until.forceAlong(Axis.Z, 15.0).or(Until.signal("MediaFlange.UserButton", true)).or(Until.travelled(0.05));
+    /** A motion that ends at what it touches; here it ends at the largest distance. */
+    private void touched() throws CommandRejected, InterruptedException {
+        StopCondition touch = StopCondition.normalForce(Axis.Z, 15.0).or(StopCondition.signal("MediaFlange.UserButton", true)).or(StopCondition.pathFromStart(0.05));
         MotionFinished end = arm.move(Move.linRel(0.0, 0.0, -0.2).along("base").velocity(0.1).until(touch));
         say("touched", end.cause + " by condition " + end.fired);
         arm.move(Move.home().speed(0.5), HOME);
     }
 
     /** A motion that is watched while it runs, and cancelled half way. */
-    private void interrupted() throws Refusal, InterruptedException {
+    private void interrupted() throws CommandRejected, InterruptedException {
         Pose before = new Pose(arm.pose().xyz, arm.pose().quat);
-        Handle down = arm.start(Move.linRel(0.0, 0.0, -0.2).along("base").velocity(0.1));
+        MotionHandle down = arm.start(Move.linRel(0.0, 0.0, -0.2).along("base").velocity(0.1));
         while (!down.isFinished() && arm.pose().xyz[2] > before.xyz[2] - 0.1) {
             Thread.sleep(5);
         }
@@ -84,7 +84,7 @@ public class Visit extends RoboticsAPIApplication {
     private void refused() throws InterruptedException {
         try {
             arm.move(Move.ptp(0.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0));
-        } catch (Refusal e) {
+        } catch (CommandRejected e) {
             say("refused", e.parameter + ": " + e.getMessage());
         }
     }
