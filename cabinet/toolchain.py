@@ -17,7 +17,7 @@ _ECJ_MAIN = "org.eclipse.jdt.internal.compiler.batch.Main"
 
 
 class ToolMissing(RuntimeError):
-    """A compiler is not on this machine; the text says how to get it."""
+    """A compiler is not on this machine; the text has the remedy."""
 
 
 @dataclass(frozen=True)
