@@ -16,7 +16,7 @@ def jars() -> list[Path]:
     Raises:
         HeptarmError: the cabinet of this checkout has not been compiled.
     """
-    paths = [_PACKAGE / "virtual" / "jars" / name for name in _JARS]
+    paths = [_PACKAGE / "sim" / "jars" / name for name in _JARS]
     missing = [path.name for path in paths if not path.exists()]
     if missing:
         raise HeptarmError(

@@ -1,31 +1,31 @@
-"""What triggers of motions do: `from heptarm.do import notify, set_output`."""
+"""Actions of triggers: `from heptarm.do import notify, set_output`."""
 
+from heptarm.values.condition.trigger import Action, Notify, SetOutput, Trigger
 from heptarm.values.io import SignalValue
-from heptarm.values.trigger import Action, Notify, SetOutput, Trigger
 
 __all__ = ["Action", "Notify", "SetOutput", "Trigger", "notify", "set_output"]
 
 
 def set_output(signal: str, value: SignalValue = True) -> SetOutput:
-    """The cabinet writes an output.
+    """Write an output on the cabinet.
 
     Args:
         signal: its name, or a part of it, as for `arm.io`.
         value: True or False, or a number.
 
     Raises:
-        ShapeError: no name, or neither of these.
+        ShapeError: no name, or another kind of value.
     """
     return SetOutput(signal, value)
 
 
 def notify(label: str = "") -> Notify:
-    """The cabinet tells of it; the motion's handle hears of the event.
+    """Send an event, which the motion's handle receives.
 
     Args:
-        label: what it is called, up to 128 octets.
+        label: name of the event, up to 128 bytes.
 
     Raises:
-        ShapeError: a label that is longer, or no text.
+        ShapeError: no text, or a longer one.
     """
     return Notify(label)

@@ -3,34 +3,34 @@
 ::
 
     HeptarmError
-    ├── ConnectFailed (ConnectionError)     nobody there, refused, wrong key
+    ├── ConnectFailed (ConnectionError)     no answer, refused, wrong key
     │   └── VersionMismatch                 the two sides speak different major versions
-    ├── ConnectionLost (ConnectionError)    the session ended under way
+    ├── ConnectionLost (ConnectionError)    the session ended unexpectedly
     ├── ProtocolError
-    │   ├── LocalProtocolError              this side broke the protocol: a bug here
-    │   └── RemoteProtocolError             the other side broke it
+    │   ├── LocalProtocolError              this side violated the protocol: a bug
+    │   └── RemoteProtocolError             the cabinet violated it
     ├── CommandRejected (ValueError)        refused before anything moved
     │   ├── ShapeError                      wrong shape or length
     │   ├── LimitError                      outside a range
-    │   │   └── Unreachable                 no joint position leads there
-    │   ├── ModeConflict                    does not go together with what is running
+    │   │   └── Unreachable                 no joint position reaches the pose
+    │   ├── ModeConflict                    conflicts with what is running
     │   └── NotInControl                    this client does not control the robot
-    ├── MotionError                         a motion did not end as it should; carries its result
-    │   ├── MotionAborted                   it was stopped under way
-    │   │   └── CollisionDetected           by a collision guard; `collision` says which joint and how much
-    │   ├── NoContact                       nothing was touched
+    ├── MotionError                         a motion did not end as commanded; has its result
+    │   ├── MotionAborted                   it was stopped early
+    │   │   └── CollisionDetected           by a collision guard; `collision` has joint and torque
+    │   ├── NoContact                       no contact was found
     │   └── ArrivalError                    it ended short of its target
     ├── StreamError
     │   ├── Starved                         no target within the watchdog time
     │   └── QualityLost                     the connection became too slow
     ├── NotReady                            the robot cannot move now
-    │   ├── NeedsOperator                   a person has to act; `instructions` says how
+    │   ├── NeedsOperator                   the operator must act; `instructions` has the steps
     │   └── SafetyStop                      a safety function is active
-    ├── StaleState                          the newest state is too old to act on
+    ├── StaleState                          the newest state is too old or lacks a group
     ├── Timeout (TimeoutError)              it did not happen in time
     └── MissingExtra (ImportError)          an optional package is not installed
 
-An error says what was refused, the value, the allowed range and what to do.
+An error names what was refused, the value with its unit, the allowed range and the remedy.
 """
 
 from __future__ import annotations
@@ -43,12 +43,12 @@ class HeptarmError(Exception):
     """Base of all errors of heptarm.
 
     Args:
-        text: what happened, in words.
+        text: what happened.
         code: number in the protocol's table of codes; 0 if it did not come over the wire.
         parameter: path of the refused field.
         value: the refused value.
-        allowed: the legal range or the legal choices.
-        hint: what to do.
+        allowed: the allowed range or choices.
+        hint: the remedy.
     """
 
     def __init__(
@@ -70,12 +70,12 @@ class HeptarmError(Exception):
         self.hint = hint
 
     def __str__(self) -> str:
-        """The text and, where there is one, the advice."""
+        """The text and, if there is one, the hint."""
         return f"{self.text} ({self.hint})" if self.hint else self.text
 
 
 class ConnectFailed(HeptarmError, ConnectionError):
-    """No session could be made."""
+    """No session could be opened."""
 
 
 class VersionMismatch(ConnectFailed):
@@ -83,23 +83,23 @@ class VersionMismatch(ConnectFailed):
 
 
 class ConnectionLost(HeptarmError, ConnectionError):
-    """The session ended under way."""
+    """The session ended unexpectedly."""
 
 
 class ProtocolError(HeptarmError):
-    """The protocol was broken."""
+    """The protocol was violated."""
 
 
 class LocalProtocolError(ProtocolError):
-    """This side tried something illegal: a bug in the calling code."""
+    """This side violated the protocol: a bug in the calling code."""
 
 
 class RemoteProtocolError(ProtocolError):
-    """The other side sent something illegal."""
+    """The cabinet sent something that the protocol does not allow."""
 
 
 class CommandRejected(HeptarmError, ValueError):
-    """Refused before anything moved; nothing has changed."""
+    """A request was refused before anything moved; nothing has changed."""
 
 
 class ShapeError(CommandRejected):
@@ -111,11 +111,11 @@ class LimitError(CommandRejected):
 
 
 class Unreachable(LimitError):
-    """No joint position leads to the pose."""
+    """No joint position reaches the pose."""
 
 
 class ModeConflict(CommandRejected):
-    """Does not go together with what is running."""
+    """The request conflicts with what is running."""
 
 
 class NotInControl(CommandRejected):
@@ -123,10 +123,10 @@ class NotInControl(CommandRejected):
 
 
 class MotionError(HeptarmError):
-    """A motion did not end as it should.
+    """A motion did not end as commanded.
 
     Attributes:
-        result: how it ended; carries the cause and the last state.
+        result: how it ended, with the cause and the last state.
         history: the last states before the end, oldest first.
     """
 
@@ -147,14 +147,14 @@ class MotionError(HeptarmError):
 
 
 class MotionAborted(MotionError):
-    """The motion was ended under way, or could not be planned."""
+    """The motion was stopped early, or could not be planned."""
 
 
 class CollisionDetected(MotionAborted):
-    """A collision guard ended it.
+    """A collision guard stopped the motion.
 
     Attributes:
-        collision: which joint, and how much; None if nothing is known of it.
+        collision: the joint and its torque; None if unknown.
     """
 
     def __init__(self, text: str, *, collision: Any = None, **details: Any) -> None:
@@ -163,7 +163,7 @@ class CollisionDetected(MotionAborted):
 
 
 class NoContact(MotionError):
-    """Something was to be touched, and was not."""
+    """A motion until contact ended without contact."""
 
 
 class ArrivalError(MotionError):
@@ -187,11 +187,11 @@ class NotReady(HeptarmError):
 
 
 class NeedsOperator(NotReady):
-    """A person at the smartPAD has to act."""
+    """The operator must act at the smartPAD."""
 
     @property
     def instructions(self) -> str:
-        """What to do, in words."""
+        """Steps for the operator."""
         return self.hint or self.text
 
 
@@ -200,11 +200,11 @@ class SafetyStop(NotReady):
 
 
 class StaleState(HeptarmError):
-    """The newest state is too old to act on."""
+    """The newest state is too old to act on, or lacks a group."""
 
 
 class Timeout(HeptarmError, TimeoutError):
-    """It did not happen in time."""
+    """Something did not happen in time."""
 
 
 class MissingExtra(HeptarmError, ImportError):
@@ -222,9 +222,9 @@ def require(module: str, *, extra: str) -> Any:
     except ImportError as error:
         root = module.partition(".")[0]
         missing = isinstance(error, ModuleNotFoundError) and error.name == root
-        trouble = "is not installed" if missing else f"cannot be imported ({error})"
+        reason = "is not installed" if missing else f"cannot be imported ({error})"
         raise MissingExtra(
-            f"this needs {root!r}, which {trouble}",
+            f"this needs the package {root!r}, which {reason}",
             parameter=root,
             hint=f"pip install 'heptarm[{extra}]'",
         ) from error

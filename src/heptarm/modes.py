@@ -1,6 +1,8 @@
 """Control modes, as in `from heptarm.modes import JointImpedance`."""
 
-from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, Position, SineImpedance
-from heptarm.values.yielding import yielding
+from heptarm.values.mode.compliance import compliance
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
+from heptarm.values.mode.mode import Mode, Position
+from heptarm.values.mode.sine import SineImpedance
 
-__all__ = ["CartesianImpedance", "JointImpedance", "Mode", "Position", "SineImpedance", "yielding"]
+__all__ = ["CartesianImpedance", "JointImpedance", "Mode", "Position", "SineImpedance", "compliance"]

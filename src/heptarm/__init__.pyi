@@ -1,0 +1,199 @@
+"""The public names of this package and where they live: the one list, read by type checkers and at run time."""
+
+from .arm.arm import (
+    Arm as Arm,
+)
+from .arm.connect import (
+    connect as connect,
+)
+from .arm.fri.session import (
+    Fri as Fri,
+)
+from .arm.link.state_stream import (
+    States as States,
+)
+from .arm.link.target import (
+    target_from_env as target_from_env,
+)
+from .arm.motion.handle import (
+    MotionHandle as MotionHandle,
+)
+from .arm.motion.servo import (
+    JointServo as JointServo,
+)
+from .arm.motion.servo import (
+    PoseServo as PoseServo,
+)
+from .arm.motion.servo import (
+    ServoStats as ServoStats,
+)
+from .errors import (
+    ArrivalError as ArrivalError,
+)
+from .errors import (
+    CollisionDetected as CollisionDetected,
+)
+from .errors import (
+    CommandRejected as CommandRejected,
+)
+from .errors import (
+    ConnectFailed as ConnectFailed,
+)
+from .errors import (
+    ConnectionLost as ConnectionLost,
+)
+from .errors import (
+    HeptarmError as HeptarmError,
+)
+from .errors import (
+    LimitError as LimitError,
+)
+from .errors import (
+    LocalProtocolError as LocalProtocolError,
+)
+from .errors import (
+    MissingExtra as MissingExtra,
+)
+from .errors import (
+    ModeConflict as ModeConflict,
+)
+from .errors import (
+    MotionAborted as MotionAborted,
+)
+from .errors import (
+    MotionError as MotionError,
+)
+from .errors import (
+    NeedsOperator as NeedsOperator,
+)
+from .errors import (
+    NoContact as NoContact,
+)
+from .errors import (
+    NotInControl as NotInControl,
+)
+from .errors import (
+    NotReady as NotReady,
+)
+from .errors import (
+    ProtocolError as ProtocolError,
+)
+from .errors import (
+    QualityLost as QualityLost,
+)
+from .errors import (
+    RemoteProtocolError as RemoteProtocolError,
+)
+from .errors import (
+    SafetyStop as SafetyStop,
+)
+from .errors import (
+    ShapeError as ShapeError,
+)
+from .errors import (
+    StaleState as StaleState,
+)
+from .errors import (
+    Starved as Starved,
+)
+from .errors import (
+    StreamError as StreamError,
+)
+from .errors import (
+    Timeout as Timeout,
+)
+from .errors import (
+    Unreachable as Unreachable,
+)
+from .errors import (
+    VersionMismatch as VersionMismatch,
+)
+from .skills.replay import (
+    Replay as Replay,
+)
+from .values.condition.collision import (
+    Collision as Collision,
+)
+from .values.condition.collision import (
+    CollisionGuard as CollisionGuard,
+)
+from .values.condition.contact import (
+    Contact as Contact,
+)
+from .values.condition.trigger import (
+    Trigger as Trigger,
+)
+from .values.motion.circle import (
+    arc as arc,
+)
+from .values.motion.circle import (
+    circ as circ,
+)
+from .values.motion.dynamics import (
+    Dynamics as Dynamics,
+)
+from .values.motion.hand_guiding import (
+    hand_guide as hand_guide,
+)
+from .values.motion.line import (
+    lin as lin,
+)
+from .values.motion.line import (
+    lin_rel as lin_rel,
+)
+from .values.motion.motion import (
+    hold as hold,
+)
+from .values.motion.ptp import (
+    ptp as ptp,
+)
+from .values.motion.ptp import (
+    ptp_home as ptp_home,
+)
+from .values.motion.spline import (
+    ellipse as ellipse,
+)
+from .values.motion.spline import (
+    spl as spl,
+)
+from .values.motion.spline import (
+    spline as spline,
+)
+from .values.motion.spline import (
+    spline_joints as spline_joints,
+)
+from .values.motion.trajectory import (
+    Trajectory as Trajectory,
+)
+from .values.pose import (
+    Pose as Pose,
+)
+from .values.pose import (
+    Redundancy as Redundancy,
+)
+from .values.pose import (
+    deg as deg,
+)
+from .values.result import (
+    Cause as Cause,
+)
+from .values.result import (
+    MotionEvent as MotionEvent,
+)
+from .values.result import (
+    Recovery as Recovery,
+)
+from .values.result import (
+    Result as Result,
+)
+from .values.state import (
+    State as State,
+)
+from .values.tool import (
+    Tool as Tool,
+)
+from .values.tool import (
+    Workpiece as Workpiece,
+)
+
+__version__: str
