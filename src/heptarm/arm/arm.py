@@ -5,44 +5,58 @@ from __future__ import annotations
 import atexit
 import contextlib
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal, overload
 
-from heptarm.arm import fri_settings, program, servo_settings
-from heptarm.arm.collision import Guarding
-from heptarm.arm.conditions import condition_message
-from heptarm.arm.connection import Connection
-from heptarm.arm.contact import Touching
-from heptarm.arm.equipment import Equipment
-from heptarm.arm.fri import Fri
-from heptarm.arm.handle import MotionHandle
-from heptarm.arm.io import Io
-from heptarm.arm.modes import mode_message
-from heptarm.arm.observer import Observer
-from heptarm.arm.operator import Operator
-from heptarm.arm.pad import Pad
-from heptarm.arm.servo import JointServo, PoseServo
-from heptarm.arm.servo_settings import ServoSettings
-from heptarm.arm.stopping import REST_TIMEOUT, Stopping
-from heptarm.arm.teaching import Teaching
-from heptarm.arm.tooling import Tooling
+import numpy as np
+
+from heptarm.arm.devices.io import Io
+from heptarm.arm.devices.operator import Operator
+from heptarm.arm.devices.smartpad import Pad
+from heptarm.arm.devices.tools import Tooling
+from heptarm.arm.fri import settings as fri_settings
+from heptarm.arm.fri.session import Fri
+from heptarm.arm.link.connection import STATE_RATE, Connection
+from heptarm.arm.link.state_stream import GROUPS, States
+from heptarm.arm.motion import program
+from heptarm.arm.motion.handle import BreakRule, MotionHandle, check_timeout
+from heptarm.arm.motion.recovery import RecoveryAttempts
+from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
+from heptarm.arm.motion.servo import JointServo, PoseServo, ServoKeywords, ServoRequest
+from heptarm.arm.translate.conditions import condition_message
+from heptarm.arm.translate.modes import mode_message
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
+from heptarm.skills import collision_guard as guarding
+from heptarm.skills import replay as replaying
+from heptarm.skills import teaching
+from heptarm.skills import touch as touching
 from heptarm.values.arrays import within
-from heptarm.values.condition import Condition
-from heptarm.values.mode import Mode
-from heptarm.values.motion import TOOL, Motion
-from heptarm.values.result import Result
+from heptarm.values.condition.condition import Condition, check_condition
+from heptarm.values.frames import BASE, TOOL
+from heptarm.values.mode.mode import Mode
+from heptarm.values.motion.motion import Motion
+from heptarm.values.pose import Pose
+from heptarm.values.result import Recovery, Result
+from heptarm.values.robot import RobotModel
+from heptarm.values.state import State, Wrench
+from heptarm.values.tool import KnownTool, Tool, Workpiece
+from heptarm.wire import messages as wire
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 _log = logging.getLogger("heptarm.arm")
 
+#: States that a stream of all states keeps for a slow loop.
+_STREAM_SIZE = 2000
+#: Longest wait, after an error, for the arm to rest so that its tool can be changed [s].
+_TOOL_PATIENCE = 5.0
+_STOPS = {kind.name.lower(): kind for kind in wire.StopKind}
 
 
-class Arm(Observer, Equipment, Stopping, Touching, Guarding, Teaching):
+class Arm:
     """A connected arm; made by `connect`. Its methods may be called from any thread.
 
     In a `with` block it is left at rest, however the block ends.
@@ -55,6 +69,7 @@ class Arm(Observer, Equipment, Stopping, Touching, Guarding, Teaching):
         self._pad = Pad(connection)
         self._speed = 1.0
         self._mode: Mode | None = None
+        self._breaks: tuple[BreakRule, ...] = ()
 
     # ------------------------------------------------------------------------------- connection
 
@@ -65,21 +80,34 @@ class Arm(Observer, Equipment, Stopping, Touching, Guarding, Teaching):
         link.open()
         if control:
             link.take_control()
-        if link.options.rate > 0 and link.feed.after(0, link.options.timeout) is None:
-            raise Timeout(f"the cabinet pushed no state within {link.options.timeout:g} s")
+        if link.options.rate > 0:
+            self._wait_for_first_state()
+
+    def _wait_for_first_state(self) -> None:
+        """Wait for a state, and for the velocities, which the cabinet knows from its second sample on."""
+        link = self._connection
+        sample = link.feed.after(0, link.options.timeout)
+        if sample is None:
+            raise Timeout(
+                f"no state received within {link.options.timeout:g} s",
+                hint="check the network and the load of the cabinet, or use connect(..., timeout=...)",
+            )
+        joints = link.build(sample).groups.joints
+        if joints is not None and np.isnan(joints.dq).any():
+            link.feed.after(sample.number, link.options.timeout)
 
     def reconnect(self) -> None:
         """Make a new connection after the old one was lost; a controller takes control again.
 
         Raises:
-            ConnectFailed: nobody answers.
+            ConnectFailed: the cabinet does not answer.
             NotInControl: another client has taken control meanwhile.
         """
         self._tooling.forget()
         self._connection.reopen()
 
     def take_control(self) -> None:
-        """Ask to control.
+        """Take control of the robot.
 
         Raises:
             NotInControl: another client controls the robot; the text names it.
@@ -88,15 +116,17 @@ class Arm(Observer, Equipment, Stopping, Touching, Guarding, Teaching):
         self._connection.take_control()
 
     def release_control(self) -> None:
-        """Give control back; what runs is stopped."""
+        """Give control back; a running motion is stopped."""
         self._connection.release_control()
 
     def close(self) -> None:
-        """Leave the arm at rest and disconnect; a private simulator ends. Closing twice is legal.
+        """Leave the arm at rest and disconnect; a private simulator ends. Calling it again has no effect.
 
-        A controller stops what runs and waits until the arm rests; an observer just leaves.
+        A controller stops the running motion and waits until the arm rests; an observer only disconnects.
         """
-        if not self._connection.close_once():
+        if self.in_control and not self._connection.closed.is_set():
+            self._connection.check_may_wait("arm.close()")
+        if not self._connection.mark_closed():
             return
         try:
             if self.in_control:
@@ -107,9 +137,9 @@ class Arm(Observer, Equipment, Stopping, Touching, Guarding, Teaching):
 
     def _come_to_rest(self) -> None:
         try:
-            self.subscribe(rate=100.0, groups=("joints", "motion", "safety"))
+            self.subscribe(groups=("joints", "motion", "safety"))
             self.stop()
-            self._connection.wait_for(self._resting(), REST_TIMEOUT)
+            self._connection.wait_for(RestDetector(self._connection), REST_TIMEOUT)
             self.release_control()
         except HeptarmError as error:
             _log.warning("closing: %s", error)
@@ -130,28 +160,73 @@ class Arm(Observer, Equipment, Stopping, Touching, Guarding, Teaching):
     def __repr__(self) -> str:
         """Short form."""
         link = self._connection
-        state = "closed" if link.closed.is_set() else "connected" if link.stands else "lost"
-        return f"<Arm {link.title}, {state}, {'in control' if link.controls else 'observing'}>"
+        state = "closed" if link.closed.is_set() else "connected" if link.is_connected else "lost"
+        return f"<Arm {link.title}, {state}, {'in control' if link.in_control else 'observing'}>"
 
-    # ------------------------------------------------------------------------------- properties
+    @property
+    def connected(self) -> bool:
+        """Whether it is connected to the cabinet."""
+        return self._connection.is_connected
+
+    @property
+    def in_control(self) -> bool:
+        """Whether it is connected and this client controls the robot."""
+        return self._connection.in_control and self._connection.is_connected
+
+    @property
+    def controller(self) -> str:
+        """Name of the client that controls the robot; empty: none."""
+        return self._connection.controller
+
+    # ---------------------------------------------------------------------- robot and components
+
+    @property
+    def robot(self) -> RobotModel:
+        """The connected robot and its limits."""
+        return self._connection.robot
+
+    @property
+    def capabilities(self) -> tuple[str, ...]:
+        """What this cabinet supports: "ptp", "lin", ..."""
+        return self._connection.welcome.capabilities
+
+    @property
+    def is_virtual(self) -> bool:
+        """Whether the robot is simulated."""
+        return self._connection.welcome.virtual
+
+    @property
+    def software(self) -> str:
+        """Version of the cabinet application."""
+        return self._connection.welcome.software
+
+    @property
+    def cabinet(self) -> str:
+        """Name of the cabinet."""
+        return self._connection.welcome.cabinet
+
+    @property
+    def pace(self) -> float:
+        """Seconds of the robot's time per second of ours: 1 on a robot, N on a simulator that runs N times faster."""
+        return self._connection.pace
 
     @property
     def operator(self) -> Operator:
-        """The person beside the robot, to be played by this program; a private simulator only.
+        """The operator beside the robot, played by this program; a private simulator only.
 
         Raises:
-            CommandRejected: this is no private simulator.
+            CommandRejected: the target is not a private simulator.
         """
         if self._connection.cabinet is None:
             raise CommandRejected(
-                "only a simulator that this program has started lets it play the operator",
-                hint='connect("sim://iiwa14"), or type the words into the terminal of `heptarm sim`',
+                "arm.operator is available only on a simulator that this program started",
+                hint='use connect("sim://iiwa14"), or type the commands into the terminal of `heptarm sim`',
             )
         return Operator(self._connection.cabinet)
 
     @property
     def io(self) -> Io:
-        """The cabinet's signals: the media flange's, and those of IO groups."""
+        """The cabinet's signals: those of the media flange and of IO groups."""
         return self._io
 
     @property
@@ -159,10 +234,86 @@ class Arm(Observer, Equipment, Stopping, Touching, Guarding, Teaching):
         """The smartPAD: messages, user keys, process data."""
         return self._pad
 
+    # ------------------------------------------------------------------------------------ states
+
     @property
-    def in_control(self) -> bool:
-        """Whether this client controls the robot, as far as is known."""
-        return self._connection.controls and self._connection.stands
+    def state(self) -> State:
+        """The newest pushed state; reading it sends no request to the cabinet.
+
+        Raises:
+            StaleState: it is too old to act on; the text has its age.
+            ConnectionLost: the connection has ended.
+        """
+        return self._connection.fresh()
+
+    @property
+    def state_rate(self) -> float:
+        """Pushed states per second [Hz]; 0: none. See `subscribe`."""
+        return self._connection.options.rate
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Groups that pushed states contain; see `subscribe`."""
+        return self._connection.options.groups
+
+    def history(self) -> tuple[State, ...]:
+        """The last states, up to 50, oldest first."""
+        return self._connection.history()
+
+    def states(
+        self, *, rate: float | None = None, duration: float | None = None, size: int = _STREAM_SIZE
+    ) -> States:
+        """Iterate over states, each at most once.
+
+        Args:
+            rate: at most this many per second [Hz], the newest each time; None: every pushed state, in order.
+            duration: end after this time [s]; None: never.
+            size: without a rate, number of states kept for a slow loop; `States.lost` counts those dropped.
+
+        Raises:
+            LimitError: a rate or duration that is not positive.
+        """
+        return self._connection.stream(
+            rate=None if rate is None else within(rate, "rate", 0.0, 1e4, above=True, unit="Hz"),
+            duration=None if duration is None else within(duration, "duration", 0.0, 1e9, unit="s"),
+            size=size,
+        )
+
+    def wait_until(self, condition: Callable[[State], object], *, timeout: float = 30.0) -> State:
+        """Wait until a condition holds for a pushed state; checked by this program, not by the cabinet.
+
+        Args:
+            condition: called with each state.
+            timeout: longest wait [s].
+
+        Returns:
+            The state for which it held.
+
+        Raises:
+            Timeout: it did not hold in time.
+            ConnectionLost: the connection has ended.
+        """
+        return self._wait_for(condition, timeout)
+
+    def subscribe(self, *, rate: float = STATE_RATE, groups: Sequence[str] = GROUPS) -> None:
+        """Choose the pushed states; a new choice replaces the old one.
+
+        Args:
+            rate: states per second [Hz]; 0: none.
+            groups: "joints", "torques", "pose", "wrench", "motion", "safety", "io", "mode".
+
+        Raises:
+            CommandRejected: a group that the cabinet does not offer.
+            LimitError: a rate above the cabinet's maximum.
+        """
+        self._connection.subscribe(rate, groups)
+
+    def _wait_for(self, condition: Callable[[State], object], timeout: float) -> State:
+        seconds = check_timeout(timeout)
+        with self._connection.stopping_on_interrupt():
+            return self._connection.wait_for(condition, seconds)
+
+    # ---------------------------------------------------------------------------------- motion
 
     @property
     def speed(self) -> float:
@@ -176,8 +327,6 @@ class Arm(Observer, Equipment, Stopping, Touching, Guarding, Teaching):
     def speed(self, value: float) -> None:
         self._speed = within(value, "speed", 0.0, 1.0, above=True)
 
-    # ---------------------------------------------------------------------------------- motion
-
     def move(
         self,
         motion: Motion | Sequence[Motion],
@@ -190,36 +339,44 @@ class Arm(Observer, Equipment, Stopping, Touching, Guarding, Teaching):
         """Carry out a motion, or several as one batch, and wait until it has ended.
 
         Args:
-            motion: what to do.
+            motion: one motion or several.
             mode: control mode of all of them; None: that of `using`, otherwise position.
-            speed: ceiling for this call, (0, 1]; the lower one of this and `arm.speed` counts.
-            until: condition that ends it when it holds, as in `until=force > 10`; what is behind the motion that it
-                ends does not begin. See heptarm.when; the result says which part of it fired, and where.
-            timeout: how long to wait [s]; None: three times as long as it can take, and more.
+            speed: ceiling for this call, (0, 1]; the lower one of this and `arm.speed` applies.
+            until: break condition, as in `until=force > 10`: the motion ends when it holds, and the motions after it
+                do not begin. See heptarm.when; the result names the part that fired, and where.
+            timeout: longest wait [s]; None: three times the longest plausible duration plus 15 s.
 
         Returns:
-            How it ended.
+            How it ended. Its state shows the arm at rest, as `arm.state` does, unless another motion waits or the arm
+            did not settle within 0.5 s, as when it is pushed in impedance control.
 
         Raises:
-            CommandRejected: refused before anything moved; LimitError and others say which value and what is allowed.
-            MotionAborted: ended under way; carries cause, state and history.
-            ConnectionLost: the cabinet was lost; it stops the arm.
+            CommandRejected: refused before anything moved; LimitError and others name the value and the range.
+            MotionAborted: ended early; carries cause, state and history.
+            ConnectionLost: the connection was lost; the cabinet stops the arm.
             Timeout: not ended in time; the arm was stopped.
+            ModeConflict: this thread is in the block of a servo motion or an FRI session.
+            LocalProtocolError: called from a callback.
         """
         motions = program.listed(motion)
+        if timeout is not None:
+            check_timeout(timeout)
+        self._connection.check_may_wait("arm.move()")
+        self._connection.check_no_block("arm.move()")
         if timeout is None and program.is_endless(motions):
             raise ShapeError(
-                "this program ends only when it is cancelled",
+                "this program ends only when it is cancelled, so that move() would never return",
                 parameter="timeout",
                 hint="give a timeout, a hold with a duration, or use arm.start()",
             )
         with self._connection.stopping_on_interrupt():
             handle = self._send(motions, mode=mode, speed=speed, until=until, when="queue")
             try:
-                return handle.wait(timeout=timeout)
+                result = handle.wait(timeout=timeout)
             except Timeout:
                 handle.cancel()
                 raise
+            return settle(self._connection, handle.id, result)
 
     def start(
         self,
@@ -233,14 +390,14 @@ class Arm(Observer, Equipment, Stopping, Touching, Guarding, Teaching):
         """Begin a motion, or several as one batch, and return at once.
 
         Args:
-            motion: what to do.
+            motion: one motion or several.
             mode: control mode of all of them; None: that of `using`, otherwise position.
             speed: ceiling for this call, (0, 1].
-            until: condition that ends it; see `move`.
-            when: while another one runs: "queue" behind it, "replace" it, or "reject" this one.
+            until: break condition; see `move`.
+            when: while another motion runs: "queue" behind it, "replace" it, or "reject" this one.
 
         Raises:
-            CommandRejected: refused; ModeConflict if `when` is "reject" and something runs.
+            CommandRejected: refused; ModeConflict if `when` is "reject" and a motion runs.
             ConnectionLost: the connection has ended.
         """
         with self._connection.stopping_on_interrupt():
@@ -248,10 +405,10 @@ class Arm(Observer, Equipment, Stopping, Touching, Guarding, Teaching):
 
     @contextlib.contextmanager
     def using(self, mode: Mode) -> Iterator[None]:
-        """A block whose motions and servo motions have a control mode unless they say another.
+        """A block whose motions and servo motions have a control mode unless they name another.
 
         Raises:
-            ShapeError: it is no mode.
+            ShapeError: not a control mode.
         """
         mode_message(mode)
         outer, self._mode = self._mode, mode
@@ -259,6 +416,35 @@ class Arm(Observer, Equipment, Stopping, Touching, Guarding, Teaching):
             yield
         finally:
             self._mode = outer
+
+    @contextlib.contextmanager
+    def breaking_on(
+        self, condition: Condition, *, error: Callable[[Result], HeptarmError] | None = None
+    ) -> Iterator[None]:
+        """A block whose motions and servo motions also end when a condition holds.
+
+        Args:
+            condition: break condition, in addition to `until` of each motion; see heptarm.when.
+            error: called with the result of a motion that it ended; returns the error that `move` and `wait` raise.
+                Called from the link's thread, so it must not block. None: the motion ends with a result.
+
+        Raises:
+            ShapeError: not a condition.
+        """
+        rule = BreakRule(check_condition(condition, "condition"), error)
+        self._breaks = (*self._breaks, rule)
+        try:
+            yield
+        finally:
+            self._breaks = tuple(one for one in self._breaks if one is not rule)
+
+    def _until(self, until: Condition | None, breaks: tuple[BreakRule, ...]) -> Condition | None:
+        """A break condition together with those of the enclosing blocks."""
+        if until is not None:
+            check_condition(until)
+        for rule in breaks:
+            until = rule.condition if until is None else until | rule.condition
+        return until
 
     def _send(
         self,
@@ -269,124 +455,303 @@ class Arm(Observer, Equipment, Stopping, Touching, Guarding, Teaching):
         until: Condition | None,
         when: str,
     ) -> MotionHandle:
-        ceiling = self._speed
+        ceiling, breaks = self._speed, self._breaks
         if speed is not None:
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
-        mode, until = mode or self._mode, self._guarded(until)
         return program.send(
-            self._connection, self._tooling, motions, ceiling=ceiling, mode=mode, until=until, when=when
+            self._connection,
+            self._tooling,
+            motions,
+            ceiling=ceiling,
+            mode=mode or self._mode,
+            until=self._until(until, breaks),
+            when=when,
+            breaks=breaks,
         )
 
     @overload
-    def servo(self, kind: Literal["joint"] = "joint", **settings: Unpack[ServoSettings]) -> JointServo: ...
+    def servo(self, kind: Literal["joint"] = "joint", **settings: Unpack[ServoKeywords]) -> JointServo: ...
     @overload
-    def servo(self, kind: Literal["pose", "lin"], **settings: Unpack[ServoSettings]) -> PoseServo: ...
+    def servo(self, kind: Literal["pose", "lin"], **settings: Unpack[ServoKeywords]) -> PoseServo: ...
     def servo(
-        self,
-        kind: Literal["joint", "pose", "lin"] = "joint",
-        *,
-        rate: float = 100.0,
-        watchdog: float | None = None,
-        engine: Literal["smart", "direct"] = "smart",
-        mode: Mode | None = None,
-        speed: float | None = None,
-        acceleration: float | None = None,
-        speed_mps: float | None = None,
-        acceleration_mps2: float | None = None,
-        speed_radps: float | None = None,
-        acceleration_radps2: float | None = None,
-        min_trajectory_time: float | None = None,
-        goal_timeout: float = 300.0,
-        speed_timeout: float | None = None,
-        moving: str = TOOL,
-        until: Condition | None = None,
+        self, kind: Literal["joint", "pose", "lin"] = "joint", **settings: Unpack[ServoKeywords]
     ) -> JointServo | PoseServo:
         """A stream of targets that the arm follows; it begins with the `with` block.
 
         Args:
-            kind: what the targets are: "joint" positions; "pose" of the moved frame, to be reached by the joints; or
-                "lin": the same, to be reached on straight lines.
-            rate: ticks per second of the loop [Hz].
-            watchdog: within this time after a target the next one has to come, or the arm stops [s], 0.005 to 2;
-                None: five periods, and at least 0.2 s.
-            engine: of joints and poses: "smart" plans a limited trajectory to each target; "direct" goes straight for
-                it, for targets that are close and smooth.
-            mode: control mode; None: position. It may change its parameters while the arm follows.
-            speed: of joints and poses: ceiling, a fraction of each axis' maximum in (0, 1]; None: 0.2. The lower one of
-                this and `arm.speed` counts.
-            acceleration: likewise, of the acceleration and the jerk.
-            speed_mps: of "lin": largest speed along each axis of the base [m/s], up to 10; None: 0.25. `arm.speed`
-                scales it, since the joints' own limits are not heeded.
-            acceleration_mps2: likewise [m/s²], up to 100; None: 1. Not scaled.
-            speed_radps: largest speed of the rotation about each axis of the base [rad/s], up to 20; None: 0.5. Scaled.
-            acceleration_radps2: likewise [rad/s²], up to 200; None: 2. Not scaled.
-            min_trajectory_time: no trajectory to a target is shorter [s]; None: a period and 5 ms.
-            goal_timeout: after so long at its target without another one the cabinet's servo motion ends [s]; the
-                next target begins a new one.
-            speed_timeout: of joints with the engine "smart": how long the velocity of a target is kept after the target
-                was passed, before the arm brakes [s], 0.001 to 10; None: 0.1.
-            moving: the moved frame: "tool" (the attached tool's, without one the flange), "flange" or a frame's name.
-            until: condition that ends it when it holds; the cabinet's application looks 250 times a second, as far as
-                its robot answers that fast. See `move`.
+            kind: what the targets are: "joint" positions; "pose" of the motion frame, reached by the joints; or "lin":
+                the same, reached on straight lines.
+            **settings: rate: ticks of the loop per second [Hz]; 100.
+                watchdog: longest gap between two targets; a longer one stops the arm [s], 0.005 to 2; None: five
+                periods, at least 0.2 s.
+                engine: of joints and poses: "smart" plans a limited trajectory to each target; "direct" moves straight
+                to it, for targets that are close and smooth.
+                mode: control mode; None: that of `using`, otherwise position. Its parameters can change while the arm
+                follows.
+                speed: of joints and poses: ceiling, a fraction of each axis' maximum in (0, 1]; None: 0.2. The lower
+                one of this and `arm.speed` applies.
+                acceleration: likewise, of the acceleration and the jerk.
+                speed_mps: of "lin": largest speed along each axis of the base [m/s], up to 10; None: 0.25. `arm.speed`
+                scales it, since the joints' own limits are not checked.
+                acceleration_mps2: likewise [m/s²], up to 100; None: 1. Not scaled.
+                speed_radps: largest angular velocity about each axis of the base [rad/s], up to 20; None: 0.5. Scaled.
+                acceleration_radps2: likewise [rad/s²], up to 200; None: 2. Not scaled.
+                min_trajectory_time: shortest trajectory to a target [s]; None: a period and 5 ms.
+                goal_timeout: time at its target without another one after which the cabinet's servo motion ends [s];
+                300. The next target begins a new one.
+                speed_timeout: of joints with the engine "smart": how long the arm keeps the velocity of a target after
+                passing it, before it brakes [s], 0.001 to 10; None: 0.1.
+                moving: motion frame: "tool" (of the attached tool, or the flange), "flange" or the name of a frame.
+                until: break condition; the cabinet's application checks it up to 250 times a second, as fast as its
+                robot answers. See `move`.
 
         Raises:
             LimitError: a value outside its range.
-            CommandRejected: a limit that this kind of stream would not heed.
+            CommandRejected: a setting that this kind of servo motion does not obey.
             ModeConflict: another motion runs (when the block begins).
         """
-        message, hertz, seconds = servo_settings.open_message(
-            kind,
-            rate=rate,
-            watchdog=watchdog,
-            engine=engine,
-            mode=mode or self._mode,
-            speed=speed,
-            acceleration=acceleration,
-            min_trajectory_time=min_trajectory_time,
-            goal_timeout=goal_timeout,
-            moving=moving,
-            line=servo_settings.Line(speed_mps, acceleration_mps2, speed_radps, acceleration_radps2),
-            ceiling=self._speed,
-            speed_timeout=speed_timeout,
-        )
-        self._tooling.check_moved(moving, "moving")
-        self._tooling.check_mode(mode or self._mode)
-        ends, parts = condition_message(self._guarded(until), self._connection.welcome.signals)
+        breaks = self._breaks
+        settings["mode"] = settings.get("mode") or self._mode
+        request = ServoRequest(kind, **settings)
+        message = request.message(self._speed)
+        self._tooling.check_motion_frame(request.moving, "moving")
+        self._tooling.check_mode(request.mode)
+        ends, parts = condition_message(self._until(request.until, breaks), self._connection.signals)
         self._tooling.check_until(parts)
         stream = JointServo if kind == "joint" else PoseServo
         return stream(
-            self._connection, replace(message, until=ends), rate=hertz, watchdog=seconds, until=parts
+            self._connection,
+            replace(message, until=ends),
+            period=request.period,
+            watchdog=request.watchdog_time,
+            until=parts,
+            breaks=breaks,
         )
 
     def fri(
         self,
         kind: Literal["position", "torque", "wrench", "pose", "monitor"] = "position",
-        **settings: Unpack[fri_settings.FriSettings],
+        **settings: Unpack[fri_settings.FriKeywords],
     ) -> Fri:
-        """An FRI session, answered by a process of its own; it begins with the `with` block.
+        """An FRI session in a process of its own; it begins with the `with` block.
 
         Args:
-            kind: what is commanded on top of a hold: joint "position", "torque" (under joint impedance), "wrench"
-                (under Cartesian impedance), "pose" (Sunrise 2.x); or "monitor", which runs beside other motions.
+            kind: the quantity commanded on top of a hold: joint "position", "torque" (in joint impedance), "wrench"
+                (in Cartesian impedance), "pose" (Sunrise 2.x); or "monitor", which runs beside other motions.
             **settings: period_ms: time between two messages, 1 to 100 [ms]; 5, and 1 for a monitor.
-                multiplier: every how manieth message is answered; 1.
+                multiplier: answer every n-th message; 1.
                 mode: control mode of the hold; None: that of `using`, otherwise position.
                 law: `law(state, out, params)`, called in the loop's process in every cycle; None: `Fri.command`.
-                params: numbers and arrays by name for the law, to be changed while it runs.
-                policy: what is sent while commands stay away, `heptarm.fri.Policy`; by default the arm brakes.
-                limits: what the guard keeps, `heptarm.fri.Limits`; the robot's, a little inside.
-                pose_limits: what it keeps of commanded poses, `heptarm.fri.PoseLimits`; 0.25 m/s and 1 rad/s.
-                io: up to ten names of signals, as in `arm.io`, that the session carries: `state.io`, `Fri.output`.
-                version: FRI release of the cabinet such as "1.15"; None: told from the first message.
-                host: under which address the cabinet reaches this machine; empty: as this connection does.
+                params: numbers and arrays by name for the law, which can change while it runs.
+                policy: what is sent while commands are missing, `heptarm.fri.Policy`; by default the arm brakes.
+                limits: limits of the guard, `heptarm.fri.Limits`; those of the robot, slightly reduced.
+                pose_limits: limits of commanded poses, `heptarm.fri.PoseLimits`; 0.25 m/s and 1 rad/s.
+                io: up to ten names of signals, as in `arm.io`, that the session transmits: `state.io`, `Fri.output`.
+                version: FRI release of the cabinet such as "1.15"; None: detected from the first message.
+                host: address at which the cabinet reaches this machine; empty: that of this connection.
                 port: own UDP port; 0: any free one; None: the first free one of FRI's.
-                realtime: ask for real-time priority and locked memory. cpu: processor of the loop; None: any.
-                history: messages that are kept. timeout: how long the session may take to stand [s].
+                realtime: request real-time priority and locked memory. cpu: processor of the loop; None: any.
+                history: messages that are kept. timeout: longest time until the session is open [s].
 
         Raises:
-            CommandRejected: this cabinet has no such session; ModeConflict: not in this control mode.
+            CommandRejected: this cabinet does not support the session; ModeConflict: not in this control mode.
             LimitError: a value outside its range.
         """
         settings["mode"] = settings.get("mode") or (None if kind == "monitor" else self._mode)
         self._tooling.check_mode(settings["mode"])
         return Fri(self._connection, fri_settings.request(self._connection, kind, **settings))
+
+    # -------------------------------------------------------------------------- stop and recover
+
+    def stop(self, kind: Literal["path", "fast", "after_motion"] = "path") -> None:
+        """Stop the running motion and drop waiting ones; any client may, at any time, from any thread.
+
+        It returns when the cabinet has accepted the stop; `wait_for_rest` waits until the arm rests. If the connection
+        was lost, the stop goes through a new one.
+
+        Args:
+            kind: "path": brake on the path; "fast": brake every axis as hard as possible, off the path (a cabinet has
+                only one kind of braking, so there it is the same); "after_motion": finish the running motion and drop
+                the waiting ones.
+
+        Raises:
+            ConnectionLost: the cabinet cannot be reached.
+        """
+        if kind not in _STOPS:
+            raise ShapeError(
+                f"kind must be one of {', '.join(map(repr, _STOPS))}, got {kind!r}",
+                parameter="kind",
+                value=kind,
+            )
+        self._connection.stop(_STOPS[kind])
+
+    def recover(self, *, timeout: float = 0.0) -> Recovery:
+        """Make the robot ready again, as far as software may, and list the steps left to a person.
+
+        It makes a new connection if the old one was lost, takes control if this client has none, acknowledges errors
+        whose cause is gone, and ends a pause: a waiting motion continues along its path. It releases no stop and
+        restarts no motion that was ended.
+
+        Args:
+            timeout: how long to try again while a step is left to a person [s].
+
+        Returns:
+            What was done, and the steps that remain.
+
+        Raises:
+            ConnectionLost: the arm was closed.
+        """
+        seconds = within(timeout, "timeout", 0.0, 1e6, unit="s")
+        self._connection.check_may_wait("arm.recover()")
+        with self._connection.stopping_on_interrupt():
+            return RecoveryAttempts(self._connection).run(seconds)
+
+    def pause(self) -> None:
+        """Pause on the path."""
+        self._connection.request(wire.Pause())
+
+    def resume(self) -> None:
+        """Continue after a pause."""
+        self._connection.request(wire.Resume())
+
+    def set_override(self, value: float) -> None:
+        """Set the application override: a factor in [0, 1] on every programmed speed, at once.
+
+        Raises:
+            LimitError: outside [0, 1].
+        """
+        self._connection.request(wire.SetOverride(value=within(value, "override", 0.0, 1.0)))
+
+    def wait_for_rest(self, *, timeout: float = REST_TIMEOUT) -> State:
+        """Wait until nothing runs, nothing waits, and no axis turns.
+
+        Raises:
+            Timeout: the arm does not come to rest in time.
+            StaleState: the subscribed groups lack "joints" or "motion".
+        """
+        return self._wait_for(RestDetector(self._connection), timeout)
+
+    # -------------------------------------------------------------------------- tools and frames
+
+    @property
+    def tools(self) -> dict[str, KnownTool]:
+        """Tools that can be attached by name: templates of the project, and defined ones."""
+        return self._tooling.known
+
+    @property
+    def frames(self) -> dict[str, Pose]:
+        """Taught frames of the project by name, in the base frame."""
+        return self._tooling.taught
+
+    def attach_tool(self, tool: Tool | str, *, frame: str | None = None) -> None:
+        """Tell the cabinet which tool is on the flange, in place of another; the arm has to be at rest.
+
+        On a robot a person mounts the tool; this sets the load with which the controller computes, and the frame to
+        which motions, poses and wrenches refer. In a simulator the tool is mounted from now on. It stays attached when
+        the client disconnects, since it stays on the flange.
+
+        Args:
+            tool: the tool, or the name of a template of the project or of a tool defined before.
+            frame: the one of its frames that motions move by default; None: its first.
+
+        Raises:
+            CommandRejected: no tool or frame of that name; the text lists them.
+            ModeConflict: a motion runs.
+        """
+        self._tooling.attach(tool, frame)
+
+    def detach_tool(self) -> None:
+        """Tell the cabinet that the flange is empty; a workpiece goes with its tool.
+
+        Raises:
+            ModeConflict: a motion runs.
+        """
+        self._tooling.detach()
+
+    def attach_workpiece(self, workpiece: Workpiece) -> None:
+        """Tell the cabinet what the tool holds, at the motion frame; the arm has to be at rest.
+
+        Raises:
+            ModeConflict: a motion runs, or a workpiece is attached already.
+        """
+        self._tooling.attach_workpiece(workpiece)
+
+    def detach_workpiece(self, workpiece: Workpiece) -> None:
+        """Tell the cabinet that the tool does not hold the workpiece any more.
+
+        Raises:
+            CommandRejected: the tool does not hold it.
+            ModeConflict: a motion runs.
+        """
+        self._tooling.detach_workpiece(workpiece)
+
+    @contextlib.contextmanager
+    def tool(self, tool: Tool | str, *, frame: str | None = None) -> Iterator[None]:
+        """A block in which a tool is attached; afterwards the one before is again. See `attach_tool`."""
+        before = self._tooling.attached
+        self.attach_tool(tool, frame=frame)
+        with self._undoing(lambda: self._tooling.restore(before)):
+            yield
+
+    @contextlib.contextmanager
+    def attached(self, workpiece: Workpiece) -> Iterator[None]:
+        """A block in which the tool holds a workpiece. See `attach_workpiece`."""
+        self.attach_workpiece(workpiece)
+        with self._undoing(lambda: self.detach_workpiece(workpiece)):
+            yield
+
+    @contextlib.contextmanager
+    def _undoing(self, undo: Callable[[], None]) -> Iterator[None]:
+        """A block that ends with an action; after an error the arm must rest first, and the error stays."""
+        try:
+            yield
+        except BaseException:
+            try:
+                self.wait_for_rest(timeout=_TOOL_PATIENCE)
+                undo()
+            except HeptarmError as error:
+                _log.warning("the attached tool did not change: %s", error)
+            raise
+        undo()
+
+    def pose(self, frame: str = TOOL, *, reference: str = BASE, state: State | None = None) -> Pose:
+        """Pose of a frame in another one.
+
+        Args:
+            frame: "tool" (the motion frame), "flange", "base", a taught frame, or one of the tool or workpiece.
+            reference: likewise.
+            state: the state to compute it from; None: the newest.
+
+        Raises:
+            CommandRejected: no such frame is known; the text lists them.
+            StaleState: as `state`.
+        """
+        seen = self.state if state is None else state
+        pose = self._tooling.pose(seen, frame)
+        return pose if reference == BASE else self._tooling.pose(seen, reference).inverse() @ pose
+
+    def wrench(self, frame: str = TOOL, *, axes: str = BASE, state: State | None = None) -> Wrench:
+        """External force and torque at the origin of a frame.
+
+        Args:
+            frame: "tool" (the motion frame), "flange", or one of the tool or workpiece.
+            axes: frame in whose axes the result is: the same names, "base", or a taught frame.
+            state: the state to compute it from; None: the newest.
+
+        Raises:
+            CommandRejected: no such frame is known; the text lists them.
+            StaleState: as `state`.
+        """
+        return self._tooling.wrench(self.state if state is None else state, frame, axes)
+
+    # ------------------------------------------------------------------------------------ skills
+    # Functions of heptarm.skills, which use only what is public above; each takes the arm first.
+
+    touch = touching.touch
+    touch_twice = touching.touch_twice
+    wait_for_taps = touching.wait_for_taps
+    collision_guard = guarding.collision_guard
+    guarded = guarding.guarded
+    guide_precisely = teaching.guide_precisely
+    teach = teaching.teach
+    replay = replaying.replay

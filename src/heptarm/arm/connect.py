@@ -1,18 +1,18 @@
-"""The one way in: from a target to an arm."""
+"""`connect`: make a connected arm of a target."""
 
 from __future__ import annotations
 
+import itertools
 import logging
 import os
 import socket
 from typing import Literal
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.connection import Connection
-from heptarm.arm.groups import GROUPS
-from heptarm.arm.options import Options
-from heptarm.arm.private_cabinet import PrivateCabinet
-from heptarm.arm.target import parse_target, target_from_env
+from heptarm.arm.link.connection import STATE_RATE, TIMEOUT, WATCHDOG, Connection, Options
+from heptarm.arm.link.local_simulator import PrivateCabinet
+from heptarm.arm.link.state_stream import GROUPS
+from heptarm.arm.link.target import parse_target, target_from_env
 from heptarm.errors import ShapeError
 from heptarm.io import tcp
 from heptarm.io.clock import RealClock
@@ -21,7 +21,19 @@ from heptarm.values.arrays import within
 
 _log = logging.getLogger("heptarm.arm")
 
-_LONGEST_NAME = 64
+#: Longest name of a client [bytes].
+_MAX_NAME = 64
+
+
+#: Counts the clients of this process that were not named.
+_unnamed = itertools.count(1)
+
+
+def _default_name() -> str:
+    """Name of a client: user, host and process, and from the second client of this process on its number."""
+    number = next(_unnamed)
+    name = f"{os.environ.get('USER', 'python')}@{socket.gethostname()}:{os.getpid()}"
+    return name if number == 1 else f"{name}#{number}"
 
 
 def connect(
@@ -30,44 +42,51 @@ def connect(
     name: str | None = None,
     key: str | None = None,
     control: bool = True,
-    timeout: float = 5.0,
-    state_rate: float = 100.0,
+    timeout: float = TIMEOUT,
+    state_rate: float = STATE_RATE,
     groups: tuple[str, ...] = GROUPS,
     on_disconnect: Literal["stop", "finish"] = "stop",
-    watchdog: float = 0.5,
+    watchdog: float = WATCHDOG,
 ) -> Arm:
     """Connect to an arm.
 
     Args:
         target: "ADDRESS[:PORT]" of a cabinet; "sim://iiwa14" or "sim://iiwa7?speed=5" for a private simulator that
             ends with the arm; "sim://HOST:PORT" for a running one. None: the environment variable HEPTARM_TARGET.
-        name: who is calling, shown to other clients, up to 64 octets; None: user, host and process.
-        key: pre-shared key of the cabinet, if it has one.
-        control: take control; otherwise observe (and stop). One client at a time controls.
-        timeout: how long to wait for the connection and for the answer to each request [s].
-        state_rate: states pushed per second [Hz]; 0 for none.
-        groups: what a state contains: "joints", "torques", "pose", "wrench", "motion", "safety", "mode".
-        on_disconnect: what the cabinet does with accepted motions when this client is lost: "stop" or "finish".
+        name: name of this client, shown to other clients, up to 64 bytes; None: user, host and process, and
+            a number from the second client of a process on.
+        key: pre-shared key of the cabinet; None: it has none.
+        control: take control; otherwise only observe (and stop). One client at a time is in control.
+        timeout: longest wait for the connection and for the answer to each request [s].
+        state_rate: pushed states per second [Hz]; 0: none.
+        groups: groups that a state contains: "joints", "torques", "pose", "wrench", "motion", "safety", "mode".
+        on_disconnect: what the cabinet does with accepted motions when this client is lost: "stop" or "finish" them.
         watchdog: silence after which the cabinet counts this client as lost, [0.1, 10] s.
 
     Returns:
         The arm; use it in a `with` block, which leaves the arm at rest.
 
     Raises:
-        ConnectFailed: nobody answers, or the session is refused; a wrong target shows examples.
-        VersionMismatch: the two sides do not fit together.
+        ConnectFailed: no answer, or the session is refused; for a wrong target the text shows examples.
+        VersionMismatch: client and cabinet speak different versions of the protocol.
         NotInControl: another client controls the robot; the text names it.
     """
     if on_disconnect not in ("stop", "finish"):
         raise ShapeError(
-            f'on_disconnect is {on_disconnect!r}; "stop" or "finish" is wanted', parameter="on_disconnect"
+            f'on_disconnect must be "stop" or "finish", got {on_disconnect!r}',
+            parameter="on_disconnect",
+            value=on_disconnect,
         )
-    if name is not None and len(name.encode()) > _LONGEST_NAME:
+    if name is not None and len(name.encode()) > _MAX_NAME:
         raise ShapeError(
-            f"name is {name!r}; at most {_LONGEST_NAME} octets are allowed", code=3, parameter="name", value=name
+            f"name must have at most {_MAX_NAME} bytes, got {len(name.encode())}: {name!r}",
+            code=3,
+            parameter="name",
+            value=name,
+            allowed=f"at most {_MAX_NAME} bytes",
         )
     options = Options(
-        name=name or f"{os.environ.get('USER', 'python')}@{socket.gethostname()}:{os.getpid()}",
+        name=name or _default_name(),
         key=key.encode() if key else None,
         timeout=within(timeout, "timeout", 0.0, 3600.0, above=True, unit="s"),
         rate=within(state_rate, "state_rate", 0.0, 1000.0, unit="Hz"),

@@ -1,24 +1,20 @@
-"""Signals of the cabinet, read from the pushed states and written by requests."""
+"""Signals of the cabinet: read from the pushed states, written by requests."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from math import isfinite
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator, Mapping
 
-from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import scalar, within
+from heptarm.arm.link.connection import Connection
+from heptarm.arm.translate.triggers import output_message
+from heptarm.errors import CommandRejected, ShapeError
+from heptarm.values.arrays import within
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
-from heptarm.wire.codes import Code
-
-if TYPE_CHECKING:
-    from heptarm.arm.connection import Connection
 
 _GROUP = "io"
-#: How long the first state with signals may take [s].
-_FIRST = 5.0
+#: Longest wait for the first state with signals [s].
+_FIRST_STATE = 5.0
 #: Lamps of a media flange by the colours of `Io.led`.
 _LAMPS = {"red": "LEDRed", "green": "LEDGreen", "blue": "LEDBlue"}
 _COLOURS = (*_LAMPS, "off")
@@ -27,9 +23,8 @@ _COLOURS = (*_LAMPS, "off")
 class Io(Mapping[str, SignalValue]):
     """The cabinet's signals; `arm.io`.
 
-    A name is "Group.Name", or any part of it behind a point that only one signal has; case and underscores do not
-    matter: `arm.io["MediaFlange.UserButton"]`, `arm.io["user_button"]`. The first reading subscribes to the state
-    group "io", if nothing else has.
+    A name is "Group.Name", or the part after a point if only one signal has it; case and underscores do not matter:
+    `arm.io["MediaFlange.UserButton"]`, `arm.io["user_button"]`. The first reading subscribes to the state group "io".
     """
 
     def __init__(self, connection: Connection) -> None:
@@ -37,7 +32,7 @@ class Io(Mapping[str, SignalValue]):
 
     @property
     def signals(self) -> dict[str, Signal]:
-        """All signals by name, as the cabinet's project has them."""
+        """All signals of the cabinet's project by name."""
         return {one.name: one for one in self._connection.signals}
 
     def __iter__(self) -> Iterator[str]:
@@ -45,63 +40,70 @@ class Io(Mapping[str, SignalValue]):
         return iter([one.name for one in self._connection.signals])
 
     def __len__(self) -> int:
-        """How many there are."""
+        """Number of signals."""
         return len(self._connection.signals)
 
     def __getitem__(self, name: str) -> SignalValue:
-        """Value of a signal, from the newest state: True or False, or a number.
+        """Value of a signal in the newest state: True or False, or a number.
 
         Raises:
-            CommandRejected: there is none of that name, or more than one.
+            CommandRejected: no signal, or more than one, has that name.
         """
         self._find(name)
         return self.values_now[name]
 
     @property
     def values_now(self) -> SignalValues:
-        """Values of all signals, from the newest state."""
+        """Values of all signals in the newest state."""
         newest = self._connection.newest()
-        if newest is None or newest.signals is None:
-            newest = self._wait(lambda state: True, _FIRST)
-        assert newest.signals is not None
-        return newest.signals
+        if newest is None or newest.groups.io is None:
+            newest = self._wait(lambda _: True, _FIRST_STATE)
+        assert newest.groups.io is not None
+        return newest.groups.io
 
     def __setitem__(self, name: str, value: SignalValue) -> None:
-        """Write an output. Raises as `set` does."""
+        """Write an output; raises as `set` does."""
         self.set({name: value})
 
     def set(self, values: Mapping[str, SignalValue]) -> None:
-        """Write outputs, all or none.
+        """Write outputs: all of them, or none if one is refused.
 
         Args:
-            values: by name; True or False, or a number.
+            values: True or False, or a number, by name.
 
         Raises:
             CommandRejected: no such output.
-            LimitError: a value that it cannot have.
+            LimitError: a value outside the range of the output.
         """
         if not values:
-            raise ShapeError("no output is named", code=3, parameter="values", hint='arm.io.set({"LEDBlue": True})')
-        wishes = tuple(output(name, value, self._connection.signals) for name, value in values.items())
-        self._connection.request(wire.SetSignals(values=wishes))
+            raise ShapeError(
+                "values must name at least one output",
+                code=3,
+                parameter="values",
+                hint='arm.io.set({"LEDBlue": True})',
+            )
+        commands = tuple(
+            output_message(name, value, self._connection.signals) for name, value in values.items()
+        )
+        self._connection.request(wire.SetSignals(values=commands))
 
     def wait(self, name: str, value: SignalValue = True, *, timeout: float = 30.0) -> State:
-        """Wait until a signal has a value; looked at here, in the pushed states.
+        """Wait until a signal has a value; checked by this program in the pushed states.
 
         Raises:
-            Timeout: it does not have it in time.
+            Timeout: it does not get the value in time.
             CommandRejected: there is no such signal.
         """
         full = self._find(name).name
         seconds = within(timeout, "timeout", 0.0, 1e9, unit="s")
         with self._connection.stopping_on_interrupt():
             return self._wait(
-                lambda state: state.signals is not None and state.signals[full] == value, seconds
+                lambda state: state.groups.io is not None and state.groups.io[full] == value, seconds
             )
 
     @property
     def led(self) -> str:
-        """Colour of the media flange's lamp: "red", "green", "blue", or "off"; to be set as well."""
+        """Colour of the media flange's lamp: "red", "green", "blue" or "off"; assign to change it."""
         lit = [colour for colour, lamp in self._lamps.items() if self[lamp]]
         return lit[0] if lit else "off"
 
@@ -111,7 +113,7 @@ class Io(Mapping[str, SignalValue]):
         if colour not in (*lamps, "off"):
             known = ", ".join((*lamps, "off")) if colour in _COLOURS else ", ".join(_COLOURS)
             raise CommandRejected(
-                f"the lamp of this media flange cannot be {colour!r}; it can be {known}",
+                f"led must be one of {known} on this media flange, got {colour!r}",
                 parameter="led",
                 value=colour,
                 allowed=known,
@@ -120,7 +122,7 @@ class Io(Mapping[str, SignalValue]):
 
     @property
     def _lamps(self) -> dict[str, str]:
-        """Full names of the lamps that there are, by colour."""
+        """Full names of the existing lamps by colour."""
         names = tuple(self)
         found = {c: n for c, lamp in _LAMPS.items() for n in names if n.rpartition(".")[2] == lamp}
         if not found:
@@ -130,42 +132,9 @@ class Io(Mapping[str, SignalValue]):
     def _find(self, name: str) -> Signal:
         return self._connection.signals[find_name(name, tuple(self))]
 
-    def _wait(self, condition: object, timeout: float) -> State:
+    def _wait(self, condition: Callable[[State], bool], timeout: float) -> State:
+        """Wait for a state with signals that meets a condition; subscribes to the signals if necessary."""
         connection = self._connection
         if _GROUP not in connection.options.groups:
             connection.subscribe(connection.options.rate, (*connection.options.groups, _GROUP))
-        return connection.wait_for(
-            lambda state: state.signals is not None and condition(state),  # type: ignore[operator]
-            timeout,
-        )
-
-
-def output(name: str, value: SignalValue, signals: Sequence[Signal]) -> wire.SetSignal:
-    """The wish that an output has a value.
-
-    Raises:
-        CommandRejected: no such output.
-        LimitError: a value that it cannot have.
-    """
-    signal = signals[find_name(name, tuple(one.name for one in signals))]
-    if not signal.is_output:
-        raise CommandRejected(
-            f"{signal.name} is an input of the cabinet",
-            code=Code.UNSUPPORTED,
-            parameter="signal",
-            value=name,
-            hint="outputs can be written",
-        )
-    number = float(value) if isinstance(value, bool) else scalar(value, signal.name)
-    if not isfinite(number):
-        within(number, signal.name, signal.low, signal.high)
-    if isinstance(value, bool) != (signal.kind == "boolean") and number not in (0.0, 1.0):
-        raise LimitError(
-            f"{signal.name} is {signal.kind}; it cannot be {value!r}",
-            code=2,
-            parameter=signal.name,
-            value=value,
-            allowed="True or False" if signal.kind == "boolean" else f"[{signal.low:g}, {signal.high:g}]",
-        )
-    within(number, signal.name, signal.low, signal.high)
-    return wire.SetSignal(signal=signal.name, value=number)
+        return connection.wait_for(lambda state: state.groups.io is not None and condition(state), timeout)

@@ -1,4 +1,4 @@
-"""The person beside a simulated robot, played by the program that started the simulator."""
+"""The operator of a private simulator, played by the program that started it."""
 
 from __future__ import annotations
 
@@ -6,25 +6,25 @@ from typing import Literal
 
 import numpy.typing as npt
 
-from heptarm.arm.private_cabinet import PrivateCabinet
+from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.errors import CommandRejected
 from heptarm.values.arrays import array, within
 
 
 class Operator:
-    """Acts on a private simulator as a person beside the robot does; `Arm.operator`.
+    """Does to a private simulator what a person beside the robot does; `Arm.operator`.
 
-    What it can do, in words: `heptarm sim` understands the same when they are typed into its terminal.
+    The terminal of `heptarm sim` takes the same commands as `do`.
     """
 
     def __init__(self, cabinet: PrivateCabinet) -> None:
         self._cabinet = cabinet
 
     def do(self, words: str) -> None:
-        """Do something, in words, such as "push 0 0 -20 1.5".
+        """Carry out a command such as "push 0 0 -20 1.5".
 
         Raises:
-            CommandRejected: that is not understood; the text says what is.
+            CommandRejected: there is no such command; the text lists them.
         """
         reply = self._cabinet.operate(words)
         if reply:
@@ -42,11 +42,11 @@ class Operator:
             "singularity",
         ],
     ) -> None:
-        """Let something go wrong; stops stay until `clear`."""
+        """Inject a fault; stops stay active until `clear`."""
         self.do(name)
 
     def clear(self, name: str = "") -> None:
-        """End a stop and acknowledge it; without a name: all of them. Execution stays paused."""
+        """End a stop and acknowledge it; all of them without a name. Execution stays paused."""
         self.do(f"clear {name}")
 
     def hold(self) -> None:
@@ -54,7 +54,7 @@ class Operator:
         self.do("enable")
 
     def release(self) -> None:
-        """Let the enabling switch go."""
+        """Release the enabling switch."""
         self.do("release")
 
     def guide(self) -> None:
@@ -62,14 +62,14 @@ class Operator:
         self.do("guide")
 
     def let_go(self) -> None:
-        """Let the enabling switch of the hand guiding device go."""
+        """Release the enabling switch of the hand guiding device."""
         self.do("let_go")
 
     def choose(self, mode: Literal["t1", "t2", "aut"]) -> None:
         """Choose the operation mode."""
         if mode not in ("t1", "t2", "aut"):
             raise CommandRejected(
-                f"mode is {mode!r}; there are t1, t2, aut",
+                f"mode must be one of t1, t2, aut, got {mode!r}",
                 parameter="mode",
                 value=mode,
                 allowed="t1, t2, aut",
@@ -77,18 +77,18 @@ class Operator:
         self.do(mode)
 
     def override(self, factor: float) -> None:
-        """Set the override at the smartPAD, [0, 1], a factor besides the application's."""
+        """Set the override at the smartPAD, [0, 1]; it multiplies the application override."""
         self.do(f"override {within(factor, 'factor', 0.0, 1.0)!r}")
 
     def start(self) -> None:
-        """Press Start: execution goes on."""
+        """Press Start: execution resumes."""
         self.do("start")
 
     def set_signal(self, name: str, value: bool | float) -> None:
-        """Give a signal of the cabinet a value, as the world does to an input.
+        """Set a signal of the cabinet, as the wiring does with an input.
 
         Raises:
-            CommandRejected: there is none of that name.
+            CommandRejected: there is no signal of that name.
         """
         self.do(f"set {name} {str(value).lower() if isinstance(value, bool) else repr(float(value))}")
 
@@ -108,8 +108,8 @@ class Operator:
         """Push the flange.
 
         Args:
-            force: base axes, shape (3,) [N].
-            duration: for so long [s].
+            force: in the base axes, shape (3,) [N].
+            duration: time for which it acts [s].
         """
         x, y, z = array(force, 3, "force").tolist()
         self.do(f"push {x!r} {y!r} {z!r} {within(duration, 'duration', 0.0, 1e6, unit='s')!r}")

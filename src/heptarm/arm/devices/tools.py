@@ -1,35 +1,36 @@
-"""Which tools the cabinet knows, what hangs on the flange, and what the names of frames mean."""
+"""Tools, workpieces and frames: which exist, what is attached, and what the names of frames mean."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from heptarm.arm.link.connection import Connection
+from heptarm.arm.translate.tools import known_tool, read_pose, tool_message
 from heptarm.errors import ShapeError
 from heptarm.model.kinematics import forward
-from heptarm.values.condition import Condition
-from heptarm.values.mode import CartesianImpedance, Mode, SineImpedance
-from heptarm.values.motion import TOOL, Motion
+from heptarm.values.condition.condition import Condition
+from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL
+from heptarm.values.mode.impedance import CartesianImpedance
+from heptarm.values.mode.mode import Mode
+from heptarm.values.mode.sine import SineImpedance
+from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose
 from heptarm.values.state import State, Wrench
-from heptarm.values.tool import BASE, FLANGE, SEPARATOR, KnownTool, Tool, Workpiece, unknown
+from heptarm.values.tool import KnownTool, Tool, Workpiece, unknown
 from heptarm.wire import messages as wire
-
-if TYPE_CHECKING:
-    from heptarm.arm.connection import Connection
 
 _ORIGIN = Pose.of((0.0, 0.0, 0.0))
 
 
 @dataclass(frozen=True, slots=True)
-class Fitted:
-    """What hangs on the flange.
+class Attachment:
+    """What is attached to the flange.
 
     Attributes:
-        tool: its name; empty: none.
-        workpiece: its name; empty: none.
-        frame: what motions move unless they say another: a frame of the tool's, or "flange".
+        tool: name of the tool; empty: none.
+        workpiece: name of the workpiece; empty: none.
+        frame: the motion frame unless a motion names another: a frame of the tool, or "flange".
     """
 
     tool: str = ""
@@ -38,10 +39,10 @@ class Fitted:
 
 
 class Tooling:
-    """Tools of one arm, as far as this client knows.
+    """Tools, workpieces and frames of one arm, as far as this client knows them.
 
-    What hangs on the flange is what this client has said last while it controls the robot, otherwise what the newest
-    state says. Where neither is known, names are left to the cabinet to refuse.
+    While this client controls the robot, the attached tool is the one that it attached last; otherwise it is the one
+    in the newest state. Where neither is known, the cabinet checks the names.
 
     Args:
         connection: to the cabinet.
@@ -50,38 +51,38 @@ class Tooling:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self._defined: dict[str, KnownTool] = {}
-        self._piece: Workpiece | None = None
-        self._said: Fitted | None = None
+        self._workpiece: Workpiece | None = None
+        self._commanded: Attachment | None = None
 
     def forget(self) -> None:
-        """Another client may have changed what hangs on the flange."""
-        self._said = self._piece = None
+        """Forget what this client attached: another client may have changed it."""
+        self._commanded = self._workpiece = None
 
     @property
     def known(self) -> dict[str, KnownTool]:
-        """Tools by name: of the project as far as the cabinet names them, and defined ones."""
-        told = {tool.name: known_tool(tool) for tool in self._connection.welcome.tools}
-        return told | self._defined
+        """Tools by name: templates that the cabinet reported, and tools that this client defined."""
+        templates = {tool.name: known_tool(tool) for tool in self._connection.welcome.tools}
+        return templates | self._defined
 
     @property
     def taught(self) -> dict[str, Pose]:
         """Taught frames of the project by name, in the base frame."""
-        return {frame.name: _pose(frame.pose) for frame in self._connection.welcome.frames}
+        return {frame.name: read_pose(frame.pose) for frame in self._connection.welcome.frames}
 
     @property
-    def fitted(self) -> Fitted | None:
-        """What hangs on the flange; None: not known here."""
-        if self._said is not None and self._connection.controls:
-            return self._said
+    def attached(self) -> Attachment | None:
+        """What is attached to the flange; None: not known."""
+        if self._commanded is not None and self._connection.in_control:
+            return self._commanded
         newest = self._connection.newest()
-        if newest is None or newest.control is None:
+        if newest is None or newest.groups.mode is None:
             return None
-        return Fitted(newest.control.tool, newest.control.workpiece, newest.control.frame)
+        return Attachment(newest.groups.mode.tool, newest.groups.mode.workpiece, newest.groups.mode.frame)
 
-    # ------------------------------------------------------------------------------- on the flange
+    # ------------------------------------------------------------------------------- attaching
 
     def attach(self, tool: Tool | str, frame: str | None) -> None:
-        """Attach a tool, defining it before if it is given as a value; see `Arm.attach_tool`."""
+        """Attach a tool, after defining it if it is a `Tool`; see `Arm.attach_tool`."""
         if isinstance(tool, Tool):
             main = frame if frame is not None else (tool.frame_names or (FLANGE,))[0]
             if frame is not None:
@@ -93,39 +94,39 @@ class Tooling:
             name, main = tool, frame or ""
         else:
             raise ShapeError(
-                f"tool is {tool!r}; a Tool or the name of one is wanted", parameter="tool", value=tool
+                f"tool must be a Tool or the name of one, got {tool!r}", parameter="tool", value=tool
             )
         self._connection.request(wire.AttachTool(name=name, frame=frame or ""))
         if not main and name in self.known:
             main = (self.known[name].frame_names or (FLANGE,))[0]
-        self._piece = None
-        self._said = Fitted(name, "", main) if main else None
+        self._workpiece = None
+        self._commanded = Attachment(name, "", main) if main else None
 
     def detach(self) -> None:
-        """Take off what hangs on the flange; nothing happens if nothing does."""
+        """Detach the tool and its workpiece; has no effect if nothing is attached."""
         self._connection.request(wire.AttachTool(name="", frame=""))
-        self._said, self._piece = Fitted(), None
+        self._commanded, self._workpiece = Attachment(), None
 
-    def load(self, workpiece: Workpiece) -> None:
+    def attach_workpiece(self, workpiece: Workpiece) -> None:
         """Attach a workpiece; see `Arm.attach_workpiece`."""
         if not isinstance(workpiece, Workpiece):
             raise ShapeError(
-                f"workpiece is {workpiece!r}; a Workpiece is wanted", parameter="workpiece", value=workpiece
+                f"workpiece must be a Workpiece, got {workpiece!r}", parameter="workpiece", value=workpiece
             )
-        before = self.fitted
+        before = self.attached
         self._connection.request(wire.AttachLoad(load=tool_message(workpiece), attached=True))
-        self._piece = workpiece
-        self._said = None if before is None else Fitted(before.tool, workpiece.name, before.frame)
+        self._workpiece = workpiece
+        self._commanded = None if before is None else Attachment(before.tool, workpiece.name, before.frame)
 
-    def unload(self, workpiece: Workpiece) -> None:
-        """Take a workpiece off; see `Arm.detach_workpiece`."""
-        before = self.fitted
+    def detach_workpiece(self, workpiece: Workpiece) -> None:
+        """Detach a workpiece; see `Arm.detach_workpiece`."""
+        before = self.attached
         self._connection.request(wire.AttachLoad(load=tool_message(workpiece), attached=False))
-        self._piece = None
-        self._said = None if before is None else Fitted(before.tool, "", before.frame)
+        self._workpiece = None
+        self._commanded = None if before is None else Attachment(before.tool, "", before.frame)
 
-    def restore(self, before: Fitted | None) -> None:
-        """Attach the tool that hung on the flange before, if one did."""
+    def restore(self, before: Attachment | None) -> None:
+        """Attach an earlier tool again, or none."""
         if before is None or not before.tool:
             self.detach()
         else:
@@ -133,60 +134,60 @@ class Tooling:
 
     # ------------------------------------------------------------------------------------- names
 
-    def _owned(self) -> dict[str, Pose] | None:
-        """Frames on the flange by all their names, seen from the flange; None: not known here."""
-        fitted = self.fitted
-        if fitted is None:
+    def _flange_frames(self) -> dict[str, Pose] | None:
+        """Poses of the frames on the flange in the flange frame, by all their names; None: not known."""
+        attached = self.attached
+        if attached is None:
             return None
         frames: dict[str, Pose] = {}
-        if fitted.tool:
-            tool = self.known.get(fitted.tool)
+        if attached.tool:
+            tool = self.known.get(attached.tool)
             if tool is None:
                 return None
             for name, pose in tool.frames:
                 frames[name] = frames[f"{tool.name}{SEPARATOR}{name}"] = pose
-        moved = frames.get(fitted.frame, _ORIGIN)
-        if fitted.workpiece:
-            piece = self._piece
-            if piece is None or piece.name != fitted.workpiece:
+        tip = frames.get(attached.frame, _ORIGIN)
+        if attached.workpiece:
+            workpiece = self._workpiece
+            if workpiece is None or workpiece.name != attached.workpiece:
                 return None
-            for name, pose in piece.frames:
-                frames.setdefault(name, moved @ pose)
-                frames[f"{piece.name}{SEPARATOR}{name}"] = moved @ pose
-        return {FLANGE: _ORIGIN, TOOL: moved} | frames
+            for name, pose in workpiece.frames:
+                frames.setdefault(name, tip @ pose)
+                frames[f"{workpiece.name}{SEPARATOR}{name}"] = tip @ pose
+        return {FLANGE: _ORIGIN, TOOL: tip} | frames
 
-    def check_moved(self, name: str, parameter: str) -> None:
-        """Refuse the name of a frame that cannot be moved; raises CommandRejected."""
-        owned = self._owned()
-        if owned is not None and name not in owned:
-            raise unknown(name, parameter, tuple(owned))
+    def check_motion_frame(self, name: str, parameter: str) -> None:
+        """Refuse a motion frame that is not on the flange; raises CommandRejected."""
+        frames = self._flange_frames()
+        if frames is not None and name not in frames:
+            raise unknown(name, parameter, tuple(frames))
 
     def check_reference(self, name: str, parameter: str) -> None:
-        """Refuse the name of a frame that gives no axes; raises CommandRejected."""
-        owned = self._owned()
-        if owned is not None and name not in owned and name != BASE and name not in self.taught:
-            raise unknown(name, parameter, (*owned, BASE, *self.taught))
+        """Refuse an unknown reference frame; raises CommandRejected."""
+        frames = self._flange_frames()
+        if frames is not None and name not in frames and name != BASE and name not in self.taught:
+            raise unknown(name, parameter, (*frames, BASE, *self.taught))
 
     def check(self, motions: Sequence[Motion], mode: Mode | None) -> None:
-        """Refuse frames in motions and mode that are not known; raises CommandRejected."""
+        """Refuse motions and a mode that name unknown frames; raises CommandRejected."""
         for index, motion in enumerate(motions):
             at = f"motions[{index}]." if len(motions) > 1 else ""
             moving, axes = getattr(motion, "moving", TOOL), getattr(motion, "frame", TOOL)
             if moving != TOOL:
-                self.check_moved(moving, f"{at}moving")
+                self.check_motion_frame(moving, f"{at}moving")
             if axes != TOOL:
                 self.check_reference(axes, f"{at}frame")
         self.check_mode(mode)
 
     def check_until(self, parts: Sequence[Condition]) -> None:
-        """Refuse conditions whose frames are not known; raises CommandRejected."""
+        """Refuse conditions that name unknown frames; raises CommandRejected."""
         for index, part in enumerate(parts):
             axes = getattr(part, "frame", TOOL)
             if axes != TOOL:
                 self.check_reference(axes, f"until[{index}].frame")
 
     def check_mode(self, mode: Mode | None) -> None:
-        """Refuse a mode whose frame is not known; raises CommandRejected."""
+        """Refuse a mode that names an unknown frame; raises CommandRejected."""
         base = mode.base if isinstance(mode, SineImpedance) else mode
         if isinstance(base, CartesianImpedance) and base.frame != TOOL:
             self.check_reference(base.frame, "mode.frame")
@@ -205,41 +206,14 @@ class Tooling:
         taught = self.taught
         if name in taught:
             return taught[name]
-        if name == TOOL and state.cartesian is not None:
+        if name == TOOL and state.groups.pose is not None:
             return state.pose
-        owned = self._owned() or {FLANGE: _ORIGIN}
-        if name not in owned:
-            raise unknown(name, "frame", (*owned, BASE, *taught))
-        return Pose.from_matrix(forward(self._connection.robot, state.q)) @ owned[name]
+        frames = self._flange_frames() or {FLANGE: _ORIGIN}
+        if name not in frames:
+            raise unknown(name, "frame", (*frames, BASE, *taught))
+        return Pose.from_matrix(forward(self._connection.robot, state.q)) @ frames[name]
 
     def wrench(self, state: State, name: str, axes: str) -> Wrench:
         """External force and torque at the origin of one frame in the axes of another; raises as `pose` does."""
-        told = state.wrench
         lever = self.pose(state, TOOL).xyz - self.pose(state, name).xyz
-        return told.seen(lever, self.pose(state, axes).rotation)
-
-
-def tool_message(tool: Tool | Workpiece) -> wire.ToolInfo:
-    """The message of a tool or a workpiece."""
-    return wire.ToolInfo(
-        name=tool.name,
-        mass=tool.mass,
-        com=tuple(tool.com.tolist()),
-        inertia=tuple(tool.inertia.tolist()),
-        frames=tuple(
-            wire.FrameInfo(
-                name=name,
-                pose=wire.Pose(xyz=tuple(pose.xyz.tolist()), quat=tuple(pose.quat.tolist())),
-            )
-            for name, pose in tool.frames
-        ),
-    )
-
-
-def known_tool(told: wire.ToolInfo) -> KnownTool:
-    """What the cabinet says of a tool."""
-    return KnownTool(told.name, told.mass, tuple((frame.name, _pose(frame.pose)) for frame in told.frames))
-
-
-def _pose(told: wire.Pose) -> Pose:
-    return Pose.of(told.xyz, told.quat)
+        return state.wrench.seen(lever, self.pose(state, axes).rotation)

@@ -1,4 +1,4 @@
-"""FRI sessions: commands every millisecond, answered by a process of their own.
+"""FRI sessions: commands up to every millisecond, sent by a process of their own.
 
 ::
 
@@ -9,7 +9,7 @@
         rt.wait(3.0)
         rt.params.amplitude = 0.2
 
-The client listens before the cabinet is asked to open the session, so nobody waits for anybody.
+The client listens before the cabinet is asked to open the session, so neither side waits for the other.
 """
 
 from __future__ import annotations
@@ -18,16 +18,13 @@ import contextlib
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
-from math import inf
-from typing import TYPE_CHECKING
 
 import numpy.typing as npt
 
-from heptarm.arm.block import Block
-from heptarm.arm.fri_advice import advice, summary
-from heptarm.arm.fri_ends import ended, explained, nothing_told
-from heptarm.arm.fri_settings import Request, check_command
-from heptarm.arm.handle import MotionHandle
+from heptarm.arm.fri.diagnosis import advice, early_end, end_text, no_report, summary
+from heptarm.arm.fri.settings import FriRequest, check_command
+from heptarm.arm.link.connection import Connection
+from heptarm.arm.motion.handle import Block, MotionHandle
 from heptarm.errors import (
     CommandRejected,
     ConnectFailed,
@@ -41,113 +38,114 @@ from heptarm.errors import (
     StreamError,
     Timeout,
 )
-from heptarm.fri.event import Event, Kind
-from heptarm.fri.messages import Quality, SessionState
+from heptarm.fri.loop.client import Client
+from heptarm.fri.loop.cycle import LAW_FAILED
+from heptarm.fri.loop.user_api import Params, Stats
+from heptarm.fri.loop.user_api import State as FriState
+from heptarm.fri.protocol.messages import Quality, SessionState
+from heptarm.fri.session.session import Event, Kind
 from heptarm.io.udp import own_address
-from heptarm.rt import Client, Params, Stats
-from heptarm.rt import State as FriState
-from heptarm.rt.cycle import LAW_FAILED
 from heptarm.values.arrays import within
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
 from heptarm.values.result import Cause, Result
 from heptarm.wire import messages as wire
 
-if TYPE_CHECKING:
-    from heptarm.arm.connection import Connection
-
-#: How long to wait for the end of a session, and for a message of a session that stands [s].
+#: Longest wait for the end of a session, and for a message of an open one [s].
 _PATIENCE = 5.0
-#: How often the end of a session is looked for without messages [s].
-_LOOK = 0.05
-#: Events kept until somebody takes them.
-_EVENTS = 256
+#: Interval of the checks whether the session has ended, while no messages arrive [s].
+_CHECK_INTERVAL = 0.05
+#: Events that are kept until `events` takes them.
+_MAX_EVENTS = 256
 
 
 class Fri(Block):
     """An FRI session; made by `Arm.fri`, used once, in a `with` block.
 
-    Leaving the block ends overlay and session, and the arm rests. What ended it earlier rises there as an error. The
-    next session needs nothing but another `arm.fri(...)`.
+    Leaving the block ends overlay and session, and the arm comes to rest. An error that ended the session earlier is
+    raised there. `arm.fri(...)` opens the next session.
 
     Args:
         connection: to the cabinet.
-        request: what is asked for.
+        request: the checked request.
     """
 
     what = "FRI session"
 
-    def __init__(self, connection: Connection, request: Request) -> None:
+    def __init__(self, connection: Connection, request: FriRequest) -> None:
         self._connection = connection
         self._request = request
         self._host = request.message.host
-        self._made: Client | None = None
+        self._client: Client | None = None
         self._handle: MotionHandle | None = None
         self._number = 0
         self._start: FriState | None = None
-        self._before: dict[str, int] = {}  # messages by quality until then
+        self._before: dict[str, int] = {}  # messages by quality before the start
         self._result: Result | None = None
-        self._events: deque[Event] = deque(maxlen=_EVENTS)
-        self._failure = ""  # of the law
+        self._events: deque[Event] = deque(maxlen=_MAX_EVENTS)
+        self._law_error = ""
         self._closed = False
         self._limited: list[str] = []
 
     @property
     def kind(self) -> str:
-        """What is commanded: "position", "torque", "wrench", "pose"; or "monitor"."""
+        """The commanded quantity: "position", "torque", "wrench" or "pose"; or "monitor"."""
         return self._request.kind
 
     # ------------------------------------------------------------------------------------ life
 
     def __enter__(self) -> Fri:
-        """Open the session; waits until commands are effective, or until monitoring is ready.
+        """Open the session and wait until commands are effective, or until monitoring is ready.
 
         Raises:
             CommandRejected: refused; ModeConflict if another motion runs.
-            ConnectFailed: the port is taken, or no session came to stand; the text says what to do.
+            ConnectFailed: the port is in use, or the session did not open; the hint gives the likely cause.
         """
-        if self._made is not None:
-            raise LocalProtocolError("an FRI session is used once; make another one with arm.fri(...)")
+        if self._client is not None:
+            raise LocalProtocolError("an FRI session is used once", hint="make another one with arm.fri(...)")
+        self._connection.check_may_wait("the with block of arm.fri()")
         link = self._connection.link
         self._host = self._host or own_address(link.peer.rpartition(":")[0])
-        client = self._made = self._request.make()
+        client = self._client = self._request.make()
         message = replace(self._request.message, host=self._host, port=client.port)
         try:
             if self.kind == "monitor":
-                self._number = link.accept(message, timeout=self._connection.options.timeout)
+                self._number = link.submit(message, timeout=self._connection.options.timeout)
             else:
-                self._handle = self._connection.run(message, 1, inf)
+                self._handle = MotionHandle.send(self._connection, message)
                 self._number = self._handle.id
-            self._start = self._await(client)
+            self._start = self._wait_open(client)
             self._before = client.stats.quality
+            if self._handle is not None:
+                self._connection.enter_block(self._handle, "arm.fri()")
         except BaseException:
-            with contextlib.suppress(HeptarmError):  # the first error tells more
+            with contextlib.suppress(HeptarmError):  # the first error explains more
                 self._end()
             raise
         return self
 
-    def _await(self, client: Client) -> FriState:
-        """The first state in which the session is what it is meant to be."""
-        wanted = SessionState.MONITORING_READY if self.kind == "monitor" else SessionState.COMMANDING_ACTIVE
+    def _wait_open(self, client: Client) -> FriState:
+        """Wait for the session state in which commands are effective, or monitoring is ready."""
+        target = SessionState.MONITORING_READY if self.kind == "monitor" else SessionState.COMMANDING_ACTIVE
         clock = self._connection.clock
         deadline = clock.nanos() + round((self._request.message.timeout + _PATIENCE) * 1e9)
         while clock.nanos() < deadline:
-            stands = self._stands  # before the look, so that nothing is missed between
+            is_open = self._is_open  # before waiting for a message, so that an end meanwhile is not missed
             with contextlib.suppress(Timeout):
-                state = client.next(timeout=_LOOK)
-                if state.session >= wanted and stands:
+                state = client.next(timeout=_CHECK_INTERVAL)
+                if state.session >= target and is_open:
                     return state
-            if not stands:
-                self._raise(client)
+            if not is_open:
+                self._raise_open_error(client)
         raise ConnectFailed(
-            f"the FRI session is {client.session.name} and does not become {wanted.name}",
+            f"the FRI session stays in {client.session.name} and does not reach {target.name}",
             hint=advice(client, host=self._host),
         )
 
-    def _raise(self, client: Client) -> None:
-        """Tell why the session never stood."""
+    def _raise_open_error(self, client: Client) -> None:
+        """Raise the error because of which the session did not open."""
         hint = advice(client, host=self._host)
-        trouble = self._connection.end()
+        lost = self._connection.final_error()
         if self._handle is not None:
             try:
                 self._handle.wait(timeout=_PATIENCE)
@@ -157,79 +155,84 @@ class Fri(Block):
                 if isinstance(error, MotionAborted) and error.cause is not Cause.FAILED:
                     raise  # stopped meanwhile
                 raise ConnectFailed(error.text, code=error.code, hint=hint or error.hint) from error
-        elif trouble is not None:
-            raise trouble
-        raise ConnectFailed(self._last_words().text or ended(controls=self._connection.controls), hint=hint)
+        elif lost is not None:
+            raise lost
+        raise ConnectFailed(
+            self._last_report().text or end_text(in_control=self._connection.in_control), hint=hint
+        )
 
     def close(self) -> None:
-        """End overlay and session, and give the port back; raises what ended it early. Closing twice is legal.
+        """End overlay and session and release the port; raises the error that ended it early.
+
+        Calling it again has no effect.
 
         Raises:
-            QualityLost: the connection became too bad; the text says what spoilt it, as far as this side can tell.
+            QualityLost: the quality of the connection became too bad; the hint gives the likely cause.
             MotionAborted: the cabinet ended the motion, by a safety stop for instance.
-            StreamError: the law failed, or the cabinet closed a session that monitors.
+            StreamError: the law raised an error, or the cabinet closed a monitoring session.
             ConnectionLost: the connection to the cabinet has ended.
         """
-        if self._closed or self._made is None:
+        if self._closed or self._client is None:
             return
-        stood = self._stands
-        hint = "" if stood else self._why()
+        was_open = self._is_open
+        hint = "" if was_open else advice(self.client, host=self._host)
         try:
             self._end()
         except MotionAborted as error:
-            raise self._explained(error, hint) from error
-        if self._failure:
-            raise StreamError(self._failure, hint="the arm braked by the guard's limits and rested")
-        if self.kind == "monitor" and not stood:
-            raise self._connection.end() or self._explained(None, hint)
+            raise self._early_end(error, hint) from error
+        if self._law_error:
+            raise StreamError(self._law_error, hint="the guard braked the arm within its limits")
+        if self.kind == "monitor" and not was_open:
+            raise self._connection.final_error() or self._early_end(None, hint)
 
     def _end(self) -> None:
         client, self._closed = self.client, True
-        self._limited = client.limited  # the law is called a last time when the overlay is off, and asks for too much
+        # taken now: the law runs once more when the overlay is off, and the guard limits that
+        self._limited = client.limited
         try:
-            if self._number and self._stands:
+            if self._number and self._is_open:
                 with contextlib.suppress(CommandRejected):  # it has just ended by itself
                     self._connection.request(wire.FriClose(session=self._number))
             if self._handle is not None:
+                self._connection.leave_block(self._handle)
                 self._result = self._handle.wait(timeout=_PATIENCE)
         finally:
-            self._listen()
+            self._take_events()
             client.close()
 
-    def _explained(self, error: MotionAborted | None, hint: str) -> HeptarmError:
-        """What ended a session early, with what this side knows of it."""
-        controls = self._connection.controls
-        return explained(
-            error, self._last_words(), hint=hint, controls=controls, limited=self.client.limited
+    def _early_end(self, error: MotionAborted | None, hint: str) -> HeptarmError:
+        """The error of a session that ended early."""
+        return early_end(
+            error,
+            self._last_report(),
+            hint=hint,
+            in_control=self._connection.in_control,
+            limited=self.client.limited,
         )
 
-    def _last_words(self) -> wire.FriChanged:
-        """The last that the cabinet told of this session."""
-        return self._connection.events.fri_change(self._number) or nothing_told(self._number)
-
-    def _why(self) -> str:
-        """What spoilt the session, as far as this side can tell."""
-        return advice(self.client, host=self._host)
+    def _last_report(self) -> wire.FriChanged:
+        """The cabinet's last report on this session."""
+        return self._connection.events.fri_change(self._number) or no_report(self._number)
 
     @property
-    def _stands(self) -> bool:
-        """Whether the session stands, as far as the cabinet has told."""
+    def _is_open(self) -> bool:
+        """Whether the session is open, as far as the cabinet reported."""
         if self._handle is not None:
             return not self._handle.done
-        if self._connection.end() is not None:
+        if self._connection.final_error() is not None:
             return False
-        told = self._connection.events.fri_change(self._number)
-        return told is None or told.state is not wire.FriSessionState.IDLE
+        report = self._connection.events.fri_change(self._number)
+        return report is None or report.state is not wire.FriSessionState.IDLE
 
     @property
     def active(self) -> bool:
-        """Whether the session stands and the law, if there is one, has not failed."""
-        self._listen()
-        return not self._closed and not self._failure and self._stands
+        """Whether the session is open and its law, if it has one, has not failed."""
+        self._take_events()
+        return not self._closed and not self._law_error and self._is_open
 
     @property
     def result(self) -> Result | None:
-        """How the overlay's motion ended, after the block; None for a session that only monitors."""
+        """How the overlay's motion ended, after the block; None for a monitoring session."""
         return self._result
 
     # --------------------------------------------------------------------------------- the loop
@@ -237,34 +240,34 @@ class Fri(Block):
     @property
     def client(self) -> Client:
         """The client behind the session: the loop's process, its shared memory and its port."""
-        if self._made is None:
-            raise LocalProtocolError("the FRI session has not begun; use it in a with block")
-        return self._made
+        if self._client is None:
+            raise _not_begun()
+        return self._client
 
     @property
     def start(self) -> FriState:
         """The first state of the block."""
         if self._start is None:
-            raise LocalProtocolError("the FRI session has not begun; use it in a with block")
+            raise _not_begun()
         return self._start
 
     @property
     def state(self) -> FriState:
-        """The newest message of the cabinet; never a question to it."""
+        """The newest message received from the cabinet."""
         return self.client.state
 
     def next(self) -> FriState | None:
-        """The newest message that was not returned before; waits for one. None when the session has ended.
+        """Wait for a message newer than the last one returned; None when the session has ended.
 
         Raises:
-            Timeout: the cabinet sends nothing any more.
+            Timeout: no message arrives any more.
             ConnectionLost: the loop's process has ended.
         """
         clock, commands = self._connection.clock, self.kind != "monitor"
         deadline = clock.nanos() + round(_PATIENCE * 1e9)
         while self.active:
             try:
-                state = self.client.next(timeout=_LOOK)
+                state = self.client.next(timeout=_CHECK_INTERVAL)
             except Timeout:
                 if clock.nanos() > deadline:
                     raise
@@ -274,20 +277,20 @@ class Fri(Block):
         return None
 
     def __iter__(self) -> Iterator[FriState]:
-        """Every newest message, never one twice, for as long as the session stands."""
+        """Iterate over messages, always the newest and each at most once, while the session is open."""
         while (state := self.next()) is not None:
             yield state
 
     def wait(self, seconds: float) -> bool:
-        """Let the law, or the last command, work for a while.
+        """Wait while the law, or the last command, is in effect.
 
         Returns:
-            Whether the session still stands; why not rises at the end of the block.
+            Whether the session is still open; if not, the end of the block raises why.
         """
         clock = self._connection.clock
         deadline = clock.nanos() + round(within(seconds, "seconds", 0.0, 1e9, unit="s") * 1e9)
         while self.active and (rest := (deadline - clock.nanos()) * 1e-9) > 0.0:
-            clock.sleep(min(rest, _LOOK))
+            clock.sleep(min(rest, _CHECK_INTERVAL))
         return self.active
 
     def command(
@@ -299,29 +302,30 @@ class Fri(Block):
         pose: Pose | npt.ArrayLike | None = None,
         e1: float | None = None,
     ) -> None:
-        """Give a command; it stands until the next one, or until the policy's patience ends.
+        """Send a command; it is in effect until the next one, or until the policy's time for a missing one has passed.
 
-        The guard limits it; `limited` says what. NaN keeps an axis' last wish. What is None stays as it was. After the
-        session has ended it does nothing.
+        The guard limits it, and `limited` reports that. NaN keeps the last target of an axis, None that of a quantity.
+        After the end of the session it has no effect.
 
         Args:
             q: joint positions, shape (7,) [rad].
             tau: torques on top of the control mode's, shape (7,) [Nm]; "torque" only.
             wrench: wrench on top of the control mode's, shape (6,) [N, Nm]; "wrench" only.
-            pose: of the flange in the base, or x y z [m] and quaternion x y z w, shape (7,); "pose" only.
+            pose: pose of the flange in the base, or x y z [m] and quaternion x y z w, shape (7,); "pose" only.
             e1: redundancy angle of the pose [rad]; "pose" only.
 
         Raises:
-            ModeConflict: this session commands something else, or a law does it.
-            ShapeError: an array has another shape.
+            ModeConflict: this session commands another quantity, or a law commands.
+            ShapeError: an array of another shape.
             ConnectionLost: the loop's process has ended.
         """
         check_command(self.kind, {"q": q, "tau": tau, "wrench": wrench, "pose": pose, "e1": e1})
         if self._request.has_law:
             raise ModeConflict(
-                "the law commands in this session", hint="change rt.params, or open it without a law"
+                "the law commands in this session, so that command() is refused",
+                hint="change rt.params, or open the session without a law",
             )
-        if self._stands:
+        if self._is_open:
             self.client.command(q=q, tau=tau, wrench=wrench, pose=pose, e1=e1)
 
     @property
@@ -331,16 +335,16 @@ class Fri(Block):
 
     @property
     def inputs(self) -> dict[str, SignalValue]:
-        """The inputs that `io=` named, as they are now, by name; `state.io` has them for every message."""
+        """Current values of the inputs named in `io=`, by name; `state.io` has them for every message."""
         return self.client.inputs
 
     @property
     def outputs(self) -> dict[str, SignalValue]:
-        """The outputs that `io=` named, as the cabinet shows them now, by name."""
+        """Current values of the outputs named in `io=`, as the cabinet reports them, by name."""
         return self.client.outputs
 
     def output(self, name: str, value: SignalValue) -> None:
-        """Write an output that `io=` named; see `heptarm.fri.Client.output`."""
+        """Write an output named in `io=`; see `heptarm.fri.Client.output`."""
         self.client.output(name, value)
 
     # ------------------------------------------------------------------------------- the report
@@ -362,31 +366,31 @@ class Fri(Block):
 
     @property
     def limited(self) -> list[str]:
-        """What the guard has limited, one line for each axis and quantity; also after the block."""
+        """What the guard limited, one line per axis and quantity; also after the block."""
         return self._limited if self._closed else self.client.limited
 
     @property
     def refused(self) -> list[str]:
-        """What the system refused the loop, such as real-time priority, in words with the remedy."""
+        """What the operating system refused the loop, such as real-time priority, each with its remedy."""
         return self.client.refused
 
     @property
     def report(self) -> str:
-        """How it went so far, in some lines for a person; also after the block."""
+        """Summary so far in a few lines; also after the block."""
         return "\n".join(summary(self.client, before=self._before))
 
     def events(self) -> list[Event]:
-        """What happened since the last call, oldest first."""
-        self._listen()
+        """Events since the last call, oldest first."""
+        self._take_events()
         taken = list(self._events)
         self._events.clear()
         return taken
 
-    def _listen(self) -> None:
+    def _take_events(self) -> None:
         for event in self.client.events():
             self._events.append(event)
             if event.kind is Kind.CLIENT and event.text.startswith(LAW_FAILED):
-                self._failure = self._failure or event.text
+                self._law_error = self._law_error or event.text
 
     def history(self, size: int | None = None) -> list[FriState]:
         """The last messages, oldest first."""
@@ -394,6 +398,12 @@ class Fri(Block):
 
     def __repr__(self) -> str:
         """Short form."""
-        if self._made is None:
+        if self._client is None:
             return f"<Fri {self.kind}, not begun>"
         return f"<Fri {self.kind}, {'closed' if self._closed else self.session.name}>"
+
+
+def _not_begun() -> LocalProtocolError:
+    return LocalProtocolError(
+        "the FRI session has not begun", hint="use it in a with block: with arm.fri(...) as session"
+    )

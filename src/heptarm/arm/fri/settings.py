@@ -1,37 +1,38 @@
-"""What an FRI session is asked for: checked here first, with the cabinet's own codes, and turned into its message."""
+"""The request for an FRI session: checked here with the cabinet's own codes, then turned into its message."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import TYPE_CHECKING, TypedDict
+from typing import TypedDict
 
 import numpy.typing as npt
 
-from heptarm.arm.modes import mode_message
+from heptarm.arm.link.connection import Connection
+from heptarm.arm.translate.modes import mode_message
 from heptarm.errors import CommandRejected, ConnectFailed, LimitError, ModeConflict, ShapeError
-from heptarm.fri.limits import Limits
-from heptarm.fri.messages import MAX_IO, MAX_NAME
-from heptarm.fri.policy import Policy
-from heptarm.fri.pose_guard import PoseLimits
+from heptarm.fri.guard.fallback import Policy
+from heptarm.fri.guard.joint_guard import Limits
+from heptarm.fri.guard.pose_guard import PoseLimits
+from heptarm.fri.loop.client import Client
+from heptarm.fri.loop.user_api import Output, Params
+from heptarm.fri.loop.user_api import State as FriState
+from heptarm.fri.protocol.messages import MAX_IO, MAX_NAME
 from heptarm.io.udp import UdpSocket
-from heptarm.rt import Client, Output, Params
-from heptarm.rt import State as FriState
 from heptarm.values.arrays import within
 from heptarm.values.io import find_name
-from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, Position, SineImpedance
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
+from heptarm.values.mode.mode import Mode, Position
+from heptarm.values.mode.sine import SineImpedance
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
-
-if TYPE_CHECKING:
-    from heptarm.arm.connection import Connection
 
 #: `law(state, out, params)`.
 Law = Callable[[FriState, Output, Params], object]
 
 KINDS = {mode.name.lower(): mode for mode in wire.FriCommandMode}
-#: What the client may command, by kind.
+#: Quantities that the client commands, by kind.
 COMMANDS: dict[str, tuple[str, ...]] = {
     "position": ("q",),
     "torque": ("q", "tau"),
@@ -41,15 +42,15 @@ COMMANDS: dict[str, tuple[str, ...]] = {
 }
 #: FRI's own ports.
 PORTS = range(30200, 30210)
-#: Period unless another one is asked for [ms].
+#: Default periods [ms].
 PERIOD, PERIOD_MONITOR = 5, 1
-#: How seldom a client that commands may answer [ms].
-_SLOWEST = {"position": 10, "torque": 5, "wrench": 10, "pose": 10, "monitor": 100}
-_SOFT = "CartesianImpedance(stiffness=(500, 500, 500, 50, 50, 50))"
+#: Longest time between two answers, by kind [ms].
+_MAX_ANSWER_TIME = {"position": 10, "torque": 5, "wrench": 10, "pose": 10, "monitor": 100}
+_EXAMPLE_MODE = "CartesianImpedance(stiffness=(500, 500, 500, 50, 50, 50))"
 
 
-class FriSettings(TypedDict, total=False):
-    """What `Arm.fri` can be told, for type checkers."""
+class FriKeywords(TypedDict, total=False):
+    """Keywords of `Arm.fri`, for type checkers; `request` has their defaults."""
 
     period_ms: int | None
     multiplier: int
@@ -70,12 +71,12 @@ class FriSettings(TypedDict, total=False):
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
-    """A checked wish for a session.
+class FriRequest:
+    """A checked request for a session.
 
     Attributes:
-        kind: what is commanded, or "monitor".
-        message: to the cabinet; host may be empty, and the port is set when the client listens.
+        kind: the commanded quantity, or "monitor".
+        message: to the cabinet; host may be empty, and the port is set once the client listens.
         make: makes the client, which then listens.
         has_law: a law commands.
     """
@@ -106,33 +107,35 @@ def request(
     cpu: int | None = None,
     history: int = 2048,
     timeout: float = 10.0,
-) -> Request:
-    """Check everything and say it in the protocol's words; see `Arm.fri`.
+) -> FriRequest:
+    """Check the keywords of `Arm.fri` and turn them into a request.
 
     Raises:
-        CommandRejected: this cabinet has no such session.
-        ModeConflict: kind and control mode do not go together.
+        CommandRejected: this cabinet does not support such a session.
+        ModeConflict: this kind is not possible in this control mode.
         LimitError: a value outside its range.
     """
     if kind not in KINDS:
         raise ShapeError(
-            f"kind is {kind!r}; allowed are {', '.join(map(repr, KINDS))}", parameter="kind", value=kind
+            f"kind must be one of {', '.join(map(repr, KINDS))}, got {kind!r}", parameter="kind", value=kind
         )
     _check_kind(kind, connection.welcome.capabilities)
     period = (PERIOD_MONITOR if kind == "monitor" else PERIOD) if period_ms is None else period_ms
-    _check_pace(kind, period, multiplier)
+    _check_period(kind, period, multiplier)
     check_mode(kind, mode)
     if kind == "monitor" and law is not None:
         raise ModeConflict(
-            "a session that only monitors calls no law",
+            "a monitoring session takes no law",
             code=int(Code.MODE_CONFLICT),
             parameter="law",
-            hint='read states from it, or choose arm.fri("position")',
+            hint='iterate over its states, or use arm.fri("position")',
         )
     if params is not None and law is None:
-        raise ShapeError("params are for a law, and none was given", parameter="params")
+        raise ShapeError("params need a law, and none was given", parameter="params", hint="give law=...")
     if port is not None and not 0 <= port < 1 << 16:
-        raise LimitError(f"port is {port}; allowed is [0, 65535]", parameter="port", value=port)
+        raise LimitError(
+            f"port must be in [0, 65535], got {port}", parameter="port", value=port, allowed="[0, 65535]"
+        )
     message = wire.FriOpen(
         host=host,
         period=round(period) * 1e-3,
@@ -161,7 +164,7 @@ def request(
             ),
         )
 
-    return Request(kind, message, make, law is not None)
+    return FriRequest(kind, message, make, law is not None)
 
 
 def _check_kind(kind: str, capabilities: tuple[str, ...]) -> None:
@@ -186,19 +189,19 @@ def _check_kind(kind: str, capabilities: tuple[str, ...]) -> None:
 
 
 def _signals(names: Sequence[str], connection: Connection) -> tuple[str, ...]:
-    """Full names of the signals that the session shall carry, checked as the cabinet does."""
+    """Full names of the signals of the session, checked as the cabinet does."""
     if isinstance(names, str):
         raise ShapeError(
-            f"io is {names!r}; a list of names is wanted", parameter="io", hint=f'io=["{names}"]'
+            f"io must be a list of names, got {names!r}", parameter="io", value=names, hint=f'io=["{names}"]'
         )
     if not names:
         return ()
     if "fri_io" not in connection.welcome.capabilities:
         raise CommandRejected(
-            "this cabinet's FRI carries no signals",
+            "the FRI of this cabinet transmits no signals",
             code=int(Code.UNSUPPORTED),
             parameter="io",
-            hint="they came with FRI 1.14; arm.io reads and writes them over the application",
+            hint="it needs FRI 1.14 or later; arm.io reads and writes them through the application",
         )
     known = connection.signals
     all_names = tuple(one.name for one in known)
@@ -206,7 +209,7 @@ def _signals(names: Sequence[str], connection: Connection) -> tuple[str, ...]:
     full = tuple(one.name for one in found)
     if len(full) > MAX_IO:
         raise LimitError(
-            f"{len(full)} signals; FRI carries at most {MAX_IO}",
+            f"FRI transmits at most {MAX_IO} signals, got {len(full)}",
             code=int(Code.BAD_LENGTH),
             parameter="io",
             value=len(full),
@@ -215,13 +218,13 @@ def _signals(names: Sequence[str], connection: Connection) -> tuple[str, ...]:
     for place, one in enumerate(found):
         if one.name in full[:place]:
             raise CommandRejected(
-                f"{one.name} is named twice", code=int(Code.UNKNOWN_NAME), parameter=f"io[{place}]"
+                f"io names {one.name} twice", code=int(Code.UNKNOWN_NAME), parameter=f"io[{place}]"
             )
         if one.kind == "integer" or len(one.name) > MAX_NAME:
             what = (
-                f"{one.name} is a number with a sign, and FRI carries none"
+                f"{one.name} is a signed integer, which FRI does not transmit"
                 if one.kind == "integer"
-                else f"FRI carries names of at most {MAX_NAME} octets; {one.name} has {len(one.name)}"
+                else f"FRI transmits names of at most {MAX_NAME} bytes, {one.name} has {len(one.name)}"
             )
             raise CommandRejected(
                 what, code=int(Code.UNSUPPORTED), parameter=f"io[{place}]", hint="arm.io reads and writes it"
@@ -229,10 +232,10 @@ def _signals(names: Sequence[str], connection: Connection) -> tuple[str, ...]:
     return full
 
 
-def _check_pace(kind: str, period: float, multiplier: int) -> None:
+def _check_period(kind: str, period: float, multiplier: int) -> None:
     if not isfinite(period) or period != round(period) or not 1 <= period <= 100:
         raise LimitError(
-            f"period_ms is {period:g}; FRI sends every whole number of milliseconds from 1 to 100",
+            f"period_ms must be a whole number from 1 to 100 ms, got {period:g}",
             code=int(Code.OUT_OF_RANGE if isfinite(period) else Code.NOT_FINITE),
             parameter="period_ms",
             value=period,
@@ -240,17 +243,17 @@ def _check_pace(kind: str, period: float, multiplier: int) -> None:
         )
     if multiplier not in range(1, 101):
         raise LimitError(
-            f"multiplier is {multiplier}; allowed is 1, 2, ... 100",
+            f"multiplier must be a whole number from 1 to 100, got {multiplier}",
             code=int(Code.OUT_OF_RANGE),
             parameter="multiplier",
             value=multiplier,
             allowed="1, 2, ... 100",
         )
-    answers, most = period * multiplier, _SLOWEST[kind]
+    answers, most = period * multiplier, _MAX_ANSWER_TIME[kind]
     if answers > most:
-        what = "a monitoring client" if kind == "monitor" else f"a client that commands a {kind}"
+        what = "a monitoring client" if kind == "monitor" else f"a client that commands {kind}"
         raise LimitError(
-            f"{what} has to answer at least every {most} ms, not every {answers:g}",
+            f"{what} must answer at least every {most} ms, got every {answers:g} ms",
             code=int(Code.OUT_OF_RANGE),
             parameter="period_ms",
             value=answers,
@@ -259,25 +262,25 @@ def _check_pace(kind: str, period: float, multiplier: int) -> None:
 
 
 def check_mode(kind: str, mode: Mode | None) -> None:
-    """Check that a command goes with the control mode of the hold beneath it, as the cabinet does.
+    """Check that a kind is possible in the control mode of the hold under the overlay, as the cabinet does.
 
     Raises:
-        ModeConflict: it does not; the hint names one that does.
+        ModeConflict: it is not; the hint names a mode in which it is.
     """
     if kind == "monitor":
         return
     mode = mode or Position()
     name = type(mode).__name__
     if isinstance(mode, SineImpedance):
-        needs, example = "no overlay goes with a superposed force", _SOFT
+        needs, example = "an overlay is not possible with a superposed sine force", _EXAMPLE_MODE
     elif kind == "torque" and not isinstance(mode, JointImpedance):
         needs, example = "a torque overlay needs joint impedance under it", "JointImpedance(stiffness=0)"
     elif kind == "wrench" and not isinstance(mode, CartesianImpedance):
-        needs, example = "a wrench overlay needs Cartesian impedance under it", _SOFT
+        needs, example = "a wrench overlay needs Cartesian impedance under it", _EXAMPLE_MODE
     else:
         return
     raise ModeConflict(
-        f"{needs}; the mode is {name}",
+        f"{needs}, got {name}",
         code=int(Code.MODE_CONFLICT),
         parameter="mode",
         value=name,
@@ -287,10 +290,10 @@ def check_mode(kind: str, mode: Mode | None) -> None:
 
 
 def check_command(kind: str, given: Mapping[str, object]) -> None:
-    """Check that a session of a kind commands what is given; None is not.
+    """Check that a session of this kind commands the given quantities; None counts as not given.
 
     Raises:
-        ModeConflict: it commands something else.
+        ModeConflict: it commands another quantity.
     """
     for name, value in given.items():
         if value is not None and name not in COMMANDS[kind]:
@@ -304,7 +307,7 @@ def check_command(kind: str, given: Mapping[str, object]) -> None:
 
 
 def _listening(port: int | None, make: Callable[[int], Client]) -> Client:
-    """A client on its port; None: the first of FRI's that is free."""
+    """Make a client on a port; None: the first free one of FRI's ports."""
     if port is not None:
         return make(port)
     for candidate in PORTS:
@@ -313,12 +316,14 @@ def _listening(port: int | None, make: Callable[[int], Client]) -> Client:
         try:
             return make(candidate)
         except ConnectFailed as error:
-            if error.parameter != "port":  # else somebody was quicker, or has just looked whether it is free
+            if (
+                error.parameter != "port"
+            ):  # otherwise another program took it, or just tests whether it is free
                 raise
     raise ConnectFailed(
         f"none of FRI's ports {PORTS[0]} to {PORTS[-1]} is free on this machine",
         parameter="port",
-        hint="end another FRI client (`ss -ulpn` names them), or give a port, as in arm.fri(..., port=30300)",
+        hint="end another FRI client (`ss -ulpn` lists them), or give a port, as in arm.fri(..., port=30300)",
     )
 
 

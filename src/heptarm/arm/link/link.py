@@ -1,28 +1,24 @@
-"""A session over a transport: requests, events, heartbeats.
+"""One session with a cabinet over one transport: requests and answers, events, states, heartbeat.
 
-Who reads the connection? While a caller waits for an answer, the caller reads itself: that saves two changes of
-threads, half of a round trip. At all other times the thread "heptarm-link" reads. It waits for the connection to
-become readable without taking anything, so a caller need not wake it to take its place; `_token` says who may take.
-A caller's thread may be interrupted anywhere. Ctrl-C is held back meanwhile; should another exception come from
-outside after octets were taken and before they were understood, nobody knows where the next frame begins: then the
-link is given up, and the cabinet stops the arm.
+Whichever thread waits for an answer reads the socket itself, so that an answer wakes one thread, not two. The link
+thread reads while nobody waits, and sends pings.
 """
 
 from __future__ import annotations
 
 import logging
+import signal
 import threading
-from _thread import get_ident
+from _thread import allocate_lock, get_ident
 from collections.abc import Callable, Iterable
+from types import FrameType
+from typing import Any
 
-from heptarm.arm.heartbeat import Heartbeat
-from heptarm.arm.refusals import farewell, refusal, rejection
-from heptarm.arm.shield import Shield
-from heptarm.arm.slot import Slot
+from heptarm.arm.translate.errors import farewell, refusal, rejection
 from heptarm.errors import ConnectFailed, ConnectionLost, HeptarmError, RemoteProtocolError, Timeout
 from heptarm.io.clock import Clock
 from heptarm.io.transport import Transport
-from heptarm.wire.clock_offset import ClockOffset
+from heptarm.wire.clock_sync import ClockOffset
 from heptarm.wire.codes import Code
 from heptarm.wire.messages import (
     MAJOR,
@@ -39,18 +35,137 @@ from heptarm.wire.messages import (
     Welcome,
 )
 from heptarm.wire.session import Received, Session, Side, StateReceived
-from heptarm.wire.transitions import SessionState
+from heptarm.wire.states import SessionState
+
+try:  # the public functions wrap every number in an enumeration, which costs ten times as much
+    from _signal import getsignal  # type: ignore[import-not-found]
+    from _signal import signal as set_signal
+except ImportError:  # another Python than CPython
+    from signal import getsignal
+    from signal import signal as set_signal
+
+_SIGINT = int(signal.SIGINT)
+
+
+class InterruptShield:
+    """Defers Ctrl-C from its construction until `release`, which calls the program's own handler.
+
+    Python runs signal handlers in the main thread only, so in other threads it has no effect. Call `release` in a
+    `finally`.
+    """
+
+    __slots__ = ("_previous", "pending")
+
+    def __init__(self) -> None:
+        self.pending = False
+        self._previous: Callable[[int, FrameType | None], Any] | None = None
+        if get_ident() == threading.main_thread().ident:
+            previous = getsignal(_SIGINT)
+            if callable(previous):  # otherwise Ctrl-C raises no exception
+                self._previous = previous
+                set_signal(_SIGINT, self)
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Record the signal."""
+        self.pending = True
+
+    def release(self) -> None:
+        """Restore the program's own handler and call it if Ctrl-C came; raises what it raises."""
+        previous = self._previous
+        if previous is not None:
+            self._previous = None
+            set_signal(_SIGINT, previous)
+            if self.pending:
+                previous(_SIGINT, None)
+
+
+class PendingRequest:
+    """A request that waits for its answer; used once.
+
+    Args:
+        on_answer: called with the answer, by the thread that reads it.
+
+    Attributes:
+        answer: None until it arrives.
+    """
+
+    __slots__ = ("_lock", "_on_answer", "answer")
+
+    def __init__(self, on_answer: Callable[[Message], None] | None = None) -> None:
+        self.answer: Message | None = None
+        self._on_answer = on_answer
+        self._lock = allocate_lock()
+        self._lock.acquire()
+
+    def resolve(self, answer: Message) -> None:
+        """Deliver the answer."""
+        if self._on_answer is not None:
+            self._on_answer(answer)
+        self.answer = answer
+        self._lock.release()
+
+    def abandon(self) -> None:
+        """Wake the waiting thread without an answer."""
+        self._lock.release()
+
+    def wait(self, seconds: float) -> None:
+        """Wait for `resolve` or `abandon`."""
+        self._lock.acquire(timeout=max(0.0, seconds))
+
+
+#: Shortest silence after which a link counts as lost [s].
+_MIN_SILENCE = 1.0
+
+
+class Heartbeat:
+    """Ping interval towards the cabinet, and the check that the cabinet is still alive.
+
+    Attributes:
+        timeout: silence after which the cabinet ends the session [s].
+        watchdog: silence after which the cabinet counts a controller as lost [s]; infinite: not in control.
+        received: our clock when bytes last arrived [ns].
+    """
+
+    __slots__ = ("received", "timeout", "watchdog")
+
+    def __init__(self, now: int) -> None:
+        self.timeout = 1.0
+        self.watchdog = float("inf")
+        self.received = now
+
+    @property
+    def interval(self) -> int:
+        """Time between pings [ns]: a quarter of the shorter timeout, so that one late ping costs nothing."""
+        return round(min(self.timeout, self.watchdog) / 4 * 1e9)
+
+    def check(self, now: int, peer: str) -> None:
+        """Check the silence so far.
+
+        Raises:
+            ConnectionLost: the cabinet has been silent for two timeouts, and for at least a second.
+        """
+        silence = (now - self.received) * 1e-9
+        allowed = max(2 * self.timeout, _MIN_SILENCE)
+        if silence > allowed:
+            raise ConnectionLost(
+                f"nothing received from {peer} for {silence:.1f} s, allowed are {allowed:g} s",
+                code=int(Code.SILENT),
+                hint="check the network and the load of both machines",
+            )
+
 
 _log = logging.getLogger("heptarm.link")
 
 _BUFFER = 65536
-#: Stands in the buffer until octets come; random, so that no frame begins like it.
-_NOTHING = bytes.fromhex("5a0f93c1d2e8471b")
-#: How long a caller waits for the link thread to finish what it is just reading [s].
+#: Marks an untouched receive buffer: random, so that no frame begins with it.
+_UNTOUCHED = bytes.fromhex("5a0f93c1d2e8471b")
+#: How long a caller waits for the link thread to finish the read that it is in [s].
 _TURN = 0.0002
-#: For so long after a request the link thread looks once per step instead of waiting for octets [ns], [s].
-_ASIDE, _STEP = 30_000_000, 0.0005
-#: Pings at the start, and the pause between them [s]: enough to see a virtual clock's rate.
+#: For this long after a request [ns] the link thread polls once per step [s] instead of waiting for bytes.
+_POLLING, _STEP = 30_000_000, 0.0005
+#: From this state rate on the link thread never polls, since states must be taken at once [Hz].
+_FAST_STATES = 250.0
+#: Pings at the start, and the pause between them [s]: enough to measure the rate of a virtual clock.
 _PROBES, _PROBE_PAUSE = 6, 0.003
 
 
@@ -58,12 +173,16 @@ class Link:
     """One connection to a cabinet, from Hello to Goodbye.
 
     Args:
-        transport: a fresh connection; it belongs to the link from now on.
+        transport: a new connection; the link owns it from now on.
         clock: this side's clock.
         key: pre-shared key, or None.
-        on_event: called with each event, in the order of the wire; must not block.
+        on_event: called with each event, in the order received; must not block.
         on_state: called with (body, our clock at its receipt [ns]) of each pushed state; must not block.
-        on_lost: called once, from the link thread, with why the link ended; not after `close`.
+        on_lost: called once, from the link thread, with the error that ended the link; not after `close`.
+
+    Attributes:
+        offset: estimate of the cabinet's clock.
+        peer: address of the cabinet.
     """
 
     def __init__(
@@ -87,29 +206,29 @@ class Link:
         self._on_lost = on_lost
         self._view = memoryview(bytearray(_BUFFER))
         self._sending = threading.Lock()
-        self._token = threading.Lock()
-        self._leading = False
-        self._holder = 0
-        self._slots: dict[int, Slot] = {}
+        self._reading = threading.Lock()  # held by the one thread that reads the socket
+        self._caller_reads = False
+        self._reader = 0  # its thread identifier
+        self._pending: dict[int, PendingRequest] = {}
         self._welcome: Welcome | None = None
         self._error: HeptarmError | None = None
         self._closing = False
         self._requested = clock.nanos()
         self._heartbeat = Heartbeat(self._requested)
-        self._aside = _ASIDE
+        self._polling = _POLLING
         self._thread = threading.Thread(target=self._run, name="heptarm-link", daemon=True)
 
     # ------------------------------------------------------------------------------------ opening
 
     def open(self, *, name: str, version: str, timeout: float) -> Welcome:
-        """Say Hello, prove the key if asked, learn the cabinet's clock, and start the link thread.
+        """Send Hello, prove the key if asked, measure the cabinet's clock, and start the link thread.
 
         Raises:
             ConnectFailed: the cabinet does not answer, or refuses the session.
         """
         deadline = self._clock.nanos() + round(timeout * 1e9)
         try:
-            self._say(self._session.hello(name=name, version=version))
+            self._send(self._session.hello(name=name, version=version))
             while self._welcome is None:
                 self._step(deadline, f"no session within {timeout:g} s")
             for count in range(1, _PROBES + 1):
@@ -118,58 +237,64 @@ class Link:
                     self._step(deadline, f"no answer to a ping within {timeout:g} s")
                 self._clock.sleep(_PROBE_PAUSE)
         except HeptarmError as error:
-            self._lose(error)
+            self._fail(error)
             if isinstance(error, ConnectFailed):
                 raise
             raise ConnectFailed(
                 f"no session with {self.peer}: {error.text}", code=error.code, hint=error.hint
             ) from error
         except BaseException:
-            self._lose(ConnectionLost("interrupted while connecting"))
+            self._fail(ConnectionLost("interrupted while connecting"))
             raise
-        self._heartbeat.tolerated = self._welcome.heartbeat
+        self._heartbeat.timeout = self._welcome.heartbeat
         self._thread.start()
         return self._welcome
 
     def _step(self, deadline: int, late: str) -> None:
-        with self._token:
+        with self._reading:
             self._read(wait=True)
         if self._error is not None:
             raise self._error
         if self._clock.nanos() > deadline:
             raise ConnectFailed(
-                f"{self.peer} is connected but answers nothing: {late}",
-                hint="check that a cabinet listens there",
+                f"{self.peer} accepted the connection but answers nothing: {late}",
+                hint="check that heptarm's application runs on the cabinet and listens on this port",
             )
 
     def _handshake(self, message: Message) -> None:
         if isinstance(message, Challenge):
             if not self._has_key:
                 raise ConnectFailed(
-                    f"the cabinet at {self.peer} asks for a pre-shared key",
+                    f"the cabinet at {self.peer} asks for a pre-shared key, none was given",
                     code=int(Code.WRONG_KEY),
-                    hint='connect(..., key="...") with the key that its process data names',
+                    hint='use connect(..., key="...") with the key in the process data of the cabinet\'s project',
                 )
-            self._say(self._session.proof())
+            self._send(self._session.proof())
         elif isinstance(message, Refusal):
             raise refusal(message, major=MAJOR, minor=MINOR)
         elif isinstance(message, Welcome):
             self._welcome = message
 
-    # ------------------------------------------------------------------------------------ talking
+    # ------------------------------------------------------------------------------------ sending
 
     @property
     def error(self) -> HeptarmError | None:
-        """Why the link has ended; None while it stands."""
+        """The error that ended the link; None while it is connected."""
         return self._error
 
+    @property
+    def is_read_here(self) -> bool:
+        """Whether the calling thread reads this link, so that it runs callbacks; nothing arrives while it waits."""
+        ident = get_ident()
+        return self._reader == ident or self._thread.ident == ident
+
     def expect_watchdog(self, seconds: float) -> None:
-        """Ping often enough for a watchdog of that length at the cabinet."""
+        """Ping often enough for a watchdog of this length at the cabinet [s]."""
         self._heartbeat.watchdog = seconds
 
     def expect_states(self, rate: float) -> None:
-        """Know how many states come per second: from a few hundred on, they must be taken at once."""
-        self._aside = _ASIDE if rate <= 250.0 else 0
+        """Prepare for this many pushed states per second of our clock [Hz]."""
+        self._polling = _POLLING if rate <= _FAST_STATES else 0
 
     def request(
         self, message: Message, *, timeout: float, on_answer: Callable[[Message], None] | None = None
@@ -179,62 +304,63 @@ class Link:
         Args:
             message: the request.
             timeout: how long to wait [s].
-            on_answer: called with the answer before anything that came after it is looked at; must not block.
+            on_answer: called with the answer before later messages are handled; must not block.
 
         Raises:
-            CommandRejected: the cabinet refuses (or another error of the table of codes).
+            CommandRejected: the cabinet refuses; the code decides which subclass or other error it is.
             ConnectionLost: the link has ended.
             Timeout: no answer in time.
         """
-        slot = Slot(on_answer)
+        pending = PendingRequest(on_answer)
         deadline = self._clock.nanos() + round(timeout * 1e9)
-        shield = Shield()
+        shield = InterruptShield()
         try:
-            self._say(message, slot)
-            if self._holder == get_ident():  # called from a callback: this thread is the one that reads
-                self._read_until(slot, deadline, shield)
-            elif self._token.acquire(timeout=_TURN):
+            self._send(message, pending)
+            if self._reader == get_ident():  # called from a callback: this thread is the one that reads
+                self._read_until(pending, deadline, shield)
+            elif self._reading.acquire(timeout=_TURN):
                 try:
-                    self._leading = True
-                    self._holder = get_ident()
-                    self._read_until(slot, deadline, shield)
+                    self._caller_reads = True
+                    self._reader = get_ident()
+                    self._read_until(pending, deadline, shield)
                 finally:
                     self._requested = self._clock.nanos()
-                    self._leading = False
-                    self._holder = 0
-                    self._token.release()
+                    self._caller_reads = False
+                    self._reader = 0
+                    self._reading.release()
         finally:
-            shield.down()
-        if slot.answer is None and self._error is None:
-            slot.wait((deadline - self._clock.nanos()) * 1e-9)
-        answer = slot.answer
+            shield.release()
+        if pending.answer is None and self._error is None:
+            pending.wait((deadline - self._clock.nanos()) * 1e-9)
+        answer = pending.answer
         if answer is None:
             if self._error is not None:
                 raise self._lost()
-            raise Timeout(f"the cabinet did not answer a {type(message).__name__} within {timeout:g} s")
+            raise Timeout(
+                f"the cabinet did not answer {type(message).__name__} within {timeout:g} s",
+                hint="check the network and the load of both machines, or use connect(..., timeout=...)",
+            )
         if isinstance(answer, Rejected):
             raise rejection(answer)
         return answer
 
-    def accept(
+    def submit(
         self, message: Message, *, timeout: float, on_answer: Callable[[Message], None] | None = None
     ) -> int:
-        """A request that is answered with an id; returns it. Raises as `request` does."""
+        """Send a request that is answered with Accepted, and return its id; raises as `request` does."""
         answer = self.request(message, timeout=timeout, on_answer=on_answer)
         if not isinstance(answer, Accepted):
-            raise RemoteProtocolError(f"a {type(answer).__name__} answers a {type(message).__name__}")
+            raise RemoteProtocolError(
+                f"the cabinet answered {type(message).__name__} with {type(answer).__name__}, not with Accepted"
+            )
         return answer.id
 
-    def post(self, message: Message) -> None:
-        """Send a request without waiting for its answer; callable from the callbacks."""
-        self._say(message, Slot())
-
-    def tell(self, kind: type[OneWay], numbers: Iterable[float], *, now: int) -> None:
-        """Send a message that nobody answers, stamped with the cabinet's clock as far as it is known.
+    def send_one_way(self, kind: type[OneWay], numbers: Iterable[float], *, now: int) -> None:
+        """Send a message that has no answer, stamped with the estimated time of the cabinet.
 
         Args:
-            kind: what to say.
-            numbers: its fields, one after the other.
+            kind: type of the message.
+            numbers: its fields in order.
             now: our clock [ns].
         """
         with self._sending:
@@ -243,65 +369,65 @@ class Link:
             data = self._session.send_numbers(kind, numbers, time=self.offset.to_cabinet(now))
             self._transmit(data)
 
-    def rehearse(self, kind: type[OneWay], numbers: Iterable[float], *, now: int) -> bytes:
-        """What `tell` would send now; nothing is sent."""
+    def pack_one_way(self, kind: type[OneWay], numbers: Iterable[float], *, now: int) -> bytes:
+        """Encode what `send_one_way` would send, without sending it."""
         return self._session.pack_numbers(kind, numbers, time=self.offset.to_cabinet(now))
 
     def ping(self) -> None:
-        """Probe the cabinet's clock; the answer goes into `offset`."""
-        self._say(Ping(sent=self._clock.nanos()))
+        """Probe the cabinet's clock; the answer updates `offset`."""
+        self._send(Ping(sent=self._clock.nanos()))
 
-    def _say(self, message: Message, slot: Slot | None = None) -> None:
+    def _send(self, message: Message, pending: PendingRequest | None = None) -> None:
         with self._sending:
             if self._error is not None:
                 raise self._lost()
             request = 0
-            if slot is not None:
+            if pending is not None:
                 request = self._session.next_request()
-                self._slots[request] = slot
+                self._pending[request] = pending
             data = self._session.send(message, request=request, time=self._clock.nanos())
             self._transmit(data)
 
     def _transmit(self, data: bytes) -> None:
-        """Send octets; the caller holds the lock."""
+        """Send bytes; the caller holds `_sending`."""
         try:
             self._transport.send(data)
         except HeptarmError as error:
-            self._lose(error)
+            self._fail(error)
             raise
         except BaseException:
-            # a part of the frame may have left: nothing can follow it
-            self._lose(ConnectionLost("interrupted while sending"))
+            # part of the frame may have left: nothing can follow it
+            self._fail(ConnectionLost("interrupted while sending"))
             raise
 
     # ------------------------------------------------------------------------------------ reading
 
-    def _read_until(self, slot: Slot, deadline: int, shield: Shield) -> None:
-        while slot.answer is None and self._error is None and not shield.pending:
+    def _read_until(self, pending: PendingRequest, deadline: int, shield: InterruptShield) -> None:
+        while pending.answer is None and self._error is None and not shield.pending:
             if self._clock.nanos() > deadline:
                 return
             self._read(wait=True)
 
     def _read_now(self) -> None:
-        """Take what is there, unless another thread does."""
-        if self._leading or not self._token.acquire(blocking=False):
+        """Read what is there, unless another thread does."""
+        if self._caller_reads or not self._reading.acquire(blocking=False):
             return
         try:
-            self._holder = get_ident()
+            self._reader = get_ident()
             self._read(wait=False)
         finally:
-            self._holder = 0
-            self._token.release()
+            self._reader = 0
+            self._reading.release()
 
     def _read(self, *, wait: bool) -> None:
-        """Take what has come and act on it; the caller holds the token."""
+        """Read and handle what has arrived; the caller holds `_reading`."""
         view = self._view
-        view[:8] = _NOTHING
+        view[:8] = _UNTOUCHED
         try:
             size = self._transport.receive_into(view, wait=wait)
             if size == 0:
                 return
-            now = self._heartbeat.heard = self._clock.nanos()
+            now = self._heartbeat.received = self._clock.nanos()
             session = self._session
             session.receive_data(view[:size])
             for event in session.events():
@@ -310,25 +436,25 @@ class Link:
                 elif type(event) is Received:
                     self._dispatch(event, now)
         except HeptarmError as error:
-            self._lose(error)
+            self._fail(error)
         except BaseException:
-            if view[:8] != _NOTHING:
-                self._lose(ConnectionLost("interrupted while reading"))
+            if view[:8] != _UNTOUCHED:
+                self._fail(ConnectionLost("interrupted while reading"))
             raise
 
     def _dispatch(self, event: Received, now: int) -> None:
         message = event.message
         kind = message.KIND
         if kind == "answer":
-            slot = self._slots.pop(event.request, None)
-            if slot is not None:
-                slot.put(message)
+            pending = self._pending.pop(event.request, None)
+            if pending is not None:
+                pending.resolve(message)
         elif isinstance(message, Ping):
-            self._say(Pong(sent=message.sent, received=now))
+            self._send(Pong(sent=message.sent, received=now))
         elif isinstance(message, Pong):
             self.offset.feed(message.sent, message.received, now)
         elif isinstance(message, Goodbye):
-            self._lose(farewell(message, self.peer))
+            self._fail(farewell(message, self.peer))
         elif kind == "handshake":
             self._handshake(message)
         else:
@@ -344,13 +470,13 @@ class Link:
                     self.ping()
                     due = now + self._heartbeat.interval
                 rest = max(0.0, (due - now) * 1e-9)
-                if self._leading:
+                if self._caller_reads:
                     # a caller reads; most are done within a fraction of a millisecond
                     clock.sleep(_STEP)
-                    if self._leading and self._token.acquire(timeout=rest):
-                        self._token.release()
-                elif now - self._requested < self._aside:
-                    # more requests may follow: an answer should wake its caller alone
+                    if self._caller_reads and self._reading.acquire(timeout=rest):
+                        self._reading.release()
+                elif now - self._requested < self._polling:
+                    # more requests may follow: an answer should wake only its caller
                     clock.sleep(_STEP)
                     self._read_now()
                 elif transport.wait_readable(rest):
@@ -358,39 +484,51 @@ class Link:
                 else:
                     self._heartbeat.check(now, self.peer)
             except HeptarmError as error:
-                self._lose(error)
+                self._fail(error)
             except Exception as error:
-                _log.exception("the link to %s fails", self.peer)
-                self._lose(ConnectionLost(f"an error in the link: {error!r}"))
+                _log.exception("unexpected error in the link to %s", self.peer)
+                self._fail(ConnectionLost(f"unexpected error in the link: {error!r}"))
         if not self._closing:
-            _log.info("link to %s ended: %s", self.peer, self._error)
+            _log.info("connection to %s ended: %s", self.peer, self._error)
             self._on_lost(self._error)
 
     # ------------------------------------------------------------------------------------- ending
 
     def close(self) -> None:
-        """Say goodbye and end the thread; closing twice is legal."""
+        """Send Goodbye and end the link thread; calling it again has no effect."""
         self._closing = True
         if self._error is None and self._session.state is SessionState.OPEN:
             try:
-                self._say(Goodbye(code=0, text="the client closes"))
+                self._send(Goodbye(code=0, text="the client closes the session"))
             except HeptarmError as error:
-                _log.debug("no goodbye to %s: %s", self.peer, error)
-        self._lose(ConnectionLost(f"the connection to {self.peer} is closed"))
+                _log.debug("Goodbye could not be sent to %s: %s", self.peer, error)
+        self._fail(ConnectionLost(f"the connection to {self.peer} is closed"))
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(5.0)
 
-    def _lose(self, error: HeptarmError) -> None:
+    def abandon(self, error: HeptarmError) -> None:
+        """Give up the copy that a fork of the process has, without any message to the cabinet.
+
+        The locks are made again, since a thread that exists only in the original process may hold them.
+        """
+        self._error, self._closing = error, True
+        self._sending, self._reading = threading.Lock(), threading.Lock()
+        self._caller_reads, self._reader = False, 0
+        self._pending.clear()
+        self._transport.abandon()
+
+    def _fail(self, error: HeptarmError) -> None:
+        """End the link; the first error is kept."""
         if self._error is None:
             self._error = error
         self._transport.close()
-        for request in list(self._slots):
-            slot = self._slots.pop(request, None)
-            if slot is not None:
-                slot.give_up()
+        for request in list(self._pending):
+            pending = self._pending.pop(request, None)
+            if pending is not None:
+                pending.abandon()
 
     def _lost(self) -> HeptarmError:
-        """A fresh error for each who asks: one exception raised in two threads mixes up their tracebacks."""
+        """Make a new error for each caller: one exception raised in two threads mixes up their tracebacks."""
         error = self._error
         assert error is not None
         if isinstance(error, ConnectionLost):

@@ -1,7 +1,7 @@
-"""A virtual cabinet of one's own: a child process that ends with this one, whatever happens.
+"""Start a private virtual cabinet: a child process that ends with this one, whatever happens.
 
-The child gets a pipe as its standard input and ends when that closes; the operating system closes it even when this
-process is killed. Nothing of heptarm.virtual is imported here.
+The child reads a pipe as its standard input and ends when that closes; the operating system closes it even when this
+process is killed. Nothing of heptarm.sim is imported here.
 """
 
 from __future__ import annotations
@@ -10,29 +10,32 @@ import atexit
 import contextlib
 import json
 import logging
+import os
 import queue
 import subprocess
 import sys
 import threading
+import weakref
 from collections import deque
 
-from heptarm.arm.target import Target
+from heptarm.arm.link.target import Target
 from heptarm.errors import ConnectFailed, ConnectionLost
+from heptarm.values.simulator_options import flag
 
 _log = logging.getLogger("heptarm.sim")
 
-#: A virtual cabinet is ready within a few seconds; a busy machine may need more [s].
+#: Longest time to start a virtual cabinet [s]: a few seconds, more on a busy machine.
 READY_TIMEOUT = 60.0
 _END_TIMEOUT = 5.0
 _REPLY_TIMEOUT = 20.0
 
 
 class PrivateCabinet:
-    """A running virtual cabinet.
+    """A running virtual cabinet of this program.
 
     Attributes:
-        host: where it listens.
-        port: where it listens.
+        host: address on which it listens.
+        port: TCP port on which it listens.
         pid: its process id.
     """
 
@@ -46,25 +49,48 @@ class PrivateCabinet:
         replies: queue.SimpleQueue[str],
     ) -> None:
         self._replies = replies
-        self._asking = threading.Lock()
+        self._command_lock = threading.Lock()
         self.port = port
         self.pid = process.pid
         self._process = process
         self._readers = readers
         atexit.register(self.close)
+        _cabinets.add(self)
+
+    def abandon(self) -> None:
+        """Give up the pipes in a fork of the process, so that only the original process keeps the simulator running."""
+        atexit.unregister(self.close)
+        self._readers = []
+        self._process.returncode = 0  # it is no child of this process: nothing to wait for
+        self._command_lock = threading.Lock()
+        nothing = os.open(os.devnull, os.O_RDWR)
+        try:
+            for pipe in (self._process.stdin, self._process.stdout, self._process.stderr):
+                if pipe is not None and not pipe.closed:
+                    os.dup2(nothing, pipe.fileno(), inheritable=False)  # the file's own lock may be held
+        finally:
+            os.close(nothing)
 
     @classmethod
     def start(cls, target: Target, *, timeout: float = READY_TIMEOUT) -> PrivateCabinet:
-        """Start one and wait until it accepts clients.
+        """Start a virtual cabinet and wait until it accepts clients.
 
         Raises:
-            ConnectFailed: it does not start; the text has its last words.
+            ConnectFailed: it does not start; the text has its last output.
         """
-        command = [sys.executable, "-m", "heptarm.virtual.cabinet", "--model", target.model, "--port", "0"]
+        command = [
+            sys.executable,
+            "-m",
+            "heptarm.sim.runtime.cabinet",
+            "--model",
+            target.model,
+            "--port",
+            "0",
+        ]
         for name, value in target.options:
-            command += [f"--{name}", value]
+            command += [flag(name), value]
         command.append("--parent-pipe")
-        # its own session: a Ctrl-C at the terminal is for this process, which then stops the arm through the link
+        # a session of its own: Ctrl-C in the terminal reaches only this process, which then stops the arm
         process = subprocess.Popen(
             command,
             stdin=subprocess.PIPE,
@@ -73,14 +99,17 @@ class PrivateCabinet:
             text=True,
             start_new_session=True,
         )
-        words: deque[str] = deque(maxlen=20)
+        output: deque[str] = deque(maxlen=20)
         ready: queue.SimpleQueue[int | None] = queue.SimpleQueue()
         replies: queue.SimpleQueue[str] = queue.SimpleQueue()
         readers = [
             threading.Thread(
-                target=_listen, args=(process, ready, replies, words), name="heptarm-sim-out", daemon=True
+                target=_read_output,
+                args=(process, ready, replies, output),
+                name="heptarm-sim-out",
+                daemon=True,
             ),
-            threading.Thread(target=_drain, args=(process, words), name="heptarm-sim-log", daemon=True),
+            threading.Thread(target=_read_log, args=(process, output), name="heptarm-sim-log", daemon=True),
         ]
         for reader in readers:
             reader.start()
@@ -94,44 +123,64 @@ class PrivateCabinet:
         if port is None:
             _end(process, readers)
             raise ConnectFailed(
-                f"the virtual cabinet did not start: {' | '.join(words) or 'it said nothing'}",
-                hint="try `python -m heptarm.virtual.cabinet`; it needs pip install 'heptarm[sim]'",
+                f"the virtual cabinet did not start: {' | '.join(output) or 'no output'}",
+                hint="run `python -m heptarm.sim.runtime.cabinet`; it needs pip install 'heptarm[sim]'",
             )
         return cls(process, port, readers, replies)
 
     @property
     def is_running(self) -> bool:
-        """Whether the process lives."""
+        """Whether the process runs."""
         return self._process.poll() is None
 
     def operate(self, words: str) -> str:
-        """Let the person beside the robot do something; returns why it was not understood, "" if it was.
+        """Carry out an operator command and return the error text, "" if it succeeded.
 
         Raises:
             ConnectionLost: the process has ended, or does not answer.
         """
-        with self._asking:
+        if not self.is_running:
+            raise ConnectionLost(
+                "the virtual cabinet has ended, or belongs to the process that this one is a fork of",
+                hint="connect again",
+            )
+        with self._command_lock:
             try:
                 assert self._process.stdin is not None
                 self._process.stdin.write(f"{' '.join(words.split())}\n")
                 self._process.stdin.flush()
                 return self._replies.get(timeout=_REPLY_TIMEOUT)
             except (OSError, ValueError, queue.Empty):
-                raise ConnectionLost("the virtual cabinet does not answer", hint="connect again") from None
+                raise ConnectionLost(
+                    f"the virtual cabinet did not answer within {_REPLY_TIMEOUT:g} s", hint="connect again"
+                ) from None
 
     def close(self) -> None:
-        """End it; closing twice is legal."""
+        """End the process; calling it again has no effect."""
         atexit.unregister(self.close)
         _end(self._process, self._readers)
 
 
-def _listen(
+#: All private cabinets, for a fork of the process.
+_cabinets: weakref.WeakSet[PrivateCabinet] = weakref.WeakSet()
+
+
+def _abandon_cabinets() -> None:
+    for cabinet in list(_cabinets):
+        cabinet.abandon()
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows, where no process forks
+    os.register_at_fork(after_in_child=_abandon_cabinets)
+
+
+def _read_output(
     process: subprocess.Popen[str],
     ready: queue.SimpleQueue[int | None],
     replies: queue.SimpleQueue[str],
-    words: deque[str],
+    output: deque[str],
 ) -> None:
-    """Wait for the READY line, then hand on what is answered to the operator."""
+    """Read the READY line, then the replies to operator commands."""
     assert process.stdout is not None
     for line in process.stdout:
         try:
@@ -141,28 +190,30 @@ def _listen(
             elif message["ready"]:
                 ready.put(int(message["port"]))
             else:
-                words.append(str(message["error"]))
+                output.append(str(message["error"]))
         except (ValueError, KeyError, TypeError):
-            words.append(line.rstrip())
+            output.append(line.rstrip())
     ready.put(None)
 
 
-def _drain(process: subprocess.Popen[str], words: deque[str]) -> None:
+def _read_log(process: subprocess.Popen[str], output: deque[str]) -> None:
     assert process.stderr is not None
     for line in process.stderr:
-        words.append(line.rstrip())
+        output.append(line.rstrip())
         _log.debug("%s", line.rstrip())
 
 
 def _end(process: subprocess.Popen[str], readers: list[threading.Thread]) -> None:
-    """Close its pipe, wait, and kill it if that is not enough."""
-    with contextlib.suppress(OSError):  # it may be gone already
+    """Close the pipe and wait; kill the process if it does not end."""
+    with contextlib.suppress(OSError):  # the process may have ended already
         if process.stdin is not None:
             process.stdin.close()
     try:
         process.wait(_END_TIMEOUT)
     except subprocess.TimeoutExpired:
-        _log.warning("the virtual cabinet (process %d) did not end by itself; killing it", process.pid)
+        _log.warning(
+            "the virtual cabinet (process %d) did not end within %g s; killing it", process.pid, _END_TIMEOUT
+        )
         process.kill()
         process.wait(_END_TIMEOUT)
     for reader, pipe in zip(readers, (process.stdout, process.stderr), strict=True):

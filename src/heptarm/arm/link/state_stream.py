@@ -1,31 +1,55 @@
-"""What the cabinet pushes: the newest state, the last ones, and streams of them.
-
-States stay octets until somebody looks at them; a thousand a second cost next to nothing.
-"""
+"""Pushed states: the newest one, the last ones, and streams of them."""
 
 from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-from heptarm.errors import HeptarmError
+from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.io.clock import Clock
-from heptarm.values.state import State
+from heptarm.values.state import GROUP_NAMES, State
+from heptarm.wire import messages as wire
 
-#: States that an error carries as evidence.
+#: Groups of the state that are subscribed by default: all but the signals.
+GROUPS = tuple(name for name in GROUP_NAMES if name != "io")
+
+
+def groups_of(names: Sequence[str], offered: wire.Groups) -> wire.Groups:
+    """Turn names of groups into the flags of the protocol.
+
+    Raises:
+        CommandRejected: the cabinet does not offer one of them; the text lists those that it offers.
+    """
+    chosen = wire.Groups.NONE
+    for name in names:
+        group = wire.Groups.__members__.get(str(name).upper(), wire.Groups.NONE)
+        if not group & offered:
+            known = ", ".join(one.name.lower() for one in wire.Groups if one & offered and one.name)
+            raise CommandRejected(
+                f"the cabinet offers no state group {name!r}",
+                parameter="groups",
+                value=name,
+                allowed=known,
+                hint=f"choose from {known}",
+            )
+        chosen |= group
+    return chosen
+
+
+#: States that are kept, and that an error carries.
 HISTORY = 50
-#: Longest a stream waits at once before it looks whether the link still stands [s].
-_LOOK = 0.2
+#: Longest wait of a stream between two checks of the link [s].
+_CHECK_INTERVAL = 0.2
 
 
-class Sample(NamedTuple):
-    """A pushed state as it came.
+class StateSample(NamedTuple):
+    """A pushed state, still encoded.
 
     Attributes:
         number: counts the states of the arm from 1.
-        body: its octets.
+        body: its bytes.
         received: our clock at its receipt [ns].
     """
 
@@ -34,25 +58,28 @@ class Sample(NamedTuple):
     received: int
 
 
-class Feed:
-    """Takes states from the link and hands them to those who want them.
+class StateFeed:
+    """Distributes states from the link to waiting threads and open streams.
 
     Args:
         clock: this side's clock.
+
+    Attributes:
+        newest: the newest sample; None before the first.
     """
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self.newest: Sample | None = None
-        self._history: deque[Sample] = deque(maxlen=HISTORY)
+        self.newest: StateSample | None = None
+        self._history: deque[StateSample] = deque(maxlen=HISTORY)
         self._changed = threading.Condition()
         self._waiting = 0
-        self._queues: tuple[Queue, ...] = ()
+        self._queues: tuple[SampleQueue, ...] = ()
 
     def push(self, body: bytes, received: int) -> None:
-        """A state has come; called by the link."""
+        """Take a new state; called by the link."""
         newest = self.newest
-        sample = Sample(1 if newest is None else newest.number + 1, body, received)
+        sample = StateSample(1 if newest is None else newest.number + 1, body, received)
         self.newest = sample
         self._history.append(sample)
         for one in self._queues:
@@ -61,16 +88,22 @@ class Feed:
             self.wake()
 
     def wake(self) -> None:
-        """Let those who wait look again."""
+        """Wake all waiting threads."""
         with self._changed:
             self._changed.notify_all()
 
-    def history(self) -> list[Sample]:
+    def abandon(self) -> None:
+        """Drop all states in a fork of the process, and the lock, which another thread may hold."""
+        self.newest, self._queues = None, ()
+        self._history.clear()
+        self._changed, self._waiting = threading.Condition(), 0
+
+    def history(self) -> list[StateSample]:
         """The last samples, oldest first."""
         return list(self._history)
 
-    def after(self, number: int, seconds: float) -> Sample | None:
-        """The newest sample if it is younger than `number`; waits for one, None if none came in time."""
+    def after(self, number: int, seconds: float) -> StateSample | None:
+        """Wait for a sample newer than `number` and return the newest; None if none arrived in time."""
         deadline = self._clock.nanos() + round(seconds * 1e9)
         with self._changed:
             self._waiting += 1
@@ -85,61 +118,61 @@ class Feed:
             finally:
                 self._waiting -= 1
 
-    def open(self, size: int) -> Queue:
-        """A queue of every sample from now on."""
-        queue = Queue(size)
+    def open(self, size: int) -> SampleQueue:
+        """Open a queue that receives every sample from now on."""
+        queue = SampleQueue(size)
         with self._changed:
             self._queues = (*self._queues, queue)
         return queue
 
-    def shut(self, queue: Queue) -> None:
-        """End a queue."""
+    def close(self, queue: SampleQueue) -> None:
+        """Close a queue."""
         with self._changed:
             self._queues = tuple(one for one in self._queues if one is not queue)
 
 
-class Queue:
-    """Every sample, up to a bound; then the oldest are dropped and counted."""
+class SampleQueue:
+    """A bounded queue of samples; when it is full the oldest are dropped and counted.
 
-    __slots__ = ("_lock", "_samples", "_there", "lost")
+    Attributes:
+        lost: number of dropped samples.
+    """
+
+    __slots__ = ("_available", "_lock", "_samples", "lost")
 
     def __init__(self, size: int) -> None:
-        self._samples: deque[Sample] = deque(maxlen=size)
-        self._there = threading.Semaphore(0)
+        self._samples: deque[StateSample] = deque(maxlen=size)
+        self._available = threading.Semaphore(0)
         self._lock = threading.Lock()
         self.lost = 0
 
-    def put(self, sample: Sample) -> None:
-        """Append one."""
+    def put(self, sample: StateSample) -> None:
+        """Append a sample."""
         with self._lock:
             is_full = len(self._samples) == self._samples.maxlen
             self._samples.append(sample)
         if is_full:
             self.lost += 1  # the oldest fell out, its permit stays for this one
         else:
-            self._there.release()
+            self._available.release()
 
-    def get(self, seconds: float) -> Sample | None:
-        """The oldest one; None if none came in time."""
-        if not self._there.acquire(timeout=max(seconds, 0.0)):
+    def get(self, seconds: float) -> StateSample | None:
+        """Take the oldest sample; None if none arrived in time."""
+        if not self._available.acquire(timeout=max(seconds, 0.0)):
             return None
         with self._lock:
             return self._samples.popleft()
 
 
 class States(Iterator[State]):
-    """States one after the other, never one twice; made by `Arm.states`.
-
-    Attributes:
-        lost: states that came but could not be kept because the loop was too slow; 0 for a paced stream.
-    """
+    """An iterator over pushed states that returns each at most once; made by `Arm.states`."""
 
     def __init__(
         self,
-        feed: Feed,
+        feed: StateFeed,
         clock: Clock,
         *,
-        build: Callable[[Sample], State],
+        build: Callable[[StateSample], State],
         check: Callable[[], HeptarmError | None],
         rate: float | None,
         duration: float | None,
@@ -158,7 +191,7 @@ class States(Iterator[State]):
 
     @property
     def lost(self) -> int:
-        """States that came but could not be kept."""
+        """States dropped because the loop was too slow; 0 for a stream with a rate."""
         return 0 if self._queue is None else self._queue.lost
 
     def __next__(self) -> State:
@@ -168,7 +201,7 @@ class States(Iterator[State]):
             ConnectionLost: the link has ended.
         """
         while self._end is None or self._clock.nanos() < self._end:
-            sample = self._every() if self._queue is not None else self._paced()
+            sample = self._next_queued() if self._queue is not None else self._next_paced()
             if sample is not None:
                 return self._build(sample)
             error = self._check()
@@ -179,19 +212,19 @@ class States(Iterator[State]):
         raise StopIteration
 
     def close(self) -> None:
-        """Take no more; a loop that ends does this itself."""
+        """Stop receiving states; the end of the iteration does this by itself."""
         if self._queue is not None:
-            self._feed.shut(self._queue)
+            self._feed.close(self._queue)
 
     def __del__(self) -> None:
-        """A loop that was left early lets go of its queue."""
+        """Close the queue of a loop that was left early."""
         self.close()
 
-    def _every(self) -> Sample | None:
+    def _next_queued(self) -> StateSample | None:
         assert self._queue is not None
         return self._queue.get(self._rest())
 
-    def _paced(self) -> Sample | None:
+    def _next_paced(self) -> StateSample | None:
         assert self._period is not None
         self._clock.sleep(min((self._due - self._clock.nanos()) * 1e-9, self._rest()))
         if self._clock.nanos() < self._due:
@@ -200,11 +233,12 @@ class States(Iterator[State]):
         if sample is None:
             return None
         self._seen = sample.number
-        # a slow loop skips beats instead of catching up with a burst
+        # a slow loop skips periods instead of catching up with a burst
         self._due = max(self._due + self._period, self._clock.nanos() - self._period)
         return sample
 
     def _rest(self) -> float:
+        """Time to wait before the next check of the link [s]."""
         if self._end is None:
-            return _LOOK
-        return min(_LOOK, (self._end - self._clock.nanos()) * 1e-9)
+            return _CHECK_INTERVAL
+        return min(_CHECK_INTERVAL, (self._end - self._clock.nanos()) * 1e-9)

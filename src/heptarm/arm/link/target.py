@@ -1,4 +1,4 @@
-"""Targets: what to connect to, as text."""
+"""Targets: the text that names what to connect to."""
 
 from __future__ import annotations
 
@@ -8,14 +8,11 @@ from urllib.parse import parse_qsl, urlsplit
 
 from heptarm.errors import ConnectFailed
 from heptarm.values.robot import ROBOTS
+from heptarm.values.simulator_options import check_target_option
 from heptarm.wire.messages import PORT
 
 #: Environment variable that names the default target.
 VARIABLE = "HEPTARM_TARGET"
-
-#: Options of a private virtual cabinet besides its speed: a box around the arm; what hangs on the flange whatever the
-#: controller is told; the project's RoboticsAPI.data.xml.
-_OTHERS = ("box", "payload", "project", "fault")
 
 _EXAMPLES = (
     'examples: "172.31.1.147" or "172.31.1.147:30001" (a cabinet), "sim://iiwa14" or "sim://iiwa7?speed=5" '
@@ -25,13 +22,13 @@ _EXAMPLES = (
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """What to connect to: a port that listens, or a private virtual cabinet to start.
+    """What to connect to: a listening cabinet, or a private virtual cabinet to start.
 
     Attributes:
         host: name or address; empty for a private virtual cabinet.
         port: TCP port.
         model: robot of the private virtual cabinet; empty otherwise.
-        options: further options of the private virtual cabinet, by name.
+        options: (name, value) pairs of the private virtual cabinet.
     """
 
     host: str = ""
@@ -41,7 +38,7 @@ class Target:
 
     @property
     def is_private(self) -> bool:
-        """Whether a virtual cabinet has to be started."""
+        """Whether a private virtual cabinet has to be started."""
         return bool(self.model)
 
     def __str__(self) -> str:
@@ -53,7 +50,7 @@ class Target:
 
 
 def target_from_env() -> str:
-    """The target that the environment variable HEPTARM_TARGET names.
+    """Read the target from the environment variable HEPTARM_TARGET.
 
     Raises:
         ConnectFailed: it is not set.
@@ -61,61 +58,52 @@ def target_from_env() -> str:
     value = os.environ.get(VARIABLE, "").strip()
     if not value:
         raise ConnectFailed(
-            f"no target: none was given and {VARIABLE} is not set",
-            hint=f'set it, as in {VARIABLE}=sim://iiwa14, or connect("sim://iiwa14"); {_EXAMPLES}',
+            f"no target was given and {VARIABLE} is not set",
+            hint=f'set it, as in {VARIABLE}=sim://iiwa14, or use connect("sim://iiwa14"); {_EXAMPLES}',
         )
     return value
 
 
 def parse_target(text: str) -> Target:
-    """Read a target.
+    """Parse a target.
 
     Args:
         text: "ADDRESS[:PORT]", "sim://MODEL[?OPTION=VALUE&...]" or "sim://HOST:PORT".
 
     Raises:
-        ConnectFailed: it is none of these; the text shows examples.
+        ConnectFailed: it has none of these forms; the text shows examples.
     """
     try:
         if not text.startswith("sim://"):
             return _address(text)
         parts = urlsplit(text)
         if parts.path.strip("/") or parts.fragment or "@" in parts.netloc:
-            raise ValueError(f"{parts.path or parts.netloc!r} has no meaning in it")
+            raise ValueError(f"{parts.path or parts.netloc!r} is not allowed in it")
         options = tuple(parse_qsl(parts.query, keep_blank_values=True, strict_parsing=bool(parts.query)))
         if parts.netloc in ROBOTS:
-            _check(options)
+            for name, value in options:
+                check_target_option(name, value)
             return Target(model=parts.netloc, options=options)
         if options:
-            raise ValueError("options belong to a private simulator")
-        if ":" not in parts.netloc:
-            raise ValueError(f"{parts.netloc!r} is no robot ({', '.join(ROBOTS)}) and has no port")
+            raise ValueError("only a private simulator, such as sim://iiwa14, has options")
+        if parts.port is None:  # "HOST:" as well
+            raise ValueError(
+                f"{parts.netloc!r} is neither a robot ({', '.join(ROBOTS)}) nor HOST:PORT with a port"
+            )
         return _address(parts.netloc)
     except ValueError as error:
-        raise ConnectFailed(f"{text!r} is no target: {error}", hint=_EXAMPLES) from None
+        raise ConnectFailed(
+            f"target must be an address or a simulator, got {text!r}: {error}", hint=_EXAMPLES
+        ) from None
 
 
 def _address(text: str) -> Target:
     if "://" in text or "/" in text:
-        raise ValueError("only sim:// is known")
+        raise ValueError("the only scheme is sim://")
     parts = urlsplit(f"//{text}")
     port = parts.port  # raises ValueError unless it is a number in range
     if not parts.hostname or any(character.isspace() for character in text):
-        raise ValueError("it names no host")
+        raise ValueError("it has no host")
     if parts.username is not None or parts.query or port == 0:
-        raise ValueError("an address is HOST or HOST:PORT")
+        raise ValueError("an address is HOST or HOST:PORT with a port of 1 to 65535")
     return Target(host=parts.hostname, port=PORT if port is None else port)
-
-
-def _check(options: tuple[tuple[str, str], ...]) -> None:
-    for name, value in options:
-        if name in _OTHERS:
-            continue  # the cabinet looks at it
-        if name != "speed":
-            raise ValueError(f"there is no option {name!r}; there are speed, {', '.join(_OTHERS)}")
-        try:
-            good = 0.01 <= float(value) <= 100.0
-        except ValueError:
-            good = False
-        if not good:
-            raise ValueError(f"speed is {value}; allowed is [0.01, 100]")

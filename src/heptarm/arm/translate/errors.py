@@ -1,4 +1,4 @@
-"""From the protocol's codes to the errors of the API."""
+"""From the codes of the protocol to errors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from heptarm.wire.messages import Goodbye, Refusal, Rejected
 def error_of(
     code: int, text: str, *, parameter: str = "", value: str = "", allowed: str = ""
 ) -> HeptarmError:
-    """The error that a code stands for, with what the cabinet said and the table's advice."""
+    """The error of a code, with the cabinet's text and the remedy from the table of codes."""
     meaning = MEANINGS.get(code)
     kind: type[HeptarmError] = CommandRejected if meaning is None else getattr(errors, meaning.error)
     what = text or (meaning.title if meaning is not None else f"refused with code {code}")
@@ -19,7 +19,7 @@ def error_of(
         what += f": {parameter} is {value}"
     if allowed and allowed not in what:
         what += f"; allowed is {allowed}"
-    # an operator's steps are in the cabinet's text: a general advice would hide them
+    # the operator's steps are in the cabinet's text: a general hint would hide them
     hint = "" if meaning is None or issubclass(kind, NeedsOperator) else meaning.advice
     return kind(what, code=code, parameter=parameter, value=value, allowed=allowed, hint=hint)
 
@@ -36,7 +36,7 @@ def rejection(message: Rejected) -> HeptarmError:
 
 
 def refusal(message: Refusal, *, major: int, minor: int) -> HeptarmError:
-    """The error of a refused session; versions that differ are both named."""
+    """The error of a refused session; if the versions differ, it names both."""
     text = message.text
     if message.major != major:
         text = (

@@ -1,0 +1,700 @@
+"""The arm's connection to the cabinet: it outlives single links, keeps track of control, and dispatches events."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import threading
+import weakref
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from heptarm import __version__
+from heptarm.arm.link.link import Link
+from heptarm.arm.link.local_simulator import PrivateCabinet
+from heptarm.arm.link.state_stream import GROUPS, StateFeed, States, StateSample, groups_of
+from heptarm.arm.translate.state import read_firing, read_result, read_robot, read_signals, read_state
+from heptarm.errors import (
+    CommandRejected,
+    ConnectionLost,
+    HeptarmError,
+    LocalProtocolError,
+    ModeConflict,
+    StaleState,
+    Timeout,
+)
+from heptarm.io.clock import Clock
+from heptarm.io.transport import Transport
+from heptarm.values.arrays import within
+from heptarm.values.io import Signal
+from heptarm.values.result import Result
+from heptarm.values.robot import RobotModel
+from heptarm.values.state import State
+from heptarm.wire import messages as wire
+from heptarm.wire.messages import Message
+
+_log = logging.getLogger("heptarm.arm")
+
+#: Silence after which the cabinet counts a controller as lost, unless the client chooses another [s].
+WATCHDOG: float = wire.TakeControl().watchdog
+#: Time for the connection and for the answer to a request, unless the client chooses another [s].
+TIMEOUT = 5.0
+#: States per second, unless the client chooses another rate [Hz].
+STATE_RATE = 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """Options of a connection; see `connect`.
+
+    Attributes:
+        name: shown to other clients.
+        key: pre-shared key; None: none.
+        timeout: longest wait for an answer [s].
+        rate: pushed states per second [Hz]; 0: none.
+        groups: groups of the state that are pushed.
+        finishes: after a lost connection accepted motions finish instead of stopping.
+        watchdog: silence after which the cabinet counts this client as lost [s].
+    """
+
+    name: str = "heptarm"
+    key: bytes | None = None
+    timeout: float = TIMEOUT
+    rate: float = STATE_RATE
+    groups: tuple[str, ...] = GROUPS
+    finishes: bool = False
+    watchdog: float = WATCHDOG
+
+
+#: FRI sessions whose last change is kept.
+_MAX_FRI_SESSIONS = 64
+#: Events that belong to one program.
+_PROGRAM_EVENTS = (
+    wire.MotionStarted,
+    wire.SegmentReached,
+    wire.ItemReached,
+    wire.TriggerFired,
+    wire.ConditionFired,
+    wire.MotionFinished,
+)
+_LEVELS = {
+    wire.Severity.INFO: logging.INFO,
+    wire.Severity.WARNING: logging.WARNING,
+    wire.Severity.ERROR: logging.ERROR,
+}
+
+
+class SentProgram(Protocol):
+    """A program sent to the cabinet, as far as the connection needs it; `MotionHandle` is one."""
+
+    @property
+    def id(self) -> int:
+        """The cabinet's number of the program."""
+        ...
+
+    @property
+    def limit(self) -> float:
+        """Longest plausible duration [s]."""
+        ...
+
+    @property
+    def done(self) -> bool:
+        """Whether it has ended."""
+        ...
+
+    def on_accepted(self, number: int) -> None:
+        """Take the number under which the cabinet accepted it."""
+        ...
+
+    def on_event(self, message: Message) -> None:
+        """Take an event of this program; called from the link thread."""
+        ...
+
+    def on_lost(self, error: HeptarmError) -> None:
+        """Take the error that ended the link; called from the link thread."""
+        ...
+
+    def on_fork(self, error: HeptarmError) -> None:
+        """Take the error of a fork of the process, in which the program cannot be followed."""
+        ...
+
+
+class Events:
+    """Dispatches unsolicited events to the running programs and to listeners.
+
+    Args:
+        on_control: called when the controlling client changes.
+
+    Attributes:
+        key_listeners: called with (slot, pressed) of each user key of the smartPAD.
+    """
+
+    def __init__(self, on_control: Callable[[wire.ControlChanged], None]) -> None:
+        self._on_control = on_control
+        self._programs: dict[int, SentProgram] = {}
+        self._unclaimed: deque[Message] = deque(maxlen=256)
+        self._servo_status: wire.ServoStatus | None = None
+        self._fri_changes: dict[int, wire.FriChanged] = {}
+        self.key_listeners: list[Callable[[int, bool], None]] = []
+
+    def dispatch(self, message: Message) -> None:
+        """Pass an event on to its receiver."""
+        if isinstance(message, _PROGRAM_EVENTS):
+            program = self._programs.get(message.id)
+            if program is None:
+                self._unclaimed.append(message)  # its Accepted may still be under way
+            else:
+                self._deliver(program, message)
+        elif isinstance(message, wire.ServoStatus):
+            self._servo_status = message
+        elif isinstance(message, wire.KeyPressed):
+            for listener in list(self.key_listeners):
+                try:
+                    listener(message.slot, message.down)
+                except Exception:  # the link thread has to go on
+                    _log.exception("a key callback raised an error")
+        elif isinstance(message, wire.FriChanged):
+            self._note_fri(message)
+        elif isinstance(message, wire.ControlChanged):
+            self._on_control(message)
+        elif isinstance(message, wire.SafetyChanged):
+            _log.info("safety: %s", message.text)
+        elif isinstance(message, wire.Notice):
+            _log.log(_LEVELS[message.severity], "cabinet: %s", message.text)
+
+    # ---------------------------------------------------------------------------------- programs
+
+    def claim(self, program: SentProgram, number: int) -> None:
+        """Register a program under its number and deliver the events that came before its acceptance."""
+        program.on_accepted(number)
+        self._programs[number] = program
+        for message in list(self._unclaimed):
+            if message.id == number:  # type: ignore[union-attr]
+                self._deliver(program, message)
+
+    def is_running(self, program: SentProgram) -> bool:
+        """Whether no end of the program was received."""
+        return program.id in self._programs
+
+    def pending(self) -> float:
+        """Longest plausible duration of all accepted programs together [s]."""
+        return sum(program.limit for program in list(self._programs.values()))
+
+    def forget_unclaimed(self) -> None:
+        """Drop events of the previous link: its program numbers mean nothing on a new one."""
+        self._unclaimed.clear()
+
+    def lose(self, error: HeptarmError) -> None:
+        """End all accepted programs with an error."""
+        while self._programs:
+            with contextlib.suppress(KeyError):  # it has just ended by itself
+                self._programs.popitem()[1].on_lost(error)
+
+    def abandon(self, error: HeptarmError) -> None:
+        """End all programs in a fork of the process; the original process goes on with them."""
+        for program in self._programs.values():
+            program.on_fork(error)
+        self._programs = {}
+        self.key_listeners = []
+
+    def _deliver(self, program: SentProgram, message: Message) -> None:
+        if isinstance(message, wire.MotionFinished):
+            self._programs.pop(message.id, None)
+        program.on_event(message)
+
+    # ----------------------------------------------------------------------------- servo and FRI
+
+    def servo_status(self, number: int) -> wire.ServoStatus | None:
+        """The cabinet's last report on the target stream of a servo motion."""
+        status = self._servo_status
+        return status if status is not None and status.servo == number else None
+
+    def fri_change(self, number: int) -> wire.FriChanged | None:
+        """The cabinet's last report on an FRI session; the report of its end is kept."""
+        return self._fri_changes.get(number)
+
+    def _note_fri(self, message: wire.FriChanged) -> None:
+        _log.info(
+            "FRI session %d: %s, %s %s",
+            message.session,
+            message.state.name,
+            message.quality.name,
+            message.text,
+        )
+        changes, known = self._fri_changes, self._fri_changes.get(message.session)
+        if known is None or known.state is not wire.FriSessionState.IDLE:
+            changes[message.session] = message
+        while len(changes) > _MAX_FRI_SESSIONS:
+            del changes[next(iter(changes))]
+
+
+#: First and longest pause between two attempts to reconnect [s].
+_BACK_OFF, _MAX_BACK_OFF = 0.1, 2.0
+#: Longest wait for a state between two checks of the link [s].
+_CHECK_INTERVAL = 0.2
+#: A state older than this many periods, and than this [s], is stale.
+_STALE_PERIODS, _STALE = 10.0, 1.0
+
+
+class Connection:
+    """The connection behind an arm; links to the cabinet come and go, it stays.
+
+    Args:
+        dial: makes a transport to the cabinet.
+        options: see `Options`.
+        clock: this side's clock.
+        cabinet: the private virtual cabinet at the other end; None: a real or a shared one.
+
+    Attributes:
+        feed: pushed states.
+        events: dispatcher of all other events.
+        in_control: this client took control and has not lost it; true also while the link is lost.
+        controller: name of the client that controls the robot; empty: none.
+        closed: set when the arm is closed.
+        signals: signals of the cabinet.
+    """
+
+    def __init__(
+        self,
+        dial: Callable[[], Transport],
+        options: Options,
+        *,
+        clock: Clock,
+        cabinet: PrivateCabinet | None = None,
+    ) -> None:
+        self.options = options
+        self.clock = clock
+        self.cabinet = cabinet
+        self.feed = StateFeed(clock)
+        self.in_control = False
+        self.controller = ""
+        self.closed = threading.Event()
+        self._dial = dial
+        self._link: Link | None = None
+        self._welcome: wire.Welcome | None = None
+        self._robot: RobotModel | None = None
+        self._built: tuple[int, State] | None = None
+        self.events = Events(self._on_control)
+        self.signals: tuple[Signal, ...] = ()
+        self._blocks: dict[SentProgram, tuple[int, str]] = {}
+        self._lock = threading.RLock()
+        self._fork_error: ConnectionLost | None = None
+        self._process = os.getpid()
+        _connections.add(self)
+
+    # ---------------------------------------------------------------------------------- the link
+
+    @property
+    def link(self) -> Link:
+        """The current link, connected or lost.
+
+        Raises:
+            ConnectionLost: there was none yet.
+        """
+        if self._link is None:
+            raise _not_connected()
+        return self._link
+
+    @property
+    def welcome(self) -> wire.Welcome:
+        """The cabinet's description of itself."""
+        if self._welcome is None:
+            raise _not_connected()
+        return self._welcome
+
+    @property
+    def robot(self) -> RobotModel:
+        """The connected robot and its limits."""
+        if self._robot is None:
+            raise _not_connected()
+        return self._robot
+
+    @property
+    def title(self) -> str:
+        """KUKA's name of the robot, for people."""
+        return "not connected" if self._robot is None else self._robot.title
+
+    @property
+    def is_connected(self) -> bool:
+        """Whether the current link is connected."""
+        return self._link is not None and self._link.error is None
+
+    @property
+    def pace(self) -> float:
+        """Cabinet seconds per second of our clock."""
+        return max(self.link.offset.rate, 0.001)
+
+    def open(self) -> None:
+        """Make a link and subscribe to states."""
+        link = self._new_link(self.events.dispatch, self.feed.push, self._on_lost)
+        self._welcome = link.open(name=self.options.name, version=__version__, timeout=self.options.timeout)
+        self.controller = self._welcome.controller
+        self.in_control = False
+        self.events.forget_unclaimed()
+        self._link = link
+        try:
+            self._robot = read_robot(self._welcome.robot)
+            self.signals = read_signals(self._welcome.signals)
+            self.subscribe(self.options.rate, self.options.groups)
+        except BaseException:
+            link.close()
+            raise
+
+    def reopen(self) -> None:
+        """Replace the link by a new one; take control again if this client had it."""
+        with self._lock:
+            self.check_open()
+            had_control = self.in_control
+            if self._link is not None:
+                self._link.close()
+            self.open()
+            if had_control:
+                self.take_control()
+
+    def close(self) -> None:
+        """End the link, everything that waits for it, and a private cabinet."""
+        if self._link is not None:
+            self._link.close()
+        self.events.lose(_closed())
+        self.feed.wake()
+        if self.cabinet is not None:
+            self.cabinet.close()
+
+    def mark_closed(self) -> bool:
+        """Mark the arm as closed; False if it was closed already."""
+        with self._lock:
+            was_open = not self.closed.is_set()
+            self.closed.set()
+            return was_open
+
+    def check_open(self) -> None:
+        """Raise ConnectionLost if the arm was closed."""
+        if self.closed.is_set():
+            raise self._closed_error()
+
+    def abandon(self) -> None:
+        """Make the copy inert that a fork of the process has; the original process keeps arm and session."""
+        self._fork_error = error = ConnectionLost(
+            f"this arm belongs to process {self._process}, of which this process is a fork",
+            hint="connect after the fork, or use multiprocessing with the start method 'spawn'",
+        )
+        self.closed, self._lock = threading.Event(), threading.RLock()
+        self.closed.set()
+        self.in_control = False
+        self._blocks = {}
+        self._built = None
+        self.feed.abandon()
+        self.events.abandon(error)
+        if self._link is not None:
+            self._link.abandon(error)
+
+    def _closed_error(self) -> ConnectionLost:
+        error = self._fork_error
+        return _closed() if error is None else ConnectionLost(error.text, hint=error.hint)
+
+    def final_error(self) -> HeptarmError | None:
+        """The error because of which no more states will arrive; None while they may.
+
+        The link of an observer reconnects by itself, that of a controller does not.
+        """
+        error = self.link.error
+        if error is None:
+            return None
+        if self.closed.is_set():
+            return self._closed_error()
+        if not self.in_control:
+            return None
+        return ConnectionLost(
+            f"the connection is lost: {error.text}",
+            code=error.code,
+            hint="arm.reconnect() connects again",
+        )
+
+    def _new_link(
+        self,
+        on_event: Callable[[Message], None],
+        on_state: Callable[[bytes, int], None],
+        on_lost: Callable[[HeptarmError], None],
+    ) -> Link:
+        return Link(
+            self._dial(),
+            self.clock,
+            key=self.options.key,
+            on_event=on_event,
+            on_state=on_state,
+            on_lost=on_lost,
+        )
+
+    # ---------------------------------------------------------------------------------- requests
+
+    def request(self, message: Message) -> None:
+        """Send a request that is only accepted or refused; raises as `Link.request` does."""
+        self.link.submit(message, timeout=self.options.timeout)
+
+    def take_control(self) -> None:
+        """Take control."""
+        lost = wire.OnLost.FINISH if self.options.finishes else wire.OnLost.STOP
+        self.link.expect_watchdog(self.options.watchdog)
+        self.request(wire.TakeControl(watchdog=self.options.watchdog, on_lost=lost))
+        self.in_control = True
+
+    def release_control(self) -> None:
+        """Give control back."""
+        self.in_control = False  # before the cabinet announces it to all clients
+        self.request(wire.ReleaseControl())
+        self.link.expect_watchdog(float("inf"))
+
+    def subscribe(self, rate: float, groups: Sequence[str]) -> None:
+        """Choose what is pushed, now and after a reconnection."""
+        chosen = groups_of(groups, self.welcome.groups)
+        within(rate, "rate", 0.0, self.welcome.max_rate, unit="Hz")
+        self.request(wire.Subscribe(groups=chosen, rate=rate))
+        self.link.expect_states(rate * self.pace)
+        self.options = replace(self.options, rate=rate, groups=tuple(groups))
+
+    def run(self, message: wire.Run | wire.ServoOpen | wire.FriOpen, program: SentProgram) -> None:
+        """Send a program, a servo motion or an FRI overlay; from its acceptance on `program` receives its events."""
+
+        def claim(answer: Message) -> None:
+            if isinstance(answer, wire.Accepted):
+                self.events.claim(program, answer.id)
+
+        self.link.submit(message, timeout=self.options.timeout, on_answer=claim)
+
+    def check_may_wait(self, call: str) -> None:
+        """Check that this thread may wait for the cabinet.
+
+        Raises:
+            LocalProtocolError: it runs a callback; nothing arrives before the callback returns.
+        """
+        if self._link is not None and self._link.is_read_here:
+            raise LocalProtocolError(
+                f"{call} was called from a callback of the link's thread, which would wait for itself",
+                hint="return from the callback and wait in another thread, for example with a threading.Event or "
+                "a queue.Queue that the callback fills; arm.stop(), arm.start() and handle.cancel() work there",
+            )
+
+    def enter_block(self, program: SentProgram, what: str) -> None:
+        """Note that a program lasts as long as a block of this thread; see `check_no_block`."""
+        self._blocks[program] = (threading.get_ident(), what)
+
+    def leave_block(self, program: SentProgram) -> None:
+        """Note the end of the block."""
+        self._blocks.pop(program, None)
+
+    def check_no_block(self, call: str) -> None:
+        """Check that this thread may wait for the running programs.
+
+        Raises:
+            ModeConflict: this thread is in the block of a servo motion or an FRI session, which would wait for itself.
+        """
+        ident = threading.get_ident()
+        for program, (owner, what) in list(self._blocks.items()):
+            if owner == ident and not program.done:
+                raise ModeConflict(
+                    f"{call} was called inside the block of {what}, for whose end it would wait",
+                    hint="leave the with block first, or use arm.start(), which queues the motion and returns",
+                )
+
+    def cancel(self, program: SentProgram) -> None:
+        """End a program; has no effect if it has ended."""
+        if program.done:
+            return
+        try:
+            self.request(wire.Cancel(id=program.id))
+        except CommandRejected:
+            if self.events.is_running(program) and not program.done:  # otherwise it has just ended by itself
+                raise
+
+    def stop(self, kind: wire.StopKind) -> None:
+        """Stop the arm; through a new link if the old one was lost, since the arm may still move."""
+        message = wire.Stop(kind=kind)
+        try:
+            self.request(message)
+        except ConnectionLost:
+            if self.closed.is_set():
+                raise
+            _log.warning("the connection is lost; stopping the arm through a new connection")
+            link = self._new_link(lambda _: None, lambda *_: None, lambda _: None)
+            try:
+                link.open(
+                    name=f"{self.options.name} (stop)", version=__version__, timeout=self.options.timeout
+                )
+                link.request(message, timeout=self.options.timeout)
+            finally:
+                link.close()
+
+    @contextlib.contextmanager
+    def stopping_on_interrupt(self) -> Iterator[None]:
+        """A block in which Ctrl-C stops the arm, if this client controls it, before it is passed on."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            if self.in_control and not self.closed.is_set():
+                try:
+                    self.stop(wire.StopKind.PATH)
+                except HeptarmError as error:
+                    _log.error("Ctrl-C: the arm could not be stopped: %s", error)
+            raise
+
+    # ------------------------------------------------------------------------------------ states
+
+    def newest(self) -> State | None:
+        """The newest state, however old; None before the first."""
+        sample = self.feed.newest
+        return None if sample is None else self.build(sample)
+
+    def fresh(self) -> State:
+        """The newest state.
+
+        Raises:
+            StaleState: it is too old, none was received, or none is subscribed.
+            ConnectionLost: the connection has ended.
+        """
+        sample, rate = self.feed.newest, self.options.rate
+        if rate <= 0:
+            raise StaleState("no states are subscribed", hint="arm.subscribe(rate=100)")
+        limit = max(_STALE, _STALE_PERIODS / (rate * self.pace))
+        age = float("inf") if sample is None else (self.clock.nanos() - sample.received) * 1e-9
+        if sample is not None and age <= limit:
+            return self.build(sample)
+        error = self.final_error()
+        if error is not None:
+            raise error
+        text = "no state received yet" if sample is None else f"the newest state is {age:.2f} s old"
+        raise StaleState(
+            f"{text}; allowed are {limit:g} s",
+            value=age,
+            allowed=f"[0, {limit:g}] s",
+            hint="check the connection and the load of this machine",
+        )
+
+    def stream(self, *, rate: float | None, duration: float | None, size: int) -> States:
+        """A stream of states; see `Arm.states`."""
+        self.check_open()
+        return States(
+            self.feed,
+            self.clock,
+            build=self.build,
+            check=self._stream_error,
+            rate=rate,
+            duration=duration,
+            size=size,
+        )
+
+    def _stream_error(self) -> HeptarmError | None:
+        """The error that ends a stream for which no state arrives."""
+        self.check_may_wait("a loop over arm.states()")
+        return self.final_error()
+
+    def wait_for(self, condition: Callable[[State], object], timeout: float) -> State:
+        """Wait until a pushed state meets a condition.
+
+        Raises:
+            Timeout: none did in time.
+            ConnectionLost: the connection has ended.
+            LocalProtocolError: called from a callback.
+        """
+        self.check_may_wait("waiting for a state")
+        deadline = self.clock.nanos() + round(timeout * 1e9)
+        seen = 0
+        while True:
+            rest = (deadline - self.clock.nanos()) * 1e-9
+            sample = self.feed.after(seen, min(max(rest, 0.0), _CHECK_INTERVAL))
+            if sample is not None:
+                seen = sample.number
+                state = self.build(sample)
+                if condition(state):
+                    return state
+            else:
+                error = self.final_error()
+                if error is not None:
+                    raise error
+            if rest <= 0:
+                raise Timeout(
+                    f"the condition was not met within {timeout:g} s",
+                    hint="give a longer timeout, or check arm.state",
+                )
+
+    def history(self) -> tuple[State, ...]:
+        """The last states, oldest first."""
+        return tuple(self.decode(sample) for sample in self.feed.history())
+
+    def build(self, sample: StateSample) -> State:
+        """The state of a sample; the last one is cached."""
+        built = self._built
+        if built is not None and built[0] == sample.number:
+            return built[1]
+        state = self.decode(sample)
+        self._built = (sample.number, state)
+        return state
+
+    def decode(self, sample: StateSample) -> State:
+        """The state of a sample."""
+        return read_state(sample.body, self.link.offset, self.clock.nanos, self.signals)
+
+    def state_of(self, message: wire.ConditionFired | wire.TriggerFired) -> State | None:
+        """The robot's state when a condition or trigger fired; None if the cabinet did not report it."""
+        return read_firing(message, self.link.offset, self.clock.nanos)
+
+    def result_of(self, message: wire.MotionFinished) -> Result:
+        """The result of a program, with the joint positions measured at its end."""
+        state = self.newest()
+        if state is not None and state.joints is not None:
+            state = state.with_groups(joints=replace(state.joints, q=np.array(message.q)))
+        return read_result(message, state)
+
+    # ---------------------------------------------------------------------------- from the link
+
+    def _on_control(self, message: wire.ControlChanged) -> None:
+        self.controller = message.controller
+        if self.in_control and message.session != self.welcome.session:
+            self.in_control = False
+            _log.warning("control is lost: %s", message.text)
+
+    def _on_lost(self, error: HeptarmError) -> None:
+        """End all programs with the error; an observer then reconnects by itself, a controller does not."""
+        self.events.lose(error)
+        self.feed.wake()
+        if self.in_control:
+            return
+        pause = _BACK_OFF
+        while not self.closed.wait(pause):
+            if self.cabinet is not None and not self.cabinet.is_running:
+                return
+            try:
+                with self._lock:
+                    if self.closed.is_set() or self.is_connected:
+                        return
+                    self.open()
+                _log.info("reconnected")
+                return
+            except HeptarmError as failure:
+                _log.info("not reconnected: %s", failure)
+                pause = min(2 * pause, _MAX_BACK_OFF)
+
+
+#: All connections, for a fork of the process.
+_connections: weakref.WeakSet[Connection] = weakref.WeakSet()
+
+
+def _abandon_connections() -> None:
+    for connection in list(_connections):
+        connection.abandon()
+
+
+if hasattr(os, "register_at_fork"):  # not on Windows, where no process forks
+    os.register_at_fork(after_in_child=_abandon_connections)
+
+
+def _not_connected() -> ConnectionLost:
+    return ConnectionLost("the arm is not connected", hint="heptarm.connect(...) makes a connected arm")
+
+
+def _closed() -> ConnectionLost:
+    return ConnectionLost("the arm was closed", hint="connect again")

@@ -1,0 +1,1 @@
+"""Sending motions: handles to wait for and cancel, servo streams, stopping and recovery."""

@@ -1,0 +1,564 @@
+"""Servo motions: the settings with which one is opened, and the stream of targets that the arm follows."""
+
+from __future__ import annotations
+
+from collections import deque
+from contextlib import suppress
+from dataclasses import KW_ONLY, dataclass, replace
+from math import nan
+from operator import le
+from typing import Literal, TypedDict
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.arm.link.connection import Connection
+from heptarm.arm.motion.handle import Block, BreakRule, MotionHandle
+from heptarm.arm.translate.modes import mode_message
+from heptarm.errors import CommandRejected, HeptarmError, LimitError, LocalProtocolError, ShapeError, Timeout
+from heptarm.io.tcp import WarmUpConnection
+from heptarm.values.arrays import Array, array, within
+from heptarm.values.condition.condition import Condition
+from heptarm.values.frames import TOOL, check_name
+from heptarm.values.mode.mode import Mode
+from heptarm.values.pose import Pose
+from heptarm.values.result import Result
+from heptarm.values.state import State
+from heptarm.wire import messages as wire
+
+KINDS = ("joint", "pose", "lin")
+ENGINES = {"smart": wire.ServoEngine.SMART, "direct": wire.ServoEngine.DIRECT}
+#: The protocol's defaults; `schema/protocol.toml` is their one place.
+_DEFAULT = wire.ServoOpen()
+#: The default watchdog is this many periods long, but at least this long [s].
+_WATCHDOG_PERIODS, _MIN_DEFAULT_WATCHDOG = 5.0, _DEFAULT.watchdog
+#: Range of the watchdog [s].
+_MIN_WATCHDOG, _MAX_WATCHDOG = 0.005, 2.0
+#: Longest time until the first target [s].
+_FIRST_TARGET = 2.0
+#: Added to the period for the default of min_trajectory_time, so that the next target comes before its end [s].
+_OVERLAP = 0.005
+#: Limits along and about each axis of the base for straight lines: default, largest value, unit.
+_LINE_LIMITS = {
+    "speed_mps": (0.25, 10.0, "m/s"),
+    "acceleration_mps2": (1.0, 100.0, "m/s²"),
+    "speed_radps": (0.5, 20.0, "rad/s"),
+    "acceleration_radps2": (2.0, 200.0, "rad/s²"),
+}
+
+
+def default_watchdog(period: float) -> float:
+    """Default servo watchdog for a period [s]: max(5 periods, 0.2 s), at most 2 s."""
+    return min(max(_WATCHDOG_PERIODS * period, _MIN_DEFAULT_WATCHDOG), _MAX_WATCHDOG)
+
+
+class ServoKeywords(TypedDict, total=False):
+    """Keywords of `Arm.servo`, for type checkers; see `ServoRequest`."""
+
+    rate: float
+    watchdog: float | None
+    engine: Literal["smart", "direct"]
+    mode: Mode | None
+    speed: float | None
+    acceleration: float | None
+    speed_mps: float | None
+    acceleration_mps2: float | None
+    speed_radps: float | None
+    acceleration_radps2: float | None
+    min_trajectory_time: float | None
+    goal_timeout: float
+    speed_timeout: float | None
+    moving: str
+    until: Condition | None
+
+
+@dataclass(frozen=True, slots=True)
+class ServoRequest:
+    """A checked request for a servo motion; `Arm.servo` documents its fields.
+
+    Attributes:
+        period: time between two ticks [s].
+        watchdog_time: longest gap between two targets [s].
+
+    Raises:
+        ShapeError: no such kind or engine.
+        LimitError: a value outside its range.
+        CommandRejected: a limit that this kind of servo motion does not obey.
+    """
+
+    kind: str
+    _: KW_ONLY
+    rate: float = 100.0
+    watchdog: float | None = None
+    engine: str = "smart"
+    mode: Mode | None = None
+    speed: float | None = None
+    acceleration: float | None = None
+    speed_mps: float | None = None
+    acceleration_mps2: float | None = None
+    speed_radps: float | None = None
+    acceleration_radps2: float | None = None
+    min_trajectory_time: float | None = None
+    goal_timeout: float = _DEFAULT.goal_timeout
+    speed_timeout: float | None = None
+    moving: str = TOOL
+    until: Condition | None = None
+
+    def __post_init__(self) -> None:
+        if self.engine not in ENGINES:
+            raise ShapeError(
+                f"engine must be one of {', '.join(map(repr, ENGINES))}, got {self.engine!r}",
+                parameter="engine",
+                value=self.engine,
+            )
+        check_name(self.moving, "moving")
+        if self.kind not in KINDS:
+            raise ShapeError(
+                f"kind must be one of {', '.join(map(repr, KINDS))}, got {self.kind!r}",
+                parameter="kind",
+                value=self.kind,
+            )
+        self._refuse_foreign_limits()
+        within(self.rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
+        within(self.watchdog, "watchdog", _MIN_WATCHDOG, _MAX_WATCHDOG, unit="s")
+        if self.watchdog_time < self.period:
+            raise LimitError(
+                f"watchdog must not be shorter than the period of {self.period:g} s, got {self.watchdog_time:g} s",
+                code=2,
+                parameter="watchdog",
+                value=self.watchdog_time,
+                allowed=f"[{self.period:g}, {_MAX_WATCHDOG:g}] s",
+                hint="give a longer watchdog or a higher rate",
+            )
+
+    @property
+    def period(self) -> float:
+        """Time between two ticks [s]."""
+        return 1.0 / self.rate
+
+    @property
+    def watchdog_time(self) -> float:
+        """Longest gap between two targets [s]."""
+        return default_watchdog(self.period) if self.watchdog is None else self.watchdog
+
+    def message(self, ceiling: float) -> wire.ServoOpen:
+        """The message that opens the servo motion, without its break condition.
+
+        Args:
+            ceiling: of the speed, a fraction in (0, 1].
+
+        Raises:
+            LimitError: a value outside its range.
+        """
+        shortest = self.min_trajectory_time
+        if shortest is None:
+            shortest = min(max(self.period + _OVERLAP, 0.001), 1.0)
+        kept = _DEFAULT.speed_timeout if self.speed_timeout is None else self.speed_timeout
+        message = wire.ServoOpen(
+            frame="" if self.moving == TOOL else self.moving,
+            mode=mode_message(self.mode),
+            min_trajectory_time=within(shortest, "min_trajectory_time", 0.001, 1.0, unit="s"),
+            goal_timeout=within(self.goal_timeout, "goal_timeout", 0.1, 3600.0, unit="s"),
+            speed_timeout=within(kept, "speed_timeout", 0.001, 10.0, unit="s"),
+            watchdog=_FIRST_TARGET,
+        )
+        if self.kind == "lin":
+            return replace(
+                message,
+                engine=wire.ServoEngine.LIN,
+                velocity=1.0,
+                acceleration=1.0,
+                linear=self._line_limits(ceiling),
+            )
+        velocity = _DEFAULT.velocity if self.speed is None else self.speed
+        acceleration = _DEFAULT.acceleration if self.acceleration is None else self.acceleration
+        return replace(
+            message,
+            engine=ENGINES[self.engine],
+            velocity=min(ceiling, within(velocity, "speed", 0.0, 1.0, above=True)),
+            acceleration=within(acceleration, "acceleration", 0.0, 1.0, above=True),
+        )
+
+    def _line_limits(self, ceiling: float) -> wire.CartesianDynamics:
+        chosen = []
+        for name, (default, most, unit) in _LINE_LIMITS.items():
+            given = getattr(self, name)
+            chosen.append(within(default if given is None else given, name, 0.0, most, above=True, unit=unit))
+        return wire.CartesianDynamics(
+            velocity=ceiling * chosen[0],
+            acceleration=chosen[1],
+            orientation_velocity=ceiling * chosen[2],
+            orientation_acceleration=chosen[3],
+        )
+
+    def _refuse_foreign_limits(self) -> None:
+        """Refuse settings that this kind of servo motion does not obey."""
+        hint = f'the limits of arm.servo("lin") are {", ".join(_LINE_LIMITS)}'
+        if self.kind == "lin":
+            for name in ("speed", "acceleration"):
+                if getattr(self, name) is not None:
+                    raise CommandRejected(
+                        f"{name} is a fraction of the axes' maxima, which a straight servo motion does not obey",
+                        parameter=name,
+                        hint=hint,
+                    )
+            if self.engine != "smart":
+                raise CommandRejected(
+                    f'engine applies to arm.servo("joint") and arm.servo("pose") only, got {self.engine!r}',
+                    parameter="engine",
+                    hint=hint,
+                )
+        else:
+            for name in _LINE_LIMITS:
+                if getattr(self, name) is not None:
+                    raise CommandRejected(
+                        f'{name} applies to arm.servo("lin") only; a {self.kind} servo has speed and acceleration',
+                        parameter=name,
+                        hint=hint,
+                    )
+        if self.speed_timeout is not None and (self.kind, self.engine) != ("joint", "smart"):
+            raise CommandRejected(
+                'speed_timeout applies only to arm.servo("joint") with the engine "smart", '
+                "whose targets have a velocity",
+                parameter="speed_timeout",
+                hint="leave it out",
+            )
+
+
+#: Longest wait for the start, and for rest at the end [s].
+_PATIENCE = 5.0
+#: Calls of `set` whose cost is kept for the statistics.
+_COSTS = 4096
+#: Time before a tick at which its thread wakes to warm up the caches [s].
+_EARLY = 200e-6
+_DOUBLES = np.dtype(np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class ServoStats:
+    """Statistics of a stream of targets.
+
+    Attributes:
+        sent: targets sent.
+        rate: targets per second since the first one [Hz].
+        late_ticks: ticks more than half a period late.
+        set_median: median duration of a call of `set` [s].
+        set_p99: its 99th percentile [s].
+        received: targets that the cabinet received, by its last report, as are all that follow.
+        applied: how many of them the arm followed; newer ones overtook the others.
+        refused: how many the cabinet refused.
+        late: gaps longer than the watchdog.
+        age_median: median age of the targets when they were applied [s]; NaN: not reported yet.
+        age_p99: its 99th percentile [s].
+        text: why the last refused target was refused.
+    """
+
+    sent: int
+    rate: float
+    late_ticks: int
+    set_median: float
+    set_p99: float
+    received: int = 0
+    applied: int = 0
+    refused: int = 0
+    late: int = 0
+    age_median: float = nan
+    age_p99: float = nan
+    text: str = ""
+
+
+class Servo(Block):
+    """A stream of targets; made by `Arm.servo`, used in a `with` block. Its subclasses define what a target is.
+
+    Leaving the block ends the motion at rest. An error that ended it earlier, such as a missed watchdog, is raised
+    there.
+
+    Attributes:
+        period: time between two ticks [s].
+        watchdog: longest gap between two targets; a longer one stops the arm [s].
+    """
+
+    what = "servo motion"
+
+    def __init__(
+        self,
+        connection: Connection,
+        message: wire.ServoOpen,
+        *,
+        period: float,
+        watchdog: float,
+        until: tuple[Condition, ...] = (),
+        breaks: tuple[BreakRule, ...] = (),
+    ) -> None:
+        self.period = period
+        self.watchdog = watchdog
+        self._connection = connection
+        self._link = connection.link
+        self._clock = connection.clock
+        self._message = message
+        self._until = until
+        self._breaks = breaks
+        self._handle: MotionHandle | None = None
+        self._number = 0
+        self._active = False
+        self._start: State | None = None
+        self._result: Result | None = None
+        self._began = self._due = self._last = 0
+        self._first_sent = self._last_sent = 0
+        self._sent = self._late_ticks = 0
+        self._warm_up_socket: WarmUpConnection | None = None
+        self._last_target: tuple[type[wire.OneWay], tuple[float, ...]] | None = None
+        self._costs: deque[int] = deque(maxlen=_COSTS)
+
+    # ------------------------------------------------------------------------------------ life
+
+    def __enter__(self) -> Servo:
+        """Begin the servo motion at the arm's position and wait until it runs.
+
+        Raises:
+            CommandRejected: refused; ModeConflict if another motion runs.
+            MotionAborted: the cabinet could not start it.
+        """
+        if self._handle is not None:
+            raise LocalProtocolError("a servo is used once", hint="make another one with arm.servo(...)")
+        self._connection.check_may_wait("the with block of arm.servo()")
+        handle = self._handle = MotionHandle.send(
+            self._connection, self._message, until=self._until, breaks=self._breaks
+        )
+        if not handle.wait_started(_PATIENCE):
+            handle.cancel()
+            raise Timeout(
+                f"the servo motion did not begin within {_PATIENCE:g} s",
+                hint="check in arm.state.safety whether the robot is ready to move, or paused",
+            )
+        if handle.done:
+            self._result = handle.wait()  # raises the error that ended it
+        newest = self._connection.newest()
+        before = 0 if newest is None or newest.joints is None else newest.joints.stamp
+        self._start = self._connection.wait_for(
+            lambda state: state.joints is not None and state.joints.stamp > before, _PATIENCE
+        )
+        self._warm_up_socket = WarmUpConnection()
+        self._began = self._due = self._last = self._clock.nanos()
+        self._number, self._active = handle.id, True
+        self._connection.enter_block(handle, "arm.servo()")
+        handle.add_done_callback(self._on_end)
+        return self
+
+    def close(self) -> None:
+        """End the motion at rest; raises the error that ended it early. Calling it again has no effect."""
+        handle = self._handle
+        if self._warm_up_socket is not None:
+            self._warm_up_socket.close()
+        if handle is None or self._result is not None:
+            return
+        if not handle.done:
+            self._connection.cancel(handle)
+        self._active = False
+        self._connection.leave_block(handle)
+        self._result = handle.wait(timeout=_PATIENCE)
+
+    def _on_end(self, _: MotionHandle) -> None:
+        self._active = False
+
+    @property
+    def active(self) -> bool:
+        """Whether the arm follows the targets."""
+        return self._active
+
+    @property
+    def start(self) -> State:
+        """The robot's state when the motion began: build targets on it, so that nothing jumps."""
+        if self._start is None:
+            raise LocalProtocolError(
+                "the servo motion has not begun", hint="use it in a with block: with arm.servo(...) as servo"
+            )
+        return self._start
+
+    @property
+    def result(self) -> Result | None:
+        """How it ended, after the block."""
+        return self._result
+
+    @property
+    def t(self) -> float:
+        """Time since the motion began [s]."""
+        return (self._clock.nanos() - self._began) * 1e-9
+
+    # ---------------------------------------------------------------------------------- the loop
+
+    def tick(self) -> float | None:
+        """Wait for the next period.
+
+        Returns:
+            Time since the last tick [s]; None when the motion has ended (the end of the block raises why).
+        """
+        if not self._active:
+            return None
+        clock = self._clock
+        self._due += round(self.period * 1e9)
+        now = clock.nanos()
+        if now < self._due:
+            clock.sleep((self._due - now) * 1e-9 - _EARLY)
+            self._warm_up()
+            clock.sleep_until(self._due)
+            now = clock.nanos()
+        late = (now - self._due) * 1e-9
+        if late > 0.5 * self.period:
+            self._late_ticks += 1
+            if late > self.period:
+                self._due = now  # missed periods are not made up for in a burst
+        passed = (now - self._last) * 1e-9
+        self._last = now
+        return passed if self._active else None
+
+    def _warm_up(self) -> None:
+        """Encode and send the last target to nowhere: between two ticks the code falls out of the caches."""
+        if self._last_target is not None and self._warm_up_socket is not None:
+            with suppress(HeptarmError):  # the link has ended: sending the next target raises
+                self._warm_up_socket.send(
+                    self._link.pack_one_way(*self._last_target, now=self._clock.nanos())
+                )
+
+    def _send(self, began: int, kind: type[wire.OneWay], target: list[float]) -> None:
+        if not self._active:
+            _ = self.start  # raises unless it has begun
+            return
+        self._last_target = kind, (self._number, self.watchdog, *target)
+        self._link.send_one_way(*self._last_target, now=began)
+        self._sent += 1
+        self._last_sent = now = self._clock.nanos()
+        self._costs.append(now - began)
+        if self._sent == 1:
+            self._first_sent = now
+
+    def change(self, mode: Mode) -> None:
+        """Change the parameters of the control mode while the arm follows.
+
+        Raises:
+            ModeConflict: another kind of mode than the one with which the servo motion began.
+        """
+        message = mode_message(mode)
+        assert message is not None
+        _ = self.start  # raises unless it has begun
+        self._connection.request(wire.ServoSettings(servo=self._number, mode=message))
+
+    @property
+    def stats(self) -> ServoStats:
+        """Statistics so far; also after the block."""
+        seconds = (self._last_sent - self._first_sent) * 1e-9
+        median, p99 = np.percentile(self._costs, [50, 99]) * 1e-9 if self._costs else (nan, nan)
+        rate = (self._sent - 1) / seconds if self._sent > 1 and seconds > 0 else nan
+        stats = ServoStats(self._sent, rate, self._late_ticks, float(median), float(p99))
+        report = None if self._handle is None else self._connection.events.servo_status(self._handle.id)
+        if report is None:
+            return stats
+        return replace(
+            stats,
+            received=report.targets,
+            applied=report.applied,
+            refused=report.refused,
+            late=report.late,
+            age_median=report.age_median,
+            age_p99=report.age_p99,
+            text=report.text,
+        )
+
+
+class JointServo(Servo):
+    """A stream of joint positions."""
+
+    def __init__(
+        self,
+        connection: Connection,
+        message: wire.ServoOpen,
+        *,
+        period: float,
+        watchdog: float,
+        until: tuple[Condition, ...] = (),
+        breaks: tuple[BreakRule, ...] = (),
+    ) -> None:
+        super().__init__(connection, message, period=period, watchdog=watchdog, until=until, breaks=breaks)
+        self._low, self._high = connection.robot.q_min.tolist(), connection.robot.q_max.tolist()
+        self._newest: Array | None = None
+
+    def __enter__(self) -> JointServo:
+        """Begin; see `Servo.__enter__`."""
+        super().__enter__()
+        return self
+
+    def set(self, q: npt.ArrayLike, dq: npt.ArrayLike | None = None) -> Array:
+        """Send a target; the newest one wins. After the end of the motion it has no effect.
+
+        Args:
+            q: joint positions, shape (7,) [rad]; clipped to the limits of the joints.
+            dq: velocity at the target, shape (7,) [rad/s]; None: come to rest there. With the engine "smart" only.
+
+        Returns:
+            The positions sent, shape (7,) [rad].
+
+        Raises:
+            ShapeError: not seven numbers.
+            LimitError: one is not finite.
+            CommandRejected: a velocity for the engine "direct", which takes none.
+        """
+        began = self._clock.nanos()
+        if dq is not None and self._message.engine is wire.ServoEngine.DIRECT:
+            raise CommandRejected(
+                'the engine "direct" takes no velocity: the following targets define it',
+                parameter="dq",
+                hint='leave dq out, or use engine="smart"',
+            )
+        sent, target = self._clip(q)
+        self._newest = sent
+        if dq is None:
+            self._send(began, wire.ServoJoints, target)
+        else:
+            self._send(began, wire.ServoJointsVelocity, target + array(dq, 7, "dq").tolist())
+        return sent
+
+    def _clip(self, q: npt.ArrayLike) -> tuple[Array, list[float]]:
+        """Clip joint positions to the limits; returns them as an array and as a list."""
+        # with cold caches the number of different functions counts more than the number of calls
+        if not (type(q) is np.ndarray and q.dtype is _DOUBLES and q.shape == (7,)):
+            q = array(q, 7, "q")
+        sent = q.copy()
+        target = sent.tolist()
+        if not (all(map(le, self._low, target)) and all(map(le, target, self._high))):  # nor is NaN
+            sent = array(sent, 7, "q").clip(self._low, self._high)
+            target = sent.tolist()
+        return sent, target
+
+    def _warm_up(self) -> None:
+        if self._newest is not None:
+            self._clip(self._newest)
+        super()._warm_up()
+
+
+class PoseServo(Servo):
+    """A stream of poses of the motion frame in the base: followed by the joints or, as "lin", on straight lines."""
+
+    def __enter__(self) -> PoseServo:
+        """Begin; see `Servo.__enter__`."""
+        super().__enter__()
+        return self
+
+    def set(self, pose: Pose) -> Pose:
+        """Send a target; the newest one wins. After the end of the motion it has no effect.
+
+        The cabinet chooses the joint positions nearest to the last target, on straight lines those that keep the arm
+        angle; it refuses a pose that is out of reach, and `stats` reports that.
+
+        Returns:
+            The pose sent.
+
+        Raises:
+            ShapeError: not a Pose.
+        """
+        began = self._clock.nanos()
+        if not isinstance(pose, Pose):
+            raise ShapeError(
+                f"pose must be a Pose, got {pose!r}", parameter="pose", value=pose, hint="Pose.of(xyz, quat)"
+            )
+        self._send(began, wire.ServoPose, pose.xyz.tolist() + pose.quat.tolist())
+        return pose

@@ -1,0 +1,54 @@
+"""Control modes as messages, and back."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+from heptarm.arm.translate.fields import NAMES, message_of, value_of
+from heptarm.errors import ShapeError
+from heptarm.values.frames import TOOL
+from heptarm.values.mode.impedance import CartesianImpedance
+from heptarm.values.mode.mode import MODES, Mode, Position
+from heptarm.values.mode.sine import SineImpedance
+from heptarm.wire import messages as wire
+
+_BY_NAME = {kind.__name__: kind for kind in MODES}
+
+
+def mode_message(mode: Mode | None) -> wire.Mode | None:
+    """The message of a mode; None, position control, stays None.
+
+    Raises:
+        ShapeError: it is no mode.
+    """
+    if mode is None:
+        return None
+    if not isinstance(mode, MODES):
+        raise ShapeError(
+            f"mode must be a control mode, got {mode!r}",
+            parameter="mode",
+            value=mode,
+            hint="make one with heptarm.modes, for example JointImpedance(300.0)",
+        )
+    if isinstance(mode, Position):
+        return wire.PositionMode()
+    return cast("wire.Mode", message_of(NAMES[type(mode).__name__], mode))
+
+
+def read_mode(message: wire.Mode) -> Mode:
+    """The mode of a message."""
+    if isinstance(message, wire.SpiralPattern):
+        return SineImpedance.spiral(
+            message.plane.name.lower(),
+            frequency=message.frequency,
+            amplitude=message.amplitude,
+            stiffness=message.stiffness,
+            total_time=message.total_time,
+        )
+    given: dict[str, Any] = {}
+    if isinstance(message, wire.CartesianImpedance):
+        given["frame"] = message.frame or TOOL
+    if isinstance(message, wire.SineImpedance):
+        given["base"] = cast("CartesianImpedance", read_mode(message.base))
+    kind = _BY_NAME.get(type(message).__name__, Position)
+    return cast("Mode", value_of(kind, message, **given))

@@ -1,0 +1,169 @@
+"""Motions as the items of a program, checked against the limits of the connected robot.
+
+A motion and its message have the same name and, mostly, the same fields. `_fields` adds what differs, one function per
+motion type; a new motion type whose fields are those of its message needs none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import singledispatch
+from math import isinf, nan
+from typing import Any
+
+import numpy as np
+
+from heptarm.arm.translate.fields import NAMES, frame_message, hints, message_of
+from heptarm.errors import HeptarmError
+from heptarm.model.inverse_kinematics import redundancy
+from heptarm.values.motion.circle import Circ
+from heptarm.values.motion.dynamics import DynamicMotion, Dynamics
+from heptarm.values.motion.hand_guiding import HandGuide
+from heptarm.values.motion.line import Lin, LinRel
+from heptarm.values.motion.motion import Hold, Motion, limited_to
+from heptarm.values.motion.ptp import Ptp, PtpPose
+from heptarm.values.motion.spline import JointSpline, Segment, Spl, Spline
+from heptarm.values.robot import RobotModel
+from heptarm.wire import messages as wire
+
+
+def items(
+    motions: Sequence[Motion],
+    robot: RobotModel,
+    speed: float,
+    *,
+    mode: wire.Mode | None = None,
+    until: wire.Condition | None = None,
+) -> tuple[wire.Item, ...]:
+    """The items of a program.
+
+    Args:
+        motions: in their order.
+        robot: the connected robot.
+        speed: no joint is faster than this fraction of its maximum, (0, 1].
+        mode: control mode of all of them; None: position.
+        until: break condition of all of them.
+
+    Raises:
+        LimitError: a target is outside the robot's limits; the text names motion, joint, value and range.
+    """
+    return tuple(
+        _item(motion, index if len(motions) > 1 else None, robot, speed, mode, until or wire.Condition())
+        for index, motion in enumerate(motions)
+    )
+
+
+def _item(
+    motion: Motion,
+    index: int | None,
+    robot: RobotModel,
+    speed: float,
+    mode: wire.Mode | None,
+    until: wire.Condition,
+) -> wire.Item:
+    try:
+        message = _message(type(motion).__name__, limited_to(motion, speed), robot)
+    except HeptarmError as error:
+        if index is not None:  # name the motion
+            error.text = f"motions[{index}]: {error.text}"
+            error.parameter = f"motions[{index}].{error.parameter}"
+            error.args = (error.text,)
+        raise
+    frame = frame_message(getattr(motion, "moving", ""))
+    return wire.Item(motion=message, frame=frame, mode=mode, until=until)
+
+
+def _message(name: str, motion: Motion | Segment, robot: RobotModel) -> Any:
+    kind = NAMES[name]
+    given = _fields(motion, robot)
+    if isinstance(motion, DynamicMotion | Spl):
+        given = dynamics_fields(kind, motion.dynamics) | given
+    return message_of(kind, motion, **given)
+
+
+def dynamics_fields(kind: type, dynamics: Dynamics) -> dict[str, object]:
+    """The fields of a message that carry dynamics: along the path, of the joints, or one field of each kind."""
+    messages = (
+        wire.CartesianDynamics(
+            velocity=dynamics.speed_mps,
+            acceleration=dynamics.acceleration_mps2,
+            jerk=dynamics.jerk_mps3,
+            orientation_velocity=dynamics.speed_radps,
+            orientation_acceleration=dynamics.acceleration_radps2,
+            orientation_jerk=dynamics.jerk_radps3,
+        ),
+        wire.JointDynamics(
+            velocity=tuple(dynamics.joint_speed.tolist()),
+            acceleration=tuple(dynamics.joint_acceleration.tolist()),
+            jerk=tuple(dynamics.joint_jerk.tolist()),
+        ),
+    )
+    types = {type(message).__name__: message for message in messages}
+    return {name: types[hint] for name, hint in hints(kind).items() if hint in types}
+
+
+# ------------------------------------------------------------- what a motion's message has under other names
+
+
+@singledispatch
+def _fields(motion: object, robot: RobotModel) -> dict[str, Any]:
+    """The fields of a motion's message that do not follow from the names of its attributes."""
+    return {}
+
+
+@_fields.register
+def _(motion: Ptp, robot: RobotModel) -> dict[str, Any]:
+    robot.check(motion.q)
+    return {}
+
+
+@_fields.register(PtpPose)
+@_fields.register(Lin)
+@_fields.register(Circ)
+def _(motion: PtpPose | Lin | Circ, robot: RobotModel) -> dict[str, Any]:
+    if motion.near is not None:
+        robot.check(motion.near, "near")
+        return {"redundancy": replace(_redundancy(redundancy(robot, motion.near.tolist())), turn=-1)}
+    if motion.redundancy is not None:
+        return {"redundancy": _redundancy(motion.redundancy)}
+    return {"redundancy": wire.Redundancy(e1=nan, status=-1, turn=-1)}
+
+
+def _redundancy(value: object) -> wire.Redundancy:
+    return message_of(wire.Redundancy, value)
+
+
+@_fields.register
+def _(motion: LinRel, robot: RobotModel) -> dict[str, Any]:
+    return {"reference": frame_message(motion.frame)}
+
+
+@_fields.register
+def _(motion: Spline, robot: RobotModel) -> dict[str, Any]:
+    segments = (_message(f"{type(one).__name__}Segment", one, robot) for one in motion.segments)
+    return {"segments": tuple(segments)}
+
+
+@_fields.register
+def _(motion: JointSpline, robot: RobotModel) -> dict[str, Any]:
+    for index, point in enumerate(motion.points):
+        robot.check(point.q, f"points[{index}].q")
+    points = (
+        message_of(wire.JointPoint, point, **dynamics_fields(wire.JointPoint, point.dynamics))
+        for point in motion.points
+    )
+    return {"points": tuple(points)}
+
+
+@_fields.register
+def _(motion: Hold, robot: RobotModel) -> dict[str, Any]:
+    return {"duration": nan if isinf(motion.duration) else motion.duration}
+
+
+@_fields.register
+def _(motion: HandGuide, robot: RobotModel) -> dict[str, Any]:
+    for name in ("q_min", "q_max"):
+        limits = getattr(motion, name)
+        robot.check(np.where(np.isnan(limits), 0.5 * (robot.q_min + robot.q_max), limits), name)
+    return {"freezes_all": motion.at_limit == "all", "pulls_back": motion.outside == "pull"}

@@ -1,0 +1,138 @@
+"""From messages to values: states, results, signals, the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from heptarm.arm.translate.fields import value_of
+from heptarm.arm.translate.modes import read_mode
+from heptarm.errors import ConnectFailed, RemoteProtocolError
+from heptarm.values import state as values
+from heptarm.values.arrays import Array
+from heptarm.values.io import Signal, SignalValues
+from heptarm.values.pose import Pose, Redundancy
+from heptarm.values.result import Cause, Result
+from heptarm.values.robot import ROBOTS, RobotModel
+from heptarm.wire import messages as wire
+from heptarm.wire.clock_sync import ClockOffset
+from heptarm.wire.codec import DecodeError
+
+_SAFETY = tuple(
+    (bit, bit.name.lower()) for bit in wire.SafetyBits if bit.name is not None and bit.name != "NONE"
+)
+
+
+def read_state(
+    body: bytes, offset: ClockOffset, clock: Callable[[], int], signals: Sequence[Signal] = ()
+) -> values.State:
+    """The state in the body of a frame.
+
+    Raises:
+        RemoteProtocolError: the bytes are no state.
+    """
+    try:
+        return _state(wire.State.decode(body), offset, clock, signals)
+    except (DecodeError, ValueError) as error:
+        raise RemoteProtocolError(f"the cabinet sent a state that cannot be decoded: {error}") from error
+
+
+def _state(
+    message: object, offset: ClockOffset, clock: Callable[[], int], signals: Sequence[Signal]
+) -> values.State:
+    """A state from a message that has groups under the same names."""
+    groups: dict[str, Any] = {}
+    for name in values.GROUP_NAMES:
+        group = getattr(message, name, None)
+        if group is not None:
+            groups[name] = _signals(group, signals) if name == "io" else _READERS[name](group)
+    stamp = max((group.stamp for group in groups.values()), default=0)
+    return values.State(values.Groups(**groups), offset.to_ours(stamp), clock)
+
+
+def read_signals(infos: Sequence[wire.SignalInfo]) -> tuple[Signal, ...]:
+    """The cabinet's signals."""
+    return tuple(
+        Signal(one.name, one.direction is wire.IoDirection.OUTPUT, one.type.name.lower(), one.low, one.high)
+        for one in infos
+    )
+
+
+def _signals(message: wire.IoState, signals: Sequence[Signal]) -> SignalValues:
+    known = {one.index: one.value for one in message.values}
+    named = {one.name: one.value(known[place]) for place, one in enumerate(signals) if place in known}
+    return SignalValues(message.stamp, named)
+
+
+def read_firing(
+    message: wire.ConditionFired | wire.TriggerFired, offset: ClockOffset, clock: Callable[[], int]
+) -> values.State | None:
+    """The state of the robot when a condition or a trigger fired, as far as the cabinet reported it."""
+    return None if message.joints is None else _state(message, offset, clock, ())
+
+
+def read_result(message: wire.MotionFinished, state: values.State | None) -> Result:
+    """How a motion ended; what stopped it comes from an earlier message."""
+    return value_of(
+        Result, message, cause=Cause(message.cause.name.lower()), state=state, stopped_by=None, fired_at=None
+    )
+
+
+def read_robot(message: wire.RobotInfo) -> RobotModel:
+    """The connected robot, with the limits that the cabinet reports.
+
+    Raises:
+        ConnectFailed: a robot that this version does not know.
+    """
+    known = ROBOTS.get(message.model)
+    if known is None:
+        raise ConnectFailed(
+            f"robot must be one of {', '.join(ROBOTS)}, got {message.model!r} ({message.title}) from the cabinet",
+            parameter="robot.model",
+            value=message.model,
+            allowed=", ".join(ROBOTS),
+            hint="pip install --upgrade heptarm",
+        )
+    return replace(
+        known,
+        title=message.title or known.title,
+        q_min=_array(message.q_min),
+        q_max=_array(message.q_max),
+        dq_max=_array(message.dq_max),
+        tau_max=_array(message.tau_max),
+    )
+
+
+def _array(numbers: tuple[float, ...]) -> Array:
+    result = np.array(numbers)
+    result.flags.writeable = False
+    return result
+
+
+def _cartesian(message: wire.PoseState) -> values.Cartesian:
+    return values.Cartesian(
+        message.stamp,
+        Pose.of(message.xyz, message.quat),
+        Pose.of(message.xyz_cmd, message.quat_cmd),
+        value_of(Redundancy, message.redundancy),
+    )
+
+
+def _safety(message: wire.SafetyState) -> values.Safety:
+    bits = {name: bool(message.bits & bit) for bit, name in _SAFETY}
+    return values.Safety(message.stamp, values.OperationMode(message.mode.name.lower()), **bits)
+
+
+#: The groups of a state, each with the function that makes a value of its message.
+_READERS: Mapping[str, Callable[[Any], Any]] = {
+    "joints": lambda message: value_of(values.Joints, message),
+    "torques": lambda message: value_of(values.Torques, message),
+    "pose": _cartesian,
+    "wrench": lambda message: value_of(values.Wrench, message),
+    "motion": lambda message: value_of(values.MotionStatus, message, id=message.motion),
+    "safety": _safety,
+    "mode": lambda message: value_of(values.Control, message, mode=read_mode(message.mode)),
+}
