@@ -1,41 +1,53 @@
-"""`heptarm check`: scenarios, one after the other, and a table of what they showed."""
+"""`heptarm check`: runs scenarios and prints a table of the results."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Annotated
 
+from cyclopts import Parameter
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from heptarm import testing
 from heptarm.arm.connect import connect
-from heptarm.arm.target import VARIABLE
+from heptarm.arm.link.target import VARIABLE
+from heptarm.cli.options import (
+    Json,
+    Target,
+    Yes,
+)
 from heptarm.cli.output import confirm, emit
 from heptarm.testing import Outcome, Report, Scenario, Verdict
 
-#: Patience of the link: a machine that simulates and looks at it may be late [s].
+#: Time limits of the link [s]: a machine that also simulates may answer late.
 _WATCHDOG, _TIMEOUT = 5.0, 20.0
 _STYLES = {Verdict.SHOWN: "green", Verdict.FAILED: "red", Verdict.LEFT_OUT: "yellow"}
 
 
-def run(
-    *,
-    only: tuple[str, ...],
-    list_only: bool,
-    contact: bool,
-    faults: bool,
-    sim_speed: float,
-    junit: Path | None,
-    yes: bool,
-    target: str | None,
-    as_json: bool,
+def check(
+    *only: Annotated[
+        str, Parameter(help="Scenarios: names, groups, or patterns such as 'motions.*'. None: all.")
+    ],
+    list_only: Annotated[
+        bool, Parameter(name="--list", negative="", help="List the scenarios, run nothing.")
+    ] = False,
+    contact: Annotated[
+        bool, Parameter(negative="", help="On a robot, also those that touch something.")
+    ] = False,
+    faults: Annotated[bool, Parameter(negative="", help="On a robot, also those that cause faults.")] = False,
+    sim_speed: Annotated[float, Parameter(help="Without a target: simulated seconds per second.")] = 2.0,
+    junit: Annotated[Path | None, Parameter(help="Write a report for CI systems, JUnit XML.")] = None,
+    yes: Yes = False,
+    target: Target = None,
+    as_json: Json = False,
 ) -> int:
-    """Run scenarios, or name them; the exit code is 1 if one fails or none could be shown.
+    """Show what a robot can do, scenario by scenario, by measurement; exit code 1 if one fails.
 
-    Raises:
-        HeptarmError: no such scenario, or no connection.
+    Without a target, a simulator with a table, signals and tools is started. A real robot moves at a tenth of its
+    speed, and every scenario that moves it asks first.
     """
     chosen = testing.find(only)
     if list_only:

@@ -7,18 +7,24 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
 from heptarm.arm.arm import Arm
 from heptarm.arm.connect import connect
+from heptarm.cli.options import (
+    Json,
+    Target,
+)
 from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected, require
 from heptarm.values.arrays import Array
-from heptarm.values.motion import lin, lin_rel, ptp
+from heptarm.values.motion.line import lin, lin_rel
+from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose, deg
 from heptarm.values.result import Cause, Result
 
@@ -29,8 +35,8 @@ _RATE = 250.0
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
-    """A motion of the demo and how it went."""
+class DemoStep:
+    """A motion of the demo and its outcome."""
 
     name: str
     cause: str
@@ -42,7 +48,7 @@ class Step:
 
 
 class _Recorder:
-    """Keeps every pushed state."""
+    """Collects every pushed state."""
 
     def __init__(self, arm: Arm) -> None:
         self._stream = arm.states(size=100_000)
@@ -51,7 +57,7 @@ class _Recorder:
         self.q_cmd: list[Array] = []
 
     def take(self, arm: Arm) -> None:
-        """Take what has come until now."""
+        """Take all states received so far."""
         last = arm.state.stamp
         for state in self._stream:
             self.times.append(state.stamp * 1e-9)
@@ -61,8 +67,13 @@ class _Recorder:
                 return
 
 
-def run(*, target: str | None, plot: Path, as_json: bool) -> int:
-    """Carry out the demo; the exit code says whether everything went as designed."""
+def demo(
+    *,
+    plot: Annotated[Path, Parameter(help="Where to save the plot.")] = Path("heptarm-demo.png"),
+    target: Target = None,
+    as_json: Json = False,
+) -> int:
+    """Move a virtual arm through the whole stack; a table and a plot show the result."""
     logging.getLogger("heptarm").setLevel(logging.ERROR)
     began = time.monotonic()
     with connect(target or "sim://iiwa14", state_rate=_RATE) as arm:
@@ -92,11 +103,11 @@ def run(*, target: str | None, plot: Path, as_json: bool) -> int:
     return 0 if all(one.as_designed for one in steps) else 1
 
 
-def _timed(arm: Arm, name: str, wanted: Cause, work: Callable[[], Result]) -> Step:
+def _timed(arm: Arm, name: str, wanted: Cause, work: Callable[[], Result]) -> DemoStep:
     begin = arm.state.stamp * 1e-9
     result = work()
     state = arm.wait_for_rest()
-    return Step(
+    return DemoStep(
         name,
         result.cause.value,
         result.text,
@@ -107,7 +118,7 @@ def _timed(arm: Arm, name: str, wanted: Cause, work: Callable[[], Result]) -> St
     )
 
 
-def _ptp(arm: Arm) -> Step:
+def _ptp(arm: Arm) -> DemoStep:
     return _timed(
         arm,
         "PTP to joint positions",
@@ -116,7 +127,7 @@ def _ptp(arm: Arm) -> Step:
     )
 
 
-def _lin(arm: Arm) -> Step:
+def _lin(arm: Arm) -> DemoStep:
     start = arm.wait_for_rest()
     goal = Pose.of(start.pose.xyz + [0.0, -0.25, 0.10], start.pose.quat)
     return _timed(
@@ -124,12 +135,12 @@ def _lin(arm: Arm) -> Step:
     )
 
 
-def _lin_rel(arm: Arm) -> Step:
+def _lin_rel(arm: Arm) -> DemoStep:
     motion = lin_rel(z=0.12, c=0.4, frame="tool", speed_mps=0.15)
     return _timed(arm, "LIN_REL in the tool frame", Cause.FINISHED, lambda: arm.move(motion))
 
 
-def _cancelled(arm: Arm) -> Step:
+def _cancelled(arm: Arm) -> DemoStep:
     def work() -> Result:
         handle = arm.start(ptp(deg(-50, 20, 0, -100, 0, 50, -40)), speed=0.4)
         arm.wait_until(lambda state: handle.progress > 0.3, timeout=10.0)
@@ -139,26 +150,26 @@ def _cancelled(arm: Arm) -> Step:
     return _timed(arm, "PTP, cancelled under way", Cause.CANCELLED, work)
 
 
-def _refused(arm: Arm) -> Step:
+def _refused(arm: Arm) -> DemoStep:
     now = arm.state.stamp * 1e-9
     try:
         arm.move(ptp(deg(0, 150, 0, -90, 0, 60, 0)))
     except CommandRejected as error:
-        return Step(
+        return DemoStep(
             "PTP beyond a joint limit", "refused", error.text, now, arm.state.stamp * 1e-9, float("nan"), True
         )
-    return Step(
+    return DemoStep(
         "PTP beyond a joint limit", "accepted", "it should have been refused", now, now, float("nan"), False
     )
 
 
-def _home(arm: Arm) -> Step:
+def _home(arm: Arm) -> DemoStep:
     return _timed(
         arm, "PTP home", Cause.FINISHED, lambda: arm.move(ptp(deg(0, 0, 0, -90, 0, 90, 0)), speed=0.6)
     )
 
 
-def _table(steps: list[Step]) -> Table:
+def _table(steps: list[DemoStep]) -> Table:
     table = Table()
     table.add_column("motion")
     table.add_column("duration", justify="right")
@@ -172,7 +183,7 @@ def _table(steps: list[Step]) -> Table:
     return table
 
 
-def _draw(recorder: _Recorder, steps: list[Step], path: Path, title: str) -> None:
+def _draw(recorder: _Recorder, steps: list[DemoStep], path: Path, title: str) -> None:
     matplotlib = require("matplotlib", extra="viz")
     matplotlib.use("Agg")
     plt: Any = require("matplotlib.pyplot", extra="viz")
@@ -200,7 +211,7 @@ def _draw(recorder: _Recorder, steps: list[Step], path: Path, title: str) -> Non
     plt.close(figure)
 
 
-def _shade(upper: Axes, lower: Axes, steps: list[Step], zero: float) -> None:
+def _shade(upper: Axes, lower: Axes, steps: list[DemoStep], zero: float) -> None:
     """Bands for the motions, with their names above."""
     top = upper.get_xaxis_transform()
     for index, one in enumerate(steps):

@@ -1,7 +1,8 @@
-"""`heptarm doctor`: one verdict and one remedy a line."""
+"""`heptarm doctor`: the installation, a target, and FRI: one verdict and one remedy per line."""
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import os
 import platform
@@ -9,34 +10,60 @@ import socket
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
+from typing import Annotated
 
 import numpy as np
+from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
 
 from heptarm import __version__, _resources
 from heptarm.arm.arm import Arm
 from heptarm.arm.connect import connect
-from heptarm.arm.target import VARIABLE, parse_target
+from heptarm.arm.fri.diagnosis import cause, silence, strangers
+from heptarm.arm.fri.settings import PORTS
+from heptarm.arm.link.target import VARIABLE, parse_target
+from heptarm.cli.options import (
+    FRI,
+    FriListen,
+    FriPeriod,
+    FriPort,
+    FriVersion,
+    Json,
+    Target,
+)
 from heptarm.cli.output import emit
-from heptarm.errors import HeptarmError
+from heptarm.errors import CommandRejected, ConnectFailed, HeptarmError, Timeout
+from heptarm.fri.loop.client import Client
+from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
+from heptarm.fri.session.session import Event, Kind
+from heptarm.io.udp import UdpSocket
 from heptarm.wire.messages import MAJOR, MINOR, PORT
 
 _REQUESTS = 200
 _SLOW_US = 2000.0
 _OLD_MS = 20.0
+#: A larger fraction of lost messages or answers is reported.
+_LOST_FRACTION = 0.001
+_LONGEST = 3600.0
+_KINDS = ("position", "torque", "wrench", "pose")
+_VERSION = (
+    "leave --fri-version (version= in a program) out: heptarm takes it from the first message; a client that is built "
+    "with KUKA's SDK has to be built for the cabinet's version"
+)
+_UNKNOWN = "look at the messages on the smartPAD and at the log of the cabinet's application"
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How to look at FRI.
+    """How to check FRI.
 
     Attributes:
-        listens: wait for the messages of whatever application runs on the cabinet, instead of opening a session.
-        port: own UDP port; None: the first free one of FRI's, 30200 for one who listens.
+        listens: wait for the messages of any application on the cabinet, instead of opening a session.
+        port: own UDP port; None: the first free one of FRI's, 30200 for a listener.
         period_ms: of a session that is opened.
         version: FRI release that the cabinet should speak; None: any.
-        seconds: how long to look [s].
+        seconds: how long to check [s].
     """
 
     listens: bool
@@ -47,8 +74,8 @@ class Look:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
-    """What was looked at, how it is ("ok", "note" or "bad"), and what to do."""
+class CheckResult:
+    """The outcome of one check: what, how it is ("ok", "note" or "bad"), what was found, and what to do."""
 
     what: str
     how: str
@@ -56,18 +83,32 @@ class Verdict:
     remedy: str = ""
 
 
-def run(*, target: str | None, as_json: bool, fri: Look | None = None) -> int:
-    """Look at everything, with `fri` also at FRI; the exit code is 1 if something is bad."""
+def doctor(
+    *,
+    fri: Annotated[bool, Parameter(group=FRI, negative="", help="Also check FRI.")] = False,
+    listen: FriListen = False,
+    fri_port: FriPort = None,
+    fri_period: FriPeriod = 1,
+    fri_version: FriVersion = None,
+    seconds: Annotated[float, Parameter(group=FRI, help="How long to check FRI [s].")] = 5.0,
+    target: Target = None,
+    as_json: Json = False,
+) -> int:
+    """Check the installation, and a target if one is given: one verdict and one remedy per line.
+
+    With --fri also check FRI: a session of the target, or with --listen the messages of another application on
+    the cabinet.
+    """
+    listens = listen or (target is None and not os.environ.get(VARIABLE))
+    look = Look(listens, fri_port, fri_period, fri_version, seconds) if fri else None
     target = target or os.environ.get(VARIABLE, "").strip() or None
     verdicts = [check() for check in (_python, _extras, _java, _jars, _priority)]
-    if target is None or (fri is not None and fri.listens):
+    if target is None or (look is not None and look.listens):
         verdicts.append(_port())
     else:
         verdicts += _target(target)
-    if fri is not None:
-        from heptarm.cli.fri_doctor import look
-
-        verdicts += look(fri, target=None if fri.listens else target)
+    if look is not None:
+        verdicts += _fri(look, target=None if look.listens else target)
     if as_json:
         for verdict in verdicts:
             emit(asdict(verdict))
@@ -76,7 +117,7 @@ def run(*, target: str | None, as_json: bool, fri: Look | None = None) -> int:
     return 1 if any(verdict.how == "bad" for verdict in verdicts) else 0
 
 
-def _table(verdicts: list[Verdict]) -> Table:
+def _table(verdicts: list[CheckResult]) -> Table:
     style = {"ok": "[green]ok[/]", "note": "[yellow]note[/]", "bad": "[red]bad[/]"}
     table = Table(
         title=f"heptarm {__version__}, protocol {MAJOR}.{MINOR}",
@@ -91,12 +132,12 @@ def _table(verdicts: list[Verdict]) -> Table:
     return table
 
 
-def _python() -> Verdict:
+def _python() -> CheckResult:
     found = f"{platform.python_version()} on {platform.system()} {platform.machine()}, numpy {np.__version__}"
-    return Verdict("Python", "ok", found)
+    return CheckResult("Python", "ok", found)
 
 
-def _extras() -> Verdict:
+def _extras() -> CheckResult:
     needed = {"sim": ("mujoco", "ruckig", "jpype"), "viz": ("viser", "matplotlib")}
     missing = [
         extra
@@ -104,78 +145,80 @@ def _extras() -> Verdict:
         if any(importlib.util.find_spec(m) is None for m in modules)
     ]
     if missing:
-        return Verdict(
+        return CheckResult(
             "extras",
             "note",
             f"not installed: {', '.join(missing)}",
             f"pip install 'heptarm[{','.join(missing)}]'",
         )
-    return Verdict("extras", "ok", "sim and viz are installed")
+    return CheckResult("extras", "ok", "sim and viz are installed")
 
 
-def _java() -> Verdict:
+def _java() -> CheckResult:
     try:
-        from heptarm.virtual import jvm
+        from heptarm.sim.runtime import jvm
 
-        return Verdict("Java", "ok", jvm.library())
+        return CheckResult("Java", "ok", jvm.library())
     except ImportError as error:
-        return Verdict(
+        return CheckResult(
             "Java", "note", str(error), "only the virtual cabinet needs it: pip install 'heptarm[sim]'"
         )
 
 
-def _jars() -> Verdict:
+def _jars() -> CheckResult:
     try:
-        return Verdict("cabinet", "ok", f"compiled, {len(_resources.jars())} jars")
+        return CheckResult("cabinet", "ok", f"compiled, {len(_resources.jars())} jars")
     except HeptarmError as error:
-        return Verdict("cabinet", "note", error.text, error.hint)
+        return CheckResult("cabinet", "note", error.text, error.hint)
 
 
-def _priority() -> Verdict:
+def _priority() -> CheckResult:
     try:
         before = os.sched_getscheduler(0)
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))
         os.sched_setscheduler(0, before, os.sched_param(0))
     except (OSError, AttributeError) as error:
         remedy = "add 'USER - rtprio 60' to /etc/security/limits.conf and log in again"
-        return Verdict(
+        return CheckResult(
             "real time", "note", f"no real-time priority ({error}); loops may be late under load", remedy
         )
-    return Verdict("real time", "ok", "real-time priority is allowed")
+    return CheckResult("real time", "ok", "real-time priority is allowed")
 
 
-def _port() -> Verdict:
+def _port() -> CheckResult:
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
             probe.bind(("127.0.0.1", PORT))
         except OSError:
-            return Verdict(
+            return CheckResult(
                 "port",
                 "note",
                 f"{PORT} is taken here",
-                f"heptarm doctor --target sim://127.0.0.1:{PORT} looks at who has it",
+                f"heptarm doctor --target sim://127.0.0.1:{PORT} names the program that uses it",
             )
-    return Verdict("port", "ok", f"{PORT} is free for heptarm sim")
+    return CheckResult("port", "ok", f"{PORT} is free for heptarm sim")
 
 
-def _target(target: str) -> Iterator[Verdict]:
+def _target(target: str) -> Iterator[CheckResult]:
     parsed = parse_target(target)
     if not parsed.is_private:
         try:
             socket.create_connection((parsed.host, parsed.port), timeout=3).close()
-            yield Verdict("network", "ok", f"{parsed.host}:{parsed.port} accepts connections")
+            yield CheckResult("network", "ok", f"{parsed.host}:{parsed.port} accepts connections")
         except OSError as error:
             remedy = "is the cabinet application (or heptarm sim) running? is this machine in its network?"
-            yield Verdict("network", "bad", f"{parsed.host}:{parsed.port} does not answer ({error})", remedy)
+            yield CheckResult(
+                "network", "bad", f"{parsed.host}:{parsed.port} does not answer ({error})", remedy
+            )
             return
     try:
         arm = connect(target, control=False)
     except HeptarmError as error:
-        yield Verdict("session", "bad", error.text, error.hint)
+        yield CheckResult("session", "bad", error.text, error.hint)
         return
     with arm:
-        yield Verdict(
+        yield CheckResult(
             "session",
             "ok",
             f"{arm.robot.title}{' (virtual)' if arm.is_virtual else ''}, cabinet application {arm.software}",
@@ -191,34 +234,203 @@ def _timed(call: Callable[[], object]) -> float:
     return (time.perf_counter_ns() - begin) / 1e3
 
 
-def _round_trip(arm: Arm) -> Verdict:
+def _round_trip(arm: Arm) -> CheckResult:
     times = [_timed(lambda: arm.subscribe(rate=100.0)) for _ in range(_REQUESTS)]
     median, late = np.percentile(times, [50, 99])
     found = f"{median:.0f} us median, {late:.0f} us 99 %"
     if median > _SLOW_US:
-        return Verdict(
+        return CheckResult(
             "round trip", "note", found, "use a cable and a direct connection; look for load on both machines"
         )
-    return Verdict("round trip", "ok", found)
+    return CheckResult("round trip", "ok", found)
 
 
-def _age(arm: Arm) -> Verdict:
+def _age(arm: Arm) -> CheckResult:
     ages = [state.age * 1e3 for state in arm.states(duration=1.0)]
     if not ages:
-        return Verdict("state", "bad", "no state came within a second", "look at the cabinet's log")
+        return CheckResult("state", "bad", "no state came within a second", "look at the cabinet's log")
     found = f"{len(ages)} states in 1 s, {np.median(ages):.2f} ms old, 99 % below {np.percentile(ages, 99):.2f} ms"
     how = "note" if np.median(ages) > _OLD_MS else "ok"
-    return Verdict("state", how, found, "subscribe at a lower rate" if how == "note" else "")
+    return CheckResult("state", how, found, "subscribe at a lower rate" if how == "note" else "")
 
 
-def _safety(arm: Arm) -> Verdict:
+def _safety(arm: Arm) -> CheckResult:
     safety = arm.state.safety
     found = f"{safety.mode.value.upper()}, {'ready' if safety.ready_to_move else 'not ready'} to move"
     if safety.ready_to_move:
-        return Verdict("safety", "ok", found)
+        return CheckResult("safety", "ok", found)
     remedy = (
         "release the emergency stop"
         if safety.emergency_stop
         else "acknowledge the messages on the smartPAD and press Start"
     )
-    return Verdict("safety", "note", found, remedy)
+    return CheckResult("safety", "note", found, remedy)
+
+
+def _fri(settings: Look, *, target: str | None) -> Iterator[CheckResult]:
+    """Check FRI of a target; without one, of any controller that sends to this machine."""
+    if not 0.1 <= settings.seconds <= _LONGEST:
+        raise CommandRejected(
+            f"--seconds must be 0.1 to {_LONGEST:g} s, got {settings.seconds:g} s", parameter="--seconds"
+        )
+    port = settings.port if settings.port is not None else PORTS[0]
+    taken = _taken(port)
+    if taken is not None:
+        if settings.port is not None or target is None:
+            yield CheckResult("FRI port", "bad", taken.text, taken.hint)
+            return
+        yield CheckResult("FRI port", "note", taken.text, taken.hint)
+    else:
+        yield CheckResult("FRI port", "ok", f"UDP port {port} is free on this machine")
+    yield from _listening(settings, port) if target is None else _opened(settings, target)
+
+
+def _taken(port: int) -> HeptarmError | None:
+    try:
+        UdpSocket(port).close()
+    except ConnectFailed as error:
+        return error
+    return None
+
+
+def _listening(settings: Look, port: int) -> Iterator[CheckResult]:
+    """Listen to another application on the cabinet."""
+    with Client(port, version=settings.version) as client:
+        began = time.monotonic()
+        with contextlib.suppress(Timeout):
+            client.next(timeout=settings.seconds)
+        if not client.stats.received:
+            yield _nothing(client, settings.seconds)
+            return
+        state = client.state
+        while time.monotonic() - began < settings.seconds:
+            time.sleep(0.05)
+            state = max(state, client.state, key=lambda one: one.session)
+        yield _messages(client, client.events())
+        if state.session >= SessionState.COMMANDING_WAIT and state.mode is not CommandMode.NO_COMMAND:
+            yield CheckResult(
+                "FRI command", "ok", f"the application lets this client command: {state.mode.name}"
+            )
+        else:
+            yield CheckResult(
+                "FRI command",
+                "note",
+                f"the session is {state.session.name}: no motion with an overlay runs, so nothing can be commanded",
+                "let the application add an FRIJointOverlay with a client command mode to a motion such as "
+                "PositionHold"
+                if state.session is SessionState.MONITORING_READY
+                else "see the quality below",
+            )
+        yield from _quality(client)
+
+
+def _nothing(client: Client, seconds: float) -> CheckResult:
+    if client.stats.malformed:
+        found, _, remedy = strangers(client).rpartition(": ")
+        return CheckResult("FRI messages", "bad", found, _VERSION if _names_version(found) else remedy)
+    advice = silence("", client.port).partition("; ")[2]
+    return CheckResult("FRI messages", "bad", f"nothing has arrived within {seconds:g} s", advice)
+
+
+def _names_version(text: str) -> bool:
+    """Whether the problem is a mismatch of FRI versions."""
+    return "speaks FRI" in text
+
+
+def _opened(settings: Look, target: str) -> Iterator[CheckResult]:
+    """Open a monitoring session of heptarm's application, beside any running motion."""
+    try:
+        arm = connect(target)
+    except HeptarmError as error:
+        yield CheckResult(
+            "FRI session", "bad", error.text, error.hint or "end the client that controls the robot"
+        )
+        return
+    with arm:
+        offered = [name.removeprefix("fri_") for name in arm.capabilities if name.startswith("fri_")]
+        kinds = [kind for kind in ("monitor", *_KINDS) if kind in offered]
+        if not kinds:
+            yield CheckResult(
+                "FRI command",
+                "bad",
+                "this cabinet has no FRI",
+                "install the option Sunrise.FRI on the cabinet",
+            )
+            return
+        missing = [kind for kind in _KINDS if kind not in kinds]
+        yield CheckResult(
+            "FRI command",
+            "ok",
+            f"offered: {', '.join(kinds)}"
+            + (f"; not offered: {', '.join(missing)}" if missing else "")
+            + ("; signals are available" if "io" in offered else "; without signals"),
+            "pose needs Sunrise 2.x" if missing == ["pose"] else "",
+        )
+        session = arm.fri(
+            "monitor",
+            period_ms=settings.period_ms,
+            port=settings.port,
+            version=settings.version,
+            timeout=min(max(settings.seconds, 3.0), 60.0),
+        )
+        try:
+            with session as rt:
+                rt.wait(settings.seconds)
+                yield _messages(rt.client, rt.events())
+                yield from _quality(rt.client)
+        except HeptarmError as error:
+            if _names_version(error.hint):
+                yield CheckResult("FRI session", "bad", error.hint.partition(": ")[0], _VERSION)
+            else:
+                yield CheckResult("FRI session", "bad", error.text, error.hint or _UNKNOWN)
+
+
+def _messages(client: Client, events: list[Event]) -> CheckResult:
+    stats, state = client.stats, client.state
+    version = next((event.text for event in events if event.kind is Kind.VERSION), "")
+    spoken = version.rpartition(" FRI ")[2] or "of the version that was asked for"
+    found = f"FRI {spoken}, every {state.period * 1e3:g} ms: {stats.received} received, {stats.lost} lost"
+    remedy = "use a cable and a direct connection instead of a busy switch"
+    if stats.lost > _LOST_FRACTION * stats.received:
+        return CheckResult("FRI messages", "note", found, remedy)
+    return CheckResult("FRI messages", "ok", found)
+
+
+def _quality(client: Client) -> Iterator[CheckResult]:
+    stats, state = client.stats, client.state
+    total = max(1, sum(stats.quality.values()))
+    parts = ", ".join(f"{100 * count / total:.0f} % {name}" for name, count in stats.quality.items() if count)
+    found = f"{_trend(client)} ({parts}); {stats.missed} answers missed"
+    median, late, longest = _latency(client)
+    why = cause(stats, state.period, client.refused, late=late)
+    if state.quality < Quality.GOOD:
+        yield CheckResult(
+            "FRI quality", "bad", found, why or "wait: the quality rises with each answer in time"
+        )
+    elif why:
+        yield CheckResult("FRI quality", "note", found, why)
+    else:
+        yield CheckResult("FRI quality", "ok", found)
+    found = f"{1e3 * median:.3f} ms median, {1e3 * late:.3f} ms 99 %, {1e3 * longest:.3f} ms longest"
+    slow = late > 0.5 * state.period
+    remedy = "; ".join(client.refused) or "look for load on this machine" if slow else ""
+    yield CheckResult("FRI answers", "note" if slow else "ok", found, remedy)
+    if client.refused and not slow:
+        yield CheckResult("FRI loop", "note", client.refused[0].partition(":")[0], client.refused[0])
+
+
+def _latency(client: Client) -> tuple[float, float, float]:
+    """Median, 99 % and longest latency since the quality was good [s]: the first answers are always slow."""
+    states = client.history()
+    first = next((i for i, one in enumerate(states) if one.quality >= Quality.GOOD), 0)
+    delays = [one.latency for one in states[first:]]
+    return float(np.median(delays)), float(np.percentile(delays, 99)), max(delays)
+
+
+def _trend(client: Client) -> str:
+    """The qualities in their order, each named once."""
+    names: list[str] = []
+    for state in client.history():
+        if not names or names[-1] != state.quality.name:
+            names.append(state.quality.name)
+    return " -> ".join(names[-6:]) or client.quality.name

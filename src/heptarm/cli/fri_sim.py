@@ -11,22 +11,21 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from heptarm.cli.output import emit
-from heptarm.cli.typed import is_silent, lines
+from heptarm.cli.output import emit, is_silent, lines
 from heptarm.errors import CommandRejected, ConnectFailed, require
-from heptarm.fri.messages import IoDirection, IoType, IoValue
-from heptarm.fri.version import Version
+from heptarm.fri.protocol.messages import IoDirection, IoType, IoValue
+from heptarm.fri.protocol.version import Version
 from heptarm.values.arrays import within
 from heptarm.values.pose import deg
 
 if TYPE_CHECKING:
-    from heptarm.virtual.fri.events import Event
-    from heptarm.virtual.fri.server import Server
-    from heptarm.virtual.fri.standalone import Standalone
+    from heptarm.sim.fri.server import Server
+    from heptarm.sim.fri.settings import Event
+    from heptarm.sim.runtime.standalone_fri import Standalone
 
 _SIGNAL = re.compile(r"(.+\.[^.<>]+)([<>])(bool|u[0-9]+|analog.*)")
 _WORDS = {"true": 1.0, "false": 0.0}
-#: Where the arm stands at first [deg]: bent, so that every direction is free.
+#: Start position [deg]: bent, so that the arm can move in every direction.
 START = (0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0)
 
 
@@ -45,7 +44,7 @@ def run(
     verbose: bool,
     as_json: bool,
 ) -> int:
-    """Offer one session after the other until Ctrl-C or SIGTERM; returns the exit code.
+    """Offer one session after the other until Ctrl-C or SIGTERM; return the exit code.
 
     Args:
         version: of FRI, such as "1.15".
@@ -54,15 +53,15 @@ def run(
         client: HOST:PORT where the client listens.
         period: between two messages [ms].
         multiplier: the client answers every n-th message.
-        port: the controller's own; None: the client's, or a neighbour of it on the same machine.
+        port: the controller's own; None: the client's, or the next free one on the same machine.
         signals: that the client sees, as `signal` reads them.
         frames: names of frames that the client is asked for.
         speed: simulated seconds per second.
-        verbose: also tell each change of quality.
+        verbose: also print each change of quality.
         as_json: print objects.
 
     Raises:
-        CommandRejected: version, command and period do not go together; the text says why.
+        CommandRejected: version, command and period do not go together; the text gives the reason.
         ConnectFailed: the port is taken, or the client's address is none.
     """
     standalone = made(
@@ -76,10 +75,11 @@ def run(
         signals=signals,
         frames=frames,
         speed=speed,
-        tell=_teller(verbose=verbose, as_json=as_json),
+        tell=_printer(verbose=verbose, as_json=as_json),
     )
     for number in (system.SIGTERM, system.SIGINT):
-        system.signal(number, lambda *_: standalone.stop())
+        if system.getsignal(number) is not system.SIG_IGN:  # a shell's background job ignores Ctrl-C
+            system.signal(number, lambda *_: standalone.stop())
     controller, own = standalone.server.controller, standalone.server.port
     ready = {"ready": True, "fri": version, "client": client, "port": own, "model": model, "command": command}
     if as_json:
@@ -91,7 +91,7 @@ def run(
         )
         sys.stdout.flush()
     if signals and not is_silent():
-        threading.Thread(target=_careful, args=(standalone.server,), daemon=True).start()
+        threading.Thread(target=_read_values, args=(standalone.server,), daemon=True).start()
     standalone.run()
     counts = asdict(controller.meter.counts)
     if as_json:
@@ -120,17 +120,17 @@ def made(
 ) -> Standalone:
     """The controller with its arm; see `run`. `tell` is called with each event."""
     require("mujoco", extra="sim")
-    from heptarm.virtual.fri.configuration import Configuration
-    from heptarm.virtual.fri.plant_arm import PlantArm
-    from heptarm.virtual.fri.standalone import Settings, Standalone, command_mode
-    from heptarm.virtual.plant import Plant
+    from heptarm.sim.fri.sessions import PlantArm
+    from heptarm.sim.fri.settings import SessionConfiguration
+    from heptarm.sim.plant.plant import Plant
+    from heptarm.sim.runtime.standalone_fri import Standalone, StandaloneSettings, command_mode
 
     try:
         spoken = Version.of(version)
     except ValueError as error:
         raise CommandRejected(str(error), parameter="--fri", value=version) from None
-    settings = Settings(
-        configuration=Configuration(
+    settings = StandaloneSettings(
+        configuration=SessionConfiguration(
             spoken, whole(period), multiplier, signals=tuple(map(signal, signals)), transformations=frames
         ),
         client=address(client),
@@ -146,11 +146,14 @@ def address(text: str) -> tuple[str, int]:
     """Host and port of "HOST:PORT" or "HOST".
 
     Raises:
-        ConnectFailed: it is neither.
+        ConnectFailed: the text is neither.
     """
     host, colon, port = text.partition(":")
     if not host or (colon and not port.isdigit()):
-        raise ConnectFailed(f"{text!r} is no address", hint="HOST:PORT is wanted, such as 127.0.0.1:30200")
+        raise ConnectFailed(
+            f"the client's address must be HOST:PORT, got {text!r}",
+            hint="give HOST:PORT, such as 127.0.0.1:30200",
+        )
     return host, int(port) if colon else 30200
 
 
@@ -158,28 +161,28 @@ def signal(text: str) -> IoValue:
     """The signal "Group.Name<type" (an input) or "Group.Name>type" (an output), at first 0.
 
     Raises:
-        CommandRejected: it is none.
+        CommandRejected: it is not one.
     """
     parts = _SIGNAL.fullmatch(text)
     if parts is None:
         raise CommandRejected(
-            f"{text!r} is no signal",
+            f"a signal must be GROUP.NAME<TYPE or GROUP.NAME>TYPE, got {text!r}",
             parameter="--fri-io",
             value=text,
-            hint="GROUP.NAME<bool is wanted, or > for an output, and bool, u8 or analog",
+            hint="< is an input of the client, > an output; TYPE is bool, u8 (or other bits) or analog",
         )
     name, direction, kind = parts[1], parts[2], parts[3]
     types = {"b": IoType.BOOLEAN, "u": IoType.DIGITAL, "a": IoType.ANALOG}
     return IoValue(name, types[kind[0]], IoDirection.INPUT if direction == "<" else IoDirection.OUTPUT, 0)
 
 
-def _careful(server: Server) -> None:
-    """Heed until standard input is closed."""
+def _read_values(server: Server) -> None:
+    """Set typed values until standard input is closed."""
     with contextlib.suppress(OSError):
-        _heed(server)
+        _set_typed(server)
 
 
-def _heed(server: Server) -> None:
+def _set_typed(server: Server) -> None:
     """Give signals the values that are typed: `set Group.Name 1`."""
     for said in lines():
         verb, name, value = (*said.split(), "", "", "")[:3]
@@ -198,11 +201,11 @@ def whole(period: float) -> int:
     """A period in whole milliseconds.
 
     Raises:
-        CommandRejected: it is none.
+        CommandRejected: it is not one.
     """
     if period != round(period):
         raise CommandRejected(
-            f"the period is {period:g} ms; FRI knows whole milliseconds",
+            f"the period must be a whole number of milliseconds, 1 to 100 ms, got {period:g} ms",
             parameter="period",
             value=period,
             allowed="1, 2, ... 100 ms",
@@ -210,13 +213,12 @@ def whole(period: float) -> int:
     return round(period)
 
 
-def _teller(*, verbose: bool, as_json: bool) -> Callable[[Event], None]:
+def _printer(*, verbose: bool, as_json: bool) -> Callable[[Event], None]:
     require("mujoco", extra="sim")
-    from heptarm.virtual.fri.events import QualityChanged
-    from heptarm.virtual.fri.standalone import words
+    from heptarm.sim.fri.settings import QualityChanged, describe
 
     def tell(event: Event) -> None:
-        text = "" if isinstance(event, QualityChanged) and not verbose else words(event)
+        text = "" if isinstance(event, QualityChanged) and not verbose else describe(event)
         if not text:
             return
         if as_json:

@@ -1,25 +1,33 @@
-"""`heptarm install-cabinet`: the sources and process data for a Sunrise project, and what to do with them."""
+"""`heptarm install-cabinet`: the sources and process data for a Sunrise project, and the installation steps."""
 
 from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from heptarm import __version__, _resources
+from heptarm.cli.options import (
+    Json,
+)
 from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected
 from heptarm.wire.messages import MAJOR, MINOR
 
 
-def run(*, out: Path, as_json: bool) -> int:
-    """Write the files; returns the exit code.
-
-    Raises:
-        CommandRejected: the folder is not empty.
-    """
+def install_cabinet(
+    *,
+    out: Annotated[Path, Parameter(help="Folder to write; must be new or empty.")],
+    as_json: Json = False,
+) -> int:
+    """Write the cabinet application for a Sunrise project, with the steps."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise CommandRejected(
-            f"{out} is not an empty folder", parameter="out", hint="name a new folder with --out"
+            f"--out must be a new or empty folder, got {out}",
+            parameter="out",
+            hint="name a new folder with --out",
         )
     sources = _resources.cabinet_sources()
     for part in ("core", "app"):

@@ -1,23 +1,14 @@
-"""The command line's groups, and the options that several commands share."""
+"""Options common to several commands, with their help texts."""
 
 from __future__ import annotations
 
 from typing import Annotated
 
-from cyclopts import App, Group, Parameter
-
-from heptarm import __version__
-
-app = App(
-    name="heptarm", help="Control a KUKA LBR iiwa, with or without a robot on the desk.", version=__version__
-)
-move_app = App(name="move", help="Move the arm and wait until it rests.")
-app.command(move_app)
-rl_app = App(name="rl", help="Train a policy that reaches targets, look how good it is, let it drive an arm.")
-app.command(rl_app)
+from cyclopts import Group, Parameter
 
 COMMON = Group("Common options")
 FRI = Group("FRI")
+
 Target = Annotated[
     str | None,
     Parameter(
@@ -27,11 +18,28 @@ Target = Annotated[
     ),
 ]
 Json = Annotated[
-    bool, Parameter(name="--json", group=COMMON, negative="", help="Print one JSON object a line.")
+    bool, Parameter(name="--json", group=COMMON, negative="", help="Print one JSON object per line.")
 ]
-Degrees = Annotated[bool, Parameter(name="--deg", negative="", help="Angles are degrees.")]
+Degrees = Annotated[bool, Parameter(name="--deg", negative="", help="Angles are in degrees.")]
 Speed = Annotated[float, Parameter(name="--speed", help="Fraction of the full speed, (0, 1].")]
 Yes = Annotated[bool, Parameter(name="--yes", negative="", help="Do not ask before a real robot moves.")]
 DryRun = Annotated[
     bool, Parameter(name="--dry-run", negative="", help="Check and show the motion, move nothing.")
+]
+
+FriPort = Annotated[
+    int | None, Parameter(group=FRI, help="Own UDP port. Default: the first free one of 30200 to 30209.")
+]
+FriPeriod = Annotated[int, Parameter(group=FRI, help="Time between two messages [ms].")]
+FriVersion = Annotated[
+    str | None,
+    Parameter(group=FRI, help="FRI release that the cabinet speaks. Default: taken from its first message."),
+]
+FriListen = Annotated[
+    bool,
+    Parameter(
+        group=FRI,
+        negative="",
+        help="Open no session; listen to the FRI application that runs on the cabinet.",
+    ),
 ]

@@ -1,10 +1,12 @@
-"""What the commands share: JSON, states as plain data, questions."""
+"""What commands print and read: JSON, states as plain data, questions, typed lines."""
 
 from __future__ import annotations
 
 import json
 import math
+import os
 import sys
+from collections.abc import Iterator
 from typing import Any
 
 from heptarm.values.state import State
@@ -32,13 +34,13 @@ def state_data(state: State) -> dict[str, Any]:
         data |= {"q": state.q.tolist(), "q_cmd": state.q_cmd.tolist(), "dq": state.dq.tolist()}
     if state.torques is not None:
         data |= {"tau": state.tau.tolist(), "tau_ext": state.tau_ext.tolist()}
-    if state.cartesian is not None:
+    if state.groups.pose is not None:
         data |= {"xyz": state.pose.xyz.tolist(), "quat": state.pose.quat.tolist()}
-    if state.external is not None:
+    if state.groups.wrench is not None:
         data |= {"force": state.wrench.force.tolist(), "torque": state.wrench.torque.tolist()}
     if state.motion is not None:
         data |= {"motion": state.motion.id, "progress": state.motion.progress}
-    if state.status is not None:
+    if state.groups.safety is not None:
         data |= {"mode": state.safety.mode.value, "ready_to_move": state.safety.ready_to_move}
         data |= {"stops": list(state.safety.stops)}
     return data
@@ -49,3 +51,21 @@ def confirm(question: str) -> bool:
     if not sys.stdin.isatty():
         return False
     return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")
+
+
+def is_silent() -> bool:
+    """Whether no input can come: reading the terminal in the background would stop the whole process."""
+    try:
+        return os.isatty(0) and os.tcgetpgrp(0) != os.getpgrp()
+    except (OSError, AttributeError):
+        return True
+
+
+def lines() -> Iterator[str]:
+    """Every line until the end of standard input."""
+    rest = b""
+    # unbuffered: a blocked buffered read would keep the interpreter from ending
+    while chunk := os.read(0, 4096):
+        *whole, rest = (rest + chunk).split(b"\n")
+        for line in whole:
+            yield line.decode("utf-8", "replace").strip()

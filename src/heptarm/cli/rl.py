@@ -1,49 +1,72 @@
-"""`heptarm rl`: trains a policy, looks how good it is, and lets it drive an arm."""
+"""`heptarm rl`: trains a policy, evaluates it in simulation, and deploys it on an arm."""
 
 from __future__ import annotations
 
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
+from cyclopts import Parameter
 
 from heptarm.arm.connect import connect
+from heptarm.cli.options import (
+    Json,
+    Speed,
+    Target,
+    Yes,
+)
 from heptarm.cli.output import confirm, emit
 from heptarm.errors import CommandRejected, NotReady, require
-from heptarm.rl.deploy import Settings, Target, circle, deploy
+from heptarm.rl import deploy as deployment
+from heptarm.rl.deploy import DeploySettings, circle
 from heptarm.rl.policy import Policy, shipped
-from heptarm.rl.report import Report
-from heptarm.values.mode import JointImpedance
+from heptarm.rl.report import EpisodeReport
+from heptarm.values.mode.impedance import JointImpedance
 
 if TYPE_CHECKING:
-    from heptarm.rl.train import Row
+    from heptarm.rl.train.train import Row
+
+Seed = Annotated[int, Parameter(help="Seed of all random numbers.")]
+Randomisation = Annotated[
+    Literal["none", "mild", "strong"], Parameter(help="How much simulated robots differ.")
+]
+Engine = Annotated[
+    Literal["mujoco", "warp", "plant"],
+    Parameter(
+        help="Simulation: MuJoCo on the CPU, MuJoCo Warp on a GPU, or the virtual cabinet's own plant."
+    ),
+]
+PolicyFile = Annotated[Path, Parameter(help="File of the policy, .npz.")]
+AnyPolicy = Annotated[
+    Path | None, Parameter(help="File of the policy, .npz. Default: the one that comes with heptarm.")
+]
 
 
 def train(
     *,
-    out: Path,
-    robot: str,
-    action: str,
-    feature: bool,
-    exact: bool,
-    steps: int,
-    seed: int,
-    resume: bool,
-    device: str,
-    engine: str,
-    as_json: bool,
+    out: PolicyFile = Path("reach.npz"),
+    robot: Annotated[Literal["iiwa7", "iiwa14"], Parameter(help="Robot.")] = "iiwa14",
+    action: Annotated[Literal["joint", "cartesian"], Parameter(help="What the policy decides.")] = "joint",
+    feature: Annotated[
+        bool, Parameter(negative="", help="Let the policy also observe the direction to the target.")
+    ] = False,
+    exact: Annotated[
+        bool, Parameter(negative="", help="Exactly the paper's reward: no costs for robustness.")
+    ] = False,
+    steps: Annotated[int, Parameter(help="Environment steps; 0: 2.2 million, 1.3 with the feature.")] = 0,
+    seed: Seed = 0,
+    resume: Annotated[bool, Parameter(negative="", help="Resume the training of --out.")] = False,
+    device: Annotated[Literal["cpu", "cuda"], Parameter(help="Where the networks learn.")] = "cpu",
+    engine: Engine = "mujoco",
+    as_json: Json = False,
 ) -> int:
-    """Train a policy; returns the exit code.
-
-    Raises:
-        HeptarmError: arguments that do not go together, nothing to resume, or a missing extra.
-    """
+    """Train a policy; under torchrun, several workers train one."""
     require("torch", extra="rl")
     from heptarm.rl.task import ReachTask
-    from heptarm.rl.train import Recipe
-    from heptarm.rl.train import train as work
+    from heptarm.rl.train.recipe import Recipe
+    from heptarm.rl.train.train import train as work
 
     task = ReachTask(robot, action=action, feature="kinematic" if feature else "")
     recipe = Recipe.exact(task, seed=seed) if exact else Recipe(task, seed=seed)
@@ -56,8 +79,8 @@ def train(
                 {"steps": row.steps, "seconds": row.seconds, "distance": row.distance, "success": row.success}
             )
             return
-        share = min(1.0, row.steps / budget)
-        bar = "#" * round(30 * share)
+        done = min(1.0, row.steps / budget)
+        bar = "#" * round(30 * done)
         print(
             f"\r[{bar:<30}] {row.steps / 1e6:5.2f} M steps  {row.seconds:5.0f} s  "
             f"{1e3 * row.distance:6.1f} mm at the end of noisy episodes",
@@ -76,9 +99,9 @@ def train(
         engine=_engine(engine),
     )
     curve = trained.plot(out.with_suffix(".png"))
-    told = {"policy": str(out), "curve": str(curve), "steps": trained.steps, "seconds": trained.seconds}
+    report = {"policy": str(out), "curve": str(curve), "steps": trained.steps, "seconds": trained.seconds}
     if as_json:
-        emit(told)
+        emit(report)
     else:
         print(f"\n{trained.steps} steps in {trained.seconds:.0f} s; policy {out}, learning curve {curve}")
     return 0
@@ -87,117 +110,118 @@ def train(
 def _engine(name: str) -> Any:
     """The class of a simulation's engine by its name."""
     if name == "mujoco":
-        from heptarm.rl.batch import Engine
+        from heptarm.rl.sim.batch import Engine
 
         return Engine
     if name == "warp":
-        from heptarm.rl.warp import WarpEngine
+        from heptarm.rl.sim.warp_engine import WarpEngine
 
         return WarpEngine
-    from heptarm.rl.plant import PlantEngine
+    from heptarm.rl.sim.plant_engine import PlantEngine
 
     return PlantEngine
 
 
 def evaluate(
+    policy: AnyPolicy = None,
+    /,
     *,
-    policy: Path | None,
-    episodes: int,
-    seed: int,
-    randomisation: str,
-    engine: str,
-    out: Path | None,
-    as_json: bool,
+    episodes: Annotated[int, Parameter(help="Targets, none of them seen in training.")] = 1000,
+    seed: Seed = 0,
+    randomisation: Randomisation = "none",
+    engine: Engine = "mujoco",
+    out: Annotated[Path | None, Parameter(help="Write report, recording and plot under this name.")] = None,
+    as_json: Json = False,
 ) -> int:
-    """Run a policy in simulation on targets that training never saw; returns the exit code.
-
-    Raises:
-        HeptarmError: no such policy, or a missing extra.
-    """
+    """Evaluate a policy in simulation."""
     from heptarm.rl.evaluate import evaluate as work
-    from heptarm.rl.randomise import level
+    from heptarm.rl.sim.randomisation import level
 
     report = work(
-        _brain(policy), episodes, randomisation=level(randomisation), seed=seed, engine=_engine(engine)
+        _load(policy), episodes, randomisation=level(randomisation), seed=seed, engine=_engine(engine)
     )
-    return _tell(report, out, film=False, as_json=as_json)
+    return _report(report, out, film=False, as_json=as_json)
 
 
-def drive(
+def deploy(
+    policy: AnyPolicy = None,
+    /,
     *,
-    policy: Path | None,
-    at: tuple[tuple[float, float, float], ...],
-    random: int,
-    ask: bool,
-    follow: bool,
-    seed: int,
-    stiffness: float | None,
-    latency: float,
-    speed: float,
-    out: Path | None,
-    film: bool,
-    yes: bool,
-    target: str | None,
-    as_json: bool,
+    at: Annotated[
+        tuple[tuple[float, float, float], ...],
+        Parameter(help="A target x y z [m], base frame; may be repeated."),
+    ] = (),
+    random: Annotated[int, Parameter(help="Without --at: so many random targets.")] = 5,
+    ask: Annotated[bool, Parameter(negative="", help="Read targets from standard input.")] = False,
+    follow: Annotated[bool, Parameter(negative="", help="Follow a target that moves on a circle.")] = False,
+    seed: Seed = 0,
+    stiffness: Annotated[
+        float | None, Parameter(help="Joint impedance [Nm/rad] instead of position control.")
+    ] = None,
+    latency: Annotated[float, Parameter(help="Delay between observation and command [s].")] = 0.0,
+    speed: Speed = 0.5,
+    out: Annotated[Path | None, Parameter(help="Write report, recording and plot under this name.")] = None,
+    film: Annotated[
+        bool, Parameter(negative="", help="With --out: also a film of the first episodes.")
+    ] = False,
+    yes: Yes = False,
+    target: Target = None,
+    as_json: Json = False,
 ) -> int:
-    """Let a policy drive an arm; returns the exit code.
-
-    Raises:
-        HeptarmError: refused, or ended under way.
-    """
-    brain = _brain(policy)
-    settings = Settings(
+    """Let a policy control an arm at 30 Hz with a servo motion; needs no torch."""
+    network = _load(policy)
+    settings = DeploySettings(
         mode=None if stiffness is None else JointImpedance(stiffness), latency=latency, speed=speed
     )
     with connect(target) as arm:
-        if not (arm.is_virtual or yes or confirm(f"Let the policy drive the real {arm.robot.title}?")):
+        if not (arm.is_virtual or yes or confirm(f"Let the policy control the real {arm.robot.title}?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
         if ask:
-            return _ask(arm, brain, settings)
-        targets = _targets(brain, at, random, follow, seed)
+            return _ask(arm, network, settings)
+        targets = _targets(network, at, random, follow, seed)
 
         def show(number: int, distance: float) -> None:
             if not as_json:
                 print(f"{number + 1:4d} of {len(targets)}: {1e3 * distance:6.1f} mm", file=sys.stderr)
 
-        report = deploy(arm, brain, targets, settings=settings, progress=show)
-    return _tell(report, out, film=film, as_json=as_json)
+        report = deployment.deploy(arm, network, targets, settings=settings, progress=show)
+    return _report(report, out, film=film, as_json=as_json)
 
 
-def _brain(file: Path | None) -> Policy:
+def _load(file: Path | None) -> Policy:
     return shipped() if file is None else Policy.load(file)
 
 
 def _targets(
-    brain: Policy, at: tuple[tuple[float, float, float], ...], random: int, follow: bool, seed: int
+    network: Policy, at: tuple[tuple[float, float, float], ...], random: int, follow: bool, seed: int
 ) -> list[Any]:
     if follow:
-        moving: Target = circle(brain.task.centre, 0.12, period=6.0)
+        moving: deployment.Target = circle(network.task.centre, 0.12, period=6.0)
         return [moving]
     if at:
         return [np.array(point) for point in at]
     if random < 1:
         raise CommandRejected(
-            f"random is {random}; at least 1 is wanted", parameter="random", hint="or give --at X Y Z"
+            f"--random must be at least 1, got {random}", parameter="random", hint="or give --at X Y Z"
         )
-    return list(brain.task.targets(np.random.default_rng(seed), random))
+    return list(network.task.targets(np.random.default_rng(seed), random))
 
 
-def _ask(arm: Any, brain: Policy, settings: Settings) -> int:
-    """Targets typed by the user, until an empty line."""
-    print("target x y z [m], empty line to end; the box is around", brain.task.centre, file=sys.stderr)
+def _ask(arm: Any, network: Policy, settings: DeploySettings) -> int:
+    """Move to targets typed by the user, until an empty line."""
+    print("target x y z [m], empty line to end; the box is around", network.task.centre, file=sys.stderr)
     while line := sys.stdin.readline().strip():
         try:
             point = [float(word) for word in line.replace(",", " ").split()]
-            report = deploy(arm, brain, [np.array(point)], settings=settings)
-        except (ValueError, CommandRejected) as error:  # a slip of the user's does not end the session
+            report = deployment.deploy(arm, network, [np.array(point)], settings=settings)
+        except (ValueError, CommandRejected) as error:  # a typing error does not end the session
             print(f"heptarm: {error}", file=sys.stderr)
             continue
         print(f"{1e3 * report.mean:.1f} mm from {point} at the end")
     return 0
 
 
-def _tell(report: Report, out: Path | None, *, film: bool, as_json: bool) -> int:
+def _report(report: EpisodeReport, out: Path | None, *, film: bool, as_json: bool) -> int:
     if out is not None:
         files = [report.save(out.with_suffix(".npz")), report.save(out.with_suffix(".json"))]
         files.append(report.plot(out.with_suffix(".png")))

@@ -11,15 +11,194 @@ from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from heptarm.cli import typed
-from heptarm.cli.output import emit
-from heptarm.errors import ConnectFailed
-from heptarm.virtual.operator import WORDS
+from cyclopts import Group, Parameter
+
+from heptarm.cli.options import (
+    FRI,
+    Json,
+)
+from heptarm.cli.output import emit, is_silent, lines
+from heptarm.errors import CommandRejected, ConnectFailed
+from heptarm.sim.runtime.operator import WORDS
+from heptarm.values.simulator_options import SimulatorOptions
+
+_APP = Group("Your own application")
 
 
-def run(
+def sim(
+    *,
+    model: Annotated[Literal["iiwa7", "iiwa14"], Parameter(help="Robot.")] = "iiwa14",
+    host: Annotated[str, Parameter(help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, Parameter(help="Port; 0 takes a free one.")] = 30001,
+    speed: Annotated[float, Parameter(help="Simulated seconds per second.")] = 1.0,
+    view: Annotated[bool, Parameter(negative="", help="Open a live 3D view in the browser.")] = False,
+    view_port: Annotated[int, Parameter(help="Port of the view; 0 takes a free one.")] = 8080,
+    key: Annotated[str, Parameter(help="Pre-shared key that clients must know.")] = "",
+    fault: Annotated[
+        tuple[str, ...],
+        Parameter(
+            help="Inject a fault at a simulated time, as NAME@SECONDS: emergency_stop, operator_safety, "
+            "protective_stop, drive_error, joint_limit, singularity, t1, release, clear ...; may be repeated. "
+            "The same words can be typed while it runs."
+        ),
+    ] = (),
+    payload: Annotated[
+        str,
+        Parameter(
+            help="MASS or MASS,X,Y,Z: the true payload on the flange, whatever load data the controller has [kg, m]. "
+            "Default: the controller's load data."
+        ),
+    ] = "",
+    project: Annotated[
+        Path | None,
+        Parameter(
+            help="RoboticsAPI.data.xml of a Sunrise project: process data, tool templates, frames; "
+            "with --app, used instead of the one in its folder."
+        ),
+    ] = None,
+    verbose: Annotated[
+        bool,
+        Parameter(
+            negative="", help="Show the cabinet's log; with --app, the simulator's beside the application's."
+        ),
+    ] = False,
+    application: Annotated[
+        Path | None,
+        Parameter(
+            name="--app", group=_APP, help="Compile and run this folder's Sunrise application instead."
+        ),
+    ] = None,
+    app_class: Annotated[
+        str,
+        Parameter(
+            group=_APP,
+            help="Its class, where there are several applications; only what it needs is compiled.",
+        ),
+    ] = "",
+    app_data: Annotated[
+        tuple[str, ...], Parameter(group=_APP, help="Process data as NAME=VALUE; may be repeated.")
+    ] = (),
+    answer: Annotated[
+        tuple[int, ...],
+        Parameter(
+            group=_APP,
+            negative="",
+            help="Button, from 0, that answers the next dialog; may be repeated. Further dialogs wait for "
+            "a typed `answer BUTTON`.",
+        ),
+    ] = (),
+    answers: Annotated[
+        Path | None,
+        Parameter(
+            group=_APP,
+            help="File of such buttons, one per line; # begins a comment. They come before --answer.",
+        ),
+    ] = None,
+    fri: Annotated[
+        str | None,
+        Parameter(
+            group=FRI,
+            help="Run only an FRI controller of this version, such as 1.15, 2.5 or 2.7, without a cabinet.",
+        ),
+    ] = None,
+    fri_command: Annotated[
+        Literal["monitor", "position", "torque", "wrench", "pose"],
+        Parameter(group=FRI, help="What the client may command."),
+    ] = "position",
+    fri_client: Annotated[
+        str, Parameter(group=FRI, help="HOST:PORT where the client listens.")
+    ] = "127.0.0.1:30200",
+    fri_period: Annotated[float, Parameter(group=FRI, help="Time between two messages [ms].")] = 5.0,
+    fri_multiplier: Annotated[int, Parameter(group=FRI, help="The client answers every n-th message.")] = 1,
+    fri_port: Annotated[
+        int | None,
+        Parameter(group=FRI, help="UDP port to send from. Default: the client's port, or the next free one."),
+    ] = None,
+    fri_io: Annotated[
+        tuple[str, ...],
+        Parameter(
+            group=FRI,
+            help="GROUP.NAME<TYPE is an input that the client reads, GROUP.NAME>TYPE an output that it writes, "
+            "TYPE bool, u8 (or other bits) or analog; may be repeated. Type `set GROUP.NAME VALUE` while it runs.",
+        ),
+    ] = (),
+    fri_frame: Annotated[
+        tuple[str, ...],
+        Parameter(group=FRI, help="Name of a frame that the client is asked for; may be repeated."),
+    ] = (),
+    as_json: Json = False,
+) -> int:
+    """Run a virtual cabinet until Ctrl-C; with --fri, a bare FRI controller; with --app, your own application."""
+    if application is not None:
+        defaults = {
+            "--view": (view, False),
+            "--view-port": (view_port, 8080),
+            "--host": (host, "127.0.0.1"),
+            "--port": (port, 30001),
+            "--key": (key, ""),
+            "--fri": (fri, None),
+            "--fri-command": (fri_command, "position"),
+            "--fri-client": (fri_client, "127.0.0.1:30200"),
+            "--fri-period": (fri_period, 5.0),
+            "--fri-multiplier": (fri_multiplier, 1),
+            "--fri-port": (fri_port, None),
+            "--fri-io": (fri_io, ()),
+            "--fri-frame": (fri_frame, ()),
+        }
+        _refuse_beside_app({name for name, (value, default) in defaults.items() if value != default})
+        return _application(
+            folder=application,
+            main=app_class,
+            data=app_data,
+            answers=(*_read_answers(answers), *answer),
+            model=model,
+            speed=speed,
+            faults=fault,
+            payload=payload,
+            project=project,
+            verbose=verbose,
+            as_json=as_json,
+        )
+    given = {"--app-class": app_class, "--app-data": app_data, "--answer": answer, "--answers": answers}
+    for name, value in given.items():
+        if value:
+            raise CommandRejected(f"{name} needs --app", parameter=name.lstrip("-"), hint="add --app FOLDER")
+    if fri is not None:
+        from heptarm.cli import fri_sim
+
+        return fri_sim.run(
+            version=fri,
+            model=model,
+            command=fri_command,
+            client=fri_client,
+            period=fri_period,
+            multiplier=fri_multiplier,
+            port=fri_port,
+            signals=fri_io,
+            frames=fri_frame,
+            speed=speed,
+            verbose=verbose,
+            as_json=as_json,
+        )
+    return _cabinet(
+        model=model,
+        host=host,
+        port=port,
+        speed=speed,
+        view=view,
+        view_port=view_port,
+        key=key,
+        faults=fault,
+        payload=payload,
+        project=project,
+        verbose=verbose,
+        as_json=as_json,
+    )
+
+
+def _cabinet(
     *,
     model: str,
     host: str,
@@ -34,22 +213,26 @@ def run(
     verbose: bool,
     as_json: bool,
 ) -> int:
-    """Run until Ctrl-C or SIGTERM; lines on standard input are what the operator does. Returns the exit code.
+    """Run a virtual cabinet until Ctrl-C or SIGTERM; lines on standard input are the operator's actions.
 
     Raises:
-        ConnectFailed: the cabinet or the view does not start; the text says why.
+        ConnectFailed: the cabinet or the view does not start; the text gives the reason.
     """
-    command = [sys.executable, "-m", "heptarm.virtual.cabinet", "--parent-pipe", "--model", model]
-    command += ["--host", host, "--port", str(port), "--speed", str(speed)]
-    command += ["--key", key] if key else []
-    for fault in faults:
-        command += ["--fault", fault]
-    command += ["--payload", payload] if payload else []
-    command += ["--project", str(project)] if project is not None else []
-    command += ["--verbose"] if verbose else []
+    options = SimulatorOptions(
+        model=model,
+        host=host,
+        port=port,
+        speed=speed,
+        key=key,
+        fault=faults,
+        payload=payload,
+        project=project,
+        parent_pipe=True,
+        verbose=verbose,
+    )
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ExitStack() as stack:
-        cabinet = stack.enter_context(_child(command))
+        cabinet = stack.enter_context(_child(_command(options)))
         ready = _ready(cabinet, f"the virtual cabinet does not start on {host}:{port}")
         target = f"sim://{host}:{ready['port']}"
         if view:
@@ -58,7 +241,7 @@ def run(
                     [
                         sys.executable,
                         "-m",
-                        "heptarm.virtual.view",
+                        "heptarm.sim.runtime.view",
                         "--target",
                         target,
                         "--port",
@@ -83,45 +266,117 @@ def run(
             return 0
 
 
-def run_application(
+def _refuse_beside_app(names: set[str]) -> None:
+    """Refuse options that have no meaning for a foreign application.
+
+    Raises:
+        CommandRejected: there is such an option.
+    """
+    for name in sorted(names):
+        if name.startswith("--view"):
+            reason = "the view needs heptarm's own application in the cabinet"
+        elif name.startswith("--fri"):
+            reason = "an FRI session is opened by the application itself"
+        else:
+            reason = "it belongs to heptarm's own application; yours opens its own connections"
+        raise CommandRejected(
+            f"{name} cannot be used with --app: {reason}",
+            parameter=name.lstrip("-"),
+            hint=f"leave out {name} or --app",
+        )
+
+
+def _read_answers(file: Path | None) -> list[int]:
+    """Buttons of a file, one per line.
+
+    Raises:
+        CommandRejected: the file cannot be read, or a line is no number.
+    """
+    if file is None:
+        return []
+    found = []
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise CommandRejected(f"--answers: {error}", parameter="answers") from None
+    for number, line in enumerate(text.splitlines(), 1):
+        said = line.partition("#")[0].strip()
+        if said and not said.isdecimal():
+            raise CommandRejected(
+                f"{file}, line {number}: an answer must be the number of a button, from 0, got {said!r}",
+                parameter="answers",
+                value=said,
+                hint="write one number per line",
+            )
+        if said:
+            found.append(int(said))
+    return found
+
+
+def _application(
     *,
     folder: Path,
     main: str,
     data: tuple[str, ...],
+    answers: tuple[int, ...],
     model: str,
     speed: float,
+    faults: tuple[str, ...],
+    payload: str,
+    project: Path | None,
+    verbose: bool,
     as_json: bool,
 ) -> int:
-    """Compile somebody else's application and run it to its end; returns the exit code.
+    """Compile another application and run it to its end; return the exit code.
 
     Raises:
-        HeptarmError: it does not compile, or there is no such application; the text says why.
+        HeptarmError: it does not compile, there is no such application, or an option is illegal.
     """
-    from heptarm.virtual.application import compile_application
+    from heptarm.sim.runtime.application import compile_application
 
+    if any(button < 0 for button in answers):
+        raise CommandRejected(
+            f"--answer must be the number of a button, from 0, got {min(answers)}",
+            parameter="answer",
+            value=min(answers),
+        )
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with TemporaryDirectory(prefix="heptarm-") as out:
         application = compile_application(folder, Path(out), main=main)
-        command = [sys.executable, "-m", "heptarm.virtual.cabinet", "--parent-pipe", "--verbose"]
-        command += ["--model", model, "--speed", str(speed), "--application", application.main]
-        command += ["--classpath", out]
-        for jar in application.jars:
-            command += ["--classpath", str(jar)]
-        for task in application.background:
-            command += ["--background", task]
-        command += ["--project", str(application.project)] if application.project else []
-        for one in data:
-            command += ["--data", one]
-        if not as_json:
-            print(f"{application.main} runs on a virtual {model}; Ctrl-C deselects it.", flush=True)
-        with _child(command) as cabinet:
+        for reason in application.left_out:
+            print(f"heptarm: {reason}", file=sys.stderr, flush=True)
+        options = SimulatorOptions(
+            model=model,
+            speed=speed,
+            application=application.main,
+            background=application.background,
+            classpath=(out, *map(str, application.jars)),
+            project=project or application.project,
+            data=data,
+            answer=answers,
+            fault=faults,
+            payload=payload,
+            parent_pipe=True,
+            verbose=verbose,
+        )
+        failure = ""
+        with _child(_command(options)) as cabinet:
             try:
-                assert cabinet.stdout is not None
-                said = cabinet.stdout.read()  # until it ends; closing its input would end it
+                ready = _first(cabinet, "the virtual cabinet does not start")
+                if not ready.get("ready"):
+                    raise ConnectFailed(f"the virtual cabinet does not start: {ready.get('error')}")
+                if not as_json:
+                    print(f"{application.main} runs on a virtual {model}; Ctrl-C deselects it.", flush=True)
+                    if sys.stdin is not None and sys.stdin.isatty():
+                        print(
+                            "You are the operator: type answer 0, press 0, emergency_stop, clear ... or help.",
+                            flush=True,
+                        )
+                _listen(cabinet, as_json)
+                failure = _answer(cabinet, as_json)  # until it ends; closing its input would end it
                 cabinet.wait()
             except KeyboardInterrupt:
                 return 0
-        failure = _failure(said)
         if as_json:
             emit({"application": application.main, "ended": not failure, "error": failure})
         elif failure:
@@ -129,17 +384,14 @@ def run_application(
         return 1 if failure or cabinet.returncode else 0
 
 
-def _failure(said: str) -> str:
-    for line in said.splitlines():
-        with suppress(ValueError):
-            return str(dict(json.loads(line)).get("error", ""))
-    return ""
+def _command(options: SimulatorOptions) -> list[str]:
+    return [sys.executable, "-m", "heptarm.sim.runtime.cabinet", *options.arguments()]
 
 
 def _type(cabinet: subprocess.Popen[str], as_json: bool) -> None:
-    """Hand on what is typed; the end of standard input ends nothing."""
+    """Pass typed lines to the cabinet; the end of standard input does not end the cabinet."""
     assert cabinet.stdin is not None
-    for said in typed.lines():
+    for said in lines():
         if said == "help":
             for words, meaning in WORDS.items():
                 about = json.dumps({"say": words, "to": meaning}) if as_json else f"{words:26} {meaning}"
@@ -150,39 +402,48 @@ def _type(cabinet: subprocess.Popen[str], as_json: bool) -> None:
 
 
 def _converse(cabinet: subprocess.Popen[str], as_json: bool) -> None:
-    """Let whoever sits before the terminal play the operator."""
+    """Let the user at the terminal play the operator."""
     threading.Thread(target=_careful, args=(_answer, cabinet, as_json), daemon=True).start()
-    if not typed.is_silent():
+    _listen(cabinet, as_json)
+
+
+def _listen(cabinet: subprocess.Popen[str], as_json: bool) -> None:
+    """Pass typed lines in the background."""
+    if not is_silent():
         threading.Thread(target=_careful, args=(_type, cabinet, as_json), daemon=True).start()
 
 
 def _careful(
-    work: Callable[[subprocess.Popen[str], bool], None], cabinet: subprocess.Popen[str], as_json: bool
+    work: Callable[[subprocess.Popen[str], bool], object], cabinet: subprocess.Popen[str], as_json: bool
 ) -> None:
-    """Work until a pipe is closed."""
+    """Work until the pipe is closed."""
     with suppress(OSError, ValueError):
         work(cabinet, as_json)
 
 
-def _answer(cabinet: subprocess.Popen[str], as_json: bool) -> None:
-    """Show what the cabinet answers."""
+def _answer(cabinet: subprocess.Popen[str], as_json: bool) -> str:
+    """Print the cabinet's answers until it ends; return the error that ended its application."""
     assert cabinet.stdout is not None
+    failure = ""
     for line in cabinet.stdout:
         try:
             reply = dict(json.loads(line))
-        except ValueError:
+        except (ValueError, TypeError):
             continue
-        if as_json:
+        if "operator" not in reply:
+            failure = str(reply.get("error", ""))
+        elif as_json:
             print(line.strip(), flush=True)
-        elif reply.get("operator"):
+        elif reply["operator"]:
             print(reply["error"] or f"done: {reply['operator']}", flush=True)
+    return failure
 
 
 class _child(subprocess.Popen[str]):
-    """A process that ends when its standard input is closed, and so with us, whatever happens to us."""
+    """A process that ends when its standard input is closed, and therefore with this process."""
 
     def __init__(self, command: list[str]) -> None:
-        # a session of its own: Ctrl-C is for us, who then end the children in order
+        # a session of its own: Ctrl-C reaches this process only, which then ends its children in order
         super().__init__(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
         )
@@ -197,13 +458,22 @@ class _child(subprocess.Popen[str]):
             self.wait()
 
 
-def _ready(child: subprocess.Popen[str], otherwise: str) -> dict[str, Any]:
+def _first(child: subprocess.Popen[str], otherwise: str) -> dict[str, Any]:
+    """The first line of a child.
+
+    Raises:
+        ConnectFailed: it is no JSON object: the child has failed.
+    """
     assert child.stdout is not None
     line = child.stdout.readline()
     try:
-        ready = dict(json.loads(line))
+        return dict(json.loads(line))
     except ValueError:
         raise ConnectFailed(f"{otherwise}: {line.strip() or 'see the message above'}") from None
+
+
+def _ready(child: subprocess.Popen[str], otherwise: str) -> dict[str, Any]:
+    ready = _first(child, otherwise)
     if not ready.get("ready"):
         raise ConnectFailed(
             f"{otherwise}: {ready.get('error')}", hint="choose another port with --port, or 0 for any"

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
+from cyclopts import Parameter
 from rich.console import Console, Group
 from rich.live import Live
 from rich.table import Table
@@ -10,18 +13,29 @@ from rich.text import Text
 
 from heptarm.arm.arm import Arm
 from heptarm.arm.connect import connect
+from heptarm.cli.options import (
+    Json,
+    Target,
+)
 from heptarm.cli.output import emit, state_data
 from heptarm.values.state import State
 
 
-def run(*, target: str | None, watch: bool, rate: float, duration: float | None, as_json: bool) -> int:
-    """Show the state once, or go on showing it; returns the exit code."""
+def state(
+    *,
+    watch: Annotated[bool, Parameter(negative="", help="Repeat until Ctrl-C.")] = False,
+    rate: Annotated[float, Parameter(help="States per second.")] = 10.0,
+    duration: Annotated[float | None, Parameter(help="Watch for this long [s].")] = None,
+    target: Target = None,
+    as_json: Json = False,
+) -> int:
+    """Show the state of the arm."""
     with connect(target, control=False, state_rate=max(rate, 10.0)) as arm:
         if not watch and duration is None:
             _show_once(arm, as_json=as_json)
             return 0
         try:
-            _show_on(arm, rate, duration, as_json=as_json)
+            _show_repeatedly(arm, rate, duration, as_json=as_json)
         except KeyboardInterrupt:
             return 0
     return 0
@@ -38,7 +52,7 @@ def _show_once(arm: Arm, *, as_json: bool) -> None:
         Console().print(table(arm, state))
 
 
-def _show_on(arm: Arm, rate: float, duration: float | None, *, as_json: bool) -> None:
+def _show_repeatedly(arm: Arm, rate: float, duration: float | None, *, as_json: bool) -> None:
     if as_json:
         for state in arm.states(rate=rate, duration=duration):
             emit(state_data(state))
