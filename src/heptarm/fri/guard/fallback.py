@@ -1,4 +1,4 @@
-"""What is sent when the user's commands stay away: the declared policy for missing commands."""
+"""Policy for missing commands: the target of every cycle, also without a fresh command."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from heptarm.errors import LimitError
-from heptarm.fri.pose_guard import between, moved
+from heptarm.fri.guard.pose_guard import between, moved
 
 
 class Missing(enum.Enum):
-    """What to do without a fresh command.
+    """Behaviour without a fresh command.
 
-    HOLD keeps the last one. EXTRAPOLATE lets position or pose move on with its last speed, from the moment it was
-    commanded, and keeps torques and elbow; after `over` seconds it ramps down. RAMP_DOWN brakes the axes, or flange and
-    elbow, to a stop where they are and lets torques and wrenches fall to zero within `over` seconds.
+    HOLD keeps the last command. EXTRAPOLATE continues the position or pose with its last velocity and keeps torques and
+    redundancy angle; after `over` seconds it ramps down. RAMP_DOWN brakes the axes, or flange and elbow, to a stop and
+    reduces torques and wrenches to zero within `over` seconds.
     """
 
     HOLD = "hold"
@@ -25,11 +25,11 @@ class Missing(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Policy:
-    """How long a command counts, and what comes after it.
+    """Validity of a command, and behaviour after it.
 
     Attributes:
-        missing: what to do without a fresh command.
-        patience: a command is fresh for this long [s].
+        missing: behaviour without a fresh command.
+        patience: time for which a command is fresh [s].
         over: duration of an extrapolation, and of a ramp of torques to zero [s].
 
     Raises:
@@ -43,26 +43,28 @@ class Policy:
     def __post_init__(self) -> None:
         for name in ("patience", "over"):
             if not getattr(self, name) >= 0.0:
-                raise LimitError(f"{name} is {getattr(self, name)}; a duration [s] is wanted", parameter=name)
+                raise LimitError(
+                    f"{name} must be at least 0 s, got {getattr(self, name):g} s", parameter=name
+                )
 
 
-class Filler:
-    """Turns commands that come when they come into one wish for every cycle.
+class CommandFallback:
+    """Source of one target per cycle from commands at irregular times.
 
     Args:
-        policy: the declared policy.
+        policy: the policy.
 
     Attributes:
-        at: when the last command was given [ns]; 0 before the first one.
+        at: time of the last command [ns]; 0 before the first one.
         q: its position [rad].
-        slope: its speed, told from the one before [rad/s].
+        slope: its velocity, from the last two commands [rad/s].
         tau: its torques [Nm].
         wrench: its wrench [N, Nm].
         pose: its pose [m, x y z w].
-        twist: the pose's speed, told from the one before [m/s, rad/s].
+        twist: velocity of the pose, from the last two commands [m/s, rad/s].
         e1: its redundancy angle [rad].
-        is_filled: the last wish was made without a fresh command.
-        is_braking: the last wish is to brake.
+        is_filled: whether the last target was made without a fresh command.
+        is_braking: whether the last target is to brake.
     """
 
     __slots__ = (
@@ -84,7 +86,7 @@ class Filler:
         self.start()
 
     def start(self) -> None:
-        """Begin without any command: the interpolator is mirrored until there is one."""
+        """Start without a command; the interpolator is mirrored until the first one."""
         self.at = 0
         self.q: Sequence[float] | None = None
         self.slope: Sequence[float] | None = None
@@ -105,10 +107,10 @@ class Filler:
         pose: Sequence[float] | None = None,
         e1: float | None = None,
     ) -> None:
-        """Take a command of the user; what is None stays as it was.
+        """Take a command of the user; parts that are None keep their values.
 
         Args:
-            at: when it was given [ns].
+            at: time of the command [ns].
             q: joint position [rad].
             tau: superposed torques [Nm].
             wrench: superposed wrench [N, Nm].
@@ -116,7 +118,7 @@ class Filler:
             e1: redundancy angle of the pose [rad].
         """
         gap = (at - self.at) * 1e-9
-        # two commands of one stream tell its speed, a pause between them does not
+        # only two commands of one stream give its velocity, not two with a pause between them
         is_stream = 0.0 < gap <= self.policy.patience
         if q is not None:
             if self.q is not None and is_stream:
@@ -134,12 +136,12 @@ class Filler:
         self.e1 = e1 if e1 is not None else self.e1
         self.at = at
 
-    def wish(self, now: int, ipo: Sequence[float]) -> Sequence[float] | None:
-        """The position wanted now; None to brake.
+    def position_target(self, now: int, ipo: Sequence[float]) -> Sequence[float] | None:
+        """Target position of this cycle; None to brake.
 
         Args:
-            now: the clock of the commands [ns].
-            ipo: interpolator's position, which is mirrored until a position was commanded.
+            now: time of the cycle [ns].
+            ipo: position of the interpolator, the target until a position is commanded.
         """
         age = self._age(now)
         if self.is_braking:
@@ -150,12 +152,12 @@ class Filler:
             return [value + slope * age for value, slope in zip(self.q, self.slope, strict=True)]
         return self.q
 
-    def pose_wish(self, now: int, ipo: Sequence[float]) -> Sequence[float] | None:
-        """The pose wanted now, x y z [m] and quaternion x y z w; None to brake.
+    def pose_target(self, now: int, ipo: Sequence[float]) -> Sequence[float] | None:
+        """Target pose of this cycle, x y z [m] and quaternion x y z w; None to brake.
 
         Args:
-            now: the clock of the commands [ns].
-            ipo: interpolator's pose, which is mirrored until a pose was commanded.
+            now: time of the cycle [ns].
+            ipo: pose of the interpolator, the target until a pose is commanded.
         """
         age = self._age(now)
         if self.is_braking:
@@ -166,18 +168,18 @@ class Filler:
             return moved(self.pose, [value * age for value in self.twist])
         return self.pose
 
-    def elbow_wish(self, now: int, ipo: float) -> float | None:
-        """The redundancy angle wanted now [rad]; None to brake.
+    def elbow_target(self, now: int, ipo: float) -> float | None:
+        """Target redundancy angle of this cycle [rad]; None to brake.
 
         Args:
-            now: the clock of the commands [ns].
-            ipo: interpolator's, which is mirrored until one was commanded.
+            now: time of the cycle [ns].
+            ipo: angle of the interpolator, the target until an angle is commanded.
         """
         self._age(now)
         return None if self.is_braking else ipo if self.e1 is None else self.e1
 
     def _age(self, now: int) -> float:
-        """Age of the last command [s]; says too whether it still counts."""
+        """Age of the last command [s]; update `is_filled` and `is_braking`."""
         self.is_filled = self.is_braking = False
         if not self.at:
             return 0.0
@@ -192,18 +194,18 @@ class Filler:
         return age
 
     def efforts(self, now: int) -> tuple[Sequence[float] | None, Sequence[float] | None]:
-        """Torques and wrench wanted now; None where none was ever commanded."""
-        share = self._share((now - self.at) * 1e-9 - self.policy.patience) if self.at else 1.0
+        """Target torques and wrench of this cycle; None where none was ever commanded."""
+        fraction = self._fraction((now - self.at) * 1e-9 - self.policy.patience) if self.at else 1.0
         tau, wrench = self.tau, self.wrench
-        if share == 1.0:
+        if fraction == 1.0:
             return tau, wrench
         return (
-            None if tau is None else [share * value for value in tau],
-            None if wrench is None else [share * value for value in wrench],
+            None if tau is None else [fraction * value for value in tau],
+            None if wrench is None else [fraction * value for value in wrench],
         )
 
-    def _share(self, late: float) -> float:
-        """How much of the last torque remains this long after patience has ended."""
+    def _fraction(self, late: float) -> float:
+        """Fraction of the last torque that remains this long after the command has expired."""
         if self.policy.missing is Missing.HOLD:
             return 1.0
         if self.policy.missing is Missing.EXTRAPOLATE:

@@ -1,12 +1,12 @@
-"""The guard of Cartesian poses: a commanded flange keeps its speeds and accelerations, whatever is asked.
+"""Pose guard: limits velocities and accelerations of a commanded flange pose.
 
-Translation and rotation are two chains in steps of the command period: the difference of two poses that are sent, as a
-vector and as a rotation vector in base axes, is their velocity, the difference of two of these their acceleration. A
-wish that moves as the limits allow passes unchanged; any other is approached along a way that brakes in time. Each step
-ends inside the ball of legal velocities and begins from a velocity inside it, so that the limits hold by induction from
-the start, which is the interpolator's pose and speed.
+Translation and rotation are limited separately, in steps of the command period. The velocity is the difference of two
+poses that are sent, as a vector and as a rotation vector in base axes; the acceleration is the difference of two
+velocities. A target that moves within the limits passes unchanged; any other is approached so that the flange can brake
+in time. Each step starts and ends with a velocity inside the limits, so they hold by induction from the start, which is
+the pose and velocity of the interpolator.
 
-A pose here is seven numbers: x y z [m] and a unit quaternion x y z w.
+A pose has seven numbers: x y z [m] and a unit quaternion x y z w.
 """
 
 from __future__ import annotations
@@ -17,23 +17,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from heptarm.errors import LimitError
-from heptarm.fri.guard import ROUNDING, SHARE
+from heptarm.fri.guard.joint_guard import PLANNED, ROUNDING
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
-#: What is limited each for itself, as the report names it.
+#: Parts of a pose that are limited separately, as the report names them.
 PARTS = ("flange", "rotation", "elbow")
-#: A quaternion that is shorter tells no rotation.
-SHORTEST = 1e-3
-#: No wish is further from the base along an axis [m].
-FURTHEST = 1e3
+#: Smallest norm of a quaternion that defines a rotation.
+MIN_NORM = 1e-3
+#: Largest coordinate of a target [m].
+MAX_COORDINATE = 1e3
 _ZERO: Vector = (0.0, 0.0, 0.0)
 _REST = (0.0,) * 6
 
 
 class PoseLimited(enum.IntEnum):
-    """What the guard had to change."""
+    """Quantity that the guard limited."""
 
     NOT_FINITE = 0
     REACH = 1
@@ -43,11 +43,21 @@ class PoseLimited(enum.IntEnum):
 
 _ANGLES = ("", "rad", "rad/s", "rad/s²")
 _UNITS = (("", "m", "m/s", "m/s²"), _ANGLES, _ANGLES)
+#: Unit of each limit, for errors.
+_LIMIT_UNITS = {
+    "velocity": "m/s",
+    "acceleration": "m/s²",
+    "angular_velocity": "rad/s",
+    "angular_acceleration": "rad/s²",
+    "elbow_velocity": "rad/s",
+    "elbow_acceleration": "rad/s²",
+    "reach": "m",
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseLimits:
-    """What the guard keeps of a commanded pose; the axes' own limits stay the cabinet's affair.
+    """Limits of the pose guard; the cabinet itself monitors the limits of the axes.
 
     Attributes:
         velocity: of the flange [m/s].
@@ -56,10 +66,10 @@ class PoseLimits:
         angular_acceleration: of its rotation [rad/s²].
         elbow_velocity: of the redundancy angle [rad/s].
         elbow_acceleration: of the redundancy angle [rad/s²].
-        reach: how far a wish may be from the interpolator [m].
+        reach: largest distance of a target from the interpolator [m].
 
     Raises:
-        LimitError: a limit is no positive number.
+        LimitError: a limit is not positive.
     """
 
     velocity: float = 0.25
@@ -75,17 +85,19 @@ class PoseLimits:
             value = getattr(self, name)
             if not value > 0.0:
                 raise LimitError(
-                    f"{name} is {value:g}; a positive number is wanted", parameter=name, value=value
+                    f"{name} must be positive, got {value:g} {_LIMIT_UNITS[name]}",
+                    parameter=name,
+                    value=value,
                 )
 
 
 class PoseReport:
-    """What the guard limited, since it was made.
+    """Counts and extremes of what a pose guard has limited.
 
     Attributes:
         counts: cycles, by `PoseLimited` and part, shape [4][3].
-        worst: largest magnitude asked, by `PoseLimited` and part.
-        allowed: largest magnitude allowed then.
+        worst: largest requested magnitude, by `PoseLimited` and part.
+        allowed: largest magnitude allowed at that time.
     """
 
     __slots__ = ("allowed", "counts", "worst")
@@ -96,14 +108,14 @@ class PoseReport:
         self.allowed = [[0.0] * len(PARTS) for _ in PoseLimited]
 
     def add(self, kind: int, part: int, asked: float, allowed: float) -> None:
-        """A part was limited in one cycle."""
+        """Count a part that was limited in one cycle."""
         self.counts[kind][part] += 1
         if asked >= self.worst[kind][part]:
             self.worst[kind][part], self.allowed[kind][part] = asked, allowed
 
     @property
     def lines(self) -> list[str]:
-        """One line for each thing and part that was limited, in words."""
+        """One line of text for each quantity and part that was limited."""
         found = []
         for kind in PoseLimited:
             for part, count in enumerate(self.counts[kind]):
@@ -111,33 +123,33 @@ class PoseReport:
                     continue
                 where, cycles = PARTS[part], f"{count} cycle{'s' * (count != 1)}"
                 if kind is PoseLimited.NOT_FINITE:
-                    found.append(f"{where}: asked for no finite number in {cycles}; the last one was kept")
+                    found.append(f"{where}: target not finite in {cycles}; the last one was kept")
                     continue
                 unit = _UNITS[part][kind]
                 found.append(
                     f"{where}: {kind.name.lower()} limited in {cycles}: "
-                    f"{self.worst[kind][part]:.4g} {unit} asked, {self.allowed[kind][part]:.4g} allowed"
+                    f"{self.worst[kind][part]:.4g} {unit} requested, {self.allowed[kind][part]:.4g} allowed"
                 )
         return found
 
 
 class PoseGuard:
-    """Limits the poses of one client.
+    """Limiter of the poses of one client.
 
     Args:
-        limits: what to keep.
+        limits: the limits.
 
     Attributes:
         report: what was limited.
-        xyz: translation that was sent last [m].
-        quat: rotation that was sent last.
+        xyz: translation sent last [m].
+        quat: rotation sent last, quaternion x y z w.
         v: last difference of the translations [m per step].
         w: last difference of the rotations [rad per step].
-        e1: redundancy angle that was sent last [rad]; NaN where the interpolator has none.
+        e1: redundancy angle sent last [rad]; NaN where the interpolator has none.
         u: its last difference [rad per step].
-        goal: the last wish, within the reach.
-        is_started: between `start` and `stop`.
-        was_limited: the last cycle changed something.
+        goal: last target, within the reach.
+        is_started: whether commands are effective.
+        was_limited: whether the last cycle was limited.
     """
 
     def __init__(self, limits: PoseLimits) -> None:
@@ -151,7 +163,7 @@ class PoseGuard:
         self._scale(1e-3)
 
     def _scale(self, period: float) -> None:
-        """Limits in steps of the command period [s]."""
+        """Convert the limits to steps of the command period [s]."""
         limits, more = self.limits, 1.0 + ROUNDING
         self.period = period
         self._rates = (limits.velocity, limits.angular_velocity, limits.elbow_velocity)
@@ -168,14 +180,14 @@ class PoseGuard:
         e1: float = math.nan,
         e1_speed: float = 0.0,
     ) -> None:
-        """Begin where the interpolator is, with its speed.
+        """Start from pose and velocity of the interpolator.
 
         Args:
             pose: interpolator's pose, shape (7,).
             twist: its velocity and angular velocity, base axes, shape (6,) [m/s, rad/s].
-            period: distance of two commands [s].
-            e1: interpolator's redundancy angle [rad]; NaN: it has none.
-            e1_speed: its speed [rad/s].
+            period: command period [s].
+            e1: interpolator's redundancy angle [rad]; NaN if it has none.
+            e1_speed: its velocity [rad/s].
         """
         self._scale(period)
         x, y, z = pose[:3]
@@ -188,44 +200,44 @@ class PoseGuard:
         self.is_started, self.was_limited = True, False
 
     def stop(self) -> None:
-        """Commands are no longer effective; the next one needs a `start`."""
+        """Note that commands are no longer effective; `start` before the next one."""
         self.is_started = False
 
     @property
     def sent(self) -> tuple[float, ...]:
-        """The pose that was sent last, shape (7,)."""
+        """Pose sent last, shape (7,)."""
         return (*self.xyz, *self.quat)
 
     @property
     def is_still(self) -> bool:
-        """No part moves."""
+        """Whether every part is at rest."""
         return not any(self.v) and not any(self.w) and not self.u
 
-    def pose(self, wish: Sequence[float] | None, ipo: Sequence[float] | None = None) -> tuple[float, ...]:
-        """The pose to send.
+    def pose(self, target: Sequence[float] | None, ipo: Sequence[float] | None = None) -> tuple[float, ...]:
+        """Limit a target pose.
 
         Args:
-            wish: a pose, shape (7,); None brakes to a stop. What is not finite of the translation stays as it was
-                wished last; a quaternion with such a number, or with none but zeros, stays as a whole.
-            ipo: interpolator's pose, for the reach.
+            target: a pose, shape (7,); None brakes to a stop. Coordinates that are not finite keep the last target, and
+                so does a whole quaternion that is not finite or zero.
+            ipo: pose of the interpolator, to limit the reach; None: no limit.
 
         Returns:
-            A pose within all limits, shape (7,).
+            The pose to send, shape (7,).
         """
         self.was_limited = False
-        if wish is None:
+        if target is None:
             self.v, self.w = _slower(self.v, self._mosts[0]), _slower(self.w, self._mosts[1])
             self.xyz, self.quat = _plus(self.xyz, self.v), _turned(self.quat, self.w)
             self.goal = (self.xyz, self.quat)
             return self.sent
         before, turned = self.goal
-        place, turn = self.goal = self._bounded(wish, before, turned, ipo)
+        place, turn = self.goal = self._bounded(target, before, turned, ipo)
         ahead = _minus(place, self.xyz)
         self.v = self._step(0, ahead, _minus(place, before), self.v)
         self.xyz = place if self.v == ahead else _plus(self.xyz, self.v)
         ahead = _turn(turn, self.quat)
         self.w = self._step(1, ahead, _turn(turn, turned), self.w)
-        if self.w == ahead:  # of the two quaternions the one that is next to the last
+        if self.w == ahead:  # of the two equal quaternions, take the one closer to the last
             near = sum(a * b for a, b in zip(turn, self.quat, strict=True)) >= 0.0
             x, y, z, w = turn
             self.quat = turn if near else (-x, -y, -z, -w)
@@ -233,40 +245,40 @@ class PoseGuard:
             self.quat = _turned(self.quat, self.w)
         return self.sent
 
-    def elbow(self, wish: float | None) -> float:
-        """The redundancy angle to send [rad]; to be asked after `pose`.
+    def elbow(self, target: float | None) -> float:
+        """Limit a target redundancy angle [rad]; call it after `pose`.
 
         Args:
-            wish: an angle; None brakes to a stop, NaN keeps the last wish.
+            target: an angle [rad]; None brakes to a stop, NaN keeps the last target.
         """
-        if wish is None:
+        if target is None:
             self.u = _slower((self.u, 0.0, 0.0), self._mosts[2])[0]
             self.e1 = self._e1_goal = self.e1 + self.u
             return self.e1
         before = self._e1_goal
-        if not math.isfinite(wish):
+        if not math.isfinite(target):
             self._limited(PoseLimited.NOT_FINITE, 2, 0.0, 0.0)
-            wish = before
-        self._e1_goal = wish
-        ahead = wish - self.e1
-        self.u = self._step(2, (ahead, 0.0, 0.0), (wish - before, 0.0, 0.0), (self.u, 0.0, 0.0))[0]
-        self.e1 = wish if self.u == ahead else self.e1 + self.u
+            target = before
+        self._e1_goal = target
+        ahead = target - self.e1
+        self.u = self._step(2, (ahead, 0.0, 0.0), (target - before, 0.0, 0.0), (self.u, 0.0, 0.0))[0]
+        self.e1 = target if self.u == ahead else self.e1 + self.u
         return self.e1
 
     # ---------------------------------------------------------------------------------------------- one part
 
     def _bounded(
-        self, wish: Sequence[float], before: Vector, turned: Quaternion, ipo: Sequence[float] | None
+        self, target: Sequence[float], before: Vector, turned: Quaternion, ipo: Sequence[float] | None
     ) -> tuple[Vector, Quaternion]:
-        """A wish of finite numbers, within the reach."""
+        """Make the numbers of a target finite and limit its reach."""
         x, y, z = (
-            min(max(new, -FURTHEST), FURTHEST) if math.isfinite(new) else old
-            for new, old in zip(wish[:3], before, strict=True)
+            min(max(new, -MAX_COORDINATE), MAX_COORDINATE) if math.isfinite(new) else old
+            for new, old in zip(target[:3], before, strict=True)
         )
         place: Vector = (x, y, z)
-        if not all(map(math.isfinite, wish[:3])):
+        if not all(map(math.isfinite, target[:3])):
             self._limited(PoseLimited.NOT_FINITE, 0, 0.0, 0.0)
-        turn = _unit(wish[3:])
+        turn = _unit(target[3:])
         if turn is None:
             self._limited(PoseLimited.NOT_FINITE, 1, 0.0, 0.0)
             turn = turned
@@ -278,20 +290,20 @@ class PoseGuard:
                 place = _plus(ipo, _times(reach / far, away))
         return place, turn
 
-    def _step(self, part: int, ahead: Vector, pace: Vector, v: Vector) -> Vector:
-        """The velocity of this step.
+    def _step(self, part: int, ahead: Vector, goal_v: Vector, v: Vector) -> Vector:
+        """Velocity of this step.
 
         Args:
-            part: 0 translation, 1 rotation, 2 redundancy angle.
-            ahead: from here to the wish.
-            pace: from the last wish to this one.
-            v: the velocity of the last step.
+            part: 0: translation, 1: rotation, 2: redundancy angle.
+            ahead: vector to the target.
+            goal_v: vector from the last target to this one.
+            v: velocity of the last step.
         """
         top, most = self._tops[part], self._mosts[part]
-        pace = _within(pace, top)
-        lead, change = _minus(ahead, pace), _minus(ahead, v)
-        far, speed, bend = _norm(lead), _norm(ahead), _norm(change)
-        # on the wish's track, or near enough to be so with the next step
+        goal_v = _within(goal_v, top)
+        lag, change = _minus(ahead, goal_v), _minus(ahead, v)
+        far, speed, bend = _norm(lag), _norm(ahead), _norm(change)
+        # on track, or close enough to be on track with the next step
         if speed <= top and bend <= most and far <= most:
             return ahead
         period = self.period
@@ -299,10 +311,10 @@ class PoseGuard:
             self._limited(PoseLimited.VELOCITY, part, speed / period, self._rates[part])
         else:
             self._limited(PoseLimited.ACCELERATION, part, max(bend, far) / period**2, self._changes[part])
-        soft, wanted = SHARE * most, pace
-        if far > 0.0:  # as fast as still stops at the moving goal, in steps of `soft`
-            rate = min(far, soft * (math.sqrt(0.25 + 2.0 * far / soft) - 0.5))
-            wanted = _within(_plus(pace, _times(rate / far, lead)), top)
+        planned, wanted = PLANNED * most, goal_v
+        if far > 0.0:  # largest velocity that still stops at the moving goal with the acceleration `planned`
+            rate = min(far, planned * (math.sqrt(0.25 + 2.0 * far / planned) - 0.5))
+            wanted = _within(_plus(goal_v, _times(rate / far, lag)), top)
         return _plus(v, _within(_minus(wanted, v), most))
 
     def _limited(self, kind: PoseLimited, part: int, asked: float, allowed: float) -> None:
@@ -311,13 +323,13 @@ class PoseGuard:
 
 
 def between(first: Sequence[float], second: Sequence[float]) -> tuple[float, ...]:
-    """Translation and rotation vector from one pose to another, base axes, shape (6,) [m, rad]."""
+    """Translation and rotation vector between two poses, base axes, shape (6,) [m, rad]."""
     return (*_minus(second, first), *_turn(second[3:], first[3:]))
 
 
-def moved(pose: Sequence[float], way: Sequence[float]) -> tuple[float, ...]:
-    """A pose, shape (7,), after a translation and a rotation vector in base axes, shape (6,) [m, rad]."""
-    return (*_plus(pose, way), *_turned(pose[3:], way[3:]))
+def moved(pose: Sequence[float], displacement: Sequence[float]) -> tuple[float, ...]:
+    """Move a pose, shape (7,), by a translation and a rotation vector in base axes, shape (6,) [m, rad]."""
+    return (*_plus(pose, displacement), *_turned(pose[3:], displacement[3:]))
 
 
 def _minus(a: Sequence[float], b: Sequence[float]) -> Vector:
@@ -337,22 +349,22 @@ def _norm(a: Vector) -> float:
 
 
 def _within(a: Vector, most: float) -> Vector:
-    """A vector that is no longer than `most`."""
+    """Shorten a vector to the length `most`."""
     size = _norm(a)
     return a if size <= most else _times(most / size, a)
 
 
 def _slower(v: Vector, most: float) -> Vector:
-    """A velocity after one step of braking."""
+    """Velocity after one step of braking."""
     speed = _norm(v)
     return _ZERO if speed <= most else _times(1.0 - most / speed, v)
 
 
 def _unit(quat: Sequence[float]) -> Quaternion | None:
-    """The unit quaternion of its direction; None if it tells no rotation."""
+    """Normalise a quaternion; None if it defines no rotation."""
     x, y, z, w = quat
     size = math.sqrt(x * x + y * y + z * z + w * w)
-    if not SHORTEST <= size < math.inf:
+    if not MIN_NORM <= size < math.inf:
         return None
     return (x / size, y / size, z / size, w / size)
 
@@ -369,7 +381,7 @@ def _product(p: Sequence[float], q: Sequence[float]) -> Quaternion:
 
 
 def _turn(goal: Sequence[float], here: Sequence[float]) -> Vector:
-    """The shortest rotation vector from one unit quaternion to another, base axes [rad]."""
+    """Shortest rotation vector from one unit quaternion to another, base axes [rad]."""
     x, y, z, w = _product(goal, (-here[0], -here[1], -here[2], here[3]))
     sine = math.sqrt(x * x + y * y + z * z)
     if sine == 0.0:
@@ -380,10 +392,10 @@ def _turn(goal: Sequence[float], here: Sequence[float]) -> Vector:
 
 
 def _turned(quat: Sequence[float], turn: Sequence[float]) -> Quaternion:
-    """A unit quaternion after a rotation vector in base axes [rad]."""
+    """Rotate a unit quaternion by a rotation vector in base axes [rad]."""
     x, y, z = turn
     angle = _norm((x, y, z))
-    share = 0.5 * math.sin(0.5 * angle) / (0.5 * angle) if angle > 1e-12 else 0.5
-    x, y, z, w = _product((share * x, share * y, share * z, math.cos(0.5 * angle)), quat)
+    scale = 0.5 * math.sin(0.5 * angle) / (0.5 * angle) if angle > 1e-12 else 0.5
+    x, y, z, w = _product((scale * x, scale * y, scale * z, math.cos(0.5 * angle)), quat)
     size = math.sqrt(x * x + y * y + z * z + w * w)
     return (x / size, y / size, z / size, w / size)

@@ -1,4 +1,4 @@
-"""The client of an FRI controller, as the user's process sees it."""
+"""Client of an FRI controller, in the user's process."""
 
 from __future__ import annotations
 
@@ -18,54 +18,54 @@ from heptarm.errors import (
     ConnectFailed,
     ConnectionLost,
 )
-from heptarm.fri.limits import Limits
-from heptarm.fri.policy import Policy
-from heptarm.fri.pose_guard import PoseLimits
-from heptarm.fri.version import Version
-from heptarm.io.shared import Block
-from heptarm.rt import launch
-from heptarm.rt import layout as at
-from heptarm.rt.cycle import Law
-from heptarm.rt.params import Params
-from heptarm.rt.reader import Reader
+from heptarm.fri.guard.fallback import Policy
+from heptarm.fri.guard.joint_guard import Limits
+from heptarm.fri.guard.pose_guard import PoseLimits
+from heptarm.fri.loop import process
+from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.loop.cycle import Law
+from heptarm.fri.loop.telemetry import Reader
+from heptarm.fri.loop.user_api import Params
+from heptarm.fri.protocol.version import Version
+from heptarm.io.shared import MemoryBlock
 from heptarm.values.arrays import array, scalar
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel, robot
 
-#: FRI's own port.
+#: Default UDP port of FRI.
 PORT = 30200
 
 
 class Client(Reader):
-    """A client that answers a controller from a process of its own; close it, or use it in a `with` block.
+    """Client that answers a controller from a separate process; close it, or use it in a `with` block.
 
-    It stays through any number of sessions: the cabinet's application may end and begin again.
+    It works over any number of sessions: the application of the cabinet may end and start again.
 
     Args:
-        port: own UDP port.
-        host: own address; "0.0.0.0" for all.
-        remote: listen to this controller's address only; None to anybody's.
-        version: FRI release such as "1.15"; None takes it from the first datagram.
+        port: UDP port to bind.
+        host: address to bind; "0.0.0.0" for all.
+        remote: address of the controller; None accepts any.
+        version: FRI release such as "1.15"; None recognises it from the first datagram.
         model: robot, for the limits.
-        limits: what the guard keeps; None for the robot's, a little inside.
-        pose_limits: what it keeps of commanded poses; None for 0.25 m/s and 1 rad/s.
-        policy: what is sent while fresh commands stay away.
+        limits: limits of joint commands; None for limits slightly inside the robot's.
+        pose_limits: limits of pose commands; None for 0.25 m/s and 1 rad/s.
+        policy: behaviour without fresh commands.
         law: `law(state, out, params)`, called in the loop's process in every cycle of COMMANDING_ACTIVE; the guard
-            still limits what it wants. None: commands come from `command`.
-        params: of the law: numbers and arrays by name.
-        history: states that are kept.
-        realtime: ask for real-time priority and locked memory.
+            limits its output. None: commands come from `command`.
+        params: parameters of the law, numbers and arrays by name.
+        history: number of states that are kept.
+        realtime: request real-time priority and locked memory.
         cpu: processor of the loop; None for any.
-        timeout: how long the loop's process may take to start [s].
+        timeout: time limit for the start of the loop's process [s].
 
     Attributes:
-        params: of the law; assign to change them while it runs.
-        port: own UDP port.
+        params: parameters of the law; assign to change them while it runs.
+        port: bound UDP port.
 
     Raises:
-        ConnectFailed: the port cannot be had, or the loop did not start.
-        CommandRejected: an argument is illegal.
+        ConnectFailed: the port cannot be bound, or the loop did not start.
+        CommandRejected: an argument is outside its range.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class Client(Reader):
         self._limits = limits or Limits.of(robot(model) if isinstance(model, str) else model)
         if not 16 <= history <= 1 << 20:
             raise CommandRejected(
-                f"history is {history}; 16 to {1 << 20} states are legal", parameter="history", value=history
+                f"history must be 16 to {1 << 20} states, got {history}", parameter="history", value=history
             )
         values, schema = Params.flat(params or {})
         try:
@@ -97,7 +97,7 @@ class Client(Reader):
         except ValueError as error:
             raise CommandRejected(str(error), parameter="version", value=version) from None
         self._values = values
-        block = Block(at.Layout.words(history=history, params=values.size))
+        block = MemoryBlock(at.Layout.words(history=history, params=values.size))
         super().__init__(at.Layout(block, history=history, params=values.size))
         self._header[at.HISTORY], self._header[at.SIZE] = history, values.size
         self._layout.config.write(
@@ -110,12 +110,12 @@ class Client(Reader):
                     "limits": asdict(self._limits),
                     "pose_limits": asdict(pose_limits or PoseLimits()),
                     "policy": _plain(policy or Policy()),
-                    "law": launch.importable(law),
+                    "law": process.importable(law),
                     "params": schema,
                     "size": values.size,
                     "parent": os.getpid(),
                     "realtime": realtime,
-                    "lock": law is None or launch.importable(law) is not None,
+                    "lock": law is None or process.importable(law) is not None,
                     "cpu": cpu,
                 }
             )
@@ -126,7 +126,7 @@ class Client(Reader):
         self._frames: dict[str, list[float]] = {}
         self._closed = False
         try:
-            self._worker = launch.start(block.path, law)
+            self._worker = process.start(block.path, law)
             self._wait_for_loop(timeout)
         finally:
             block.unlink()
@@ -148,7 +148,7 @@ class Client(Reader):
 
     @property
     def is_running(self) -> bool:
-        """The loop's process runs, or the client was closed in order."""
+        """Whether the loop's process runs, or the client was closed."""
         return self._closed or self._worker.is_alive()
 
     # ---------------------------------------------------------------------------------------------- commands
@@ -162,10 +162,10 @@ class Client(Reader):
         pose: Pose | npt.ArrayLike | None = None,
         e1: float | None = None,
     ) -> None:
-        """Give a command; it stands until the next one, or until the policy's patience ends.
+        """Send a command to the loop; it is valid until the next one, or until the policy's patience ends.
 
-        The guard limits it. NaN entries keep the last wish of their axis or coordinate, or of the rotation. What is
-        None stays as it was.
+        The guard limits it. NaN entries keep the last target of their axis or coordinate, or of the rotation. Arguments
+        that are None keep their last values.
 
         Args:
             q: joint position, shape (7,) [rad].
@@ -173,8 +173,8 @@ class Client(Reader):
             wrench: superposed wrench, shape (6,) [N, Nm].
             pose: of the flange in the base, or x y z [m] and unit quaternion x y z w, shape (7,); in sessions that
                 command poses.
-            e1: redundancy angle of the pose [rad], that of A3; in sessions that command poses. None: the last one,
-                at first the interpolator's.
+            e1: redundancy angle of the pose [rad]; in sessions that command poses. None: the last one, initially the
+                interpolator's.
 
         Raises:
             ShapeError: an array has another shape, or the quaternion's norm is further than 1e-3 from 1.
@@ -204,42 +204,45 @@ class Client(Reader):
         self._layout.params.write(self._values)
 
     def output(self, name: str, value: SignalValue) -> None:
-        """Write an output of the cabinet; it is sent until the cabinet shows it, in every state of a session.
+        """Write an output of the cabinet; it is sent until the cabinet shows it, in any state of the session.
 
         Args:
-            name: "Group.Signal", or the part behind the point where only one signal has it.
+            name: "Group.Signal", or the part behind the point if it is unambiguous.
             value: True or False, or a number.
 
         Raises:
-            CommandRejected: the session carries no such output.
-            LimitError: it cannot have the value.
+            CommandRejected: the session has no such output.
+            LimitError: the value is outside the range of the output.
             ConnectionLost: the client is closed, or its loop has ended.
         """
         full, number = self._signals.output(name, value)
         count = 1 + max((one[0] for one in self._outputs.values()), default=0)
-        self._outputs[full] = (count, number)  # counted, since the loop may see several at once
+        self._outputs[full] = (
+            count,
+            number,
+        )  # with a count, because the loop may read several writes at once
         self._send_outputs()
 
     def frame(self, name: str, pose: Pose | npt.ArrayLike) -> None:
-        """Tell the controller where a frame is that it asks for; from now on, until the next word.
+        """Set the pose of a frame that the controller requests; it is valid until the next call.
 
         Args:
             name: of the frame, one of `wanted_frames`.
             pose: of the frame, or x y z [m] and unit quaternion x y z w, shape (7,).
 
         Raises:
-            CommandRejected: the controller asks for no such frame.
-            ShapeError: seven numbers are wanted, or the quaternion's norm is further than 1e-3 from 1.
+            CommandRejected: the controller does not request such a frame.
+            ShapeError: the array does not have seven numbers, or the quaternion's norm is further than 1e-3 from 1.
             ConnectionLost: the client is closed, or its loop has ended.
         """
-        wanted = self.wanted_frames
-        if name not in wanted:
+        requested = self.wanted_frames
+        if name not in requested:
             raise CommandRejected(
-                f"the controller asks for no frame {name!r}",
+                f"the controller requests no frame {name!r}",
                 parameter="name",
                 value=name,
-                allowed=", ".join(wanted) or "none",
-                hint="its application registers it with registerTransformationProvider",
+                allowed=", ".join(requested) or "none",
+                hint="the application of the cabinet has to register it with registerTransformationProvider",
             )
         given = pose if isinstance(pose, Pose) else array(pose, 7, "pose")
         self._frames[name] = (
@@ -258,10 +261,10 @@ class Client(Reader):
             raise ConnectionLost("the FRI client is closed")
         super()._check()
         if not self._worker.is_alive():
-            raise ConnectionLost("the FRI loop has ended: its process is gone")
+            raise ConnectionLost("the FRI loop has ended: its process has ended")
 
     def close(self, *, timeout: float = 5.0) -> None:
-        """Brake the arm to a stop and end the loop. Closing twice is legal."""
+        """Brake the arm to a stop and end the loop. Closing twice is allowed."""
         if self._closed:
             return
         self._closed = True
@@ -280,12 +283,12 @@ class Client(Reader):
 
 
 def _seven(pose: Pose | npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """The numbers of a pose, shape (7,); only those that are given have to be some."""
+    """Convert a pose to an array, shape (7,); numbers may be NaN."""
     if isinstance(pose, Pose):
         return pose.array
     values = array(pose, 7, "pose", nan=True)
     if not np.isnan(values[3:]).any():
-        Pose.of((0.0, 0.0, 0.0), values[3:])  # says what is wrong with its norm
+        Pose.of((0.0, 0.0, 0.0), values[3:])  # raises the error about its norm
     return values
 
 

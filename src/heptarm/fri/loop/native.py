@@ -1,7 +1,7 @@
-"""The native part of the loop: builds it where there is a compiler, and keeps it in step with the Python turn.
+"""Native part of the loop in C: build, load, and synchronise its state with the Python cycle.
 
-Python stays the authority. The native part answers messages that differ from the one before in numbers only; any other
-comes back here, and the Python turn goes on from where the native one has stopped.
+The Python cycle is the reference. The native part answers messages that differ from the previous one in numbers only
+and hands back any other; the Python cycle then continues from the state of the native part.
 """
 
 from __future__ import annotations
@@ -17,107 +17,107 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from heptarm.errors import HeptarmError
-from heptarm.fri.guard import Limited
-from heptarm.fri.messages import CommandMode, SessionState
-from heptarm.fri.policy import Missing
-from heptarm.fri.protobuf import fields
-from heptarm.fri.statistics import BINS
-from heptarm.fri.version import unwrap
-from heptarm.rt import layout as at
-from heptarm.rt.cycle import Cycle
+from heptarm.fri.guard.fallback import Missing
+from heptarm.fri.guard.joint_guard import AXES, Limited
+from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.loop.cycle import Cycle
+from heptarm.fri.protocol.messages import CommandMode, SessionState
+from heptarm.fri.protocol.protobuf import fields
+from heptarm.fri.protocol.version import unwrap
+from heptarm.fri.session.statistics import BINS
 
-#: Set to anything to run in pure Python.
+#: Environment variable; any value switches the native part off.
 SWITCH = "HEPTARM_PURE_PYTHON"
 HANDBACK, LAW = -1, -2
-TIMEOUT, GIVEN_BACK, LOOK, BROKEN, CALL_LAW = range(5)
+TIMEOUT, HANDED_BACK, CHECK, SOCKET_ERROR, CALL_LAW = range(5)
 BUFFER = 2048
+#: Largest size of robot and connection info in messages for the native part.
+MAX_PLAIN = 64
 
 _SOURCE = Path(__file__).with_name("native.c")
-_WORD, _REAL, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
-_REALS7, _REALS6 = _REAL * 7, _REAL * 6
-_MISSING = (Missing.HOLD, Missing.EXTRAPOLATE, Missing.RAMP_DOWN)
+_HEADER = _SOURCE.with_name("native_layout.h")
+_WORD, _POINTER = ctypes.c_int64, ctypes.c_void_p
+#: Fallbacks for missing commands, in the numbering of the native part.
+MISSING = tuple(Missing)
 _JOINT_MODES = (CommandMode.POSITION, CommandMode.TORQUE, CommandMode.WRENCH)
-_STATES = ("MONITORING_WAIT", "MONITORING_READY", "COMMANDING_WAIT", "COMMANDING_ACTIVE")
 
 
 class Unavailable(HeptarmError):
-    """There is no native part here; the text says why."""
+    """The native part is not available; the text gives the reason."""
+
+
+#: `struct loop` of native.c, whose header schema/generate.py writes from this table: type, size (1: no array), names.
+STRUCT: tuple[tuple[str, int, str], ...] = (
+    ("pointer", 1, "header latency jitter states commands outputs"),
+    ("word", 1, "history bins sock address port"),
+    # session
+    ("word", 1, "hot framed echoes state quality mode sequence received period"),
+    ("word", 1, "multiplier waiting sent reflected"),
+    ("word", 1, "overlay safety operation control drive receive_multiplier"),
+    ("word", 1, "robot_size connection_size"),
+    ("char", MAX_PLAIN, "robot connection"),
+    # commanding
+    ("word", 1, "is_started is_ending has_law ticks commands_seen outputs_seen started"),
+    ("word", 1, "ipo_known ipo_sequence"),
+    ("real", AXES, "ipo slope"),
+    # guard
+    ("real", AXES, "q v a r tau"),
+    ("real", 6, "wrench"),
+    ("real", AXES, "low high top_v top_a top_j near dq_max ddq_max dddq_max tau_max tau_step"),
+    ("real", 6, "wrench_max wrench_step"),
+    ("real", 1, "reach step"),
+    # fallback for missing commands
+    ("word", 1, "f_at f_has_q f_has_slope f_has_tau f_has_wrench f_missing"),
+    ("real", AXES, "f_q f_slope f_tau"),
+    ("real", 6, "f_wrench"),
+    ("real", 1, "patience over"),
+    # output of the user's law
+    ("real", AXES, "out_q out_tau"),
+    ("real", 6, "out_wrench"),
+    # this cycle; t_known has one bit for each array of t_arrays, which are those of a state from S_Q on
+    ("word", 1, "t_flags t_received t_answer t_size t_stamp t_known"),
+    ("real", 1, "t_tracking"),
+    ("real", at.S_WRENCH - at.S_Q, "t_arrays"),
+    ("real", 6, "t_wrench"),
+    ("real", AXES, "t_pose"),
+    ("real", 1, "t_e1"),
+    ("byte", BUFFER, "t_datagram t_reply"),
+)
+_INFO = ("overlay", "safety", "operation", "control", "drive", "receive_multiplier")
+_TYPES: dict[str, Any] = {
+    "pointer": ctypes.c_void_p,
+    "word": _WORD,
+    "real": ctypes.c_double,
+    "char": ctypes.c_char,
+    "byte": ctypes.c_uint8,
+}
 
 
 class _Memory(ctypes.Structure):
     """`struct loop` of native.c."""
 
-    _fields_ = (
-        *((name, _POINTER) for name in ("header", "latency", "jitter", "states", "commands", "outputs")),
-        *((name, _WORD) for name in ("history", "bins", "sock", "address", "port")),
-        *(
-            (name, _WORD)
-            for name in (
-                *("hot", "framed", "echoes", "state", "quality", "mode", "sequence", "received", "period"),
-                *("multiplier", "waiting", "sent", "reflected"),
-            )
-        ),
-        ("info", _WORD * 6),
-        ("robot_size", _WORD),
-        ("connection_size", _WORD),
-        ("robot", ctypes.c_char * 64),
-        ("connection", ctypes.c_char * 64),
-        *(
-            (name, _WORD)
-            for name in (
-                *("is_started", "is_ending", "has_law", "ticks", "commands_seen", "outputs_seen", "started"),
-                *("ipo_known", "ipo_sequence"),
-            )
-        ),
-        *((name, _REALS7) for name in ("ipo", "slope", "q", "v", "a", "r", "tau")),
-        ("wrench", _REALS6),
-        *(
-            (name, _REALS7)
-            for name in (
-                *("low", "high", "top_v", "top_a", "top_j", "near", "dq_max", "ddq_max", "dddq_max"),
-                *("tau_max", "tau_step"),
-            )
-        ),
-        ("wrench_max", _REALS6),
-        ("wrench_step", _REALS6),
-        ("reach", _REAL),
-        ("step", _REAL),
-        *(
-            (name, _WORD)
-            for name in ("f_at", "f_has_q", "f_has_slope", "f_has_tau", "f_has_wrench", "f_missing")
-        ),
-        *((name, _REALS7) for name in ("f_q", "f_slope", "f_tau")),
-        ("f_wrench", _REALS6),
-        ("patience", _REAL),
-        ("over", _REAL),
-        ("out_q", _REALS7),
-        ("out_tau", _REALS7),
-        ("out_wrench", _REALS6),
-        *((name, _WORD) for name in ("t_flags", "t_received", "t_answer", "t_size", "t_stamp", "t_known")),
-        ("t_tracking", _REAL),
-        ("t_q", _REAL * 42),
-        ("t_wrench", _REALS6),
-        ("t_pose", _REALS7),
-        ("t_e1", _REAL),
-        ("t_octets", ctypes.c_uint8 * BUFFER),
-        ("t_reply", ctypes.c_uint8 * BUFFER),
+    _fields_ = tuple(
+        (name, _TYPES[kind] if size == 1 else _TYPES[kind] * size)
+        for kind, size, names in STRUCT
+        for name in names.split()
     )
 
 
 @functools.cache
 def library() -> ctypes.CDLL:
-    """The compiled native part; compiled at the first use and kept in the user's cache.
+    """Load the native part; compile it at the first use and keep it in the user's cache.
 
     Raises:
-        Unavailable: this system has none, or no compiler.
+        Unavailable: this system is not supported, or has no compiler.
     """
     if os.environ.get(SWITCH):
         raise Unavailable(f"switched off by {SWITCH}")
     if sys.platform != "linux" or sys.byteorder != "little":
-        raise Unavailable("it is for Linux on little-endian machines")
-    source = _SOURCE.read_bytes()
+        raise Unavailable("the native part needs Linux on a little-endian machine")
+    source = _HEADER.read_bytes() + _SOURCE.read_bytes()
     key = hashlib.sha256(source + os.uname().machine.encode()).hexdigest()[:16]
     root = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     target = Path(root) / "heptarm" / f"fri-{key}.so"
@@ -126,7 +126,7 @@ def library() -> ctypes.CDLL:
             _compile(target)
         made = ctypes.CDLL(str(target))
     except OSError as error:
-        raise Unavailable(f"it cannot be built or loaded: {error}") from error
+        raise Unavailable(f"the native part cannot be built or loaded: {error}") from error
     made.hf_size.restype = _WORD
     made.hf_turn.argtypes = (_POINTER, ctypes.c_char_p, ctypes.c_int, _WORD)
     made.hf_answer.argtypes = (_POINTER,)
@@ -134,40 +134,42 @@ def library() -> ctypes.CDLL:
     made.hf_send.argtypes = (_POINTER,)
     made.hf_run.argtypes = (_POINTER, _WORD, _POINTER)
     if made.hf_size() != ctypes.sizeof(_Memory):
-        raise Unavailable(f"its memory has {made.hf_size()} octets, not {ctypes.sizeof(_Memory)}")
+        raise Unavailable(f"`struct loop` must have {ctypes.sizeof(_Memory)} bytes, got {made.hf_size()}")
     return made
 
 
 def _compile(target: Path) -> None:
     compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
     if compiler is None:
-        raise Unavailable("there is no C compiler: install gcc for the fastest loop")
+        raise Unavailable("no C compiler found: install gcc for the fastest loop")
     target.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(
-        dir=target.parent
-    ) as folder:  # the same file system: the last step is atomic
+    # on the same file system, so that the last step is atomic
+    with tempfile.TemporaryDirectory(dir=target.parent) as folder:
         made = Path(folder) / "made.so"
-        # no contraction: the numbers are Python's to the last bit
+        # without contraction, so that all numbers equal Python's to the last bit
         flags = ("-O2", "-shared", "-fPIC", "-ffp-contract=off")
         run = subprocess.run(
-            [compiler, *flags, "-o", str(made), str(_SOURCE), "-lm"], check=False, capture_output=True, text=True
+            [compiler, *flags, "-o", str(made), str(_SOURCE), "-lm"],
+            check=False,
+            capture_output=True,
+            text=True,
         )
         if run.returncode:
-            raise Unavailable(f"{compiler} refuses it: {run.stderr.strip().splitlines()[0]}")
+            raise Unavailable(f"{compiler} fails: {run.stderr.strip().splitlines()[0]}")
         os.replace(made, target)
 
 
 class Native:
-    """The native part of one loop.
+    """Native part of one loop.
 
     Args:
-        cycle: the Python turn, which it relieves.
+        cycle: the Python cycle with which it alternates.
 
     Attributes:
-        memory: what both share.
+        memory: `struct loop`.
 
     Raises:
-        Unavailable: there is none here.
+        Unavailable: the native part is not available.
     """
 
     def __init__(self, cycle: Cycle) -> None:
@@ -176,22 +178,22 @@ class Native:
         self.memory = memory = _Memory()
         self.reference = ctypes.byref(memory)
         self.sender = (_WORD * 2)()
-        self._ahead = False
+        self._is_newer = False
         layout, base = cycle.layout, cycle.layout.block.ints.ctypes.data
         memory.header, memory.latency, memory.jitter = base, base + 8 * at.LATENCY, base + 8 * at.JITTER
         memory.states, memory.commands = base + 8 * layout.states_at, base + 8 * layout.commands_at
         memory.outputs = base + 8 * layout.outputs_at
         memory.history, memory.bins = len(layout.states.ints), BINS
         memory.has_law = cycle.law is not None
-        limits, policy = cycle.guard.limits, cycle.filler.policy
+        limits, policy = cycle.guard.limits, cycle.fallback.policy
         for name in ("dq_max", "ddq_max", "dddq_max", "tau_max", "wrench_max"):
             getattr(memory, name)[:] = getattr(limits, name)
         memory.reach = limits.reach
-        memory.f_missing = _MISSING.index(policy.missing)
+        memory.f_missing = MISSING.index(policy.missing)
         memory.patience, memory.over = policy.patience, policy.over
 
     def listen(self, sock: socket.socket, peer: tuple[str, int] | None) -> None:
-        """The socket, and the controller that is listened to."""
+        """Set the socket, and the address of the controller."""
         self.memory.sock = sock.fileno()
         if peer is not None:
             self.memory.address = int.from_bytes(socket.inet_aton(peer[0]), "little")
@@ -199,31 +201,34 @@ class Native:
 
     @property
     def datagram(self) -> bytes:
-        """The datagram that was handed back."""
-        return bytes(memoryview(self.memory.t_octets)[: self.memory.t_size])
+        """Datagram that was handed back."""
+        return bytes(memoryview(self.memory.t_datagram)[: self.memory.t_size])
 
     @property
-    def heard(self) -> tuple[str, int]:
-        """Its sender."""
+    def sender_address(self) -> tuple[str, int]:
+        """Sender of the datagram that was handed back."""
         return socket.inet_ntoa(int(self.sender[0]).to_bytes(4, "little")), int(self.sender[1])
 
-    def give(self, datagram: bytes) -> None:
-        """Let the native part go on from where the Python turn is; it needs the last datagram.
+    def sync_from_python(self, datagram: bytes) -> None:
+        """Copy the state of the Python cycle to the native part, which continues from it.
 
-        It stays out of sessions that are not plain.
+        The native part stays inactive in sessions with signals, frames or poses.
+
+        Args:
+            datagram: the last message, with which it compares the next one.
         """
         cycle, memory = self._cycle, self.memory
-        session, guard, filler = cycle.session, cycle.guard, cycle.filler
+        session, guard, fallback = cycle.session, cycle.guard, cycle.fallback
         sample, version, state, mode = session.sample, session.version, session.state, session.mode
         commanding = state in (SessionState.COMMANDING_WAIT, SessionState.COMMANDING_ACTIVE)
         memory.hot = 0
         if sample is None or version is None or state is SessionState.IDLE or sample.connection is None:
             return
-        if session.trouble:  # another message of this session has to end it
+        if session.trouble:  # the next message of this session has to clear it
             return
         if commanding and (mode not in _JOINT_MODES or sample.q_ipo is None):
             return
-        if not cycle.exchange.is_idle:  # signals and frames are Python's
+        if not cycle.exchange.is_idle:  # Python handles signals and frames
             return
         if state is SessionState.COMMANDING_ACTIVE and not guard.is_started:
             return
@@ -231,7 +236,7 @@ class Native:
             tag: value for tag, _, value in fields(unwrap(datagram, version)) if isinstance(value, bytes)
         }
         robot, connection = parts.get(2), parts.get(4, b"")
-        if max(len(robot or b""), len(connection)) > 64 or set(parts) - {1, 2, 3, 4, 5}:
+        if max(len(robot or b""), len(connection)) > MAX_PLAIN or set(parts) - {1, 2, 3, 4, 5}:
             return
         memory.robot_size = -1 if robot is None else len(robot)
         memory.connection_size = len(connection)
@@ -242,7 +247,8 @@ class Native:
         memory.sequence, memory.received = sample.sequence, session.received
         memory.period, memory.multiplier = session.period, session.multiplier
         memory.waiting, memory.sent, memory.reflected = session.waiting, session.sent, session.reflected
-        memory.info[:] = cycle.record.info[2]
+        for name, number in zip(_INFO, cycle.record.info[2], strict=True):
+            setattr(memory, name, number)
         memory.is_started, memory.is_ending = guard.is_started, cycle.is_ending
         memory.ticks, memory.started = cycle.record.ticks, cycle.started
         memory.commands_seen, memory.outputs_seen = cycle.commands_seen, cycle.exchange.outputs_seen
@@ -256,22 +262,22 @@ class Native:
         memory.step = guard.period
         memory.tau_step[:] = [rate * guard.period for rate in guard.limits.dtau_max]
         memory.wrench_step[:] = [rate * guard.period for rate in guard.limits.dwrench_max]
-        memory.f_at = filler.at
+        memory.f_at = fallback.at
         for name in ("q", "slope", "tau", "wrench"):
-            value: Sequence[float] | None = getattr(filler, name)
+            value: Sequence[float] | None = getattr(fallback, name)
             setattr(memory, f"f_has_{name}", value is not None)
             if value is not None:
                 getattr(memory, f"f_{name}")[:] = value
         memory.hot = 1
-        self._ahead = True
+        self._is_newer = True
 
-    def take(self) -> None:
-        """Let the Python turn go on from where the native part is."""
+    def sync_to_python(self) -> None:
+        """Copy the state of the native part to the Python cycle, which continues from it."""
         cycle, memory = self._cycle, self.memory
-        if not self._ahead:
+        if not self._is_newer:
             return
-        self._ahead = False
-        session, guard, filler = cycle.session, cycle.guard, cycle.filler
+        self._is_newer = False
+        session, guard, fallback = cycle.session, cycle.guard, cycle.fallback
         assert session.sample is not None
         header = cycle.layout.header
         session.counters.load(header, at.COUNTS)
@@ -283,38 +289,36 @@ class Native:
             cycle.slope = list(memory.slope)
         for name in ("q", "v", "a", "r", "tau", "wrench"):
             setattr(guard, name, list(getattr(memory, name)))
-        filler.at = memory.f_at
+        fallback.at = memory.f_at
         for name in ("q", "slope", "tau", "wrench"):
             if getattr(memory, f"f_has_{name}"):
-                setattr(filler, name, list(getattr(memory, f"f_{name}")))
+                setattr(fallback, name, list(getattr(memory, f"f_{name}")))
             elif name == "slope":
-                filler.slope = None
+                fallback.slope = None
         ints, floats = cycle.layout.block.ints, cycle.layout.block.floats
         report = guard.report
         for kind in Limited:
-            start = 7 * kind
-            report.counts[kind] = ints[at.LIMITED_COUNTS + start : at.LIMITED_COUNTS + start + 7].tolist()
-            report.worst[kind] = floats[at.LIMITED_WORST + start : at.LIMITED_WORST + start + 7].tolist()
-            report.allowed[kind] = floats[
-                at.LIMITED_ALLOWED + start : at.LIMITED_ALLOWED + start + 7
-            ].tolist()
+            axes = slice(AXES * kind, AXES * (kind + 1))
+            report.counts[kind] = ints[at.LIMITED_COUNTS :][axes].tolist()
+            report.worst[kind] = floats[at.LIMITED_WORST :][axes].tolist()
+            report.allowed[kind] = floats[at.LIMITED_ALLOWED :][axes].tolist()
 
-    # the turn without a socket, for tests
+    # one cycle without a socket, for tests
 
     def turn(self, datagram: bytes, received: int) -> int:
-        """Take a datagram: HANDBACK, LAW, or the size of the answer."""
+        """Process a datagram: HANDBACK, LAW, or the size of the answer."""
         return int(self.library.hf_turn(self.reference, datagram, len(datagram), received))
 
     def answer(self) -> int:
-        """The law has spoken; returns the size of the answer."""
+        """Make the answer after the law was called; return its size."""
         return int(self.library.hf_answer(self.reference))
 
     def finish(self, now: int) -> None:
-        """Publish the turn."""
+        """Publish the cycle."""
         self.library.hf_finish(self.reference, now)
 
     def reply(self, size: int) -> bytes:
-        """The answer."""
+        """Bytes of the answer."""
         return bytes(memoryview(self.memory.t_reply)[:size])
 
 

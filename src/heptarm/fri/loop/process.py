@@ -1,51 +1,207 @@
-"""The process of the loop: waits for the controller's datagrams and answers them, whatever the user's process does."""
+"""Process of the loop: start, real-time priority, receiving and answering datagrams.
+
+The loop is a new process if the law can be imported, otherwise a fork of the user's process; so the user's process does
+not delay answers.
+"""
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import importlib
 import json
+import multiprocessing
 import os
 import signal
+import subprocess
 import sys
 import time
-from typing import Any
+import warnings
+from importlib.machinery import PathFinder
+from typing import Any, Protocol
 
 import numpy as np
 
-from heptarm.errors import ConnectFailed, ConnectionLost
-from heptarm.fri.limits import Limits
-from heptarm.fri.messages import SessionState
-from heptarm.fri.policy import Missing, Policy
-from heptarm.fri.pose_guard import PoseLimits
-from heptarm.fri.version import Version
-from heptarm.io.shared import Block
+from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost
+from heptarm.fri.guard.fallback import Missing, Policy
+from heptarm.fri.guard.joint_guard import Limits
+from heptarm.fri.guard.pose_guard import PoseLimits
+from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.loop.cycle import Cycle, Law
+from heptarm.fri.loop.native import CALL_LAW, CHECK, HANDED_BACK, SOCKET_ERROR, TIMEOUT, Native, Unavailable
+from heptarm.fri.loop.user_api import Output, Params, State
+from heptarm.fri.protocol.messages import SessionState
+from heptarm.fri.protocol.version import Version
+from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import Address, UdpSocket
-from heptarm.rt import layout as at
-from heptarm.rt import realtime
-from heptarm.rt.cycle import Cycle, Law
-from heptarm.rt.native import BROKEN, CALL_LAW, GIVEN_BACK, LOOK, TIMEOUT, Native, Unavailable
-from heptarm.rt.output import Output
-from heptarm.rt.params import Params
-from heptarm.rt.state import State
 
-#: A datagram is waited for this long before the loop looks around [s].
+PRIORITY = 60
+#: Longest wait for a datagram before the loop checks whether it has to end [s].
 PATIENCE = 0.05
-#: Another sender is listened to when the one before has been silent for this long [ns].
+#: The loop accepts another sender after this long without a message of the previous one [ns].
 SILENT = 1_000_000_000
-#: An end that is asked for waits this long for the arm to stand [s].
+#: Longest wait for the arm to come to rest before the loop ends [s].
 BRAKING = 3.0
-#: The user's process is looked for every that many datagrams.
-_LOOK = 256
+#: The loop checks every so many datagrams whether the user's process is alive.
+_CHECK_EVERY = 256
+_PR_SET_TIMERSLACK = 29
+_MCL_CURRENT_FUTURE = 3
+
+
+def request_realtime(*, cpu: int | None = None, priority: int = PRIORITY, lock: bool = True) -> list[str]:
+    """Request real-time priority, locked memory, short timer slack and one processor; stop garbage collection.
+
+    Args:
+        cpu: processor to run on; None for any.
+        priority: priority of SCHED_FIFO.
+        lock: whether to lock the memory of the process.
+
+    Returns:
+        A text for each refused request, with its remedy.
+    """
+    refused = []
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except (OSError, AttributeError) as error:
+        refused.append(
+            f"no real-time priority ({_reason(error)}): answers may be late while the machine is busy; allow it with "
+            "`rtprio` in /etc/security/limits.conf, or run as root"
+        )
+    if cpu is not None:
+        try:
+            os.sched_setaffinity(0, {cpu})
+        except (OSError, AttributeError) as error:
+            refused.append(f"not bound to processor {cpu} ({_reason(error)})")
+    if sys.platform == "linux":
+        libc = ctypes.CDLL(None, use_errno=True)
+        libc.prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
+        if lock and libc.mlockall(_MCL_CURRENT_FUTURE) != 0:
+            refused.append(
+                f"memory not locked ({os.strerror(ctypes.get_errno()).lower()}): a page fault may delay an answer; "
+                "allow it with `memlock` in /etc/security/limits.conf"
+            )
+    elif lock:
+        refused.append(f"memory not locked: not supported on {sys.platform}")
+    sys.setswitchinterval(2e-4)
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    return refused
+
+
+def _reason(error: BaseException) -> str:
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror.lower()
+    return f"{sys.platform} has none"
+
+
+class Worker(Protocol):
+    """Started process of a loop."""
+
+    def is_alive(self) -> bool:
+        """Whether it runs."""
+        ...
+
+    def join(self, seconds: float) -> None:
+        """Wait for its end."""
+        ...
+
+    def kill(self) -> None:
+        """Kill it."""
+        ...
+
+
+def importable(law: Law | None) -> str | None:
+    """Name "module:function" by which a new process can import a law; None if it cannot."""
+    module, name = getattr(law, "__module__", None), getattr(law, "__qualname__", "<")
+    if module is None or module == "__main__" or "<" in name:
+        return None
+    if PathFinder.find_spec(module.partition(".")[0]) is None:  # only this process can find the module
+        return None
+    found: object = sys.modules.get(module)
+    for part in name.split("."):
+        found = getattr(found, part, None)
+    return f"{module}:{name}" if found is law else None
+
+
+def start(path: str, law: Law | None) -> Worker:
+    """Start a loop on the shared memory at `path`.
+
+    Raises:
+        CommandRejected: the law cannot be imported and this system cannot fork.
+    """
+    if law is None or importable(law):
+        return _FreshProcess(path)
+    if "fork" not in multiprocessing.get_all_start_methods() or sys.platform == "darwin":
+        raise CommandRejected(
+            f"the law {getattr(law, '__qualname__', law)!r} cannot be imported by the loop's process",
+            parameter="law",
+            hint="define it at the top level of a module; this system cannot fork a process for it",
+        )
+    return _ForkedProcess(path, law)
+
+
+class _FreshProcess:
+    """New interpreter with the module path of this one."""
+
+    def __init__(self, path: str) -> None:
+        folders = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "heptarm.fri.loop.process", path],
+            env={**os.environ, "PYTHONPATH": folders, "OPENBLAS_NUM_THREADS": "1"},
+            stdin=subprocess.DEVNULL,
+        )
+
+    def is_alive(self) -> bool:
+        """Whether it runs."""
+        return self._process.poll() is None
+
+    def join(self, seconds: float) -> None:
+        """Wait for its end."""
+        try:
+            self._process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return
+
+    def kill(self) -> None:
+        """Kill it."""
+        self._process.kill()
+        self._process.wait()
+
+
+class _ForkedProcess:
+    """Fork of this process, for laws that cannot be imported."""
+
+    def __init__(self, path: str, law: Law) -> None:
+        self._process = multiprocessing.get_context("fork").Process(
+            target=main, args=(path, law), daemon=True
+        )
+        # Python 3.12 warns if there are threads; the fork uses none of their locks
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)
+            self._process.start()
+
+    def is_alive(self) -> bool:
+        """Whether it runs."""
+        return self._process.is_alive()
+
+    def join(self, seconds: float) -> None:
+        """Wait for its end."""
+        self._process.join(seconds)
+
+    def kill(self) -> None:
+        """Kill it."""
+        self._process.kill()
+        self._process.join()
 
 
 class Loop:
-    """Socket, turn, shared memory.
+    """The loop: a socket, a cycle and the shared memory.
 
     Args:
         layout: the shared memory.
-        config: as `heptarm.rt.client` leaves it.
-        law: overrides the one that the configuration names.
+        config: configuration that `heptarm.fri.loop.client` wrote.
+        law: overrides the law of the configuration.
     """
 
     def __init__(self, layout: at.Layout, config: dict[str, Any], *, law: Law | None = None) -> None:
@@ -71,18 +227,18 @@ class Loop:
         self._last = b""
 
     def run(self) -> None:
-        """Answer until the user's process ends it or is gone, and the arm stands."""
+        """Answer until the user's process stops the loop or has ended, and the arm is at rest."""
         try:
             native = Native(self.cycle)
         except Unavailable as reason:
-            self.cycle.record.tell(time.monotonic_ns(), f"the loop runs in pure Python: {reason}")
+            self.cycle.record.report(time.monotonic_ns(), f"the loop runs in pure Python: {reason}")
             self._run_in_python()
         else:
             self.layout.header[at.NATIVE] = 1
             self._run_native(native)
 
     def _run_native(self, native: Native) -> None:
-        """The native part answers what is plain; the rest comes back to be handled here."""
+        """Run the native part, which answers frequent messages; handle here what it hands back."""
         header, cycle, states = self.layout.header, self.cycle, self.layout.states
         run, send, now_ns = native.library.hf_run, native.library.hf_send, time.monotonic_ns
         memory, reference = native.memory, native.reference
@@ -90,44 +246,44 @@ class Loop:
         native.listen(self.socket.sock, None)
         history = len(states.ints)
         while True:
-            code = run(reference, _LOOK, native.sender)
+            code = run(reference, _CHECK_EVERY, native.sender)
             if code == CALL_LAW:
-                cycle.ask(State(states.floats[header[at.STATES] % history]), out, memory.received)
+                cycle.call_law(State(states.floats[header[at.STATES] % history]), out, memory.received)
                 memory.is_ending = cycle.is_ending
                 send(reference)
-                code = LOOK if header[at.STOP] else CALL_LAW
-            elif code == GIVEN_BACK:
-                native.take()
-                datagram, sender = native.datagram, native.heard
+                code = CHECK if header[at.STOP] else CALL_LAW
+            elif code == HANDED_BACK:
+                native.sync_to_python()
+                datagram, sender = native.datagram, native.sender_address
                 received = memory.t_received
                 if sender != self._peer and not self._accept(sender, received):
-                    native.give(self._last)
+                    native.sync_from_python(self._last)
                     continue
                 native.listen(self.socket.sock, sender)
-                octets = cycle.turn(datagram, received)
-                if octets is not None:
-                    self.socket.send(octets, sender)
+                answer = cycle.turn(datagram, received)
+                if answer is not None:
+                    self.socket.send(answer, sender)
                 cycle.finish(now_ns())
                 if cycle.session.sample is not None and cycle.session.received == received:
                     self._last = datagram
                 if self._last:
-                    native.give(self._last)
-                code = LOOK if header[at.STOP] else GIVEN_BACK
-            elif code == BROKEN:
+                    native.sync_from_python(self._last)
+                code = CHECK if header[at.STOP] else HANDED_BACK
+            elif code == SOCKET_ERROR:
                 raise ConnectionLost(
                     f"UDP port {self.socket.port} fails: {os.strerror(memory.t_size).lower()}"
                 )
             if code == TIMEOUT:
                 cycle.idle(now_ns())
                 gc.collect()
-            if code in (TIMEOUT, LOOK) and (
+            if code in (TIMEOUT, CHECK) and (
                 self._deadline or header[at.STOP] or os.getppid() != self._parent
             ):
-                native.take()
+                native.sync_to_python()
                 if self._is_over(now_ns()):
                     return
                 if self._last:
-                    native.give(self._last)
+                    native.sync_from_python(self._last)
 
     def _run_in_python(self) -> None:
         header, cycle, receive, send = self.layout.header, self.cycle, self.socket.receive, self.socket.send
@@ -144,17 +300,17 @@ class Loop:
             datagram, received, sender = got
             if sender != self._peer and not self._accept(sender, received):
                 continue
-            octets = cycle.turn(datagram, received)
-            if octets is not None:
-                send(octets, sender)
+            answer = cycle.turn(datagram, received)
+            if answer is not None:
+                send(answer, sender)
             now = now_ns()
             cycle.finish(now)
             turns += 1
-            if (header[at.STOP] or turns % _LOOK == 0) and self._is_over(now):
+            if (header[at.STOP] or turns % _CHECK_EVERY == 0) and self._is_over(now):
                 return
 
     def _accept(self, sender: Address, now: int) -> bool:
-        """Whether to listen to another sender: only when the one before has ended or fallen silent."""
+        """Whether to accept another sender: only if the session of the previous one has ended or it is silent."""
         remote = self.config["remote"]
         if remote is not None and sender[0] != remote:
             return False
@@ -164,11 +320,11 @@ class Loop:
                 return False
             session.restart()
         self._peer = sender
-        self.cycle.record.tell(now, f"listening to {sender[0]}:{sender[1]}")
+        self.cycle.record.report(now, f"listening to {sender[0]}:{sender[1]}")
         return True
 
     def _is_over(self, now: int) -> bool:
-        """Whether the loop may end; asks the cycle to brake if it should."""
+        """Whether the loop has ended; make the cycle brake if it has to end."""
         if not self._deadline:
             if not self.layout.header[at.STOP] and os.getppid() == self._parent:
                 return False
@@ -178,12 +334,12 @@ class Loop:
         return self.cycle.may_end or silent or now > self._deadline
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the port."""
         self.socket.close()
 
 
 def _imported(name: str | None) -> Law | None:
-    """The law "module:function"."""
+    """Import the law "module:function"."""
     if name is None:
         return None
     module, _, function = name.partition(":")
@@ -203,17 +359,17 @@ def main(path: str, law: Law | None = None) -> int:
     """Run a loop.
 
     Args:
-        path: of the shared memory, whose configuration is already written.
-        law: for a forked process; a fresh one imports what the configuration names.
+        path: file of the shared memory, with the configuration.
+        law: law of a forked process; a new process imports that of the configuration.
     """
-    block = Block(path=path)
+    block = MemoryBlock(path=path)
     header = block.view(0, at.LATENCY)
 
     def stop(number: int, frame: object) -> None:
         header[at.STOP] = 1
 
     signal.signal(signal.SIGTERM, stop)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the user's process, which then ends this one
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the user's process handles Ctrl-C and stops this one
     first = at.Layout(block, history=header[at.HISTORY], params=header[at.SIZE])
     config = json.loads(first.config.read() or "{}")
     header[at.PID] = os.getpid()
@@ -224,7 +380,7 @@ def main(path: str, law: Law | None = None) -> int:
         has_port = not isinstance(error, ConnectFailed) or error.parameter != "port"
         header[at.STATUS] = at.Status.FAILED if has_port else at.Status.NO_PORT
         return 1
-    refused = realtime.ask(cpu=config["cpu"], lock=config["lock"]) if config["realtime"] else []
+    refused = request_realtime(cpu=config["cpu"], lock=config["lock"]) if config["realtime"] else []
     first.refused.write("\n".join(refused))
     header[at.STATUS] = at.Status.RUNNING
     try:

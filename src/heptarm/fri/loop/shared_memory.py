@@ -1,12 +1,17 @@
-"""Where everything stands in the memory that the loop and the user's process share; the native loop has the same."""
+"""Layout of the shared memory of the loop and the user's process, and the guards' reports in it.
+
+schema/generate.py writes the same layout for the native loop.
+"""
 
 from __future__ import annotations
 
 import enum
 
-from heptarm.fri.messages import MAX_IO
-from heptarm.fri.statistics import BINS, COUNTERS
-from heptarm.io.shared import Block, Note, Ring
+from heptarm.fri.guard.joint_guard import AXES, JointReport
+from heptarm.fri.guard.pose_guard import PARTS, PoseReport
+from heptarm.fri.protocol.messages import MAX_IO
+from heptarm.fri.session.statistics import BINS, COUNTERS
+from heptarm.io.shared import MemoryBlock, Note, Ring
 
 # words of the header
 STATES, COMMANDS, PARAMS, EVENTS, STOP, STATUS, PID, BEAT, PORT, NATIVE, HISTORY, SIZE = range(12)
@@ -49,13 +54,13 @@ S_Q_SENT, S_TAU_SENT, S_WRENCH_SENT = 76, 83, 90
 S_POSE_IPO, S_POSE_SENT, S_E1_IPO, S_E1_SENT = 96, 103, 110, 111
 S_IO = 112
 STATE_WORDS = S_IO + MAX_IO
-#: An enumeration that the controller did not send.
+#: Value of an enumeration that the controller did not send.
 ABSENT = -1
 
 # bits of the flags
 ANSWERED, FILLED, LIMITED, BRAKING = 1, 2, 4, 8
 
-# words of a command: sequence, time [ns], bits of what is given, then the numbers
+# words of a command: sequence, time [ns], bits of the parts that it has, then the numbers
 C_AT, C_GIVEN, C_Q, C_TAU, C_WRENCH, C_POSE, C_E1 = 1, 2, 3, 10, 17, 23, 30
 COMMAND_WORDS, COMMAND_SLOTS = 31, 8
 GIVEN_Q, GIVEN_TAU, GIVEN_WRENCH, GIVEN_POSE, GIVEN_E1 = 1, 2, 4, 8, 16
@@ -68,7 +73,7 @@ NOTE_WORDS = 1024
 
 
 class Status(enum.IntEnum):
-    """Life of the loop's process."""
+    """Status of the loop's process."""
 
     STARTING = 0
     RUNNING = 1
@@ -78,15 +83,15 @@ class Status(enum.IntEnum):
 
 
 class Layout:
-    """The rings and notes of a block.
+    """Rings and notes of a block.
 
     Args:
         block: the memory.
-        history: slots of the ring of states.
-        params: numbers of the law's parameters.
+        history: number of slots of the ring of states.
+        params: number of values of the law's parameters.
     """
 
-    def __init__(self, block: Block, *, history: int, params: int) -> None:
+    def __init__(self, block: MemoryBlock, *, history: int, params: int) -> None:
         at = HEADER_WORDS
         self.block = block
         self.states_at = at
@@ -111,6 +116,39 @@ class Layout:
 
     @staticmethod
     def words(*, history: int, params: int) -> int:
-        """Size of a block."""
+        """Size of a block in words."""
         rings = history * STATE_WORDS + COMMAND_SLOTS * COMMAND_WORDS + PARAM_SLOTS * (1 + params)
         return HEADER_WORDS + rings + EVENT_SLOTS * EVENT_WORDS + 5 * NOTE_WORDS
+
+
+def write_report(layout: Layout, report: JointReport | PoseReport) -> None:
+    """Write the report of a guard."""
+    ints, floats = layout.block.ints, layout.block.floats
+    size, (counts, worst, allowed) = _places(report)
+    for kind in range(len(report.counts)):
+        start, end = size * kind, size * (kind + 1)
+        ints[counts + start : counts + end] = report.counts[kind]
+        floats[worst + start : worst + end] = report.worst[kind]
+        floats[allowed + start : allowed + end] = report.allowed[kind]
+
+
+def report_lines(layout: Layout) -> list[str]:
+    """Read the reports of both guards as lines of text."""
+    found: list[str] = []
+    ints, floats = layout.block.ints, layout.block.floats
+    for report in (JointReport(), PoseReport()):
+        size, (counts, worst, allowed) = _places(report)
+        for kind in range(len(report.counts)):
+            start, end = size * kind, size * (kind + 1)
+            report.counts[kind] = ints[counts + start : counts + end].tolist()
+            report.worst[kind] = floats[worst + start : worst + end].tolist()
+            report.allowed[kind] = floats[allowed + start : allowed + end].tolist()
+        found += report.lines
+    return found
+
+
+def _places(report: JointReport | PoseReport) -> tuple[int, tuple[int, int, int]]:
+    """Number of values of a kind, and places of counts, worst and allowed values."""
+    if isinstance(report, JointReport):
+        return AXES, (LIMITED_COUNTS, LIMITED_WORST, LIMITED_ALLOWED)
+    return len(PARTS), (POSE_COUNTS, POSE_WORST, POSE_ALLOWED)

@@ -1,34 +1,188 @@
-"""What a loop leaves in the shared memory, as the user's process reads it."""
+"""States, events and counts that the loop publishes for the user's process.
+
+`Record` writes them in the loop's process, `Reader` reads them in the user's.
+"""
 
 from __future__ import annotations
 
 import json
+import math
+import struct
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from heptarm.errors import ConnectionLost, NotReady, Timeout
-from heptarm.fri.event import Event, Kind
-from heptarm.fri.messages import Quality, SessionState
-from heptarm.rt import layout as at
-from heptarm.rt import limited
-from heptarm.rt.signals import Signals
-from heptarm.rt.state import State
-from heptarm.rt.stats import Stats
+from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.loop.user_api import Signals, State, Stats, information
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.fast_codec import Sample
+from heptarm.fri.protocol.messages import Quality, SessionState
+from heptarm.fri.session.session import Event, Kind, Session
 from heptarm.values.io import SignalValue
 
-#: A state is looked for this often once it is due [s].
-_LOOK = 1e-4
+NAN7, NAN6 = (math.nan,) * 7, (math.nan,) * 6
+_ROW = struct.Struct(f"=18q{at.STATE_WORDS - 19}d")
 _KINDS = list(Kind)
-_NOBODY = (
-    "is the FRI application running on the cabinet, does it send to this machine's address and this port, are both in "
-    "one network (address and netmask), and does a firewall let UDP through?"
+_NO_SIGNALS = (math.nan,) * m.MAX_IO
+
+
+@dataclass(slots=True)
+class Sent:
+    """Command that was sent in a cycle; NaN for quantities that were not commanded.
+
+    Attributes:
+        q: positions [rad].
+        tau: torques [Nm].
+        wrench: wrench [N, Nm].
+        pose: pose in FRI's numbers.
+        e1: redundancy angle of the pose [rad].
+    """
+
+    q: Sequence[float] = NAN7
+    tau: Sequence[float] = NAN7
+    wrench: Sequence[float] = NAN6
+    pose: Sequence[float] = NAN7
+    e1: float = math.nan
+
+
+NOTHING_SENT = Sent()
+
+
+class Record:
+    """Writer of states and events in the shared memory.
+
+    Args:
+        layout: the shared memory.
+        session: session of the messages.
+
+    Attributes:
+        info: robot and connection of the last message, and the values derived from them.
+        state: state filled last, as a law sees it.
+        flags: flags of the cycle.
+        ticks: messages since commands became effective.
+        sent: command of the cycle.
+        ipo: interpolator's pose in FRI's numbers, in sessions that command poses.
+        ipo_e1: its redundancy angle [rad].
+        signals: values of the session's signals.
+    """
+
+    def __init__(self, layout: at.Layout, session: Session) -> None:
+        self._layout, self._session = layout, session
+        self._slot = memoryview(bytearray(8 * at.STATE_WORDS))
+        self.state = State(np.frombuffer(self._slot, dtype=np.float64))
+        self.info: tuple[object, object, tuple[int, ...]] = (None, None, ())
+        self.flags = 0
+        self.ticks = 0
+        self.sent = NOTHING_SENT
+        self.ipo: Sequence[float] = NAN7
+        self.ipo_e1 = math.nan
+        self.signals: Sequence[float] = ()
+        self._trouble = session.trouble
+        layout.trouble.write(self._trouble)
+
+    def fill(self, sample: Sample, latency: int) -> None:
+        """Fill the state of a message.
+
+        Args:
+            sample: the message.
+            latency: time from receipt to answer [ns].
+        """
+        session = self._session
+        robot, link = sample.robot, sample.connection
+        if self.info[0] is not robot or self.info[1] is not link:
+            self.info = (robot, link, information(sample.message))
+        seconds, nanos = sample.stamp
+        wrench: Sequence[float] = NAN6
+        pose: Sequence[float] = NAN7
+        e1 = math.nan
+        if session.version is not None and session.version.traits.quaternions:
+            monitor = sample.message.monitor or m.MonitorData()
+            wrench = monitor.wrench or NAN6
+            pose = monitor.pose.values if monitor.pose is not None else NAN7
+            e1 = monitor.redundancy.value if monitor.redundancy is not None else math.nan
+        overlay, safety, operation, control, drive, multiplier = self.info[2]
+        sent, is_commanding = self.sent, session.is_commanding
+        _ROW.pack_into(
+            self._slot,
+            8,
+            session.received,
+            sample.sequence,
+            seconds * 1_000_000_000 + nanos,
+            session.state,
+            session.quality,
+            session.mode,
+            overlay,
+            safety,
+            operation,
+            control,
+            drive,
+            session.period,
+            multiplier,
+            latency,
+            self.flags,
+            session.reflected,
+            session.sent,
+            max(0, self.ticks) if is_commanding else 0,
+            sample.tracking,
+            *(sample.q or NAN7),
+            *(sample.tau or NAN7),
+            *(sample.tau_cmd or NAN7),
+            *(sample.tau_ext or NAN7),
+            *(sample.q_cmd or NAN7),
+            *(sample.q_ipo or NAN7),
+            *wrench,
+            *pose,
+            e1,
+            *sent.q,
+            *sent.tau,
+            *sent.wrench,
+            *(self.ipo if is_commanding else NAN7),
+            *sent.pose,
+            self.ipo_e1 if is_commanding else math.nan,
+            sent.e1,
+            *self.signals,
+            *_NO_SIGNALS[len(self.signals) :],
+        )
+
+    def publish(self, sample: Sample, latency: int) -> None:
+        """Publish the state of a message at the end of its cycle."""
+        self.fill(sample, latency)
+        ring = self._layout.states
+        slot = ring.begin()
+        ring.ints[slot, 1:] = self._slot[8:].cast("q")
+        ring.end()
+
+    def report(self, now: int, text: str, kind: Kind = Kind.CLIENT) -> None:
+        """Publish an event."""
+        ring = self._layout.events
+        encoded = text.encode()[: at.EVENT_TEXT].ljust(at.EVENT_TEXT, b"\0")
+        slot = ring.begin()
+        ring.ints[slot, 1], ring.ints[slot, 2] = now, _KINDS.index(kind)
+        ring.ints[slot, 3:] = memoryview(encoded).cast("q")
+        ring.end()
+
+    def report_all(self) -> None:
+        """Publish the events of the session, and why there is no session."""
+        for event in self._session.events():
+            self.report(event.at, event.text, event.kind)
+        if self._session.trouble != self._trouble:
+            self._trouble = self._session.trouble
+            self._layout.trouble.write(self._trouble)
+
+
+#: Polling period for a state that is due [s].
+_POLL = 1e-4
+_NO_MESSAGES = (
+    "check that the FRI application runs on the cabinet and sends to this machine's address and this port, that both "
+    "are in one network (address and netmask), and that no firewall blocks UDP"
 )
 
 
 class Reader:
-    """Reads states, signals, events and counts of a loop.
+    """Reader of states, signals, events and counts of a loop.
 
     Args:
         layout: the shared memory.
@@ -42,14 +196,14 @@ class Reader:
 
     @property
     def state(self) -> State:
-        """The newest message.
+        """State of the newest message.
 
         Raises:
-            NotReady: none has come yet; the text says what may be the cause.
+            NotReady: no message received yet; the text names possible causes.
         """
         words = self._layout.states.newest()
         if words is None:
-            raise NotReady(self.trouble, hint=_NOBODY)
+            raise NotReady(self.trouble, hint=_NO_MESSAGES)
         return State(words, self._signals)
 
     @property
@@ -66,21 +220,21 @@ class Reader:
 
     @property
     def trouble(self) -> str:
-        """Why no session stands, in words; empty if one does."""
+        """Why there is no session, as text; empty if there is one."""
         return self._layout.trouble.read() or ""
 
     @property
     def refused(self) -> list[str]:
-        """What the system refused the loop, in words with the remedy."""
+        """What the system refused the loop, with the remedies."""
         return (self._layout.refused.read() or "").splitlines()
 
     @property
     def is_native(self) -> bool:
-        """The loop's frequent turns are done by the native part."""
+        """Whether the native part does the frequent cycles of the loop."""
         return bool(self._header[at.NATIVE])
 
     def history(self, size: int | None = None) -> list[State]:
-        """The last states, oldest first; the very oldest may be overwritten meanwhile and are left out."""
+        """Get the last states, oldest first, without those that were overwritten in the meantime."""
         ring = self._layout.states
         count = ring.count
         first = max(0, count - (len(ring.ints) - 1 if size is None else size))
@@ -89,10 +243,10 @@ class Reader:
         return [State(words, signals) for words in found if words is not None]
 
     def next(self, *, timeout: float = 5.0) -> State:
-        """The newest state that was not returned before; waits for one.
+        """Wait for the newest state that was not returned before.
 
         Raises:
-            Timeout: none came; the text says what may be the cause.
+            Timeout: no message received; the text names possible causes.
             ConnectionLost: the client is closed, or its loop has ended.
         """
         header, deadline = self._header, time.monotonic() + timeout
@@ -102,23 +256,23 @@ class Reader:
             if now > deadline:
                 known = self._layout.states.newest()
                 text = self.trouble or (
-                    "the controller sends no more" if known is not None else "nothing has arrived"
+                    "the controller has stopped sending" if known is not None else "no message received"
                 )
-                raise Timeout(f"no FRI message within {timeout:g} s: {text}", hint=_NOBODY)
-            time.sleep(min(self._until_due(), deadline - now + _LOOK))
+                raise Timeout(f"no FRI message within {timeout:g} s: {text}", hint=_NO_MESSAGES)
+            time.sleep(min(self._until_due(), deadline - now + _POLL))
         self._seen = header[at.STATES]
         return self.state
 
     def _until_due(self) -> float:
-        """Time until the next state is likely to be there [s]."""
+        """Expected time until the next state [s]."""
         words = self._layout.states.newest()
         if words is None:
             return 1e-3
         newest = State(words)
-        return min(max(newest.period - newest.age, _LOOK), 0.05)
+        return min(max(newest.period - newest.age, _POLL), 0.05)
 
     def __iter__(self) -> Iterator[State]:
-        """Every newest state, never one twice, as long as messages come."""
+        """Iterate over the newest states, each once, as long as messages arrive."""
         while True:
             yield self.next()
 
@@ -127,27 +281,27 @@ class Reader:
 
         Args:
             session: the state, or its name such as "COMMANDING_ACTIVE".
-            timeout: how long [s].
+            timeout: time limit [s].
 
         Raises:
-            Timeout: it did not come; the text says what stands in the way.
+            Timeout: the session did not reach the state; the text names possible causes.
         """
-        wanted = SessionState[session] if isinstance(session, str) else session
+        target = SessionState[session] if isinstance(session, str) else session
         deadline = time.monotonic() + timeout
         while (rest := deadline - time.monotonic()) > 0.0:
             state = self.next(timeout=rest)
-            if state.session is wanted:
+            if state.session is target:
                 return state
         state = self.state
         hint = ""
-        if wanted > state.session:
+        if target > state.session:
             if state.session is SessionState.MONITORING_WAIT:
-                hint = "the controller wants quality GOOD first; see `stats` for latency and lost messages"
+                hint = "the controller waits for quality GOOD; see `stats` for latency and lost messages"
             elif state.session is SessionState.MONITORING_READY:
                 hint = "the cabinet's application has started no overlay"
         raise Timeout(
             f"the session is {state.session.name} with quality {state.quality.name} after {timeout:g} s, "
-            f"not {wanted.name}",
+            f"not {target.name}",
             hint=hint,
         )
 
@@ -155,23 +309,23 @@ class Reader:
 
     @property
     def _signals(self) -> Signals:
-        """Those that the session carries."""
+        """Signals of the session."""
         note = self._layout.offered
         if note.tick != self._offer[0]:
             tick, text = note.tick, note.read()
             if text is not None:
-                told = json.loads(text)
-                self._offer = (tick, Signals.read(told["signals"]), tuple(told["frames"]))
+                offer = json.loads(text)
+                self._offer = (tick, Signals.read(offer["signals"]), tuple(offer["frames"]))
         return self._offer[1]
 
     @property
     def inputs(self) -> dict[str, SignalValue]:
-        """The cabinet's inputs that the session carries, as they are now, by name."""
+        """Current values of the session's inputs of the cabinet, by name."""
         return self._now(is_output=False)
 
     @property
     def outputs(self) -> dict[str, SignalValue]:
-        """The cabinet's outputs that the session carries, as the cabinet shows them now, by name."""
+        """Current values of the session's outputs of the cabinet, by name."""
         return self._now(is_output=True)
 
     def _now(self, *, is_output: bool) -> dict[str, SignalValue]:
@@ -181,23 +335,23 @@ class Reader:
 
     @property
     def wanted_frames(self) -> tuple[str, ...]:
-        """Names of the frames that the controller asks for."""
+        """Names of the frames that the controller requests."""
         return self._offer[2] if self._signals is not None else ()
 
     # ------------------------------------------------------------------------------------------------ report
 
     @property
     def stats(self) -> Stats:
-        """Counts, latency and jitter so far."""
+        """Counts, latency and jitter of the client."""
         return Stats.of(self._layout)
 
     @property
     def limited(self) -> list[str]:
-        """What the guard has limited, one line for each axis (or part of a pose) and quantity, in words."""
-        return limited.lines(self._layout)
+        """What the guards have limited, one line of text for each axis (or part of a pose) and quantity."""
+        return at.report_lines(self._layout)
 
     def events(self) -> list[Event]:
-        """What happened since the last call, oldest first."""
+        """Get the events since the last call, oldest first."""
         ring, found = self._layout.events, []
         count = ring.count
         for tick in range(max(self._events_seen, count - len(ring.ints)), count):
@@ -210,12 +364,12 @@ class Reader:
         return found
 
     def _check(self) -> None:
-        """Whether more can come.
+        """Check that the loop runs.
 
         Raises:
             ConnectionLost: the loop has ended.
         """
         if self._header[at.STATUS] in (at.Status.ENDED, at.Status.FAILED):
             raise ConnectionLost(
-                f"the FRI loop has ended: {self._layout.trouble.read() or 'its process is gone'}"
+                f"the FRI loop has ended: {self._layout.trouble.read() or 'its process has ended'}"
             )

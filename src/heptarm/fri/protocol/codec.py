@@ -1,19 +1,195 @@
-"""Strict decoding of FRI messages, one table-driven walk for all versions.
+"""Codec of FRI messages for all versions: encoding writes the same bytes as KUKA's sides, decoding is strict.
 
-Strict means: the message id is right, joint arrays have exactly 7 doubles, enumerations have known values,
-names fit 63 characters, at most 10 signals and 5 transformations. Packed and unpacked doubles are both read;
-unknown fields are skipped. The hot path has its own reader in `heptarm.fri.template`.
+The 1 kHz path has its own codec in `heptarm.fri.protocol.fast_codec`.
 """
 
 from __future__ import annotations
 
 import enum
+from collections.abc import Callable
 from typing import TypeVar
 
-from heptarm.fri import messages as m
-from heptarm.fri.messages import JOINTS, MAX_IO, MAX_NAME, MAX_TRANSFORMATIONS
-from heptarm.fri.protobuf import BYTES, FIXED64, VARINT, MalformedMessage, Raw, doubles, fields
-from heptarm.fri.version import COMMAND_ID, MONITORING_ID, Version, unwrap
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.messages import JOINTS, MAX_IO, MAX_NAME, MAX_TRANSFORMATIONS
+from heptarm.fri.protocol.protobuf import (
+    BYTES,
+    FIXED64,
+    VARINT,
+    MalformedMessage,
+    Raw,
+    doubles,
+    fields,
+    put_bytes,
+    put_double,
+    put_packed,
+    put_unpacked,
+    put_varint,
+)
+from heptarm.fri.protocol.version import COMMAND_ID, MONITORING_ID, Version, unwrap, wrap
+
+_T = TypeVar("_T")
+
+
+def _put(tag: int, body: bytes | None) -> bytes:
+    return b"" if body is None else put_bytes(tag, body)
+
+
+def _put_int(tag: int, value: int | None) -> bytes:
+    return b"" if value is None else put_varint(tag, int(value))
+
+
+def _put_joints(tag: int, values: m.Joints | None) -> bytes:
+    if values is None:
+        return b""
+    if len(values) != JOINTS:
+        raise ValueError(f"a joint array must have {JOINTS} values, got {len(values)}")
+    return put_bytes(tag, put_unpacked(1, values))
+
+
+def _put_name(name: str) -> bytes:
+    if not 0 < len(name.encode()) <= MAX_NAME:
+        raise ValueError(f"a name must have 1 to {MAX_NAME} bytes, got {len(name.encode())}: {name!r}")
+    return put_bytes(1, name.encode())
+
+
+def _put_stamp(tag: int, stamp: m.TimeStamp | None) -> bytes:
+    return (
+        b""
+        if stamp is None
+        else put_bytes(tag, put_varint(1, stamp.seconds) + put_varint(2, stamp.nanoseconds))
+    )
+
+
+def _put_transformation(tag: int, value: m.Transformation | None) -> bytes:
+    if value is None:
+        return b""
+    values = put_packed(2, value.values) if value.values else b""
+    return put_bytes(tag, _put_name(value.name) + values + _put_stamp(3, value.stamp))
+
+
+def _put_redundancy(tag: int, value: m.Redundancy | None) -> bytes:
+    return (
+        b"" if value is None else put_bytes(tag, put_varint(1, value.strategy) + put_double(2, value.value))
+    )
+
+
+def _put_io(tag: int, value: m.IoValue) -> bytes:
+    content = (
+        put_double(5, float(value.value))
+        if value.type is m.IoType.ANALOG
+        else put_varint(4, int(value.value))
+    )
+    return put_bytes(
+        tag, _put_name(value.name) + put_varint(2, value.type) + put_varint(3, value.direction) + content
+    )
+
+
+def _put_header(header: m.Header, message_id: int) -> bytes:
+    return put_bytes(
+        1, put_varint(1, message_id) + put_varint(2, header.sequence) + put_varint(3, header.reflected)
+    )
+
+
+def _few(values: tuple[_T, ...], most: int, name: str) -> tuple[_T, ...]:
+    if len(values) > most:
+        raise ValueError(f"a message must have at most {most} {name}, got {len(values)}")
+    return values
+
+
+def _join(values: tuple[_T, ...], put: Callable[[_T], bytes]) -> bytes:
+    return b"".join(put(value) for value in values)
+
+
+def _refuse(condition: object, what: str, version: Version) -> None:
+    if condition:
+        raise ValueError(f"FRI {version.value} cannot carry {what}")
+
+
+def encode_monitoring(message: m.Monitoring, version: Version) -> bytes:
+    """Encode a monitoring message, byte for byte as a controller of this version does.
+
+    Raises:
+        ValueError: the version cannot carry a field, or a name or list is too long.
+    """
+    traits = version.traits
+    parts = [_put_header(message.header, MONITORING_ID)]
+    if (robot := message.robot) is not None:
+        drives = _join(robot.drives, lambda drive: put_varint(5, drive))
+        parts.append(
+            put_bytes(
+                2,
+                _put_int(1, robot.joints)
+                + _put_int(2, robot.safety)
+                + drives
+                + _put_int(6, robot.operation_mode)
+                + _put_int(7, robot.control_mode),
+            )
+        )
+    if (data := message.monitor) is not None:
+        _refuse(data.io and not traits.io, "IO", version)
+        _refuse(data.q_cmd is not None and traits.quaternions, "a commanded joint position", version)
+        _refuse((data.pose or data.redundancy) and not traits.quaternions, "a Cartesian pose", version)
+        _refuse(data.wrench is not None and not traits.framed, "an external force", version)
+        joints = zip((1, 2, 3, 4, 5), (data.q, data.tau, data.q_cmd, data.tau_cmd, data.tau_ext), strict=True)
+        body = b"".join(_put_joints(tag, values) for tag, values in joints)
+        body += _put(6, None if data.wrench is None else put_packed(1, data.wrench))
+        body += _join(_few(data.io, MAX_IO, "IO values"), lambda value: _put_io(8, value))
+        body += (
+            _put_transformation(9, data.pose)
+            + _put_redundancy(10, data.redundancy)
+            + _put_stamp(15, data.stamp)
+        )
+        parts.append(put_bytes(3, body))
+    if (link := message.connection) is not None:
+        parts.append(
+            put_bytes(
+                4,
+                put_varint(1, link.state)
+                + put_varint(2, link.quality)
+                + _put_int(3, link.period_ms)
+                + _put_int(4, link.multiplier),
+            )
+        )
+    if (ipo := message.ipo) is not None:
+        _refuse((ipo.pose or ipo.redundancy) and not traits.quaternions, "a Cartesian pose", version)
+        body = _put_joints(1, ipo.q) + _put_transformation(2, ipo.pose) + _put_redundancy(3, ipo.redundancy)
+        body += _put_int(10, ipo.command_mode) + _put_int(11, ipo.overlay)
+        body += b"" if ipo.tracking is None else put_double(12, ipo.tracking)
+        parts.append(put_bytes(5, body))
+    parts.append(
+        _join(
+            _few(message.requested, MAX_TRANSFORMATIONS, "transformations"),
+            lambda value: _put_transformation(6, value),
+        )
+    )
+    return wrap(b"".join(parts), version)
+
+
+def encode_command(message: m.Command, version: Version) -> bytes:
+    """Encode a command message, byte for byte as a client of this version does.
+
+    Raises:
+        ValueError: the version cannot carry a field, or a name, list or joint array has the wrong length.
+    """
+    traits = version.traits
+    _refuse(message.io and not traits.io, "IO", version)
+    _refuse((message.pose or message.redundancy) and not traits.quaternions, "a Cartesian pose", version)
+    if message.wrench is not None and len(message.wrench) != 6:
+        raise ValueError(f"a wrench must have 6 values, got {len(message.wrench)}")
+    body = (
+        _put_joints(1, message.q)
+        + _put(2, None if message.wrench is None else put_packed(1, message.wrench))
+        + _put_joints(3, message.tau)
+    )
+    body += _join(
+        _few(message.transformations, MAX_TRANSFORMATIONS, "transformations"),
+        lambda value: _put_transformation(4, value),
+    )
+    body += _join(_few(message.io, MAX_IO, "IO values"), lambda value: _put_io(5, value))
+    body += _put_transformation(6, message.pose) + _put_redundancy(7, message.redundancy)
+    header = _put_header(message.header, COMMAND_ID)
+    return wrap(header + (put_bytes(2, body) if body else b""), version)
+
 
 _E = TypeVar("_E", bound=enum.IntEnum)
 _Collected = dict[int, list[tuple[int, Raw]]]
@@ -27,12 +203,12 @@ def _collect(data: bytes) -> _Collected:
 
 
 def _last(found: _Collected, tag: int, kind: int, name: str) -> Raw | None:
-    """The last occurrence of a field, as proto2 says; None if absent."""
+    """Get the last occurrence of a field, as proto2 requires; None if absent."""
     if tag not in found:
         return None
     seen, value = found[tag][-1]
     if seen != kind:
-        raise MalformedMessage(f"FRI message: {name} has wire type {seen}, {kind} is legal")
+        raise MalformedMessage(f"FRI message: the wire type of {name} must be {kind}, got {seen}")
     return value
 
 
@@ -42,10 +218,10 @@ def _integer(found: _Collected, tag: int, name: str) -> int | None:
 
 
 def _word(found: _Collected, tag: int, name: str) -> int | None:
-    """An integer of 32 bits."""
+    """Get an integer of 32 bits."""
     value = _integer(found, tag, name)
     if value is not None and value >> 32:
-        raise MalformedMessage(f"FRI message: {name} is {value}, which is more than 32 bits hold")
+        raise MalformedMessage(f"FRI message: {name} must be below 2**32, got {value}")
     return value
 
 
@@ -63,7 +239,7 @@ def _member(found: _Collected, tag: int, kind: type[_E], name: str) -> _E | None
         return kind(value)
     except ValueError:
         raise MalformedMessage(
-            f"FRI message: {name} is {value}; legal are {', '.join(str(int(v)) for v in kind)}"
+            f"FRI message: {name} must be one of {', '.join(str(int(v)) for v in kind)}, got {value}"
         ) from None
 
 
@@ -75,10 +251,10 @@ def _sub(found: _Collected, tag: int, name: str) -> _Collected | None:
 def _subs(found: _Collected, tag: int, name: str, most: int) -> list[_Collected]:
     chunks = found.get(tag, [])
     if len(chunks) > most:
-        raise MalformedMessage(f"FRI message: {len(chunks)} {name}, at most {most} are legal")
+        raise MalformedMessage(f"FRI message: there must be at most {most} {name}, got {len(chunks)}")
     for kind, value in chunks:
         if kind != BYTES or not isinstance(value, bytes):
-            raise MalformedMessage(f"FRI message: {name} has wire type {kind}")
+            raise MalformedMessage(f"FRI message: the wire type of {name} must be {BYTES}, got {kind}")
     return [_collect(value) for _, value in chunks if isinstance(value, bytes)]
 
 
@@ -102,7 +278,7 @@ def _name(found: _Collected) -> str:
         raise MalformedMessage("FRI message: a name is not UTF-8") from None
     if len(name) > MAX_NAME:
         raise MalformedMessage(
-            f"FRI message: the name {name[:20]!r}… has {len(name)} characters, at most {MAX_NAME} are legal"
+            f"FRI message: a name must have at most {MAX_NAME} characters, got {len(name)}: {name[:20]!r}…"
         )
     return name
 
@@ -124,8 +300,8 @@ def _transformation(found: _Collected, *, quaternion: bool) -> m.Transformation:
     )
 
 
-def _wanted(found: _Collected, *, quaternion: bool) -> m.Transformation:
-    """A requested transformation: its values may be absent."""
+def _request(found: _Collected, *, quaternion: bool) -> m.Transformation:
+    """Decode a requested transformation, whose values may be absent."""
     size = 7 if quaternion else 12
     return m.Transformation(
         _name(found), doubles(found.get(2, []), "a transformation", most=size), _stamp(found, 3)
@@ -158,13 +334,13 @@ def _io(found: _Collected) -> m.IoValue:
     return m.IoValue(_name(found), kind, direction, 0 if value is None else value)
 
 
-def _header(found: _Collected, wanted: int) -> m.Header:
+def _header(found: _Collected, expected: int) -> m.Header:
     sub = _sub(found, 1, "header")
     if sub is None:
         raise MalformedMessage("FRI message: no header")
     seen = _word(sub, 1, "message id")
-    if seen != wanted:
-        raise MalformedMessage(f"FRI message: id is {seen}, {wanted} is legal here")
+    if seen != expected:
+        raise MalformedMessage(f"FRI message: the id must be {expected}, got {seen}")
     return m.Header(
         _needed(_word(sub, 2, "sequence"), "sequence"), _needed(_word(sub, 3, "reflected"), "reflected")
     )
@@ -173,10 +349,10 @@ def _header(found: _Collected, wanted: int) -> m.Header:
 def _robot(sub: _Collected) -> m.RobotInfo:
     drives: list[m.DriveState] = []
     for kind, value in sub.get(5, []):
-        octets = value if isinstance(value, bytes) else bytes([value & 0xFF])
-        if kind not in (VARINT, BYTES) or any(octet > max(m.DriveState) for octet in octets):
+        states = value if isinstance(value, bytes) else bytes([value & 0xFF])
+        if kind not in (VARINT, BYTES) or any(state > max(m.DriveState) for state in states):
             raise MalformedMessage("FRI message: unknown drive state")
-        drives.extend(m.DriveState(octet) for octet in octets)
+        drives.extend(m.DriveState(state) for state in states)
     return m.RobotInfo(
         joints=_integer(sub, 1, "number of joints"),
         safety=_member(sub, 2, m.Safety, "safety state"),
@@ -223,10 +399,10 @@ def _connection(sub: _Collected) -> m.ConnectionInfo:
 
 
 def decode_monitoring(datagram: bytes, version: Version) -> m.Monitoring:
-    """Decode a controller's datagram.
+    """Decode a datagram of the controller.
 
     Raises:
-        MalformedMessage: it is not a legal monitoring message of this version; the text says why.
+        MalformedMessage: it is not a legal monitoring message of this version; the text names the cause.
     """
     found = _collect(unwrap(datagram, version))
     robot, monitor, connection, ipo = (
@@ -241,17 +417,17 @@ def decode_monitoring(datagram: bytes, version: Version) -> m.Monitoring:
         connection=None if connection is None else _connection(connection),
         ipo=None if ipo is None else _ipo(ipo),
         requested=tuple(
-            _wanted(one, quaternion=quaternion)
+            _request(one, quaternion=quaternion)
             for one in _subs(found, 6, "transformations", MAX_TRANSFORMATIONS)
         ),
     )
 
 
 def decode_command(datagram: bytes, version: Version) -> m.Command:
-    """Decode a client's datagram.
+    """Decode a datagram of the client.
 
     Raises:
-        MalformedMessage: it is not a legal command message of this version; the text says why.
+        MalformedMessage: it is not a legal command message of this version; the text names the cause.
     """
     found = _collect(unwrap(datagram, version))
     header = _header(found, COMMAND_ID)

@@ -1,8 +1,9 @@
-"""The hot path of FRI: fixed layouts for the datagrams that pass a thousand times a second.
+"""Codec of the 1 kHz path of FRI: fixed layouts for the frequent datagrams.
 
-`CommandTemplate` writes a joint (and torque or wrench) command; `MonitoringReader` reads the joint arrays of a
-monitoring message in one `struct` call and compares all that seldom changes (robot info, connection, keys) with
-the message before. Both agree with `heptarm.fri.codec`, on which the reader falls back as soon as anything differs.
+`CommandTemplate` writes a joint (and torque or wrench) command. `MonitoringReader` reads the joint arrays of a
+monitoring message in one `struct` call and compares what seldom changes (robot info, connection, keys) with the
+previous message. Both agree with `heptarm.fri.protocol.codec`, to which the reader falls back when anything else
+differs.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ import zlib
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.fri import codec
-from heptarm.fri import messages as m
-from heptarm.fri.protobuf import (
+from heptarm.fri.protocol import codec
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.protobuf import (
     MalformedMessage,
     fields,
     put_bytes,
@@ -26,7 +27,7 @@ from heptarm.fri.protobuf import (
     read_varint,
     varint,
 )
-from heptarm.fri.version import COMMAND_ID, MONITORING_ID, Version, unwrap
+from heptarm.fri.protocol.version import COMMAND_ID, MONITORING_ID, Version, unwrap
 
 _ZERO = (0.0,) * 7
 _COMMAND_HEAD = put_varint(1, COMMAND_ID) + b"\x10"  # then sequence, 0x18, reflected
@@ -36,7 +37,7 @@ Floats = npt.NDArray[np.float64]
 
 
 class CommandTemplate:
-    """Encodes commands with a fixed set of fields.
+    """Encoder of commands with a fixed set of fields.
 
     Args:
         version: wire format.
@@ -68,7 +69,7 @@ class CommandTemplate:
         self.wrench: Floats | None = np.ndarray(6, "<f8", self._body, shift + wrench_at) if wrench else None
 
     def encode(self, sequence: int, reflected: int) -> bytes:
-        """The datagram with the arrays' present content."""
+        """Encode the current content of the arrays."""
         counters = varint(sequence) + b"\x18" + varint(reflected)
         head = bytes((0x0A, len(_COMMAND_HEAD) + len(counters))) + _COMMAND_HEAD + counters
         message = head + self._body
@@ -78,7 +79,7 @@ class CommandTemplate:
 
 
 class Sample:
-    """What a control law needs of one monitoring message, without the cost of the full value.
+    """Values of a monitoring message that a control law needs, without the cost of decoding all of it.
 
     Joint arrays are tuples of 7, None where the message has none: `q`, `tau`, `q_cmd`, `tau_cmd`, `tau_ext`, `q_ipo`.
 
@@ -124,19 +125,19 @@ class Sample:
 
     @property
     def is_full(self) -> bool:
-        """The full value is there already; else it has no signals, no poses of its own and no requests."""
+        """Whether the message is decoded in full; otherwise it has no signals, poses or requests."""
         return self._full is not None
 
     @property
     def message(self) -> m.Monitoring:
-        """The full value, decoded on demand."""
+        """Full message, decoded when first needed."""
         if self._full is None:
             self._full = codec.decode_monitoring(self._datagram, self._version)
         return self._full
 
 
 def _sample(datagram: bytes, version: Version, full: m.Monitoring) -> Sample:
-    """The sample of a fully decoded message."""
+    """Make the sample of a fully decoded message."""
     sample = Sample()
     monitor, ipo = full.monitor or m.MonitorData(), full.ipo or m.IpoData()
     sample._datagram, sample._version, sample._full = datagram, version, full
@@ -149,16 +150,16 @@ def _sample(datagram: bytes, version: Version, full: m.Monitoring) -> Sample:
 
 
 def _varint_at(data: bytes, pos: int) -> tuple[int, int]:
-    """A varint of a datagram that is long enough for any; small ones first, they are the most."""
-    octet = data[pos]
-    return (octet, pos + 1) if octet < 0x80 else read_varint(data, pos, len(data))
+    """Read a varint of a datagram that is long enough for any; the fast case is one byte."""
+    byte = data[pos]
+    return (byte, pos + 1) if byte < 0x80 else read_varint(data, pos, len(data))
 
 
 class _Layout:
-    """Where everything stands in a message whose arrays are KUKA's, and what must not differ from the one before.
+    """Places of all fields in a message as KUKA writes it, and the bytes to compare.
 
-    Holds for: header, robot info, monitor data of joint arrays and a stamp, connection, ipo data of a joint array and
-    enumerations. Anything else (IO, poses, transformations) has no layout and is decoded in full.
+    For messages with header, robot info, monitor data of joint arrays and a stamp, connection, ipo data of a joint
+    array and enumerations. Messages with IO, poses or transformations have no layout and are decoded in full.
     """
 
     _ARRAYS = ((1, "q"), (2, "tau"), (3, "q_cmd"), (4, "tau_cmd"), (5, "tau_ext"))
@@ -175,7 +176,7 @@ class _Layout:
         names = [name for _, name in self._ARRAYS]
         present = [tag for tag, name in self._ARRAYS if getattr(monitor, name) is not None]
         arrays = b"".join(put_bytes(tag, put_unpacked(1, _ZERO)) for tag in present)
-        if monitor.io or monitor.wrench or monitor.pose or monitor.redundancy:  # nothing stays where it was
+        if monitor.io or monitor.wrench or monitor.pose or monitor.redundancy:  # variable positions
             raise MalformedMessage("no fixed layout")
         tracked = ipo is not None and ipo.tracking is not None
         ipo_array = put_bytes(1, put_unpacked(1, _ZERO)) if ipo is not None and ipo.q is not None else b""
@@ -196,7 +197,7 @@ class _Layout:
         self._has_ipo, self._tracked = bool(ipo_array), tracked
 
     def read(self, message: bytes, datagram: bytes) -> Sample | None:
-        """The sample of a message of this layout; None if it differs in anything that must be equal."""
+        """Read a message of this layout; None if it differs in anything that must be equal."""
         if message[0] != 0x0A or message[2:8] != _MONITORING_HEAD:
             return None
         sequence, pos = _varint_at(message, 8)
@@ -242,7 +243,7 @@ class _Layout:
 
 
 def _struct_of(body: bytes, doubles: int) -> tuple[struct.Struct, tuple[bytes, ...]]:
-    """A struct that reads `body` as runs of fixed octets around `doubles` zeroed doubles; and the runs."""
+    """Make a struct that reads `body` as fixed runs around `doubles` zeroed doubles; return it and the runs."""
     runs: list[bytes] = []
     rest = body
     for _ in range(doubles):
@@ -253,10 +254,10 @@ def _struct_of(body: bytes, doubles: int) -> tuple[struct.Struct, tuple[bytes, .
 
 
 class MonitoringReader:
-    """Decodes the monitoring messages of one session.
+    """Decoder of the monitoring messages of one session.
 
-    The first message of a layout is decoded in full. As long as everything but counters, stamps and doubles stays
-    the same, later ones are read from their known places; any difference goes the full way again.
+    The first message of a layout is decoded in full. As long as only counters, stamps and doubles change, later ones
+    are read from known positions; on any other difference a message is decoded in full again.
     """
 
     def __init__(self, version: Version) -> None:
@@ -264,7 +265,7 @@ class MonitoringReader:
         self._layout: _Layout | None = None
 
     def read(self, datagram: bytes) -> Sample:
-        """Decode a controller's datagram.
+        """Decode a datagram of the controller.
 
         Raises:
             MalformedMessage: it is not a legal monitoring message of this version.
@@ -272,10 +273,7 @@ class MonitoringReader:
         if self._layout is not None:
             try:
                 sample = self._layout.read(unwrap(datagram, self._version), datagram)
-            except (
-                IndexError,
-                struct.error,
-            ):  # shorter than the layout: the full decoder names what is wrong
+            except (IndexError, struct.error):  # shorter than the layout: the full decoder names the defect
                 sample = None
             if sample is not None:
                 return sample

@@ -1,7 +1,7 @@
-"""The values of an FRI exchange, the same for every version; what a version lacks stays None.
+"""Messages of FRI as values, the same for every version; a field that a version lacks is None.
 
-Units are FRI's own (rad, Nm, N, and millimetres in transformations), since these values are the wire's; the
-client turns them into SI. Joint arrays have 7 entries.
+Units are those on the wire (rad, Nm, N, and millimetres in transformations); the client converts them to SI. Joint
+arrays have 7 entries.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ Joints = tuple[float, ...]
 JOINTS = 7
 MAX_IO = 10
 MAX_TRANSFORMATIONS = 5
-#: Characters of a name.
+#: Largest length of a name.
 MAX_NAME = 63
 
 
@@ -29,7 +29,7 @@ class SessionState(enum.IntEnum):
 
 
 class Quality(enum.IntEnum):
-    """Quality of the connection, as the controller judges it."""
+    """Quality of the connection, as the controller rates it."""
 
     POOR = 0
     FAIR = 1
@@ -63,7 +63,7 @@ class DriveState(enum.IntEnum):
 
 
 class ControlMode(enum.IntEnum):
-    """Control mode under the overlay."""
+    """Control mode of the motion under the overlay."""
 
     POSITION = 0
     CARTESIAN_IMPEDANCE = 1
@@ -72,7 +72,7 @@ class ControlMode(enum.IntEnum):
 
 
 class CommandMode(enum.IntEnum):
-    """What the client commands. POSITION is called JOINT_POSITION from 2.x on."""
+    """Quantity that the client commands. POSITION is called JOINT_POSITION from 2.x on."""
 
     NO_COMMAND = 0
     POSITION = 1
@@ -105,7 +105,7 @@ class IoDirection(enum.IntEnum):
 
 
 class RedundancyStrategy(enum.IntEnum):
-    """How the redundancy value is meant."""
+    """Meaning of the redundancy value."""
 
     E1 = 0
     NONE = 4
@@ -113,7 +113,7 @@ class RedundancyStrategy(enum.IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """Counters of the exchange: own, and the last one heard from the other side."""
+    """Counters of the messages: the sender's, and the last one received from the other side."""
 
     sequence: int
     reflected: int
@@ -121,7 +121,7 @@ class Header:
 
 @dataclass(frozen=True, slots=True)
 class TimeStamp:
-    """Controller's clock, UNIX epoch."""
+    """Time of the controller's clock, UNIX epoch."""
 
     seconds: int
     nanoseconds: int
@@ -156,7 +156,7 @@ class IoValue:
 
 @dataclass(frozen=True, slots=True)
 class RobotInfo:
-    """What the controller says of itself."""
+    """State of the robot."""
 
     joints: int | None = None
     safety: Safety | None = None
@@ -177,7 +177,7 @@ class ConnectionInfo:
 
 @dataclass(frozen=True, slots=True)
 class MonitorData:
-    """Measured side. `q_cmd` exists in 1.x only, `pose` and `redundancy` in 2.x, `wrench` in 2.7."""
+    """Measured values. `q_cmd` exists in 1.x only, `pose` and `redundancy` in 2.x, `wrench` in 2.7."""
 
     q: Joints | None = None
     tau: Joints | None = None
@@ -193,7 +193,7 @@ class MonitorData:
 
 @dataclass(frozen=True, slots=True)
 class IpoData:
-    """Interpolator side: what the overlay is laid on."""
+    """Values of the interpolator, to which the overlay is added."""
 
     q: Joints | None = None
     pose: Transformation | None = None
@@ -205,7 +205,7 @@ class IpoData:
 
 @dataclass(frozen=True, slots=True)
 class Monitoring:
-    """Controller to client, once per send period."""
+    """Message from the controller to the client, once per send period."""
 
     header: Header
     robot: RobotInfo | None = None
@@ -217,7 +217,7 @@ class Monitoring:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """Client to controller, in answer to a monitoring message."""
+    """Message from the client to the controller, in answer to a monitoring message."""
 
     header: Header
     q: Joints | None = None

@@ -1,6 +1,6 @@
-"""The part of the protobuf wire format that FRI uses: varints, doubles, 32-bit words and length-delimited fields.
+"""Part of the protobuf wire format that FRI uses: varints, doubles, 32-bit words and length-delimited fields.
 
-Source of the encoding: the public description of the protocol-buffers wire format (proto2). Bytes in, values out.
+After the public description of the protocol-buffers wire format (proto2).
 """
 
 from __future__ import annotations
@@ -14,37 +14,37 @@ VARINT, FIXED64, BYTES, FIXED32 = 0, 1, 2, 5
 
 _DOUBLE = struct.Struct("<d")
 
-#: A field's value as it stands on the wire: an int (varint, 32 bit) or the octets (64 bit, length-delimited).
+#: Value of a field on the wire: an int (varint, 32 bit) or bytes (64 bit, length-delimited).
 Raw = int | bytes
 
 
 class MalformedMessage(RemoteProtocolError):
-    """Octets that are not a legal FRI message; the text says where and why."""
+    """The bytes are not a legal FRI message; the text names the place and the cause."""
 
 
 def read_varint(data: bytes, pos: int, end: int) -> tuple[int, int]:
-    """Read one varint (at most 64 bit) at `pos`; returns it and the position behind it.
+    """Read a varint (at most 64 bit) at `pos`; return it and the position behind it.
 
     Raises:
-        MalformedMessage: it runs over `end` or is longer than ten octets.
+        MalformedMessage: it extends beyond `end` or is longer than ten bytes.
     """
     value = shift = 0
     while pos < end:
-        octet = data[pos]
+        byte = data[pos]
         pos += 1
-        value |= (octet & 0x7F) << shift
-        if octet < 0x80:
+        value |= (byte & 0x7F) << shift
+        if byte < 0x80:
             if value >> 64:
                 break
             return value, pos
         shift += 7
         if shift > 63:
             break
-    raise MalformedMessage(f"FRI message: varint at octet {pos} is cut or too long")
+    raise MalformedMessage(f"FRI message: the varint that ends at byte {pos} is incomplete or too long")
 
 
 def varint(value: int) -> bytes:
-    """The varint of a non-negative integer."""
+    """Encode a non-negative integer as a varint."""
     out = bytearray()
     while value > 0x7F:
         out.append(value & 0x7F | 0x80)
@@ -54,10 +54,10 @@ def varint(value: int) -> bytes:
 
 
 def fields(data: bytes, pos: int = 0, end: int | None = None) -> Iterator[tuple[int, int, Raw]]:
-    """Walk the fields of a message: tag, wire type, value; unknown fields are the caller's to skip.
+    """Iterate over the fields of a message: tag, wire type, value; the caller skips unknown fields.
 
     Raises:
-        MalformedMessage: a field is cut, or its wire type is none that protobuf knows.
+        MalformedMessage: a field is incomplete, or its wire type is unknown.
     """
     end = len(data) if end is None else end
     while pos < end:
@@ -74,10 +74,10 @@ def fields(data: bytes, pos: int = 0, end: int | None = None) -> Iterator[tuple[
         elif kind == FIXED32:
             size = 4
         else:
-            raise MalformedMessage(f"FRI message: field {tag} at octet {pos} has wire type {kind}")
+            raise MalformedMessage(f"FRI message: field {tag} at byte {pos} has the unknown wire type {kind}")
         if tag == 0 or pos + size > end:
             raise MalformedMessage(
-                f"FRI message: field {tag} at octet {pos} is cut ({size} octets wanted, {end - pos} left)"
+                f"FRI message: field {tag} at byte {pos} is incomplete ({size} bytes expected, {end - pos} left)"
             )
         chunk = data[pos : pos + size]
         pos += size
@@ -87,12 +87,12 @@ def fields(data: bytes, pos: int = 0, end: int | None = None) -> Iterator[tuple[
 def doubles(
     chunks: list[tuple[int, Raw]], name: str, *, exactly: int | None = None, most: int | None = None
 ) -> tuple[float, ...]:
-    """The doubles of a repeated field, packed or not.
+    """Decode the doubles of a repeated field, packed or not.
 
     Args:
         chunks: wire type and value of each occurrence.
         name: of the field, for the error.
-        exactly: number of doubles wanted.
+        exactly: required number of doubles.
         most: largest number allowed.
 
     Raises:
@@ -101,41 +101,41 @@ def doubles(
     values: list[float] = []
     for kind, chunk in chunks:
         if not isinstance(chunk, bytes) or kind not in (FIXED64, BYTES) or len(chunk) % 8:
-            raise MalformedMessage(f"FRI message: {name} is not made of doubles")
+            raise MalformedMessage(f"FRI message: {name} must consist of doubles")
         values.extend(struct.unpack(f"<{len(chunk) // 8}d", chunk))
     if exactly is not None and len(values) != exactly:
-        raise MalformedMessage(f"FRI message: {name} has {len(values)} values, exactly {exactly} are legal")
+        raise MalformedMessage(f"FRI message: {name} must have {exactly} values, got {len(values)}")
     if most is not None and len(values) > most:
-        raise MalformedMessage(f"FRI message: {name} has {len(values)} values, at most {most} are legal")
+        raise MalformedMessage(f"FRI message: {name} must have at most {most} values, got {len(values)}")
     return tuple(values)
 
 
 def key(tag: int, kind: int) -> bytes:
-    """The key octets of a field."""
+    """Encode the key of a field."""
     return varint(tag << 3 | kind)
 
 
 def put_varint(tag: int, value: int) -> bytes:
-    """A varint field."""
+    """Encode a varint field."""
     return key(tag, VARINT) + varint(value)
 
 
 def put_double(tag: int, value: float) -> bytes:
-    """A double field."""
+    """Encode a double field."""
     return key(tag, FIXED64) + _DOUBLE.pack(value)
 
 
 def put_bytes(tag: int, value: bytes) -> bytes:
-    """A length-delimited field."""
+    """Encode a length-delimited field."""
     return key(tag, BYTES) + varint(len(value)) + value
 
 
 def put_unpacked(tag: int, values: tuple[float, ...]) -> bytes:
-    """A repeated double field, one key per value, as KUKA's joint arrays are written."""
+    """Encode a repeated double field with one key per value, as in KUKA's joint arrays."""
     head = key(tag, FIXED64)
     return b"".join(head + _DOUBLE.pack(value) for value in values)
 
 
 def put_packed(tag: int, values: tuple[float, ...]) -> bytes:
-    """A repeated double field in one run."""
+    """Encode a packed repeated double field."""
     return put_bytes(tag, struct.pack(f"<{len(values)}d", *values))

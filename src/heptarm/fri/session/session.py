@@ -1,30 +1,57 @@
-"""The client's side of an FRI session, sans IO: datagrams and times in, answers and events out.
-
-The controller leads: it names the session state in every message and the client answers every multiplier-th one.
-`receive` takes a datagram; if it says that an answer is due, `answer` makes it: nothing in IDLE, a bare header (1.x:
-the commanded position too) while monitoring, a mirror of the interpolator in COMMANDING_WAIT, and the given setpoint,
-with all that the client command mode needs, in COMMANDING_ACTIVE. Outputs and transformations go with any of them. A
-session may end and another begin at any time.
-"""
+"""State machine of a client's session: it tracks state, quality, counters and lost messages."""
 
 from __future__ import annotations
 
+import enum
 import math
+from dataclasses import dataclass
 
-from heptarm.fri import messages as m
-from heptarm.fri.answers import Answers
-from heptarm.fri.event import Event, Kind
-from heptarm.fri.protobuf import MalformedMessage, read_varint
-from heptarm.fri.setpoint import NOTHING, Setpoint
-from heptarm.fri.statistics import Counters, Histogram
-from heptarm.fri.template import MonitoringReader, Sample
-from heptarm.fri.version import Version, recognise
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.fast_codec import MonitoringReader, Sample
+from heptarm.fri.protocol.protobuf import MalformedMessage, read_varint
+from heptarm.fri.protocol.version import Version, recognise
+from heptarm.fri.session.answers import NOTHING, Answers, Setpoint
+from heptarm.fri.session.statistics import Counters, Histogram
 
-#: A counter that goes back by no more than this is a message overtaken on its way, else the controller began anew.
-OVERTAKEN = 64
-#: After this long without a message, a lower counter means a new session in any case [ns].
-SILENCE = 500_000_000
-#: Events kept until somebody takes them.
+
+class Kind(enum.Enum):
+    """Subject of an event."""
+
+    STATE = "state"
+    QUALITY = "quality"
+    VERSION = "version"
+    WRONG_VERSION = "wrong version"
+    MALFORMED = "malformed"
+    LOST = "lost"
+    DUPLICATED = "duplicated"
+    REORDERED = "reordered"
+    RESTARTED = "restarted"
+    COMMAND_MODE = "command mode"
+    SAFETY = "safety"
+    NO_IPO = "no interpolator position"
+    CLIENT = "client"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Event of a session.
+
+    Attributes:
+        kind: subject.
+        text: description.
+        at: time of the client's clock [ns].
+    """
+
+    kind: Kind
+    text: str
+    at: int
+
+
+#: Largest decrease of the counter that counts as a reordered message; a larger one is a restart of the controller.
+MAX_REORDERED = 64
+#: After this long without a message, a lower counter always means a new session [ns].
+MAX_GAP = 500_000_000
+#: Largest number of events kept until they are read.
 MAX_EVENTS = 256
 
 _WRAP = 1 << 32
@@ -32,23 +59,23 @@ _QUALITIES = ("poor", "fair", "good", "excellent")
 
 
 class Session:
-    """Client of one controller, over any number of its sessions.
+    """State of one controller as its client sees it, over any number of sessions.
 
     Args:
         version: wire format; None takes it from the first datagram.
-        counters: where to count; None for own ones.
-        latency: receipt to answer; None for an own histogram.
-        jitter: deviation of the messages' distance from the send period; None for an own histogram.
+        counters: counters to use; None creates them.
+        latency: histogram of the times from receipt to answer; None creates one.
+        jitter: histogram of the deviations from the send period; None creates one.
 
     Attributes:
-        version: wire format; None until it is known.
-        state: as the last message said; IDLE before the first one.
-        quality: as the last message said.
-        mode: client command mode of the last message.
+        version: wire format; None until the first message.
+        state: state in the last message; IDLE before the first one.
+        quality: quality in the last message.
+        mode: client command mode in the last message.
         sample: the last message; None before the first one.
-        period: send period [ns], 0 until known.
-        is_due: the last message wants an answer.
-        trouble: why no session stands, in words; empty if one does.
+        period: send period [ns]; 0 before the first message.
+        is_due: whether the last message has to be answered.
+        trouble: why there is no session, as text; empty if there is one.
     """
 
     def __init__(
@@ -59,16 +86,16 @@ class Session:
         latency: Histogram | None = None,
         jitter: Histogram | None = None,
     ) -> None:
-        self._wanted = version
+        self._configured = version
         self.counters = counters or Counters()
         self.latency = latency or Histogram()
         self.jitter = jitter or Histogram()
-        self.sent = 0  # counter of the next command
+        self.sent = 0  # counter of the next answer
         self._events: list[Event] = []
         self.restart()
 
     def restart(self) -> None:
-        """Forget the controller, as after a change of address; counts stay."""
+        """Forget the controller, for example after a change of its address; keep the counts."""
         self.version: Version | None = None
         self.state = m.SessionState.IDLE
         self.quality = m.Quality.POOR
@@ -76,39 +103,39 @@ class Session:
         self.sample: Sample | None = None
         self.period = 0
         self.is_due = False
-        self.trouble = "nothing has arrived from a controller yet"
-        self.received = 0  # when the last message came
+        self.trouble = "no message received from a controller yet"
+        self.received = 0  # time of the last message
         self.waiting = 0  # messages since the last answer
-        self.reflected = -1  # our counter, as the controller knows it
+        self.reflected = -1  # counter of the last answer that the controller has received
         self._safety: m.Safety | None = None
         self._reader: MonitoringReader | None = None
         self._answers: Answers | None = None
 
     @property
     def multiplier(self) -> int:
-        """Every how manieth message is answered."""
+        """Number of messages per answer."""
         link = self.sample.connection if self.sample is not None else None
         return max(1, (link.multiplier or 1) if link is not None else 1)
 
     @property
     def is_commanding(self) -> bool:
-        """Commands are effective."""
+        """Whether commands are effective."""
         return self.state is m.SessionState.COMMANDING_ACTIVE
 
     def events(self) -> list[Event]:
-        """What happened since the last call, oldest first; at most 256, later ones are dropped."""
+        """Get the events since the last call, oldest first; at most 256, later ones are dropped."""
         taken, self._events = self._events, []
         return taken
 
     def receive(self, datagram: bytes, now: int) -> Sample | None:
-        """Take a datagram of the controller.
+        """Decode a datagram of the controller.
 
         Args:
-            datagram: its octets.
-            now: the client's clock at its receipt [ns].
+            datagram: the datagram.
+            now: time of receipt, client's clock [ns].
 
         Returns:
-            The message if it is the newest one; None if it is to be ignored, with an event that says why.
+            The message if it is the newest one; None if it is ignored, with an event that gives the reason.
         """
         self.is_due = False
         try:
@@ -116,15 +143,15 @@ class Session:
         except MalformedMessage as error:
             self.counters.malformed += 1
             if not _is_legal(datagram):
-                self._tell(Kind.MALFORMED, str(error), now)
-            elif self.trouble != str(error):  # told once, not a thousand times a second
+                self._report(Kind.MALFORMED, str(error), now)
+            elif self.trouble != str(error):  # once, not in every cycle
                 self.trouble = str(error)
-                self._tell(Kind.WRONG_VERSION, self.trouble, now)
+                self._report(Kind.WRONG_VERSION, self.trouble, now)
             return None
         if not self._count(sample, now):
             return None
         link = sample.connection
-        if link is None:  # a legal message of a controller that has no session
+        if link is None:  # a legal message of a controller without a session
             self._enter(m.SessionState.IDLE, now)
         else:
             self.period = (link.period_ms or 0) * 1_000_000
@@ -133,9 +160,9 @@ class Session:
             if link.state is not self.state:
                 self._enter(link.state, now)
             if link.quality is not self.quality:
-                self._tell(Kind.QUALITY, f"quality {self.quality.name} -> {link.quality.name}", now)
+                self._report(Kind.QUALITY, f"quality {self.quality.name} -> {link.quality.name}", now)
                 self.quality = link.quality
-        self._look(sample, datagram, now)
+        self._detect_changes(sample, datagram, now)
         self.sample, self.received, self.trouble = sample, now, ""
         if self.state is not m.SessionState.IDLE:
             self.waiting += 1
@@ -145,30 +172,30 @@ class Session:
         return sample
 
     def answer(self, setpoint: Setpoint = NOTHING) -> bytes | None:
-        """The answer to the last message; None if none is due.
+        """Make the answer to the last message; None if none is due.
 
         Raises:
-            CommandRejected: the setpoint names outputs or transformations that the controller does not offer.
+            CommandRejected: the session lacks an output or a transformation of the setpoint.
         """
         sample = self.sample
         if not self.is_due or sample is None or self._answers is None:
             return None
         if not setpoint.is_plain:
             setpoint.check(sample.message)
-        octets = self._answers.make(
+        answer = self._answers.make(
             sample, setpoint, m.Header(self.sent, sample.sequence), state=self.state, mode=self.mode
         )
-        if self._answers.lack:
-            self._tell(Kind.NO_IPO, self._answers.lack, self.received)
+        if self._answers.missing:
+            self._report(Kind.NO_IPO, self._answers.missing, self.received)
         self.sent = (self.sent + 1) % _WRAP
         self.waiting, self.is_due = 0, False
         self.counters.answered += 1
         if self.is_commanding:
             self.counters.commanded += 1
-        return octets
+        return answer
 
     def answered(self, now: int) -> None:
-        """The answer has left at `now` [ns]."""
+        """Note that the answer was sent at `now` [ns]."""
         self.latency.add(now - self.received)
 
     # ------------------------------------------------------------------------------------------ receiving
@@ -180,18 +207,18 @@ class Session:
             try:
                 sample = self._reader.read(datagram)
             except MalformedMessage:
-                # another application may have been started on the controller, with another version
-                if self._wanted is not None or recognise(datagram) is self.version:
+                # the controller may have started another application with another version
+                if self._configured is not None or recognise(datagram) is self.version:
                     raise
                 sample = self._begin(datagram, now)
         for values in (sample.q, sample.q_ipo):
             if values is not None and not math.isfinite(sum(values)):
-                raise MalformedMessage("FRI message: a joint position is not finite")
+                raise MalformedMessage("FRI message: joint positions must be finite")
         return sample
 
     def _begin(self, datagram: bytes, now: int) -> Sample:
-        """The first datagram: find or check its version."""
-        version = recognise(datagram) if self._wanted is None else self._wanted
+        """Read the first datagram; find or check its version."""
+        version = recognise(datagram) if self._configured is None else self._configured
         reader = MonitoringReader(version)
         sample = reader.read(datagram)
         full = sample.message
@@ -203,51 +230,53 @@ class Session:
             spoken = "2.5"
         if spoken is not None:
             raise MalformedMessage(
-                f"the controller speaks FRI {spoken}, this client was told {version.value}: "
-                "give the client the controller's version, or none to take it from the first datagram"
+                f"the controller speaks FRI {spoken}, this client is set to {version.value}: "
+                "set the client to the controller's version, or leave the version out to recognise it"
             )
         if version is not self.version:
-            self._tell(Kind.VERSION, f"the controller speaks FRI {version.value}", now)
+            self._report(Kind.VERSION, f"the controller speaks FRI {version.value}", now)
         self.version, self._reader, self._answers = version, reader, Answers(version)
         return sample
 
     def _count(self, sample: Sample, now: int) -> bool:
-        """Whether a message is newer than the last; counts those that were lost, came twice or too late."""
+        """Whether a message is newer than the last; count lost, duplicated and reordered ones."""
         counts, last = self.counters, self.sample
         counts.received += 1
         if last is None:
             return True
         step = (sample.sequence - last.sequence) % _WRAP
         interval = now - self.received
-        if step == 0 and interval < SILENCE:
+        if step == 0 and interval < MAX_GAP:
             counts.duplicated += 1
-            self._tell(Kind.DUPLICATED, f"message {sample.sequence} came twice", now)
+            self._report(Kind.DUPLICATED, f"message {sample.sequence} received twice", now)
             return False
         if 0 < step < _WRAP // 2:
             if step > 1:
                 counts.lost += step - 1
-                self._tell(Kind.LOST, f"{step - 1} messages before {sample.sequence} are missing", now)
-            if self.period and step <= OVERTAKEN:
+                self._report(Kind.LOST, f"{step - 1} messages before {sample.sequence} are lost", now)
+            if self.period and step <= MAX_REORDERED:
                 self.jitter.add(abs(interval - step * self.period))
             return True
-        if _WRAP - step <= OVERTAKEN and interval < SILENCE and self.state is not m.SessionState.IDLE:
+        if _WRAP - step <= MAX_REORDERED and interval < MAX_GAP and self.state is not m.SessionState.IDLE:
             counts.reordered += 1
             counts.lost = max(0, counts.lost - 1)
-            self._tell(Kind.REORDERED, f"message {sample.sequence} came after {last.sequence}", now)
+            self._report(Kind.REORDERED, f"message {sample.sequence} received after {last.sequence}", now)
             return False
         counts.restarts += 1
         self.reflected, self.waiting = -1, 0
-        self._tell(Kind.RESTARTED, f"the controller counts anew from {sample.sequence}: a new session", now)
+        self._report(
+            Kind.RESTARTED, f"the controller's counter restarts at {sample.sequence}: a new session", now
+        )
         self._enter(m.SessionState.IDLE, now)
         return True
 
     def _enter(self, state: m.SessionState, now: int) -> None:
         if state is not self.state:
-            self._tell(Kind.STATE, f"{self.state.name} -> {state.name}", now)
+            self._report(Kind.STATE, f"{self.state.name} -> {state.name}", now)
             self.state = state
 
-    def _look(self, sample: Sample, datagram: bytes, now: int) -> None:
-        """Notice a change of command mode and safety, and answers that the controller did not take."""
+    def _detect_changes(self, sample: Sample, datagram: bytes, now: int) -> None:
+        """Detect a change of command mode or safety state, and answers that the controller missed."""
         reflected = reflected_in(datagram, framed=bool(self.version and self.version.traits.framed))
         if 0 <= self.reflected < reflected <= self.sent:
             self.counters.missed += reflected - self.reflected - 1
@@ -259,22 +288,23 @@ class Session:
                 if safety is not None and (
                     self._safety is not None or safety is not m.Safety.NORMAL_OPERATION
                 ):
-                    self._tell(Kind.SAFETY, f"safety state {safety.name}", now)
+                    self._report(Kind.SAFETY, f"safety state {safety.name}", now)
                 self._safety = safety
-        # layouts are equal as long as the connection value is the very same object
+        # the layout is unchanged as long as the connection is the same object
         if last is None or sample.connection is not last.connection:
             ipo = sample.message.ipo
             mode = (ipo.command_mode if ipo is not None else None) or m.CommandMode.NO_COMMAND
             if mode is not self.mode:
-                self._tell(Kind.COMMAND_MODE, f"client command mode {self.mode.name} -> {mode.name}", now)
+                self._report(Kind.COMMAND_MODE, f"client command mode {self.mode.name} -> {mode.name}", now)
                 self.mode = mode
 
-    def _tell(self, kind: Kind, text: str, now: int) -> None:
+    def _report(self, kind: Kind, text: str, now: int) -> None:
         if len(self._events) < MAX_EVENTS:
             self._events.append(Event(kind, text, now))
 
+
 def reflected_in(datagram: bytes, *, framed: bool) -> int:
-    """The reflected counter of a legal monitoring datagram; -1 if it is in no usual place."""
+    """Read the reflected counter of a legal monitoring datagram; -1 if it is not at its usual place."""
     pos, end = 4 if framed else 0, len(datagram)
     if datagram[pos] != 0x0A:
         return -1
@@ -291,7 +321,7 @@ def reflected_in(datagram: bytes, *, framed: bool) -> int:
 
 
 def _is_legal(datagram: bytes) -> bool:
-    """Whether it is a legal message of some version."""
+    """Whether a datagram is a legal message of any version."""
     try:
         recognise(datagram)
     except MalformedMessage:

@@ -1,4 +1,4 @@
-"""What a client counts and measures of its own exchange; times are passed in, the words may live in shared memory."""
+"""Counters and histograms of a client; their words may be in shared memory."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from array import array
 from collections.abc import Iterator
 from typing import Protocol
 
-#: Histograms have bins of one microsecond; the last one takes all that is longer.
+#: Number of bins of a histogram, one microsecond each; the last one holds all longer durations.
 BINS = 16_384
-#: Longest duration that is told apart [ns].
+#: Upper bound of a recorded duration [ns].
 LONGEST = 10**15
 
 
 class Words(Protocol):
-    """Integer words, of an array or of shared memory."""
+    """Integer words of an array or of shared memory."""
 
     def __getitem__(self, index: int, /) -> int: ...
 
@@ -23,20 +23,20 @@ class Words(Protocol):
 
 
 class Counters:
-    """Plain counts of one client, over all its sessions.
+    """Counts of one client over all its sessions.
 
     Attributes:
         received: legal monitoring messages.
         answered: commands sent.
-        lost: monitoring messages that never came, told from the controller's counter.
-        duplicated: messages that came twice; the second one is not answered.
-        reordered: messages overtaken by a later one; they are not answered.
+        lost: monitoring messages that did not arrive, by the controller's counter.
+        duplicated: messages received twice; the second one is not answered.
+        reordered: messages received after a later one; they are not answered.
         malformed: datagrams that are no legal message of this version.
-        missed: answers that the controller did not take in time, late or lost, told from its reflected counter.
-        restarts: times the controller's counter began anew.
-        poor, fair, good, excellent: messages that named that quality.
+        missed: answers that the controller did not receive in time, by its reflected counter.
+        restarts: restarts of the controller's counter.
+        poor, fair, good, excellent: messages with that quality.
         commanded: answers in COMMANDING_ACTIVE.
-        filled: of those, answers without a fresh command of the user, made by the policy.
+        filled: of those, answers made by the policy because there was no fresh command.
         limited: of those, answers in which the guard changed something.
     """
 
@@ -79,21 +79,21 @@ class Counters:
             setattr(self, name, 0)
 
     def save(self, words: Words, at: int) -> None:
-        """Write the counts into integer words, in the order of `COUNTERS`."""
+        """Write the counts to integer words, in the order of `COUNTERS`."""
         for index, name in enumerate(COUNTERS):
             words[at + index] = getattr(self, name)
 
     def load(self, words: Words, at: int) -> None:
-        """Take the counts from integer words, in the order of `COUNTERS`."""
+        """Read the counts from integer words, in the order of `COUNTERS`."""
         for index, name in enumerate(COUNTERS):
             setattr(self, name, int(words[at + index]))
 
     def as_dict(self) -> dict[str, int]:
-        """All counts by name."""
+        """Get all counts by name."""
         return {name: getattr(self, name) for name in COUNTERS}
 
 
-#: Order of the counts in memory; the native loop has the same.
+#: Order of the counts in memory, in Python and C.
 COUNTERS = (
     "received",
     "answered",
@@ -114,10 +114,10 @@ COUNTERS = (
 
 
 class Histogram:
-    """Counts durations in bins of one microsecond.
+    """Histogram of durations with bins of one microsecond.
 
     Args:
-        words: BINS + 1 integer words, the last one being the longest duration [ns]; None for own memory.
+        words: BINS + 1 integer words, the last one being the longest duration [ns]; None allocates them.
     """
 
     __slots__ = ("_words",)
@@ -134,22 +134,22 @@ class Histogram:
 
     @property
     def longest(self) -> float:
-        """The longest duration [s]."""
+        """Longest duration [s]."""
         return self._words[BINS] * 1e-9
 
-    def percentiles(self, *shares: float) -> tuple[float, ...]:
-        """Durations [s] that these shares (0 to 1) stay below; zeros if nothing was counted.
+    def percentiles(self, *fractions: float) -> tuple[float, ...]:
+        """Percentiles of the durations [s] for fractions of 0 to 1; zeros if nothing was counted.
 
-        Resolution is a microsecond; what is beyond the bins answers with the longest duration.
+        The resolution is a microsecond; beyond the bins the result is the longest duration.
         """
         counts = list(self._words)[:BINS]
         total = sum(counts)
         found = []
-        for share in shares:
-            wanted, seen = share * total, 0
+        for fraction in fractions:
+            needed, seen = fraction * total, 0
             for index, count in enumerate(counts):
                 seen += count
-                if seen >= wanted and seen:
+                if seen >= needed and seen:
                     found.append(self.longest if index == BINS - 1 else (index + 0.5) * 1e-6)
                     break
             else:
@@ -157,6 +157,6 @@ class Histogram:
         return tuple(found)
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Reset all bins."""
         for index in range(BINS + 1):
             self._words[index] = 0

@@ -1,0 +1,604 @@
+"""Interface for laws and users: states, commands, parameters, signals, statistics."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.messages import (
+    CommandMode,
+    ControlMode,
+    DriveState,
+    IpoData,
+    Monitoring,
+    OperationMode,
+    Overlay,
+    Quality,
+    RobotInfo,
+    Safety,
+    SessionState,
+)
+from heptarm.fri.session.statistics import Counters, Histogram
+from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
+from heptarm.values.pose import Pose
+
+Ints = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.float64]
+
+_KINDS = {m.IoType.BOOLEAN: "boolean", m.IoType.DIGITAL: "unsigned", m.IoType.ANALOG: "analog"}
+_RANGES = {"boolean": (0.0, 1.0), "unsigned": (0.0, 2.0**64 - 1), "analog": (-math.inf, math.inf)}
+
+
+class Signals:
+    """Signals of a session, in the order of its messages.
+
+    Args:
+        signals: all of them.
+
+    Attributes:
+        names: "Group.Signal" of each.
+    """
+
+    __slots__ = ("_signals", "names")
+
+    def __init__(self, signals: Iterable[Signal] = ()) -> None:
+        self._signals = tuple(signals)
+        self.names = tuple(one.name for one in self._signals)
+
+    @classmethod
+    def of(cls, values: Iterable[m.IoValue]) -> Signals:
+        """Make the signals of a message."""
+        return cls(
+            _signal(one.name, _KINDS[one.type], is_output=one.direction is m.IoDirection.OUTPUT)
+            for one in values
+        )
+
+    def __len__(self) -> int:
+        return len(self._signals)
+
+    @property
+    def text(self) -> str:
+        """Text of the signals for the shared memory."""
+        return json.dumps([(one.name, one.kind, one.is_output) for one in self._signals])
+
+    @classmethod
+    def read(cls, text: str) -> Signals:
+        """Read the signals from their text."""
+        return cls(_signal(name, kind, is_output=is_output) for name, kind, is_output in json.loads(text))
+
+    def values(self, numbers: Sequence[float], *, is_output: bool | None = None) -> dict[str, SignalValue]:
+        """Map names to values.
+
+        Args:
+            numbers: one number per signal.
+            is_output: True for outputs only, False for inputs only; None for all.
+        """
+        return {
+            one.name: one.value(number)
+            for one, number in zip(self._signals, numbers, strict=False)
+            if is_output is None or one.is_output is is_output
+        }
+
+    def output(self, name: str, value: SignalValue) -> tuple[str, int | float]:
+        """Check a value for an output; return its full name and the number to send.
+
+        Raises:
+            CommandRejected: the session has no output of that name.
+            LimitError: the value is outside the range of the output.
+        """
+        outputs = ", ".join(one.name for one in self._signals if one.is_output) or "none"
+        try:
+            signal = self._signals[find_name(name, self.names)]
+        except CommandRejected as error:
+            raise CommandRejected(
+                f"{error.text} in this FRI session",
+                parameter="io",
+                value=name,
+                allowed=outputs,
+                hint="name it where the session is opened, as in arm.fri(..., io=[...]); a cabinet that runs another "
+                "application registers it in its FRI configuration",
+            ) from None
+        if not signal.is_output:
+            raise CommandRejected(
+                f"{signal.name} is an input of the cabinet, which FRI cannot write",
+                parameter="io",
+                value=name,
+                allowed=outputs,
+            )
+        number = float(value)
+        low, high = signal.low, signal.high
+        whole = signal.kind == "analog" or number == round(number) if math.isfinite(number) else False
+        if not (low <= number <= high) or not whole:
+            allowed = {"boolean": "True or False", "unsigned": "0, 1, 2, ..."}.get(
+                signal.kind, "a finite number"
+            )
+            raise LimitError(
+                f"{signal.name} ({signal.kind}) must be {allowed}, got {value!r}",
+                parameter=signal.name,
+                value=value,
+                allowed=allowed,
+            )
+        return signal.name, number if signal.kind == "analog" else int(value)
+
+
+def _signal(name: str, kind: str, *, is_output: bool) -> Signal:
+    low, high = _RANGES[kind]
+    return Signal(name, is_output, kind, low, high)
+
+
+class Outputs:
+    """Outputs that a law writes: `out.io["LEDBlue"] = True`.
+
+    Attributes:
+        signals: signals of the session.
+        written: values written in this cycle, by full name.
+    """
+
+    __slots__ = ("signals", "written")
+
+    def __init__(self) -> None:
+        self.signals = Signals()
+        self.written: dict[str, int | float] = {}
+
+    def __setitem__(self, name: str, value: SignalValue) -> None:
+        """Write an output; raises the errors of `Signals.output`."""
+        full, number = self.signals.output(name, value)
+        self.written[full] = number
+
+
+class Output:
+    """Command of a law; reset before every call.
+
+    Attributes:
+        q: position, shape (7,) [rad]; initially the interpolator's.
+        tau: superposed torques, shape (7,) [Nm]; initially zero.
+        wrench: superposed wrench, shape (6,) [N, Nm]; initially zero.
+        pose: x y z [m] and quaternion x y z w, shape (7,); a `Pose` can be assigned. Initially the interpolator's, NaN
+            in sessions that command no pose.
+        e1: redundancy angle of the pose [rad]; initially the interpolator's.
+        io: outputs of the cabinet, `out.io["LEDBlue"] = True`; others keep their values.
+    """
+
+    __slots__ = ("_pose", "e1", "io", "q", "tau", "wrench")
+
+    def __init__(self, outputs: Outputs | None = None) -> None:
+        self.io = Outputs() if outputs is None else outputs
+        self.e1 = math.nan
+        self.q: Floats = np.zeros(7)
+        self.tau: Floats = np.zeros(7)
+        self.wrench: Floats = np.zeros(6)
+        self._pose: Floats = np.full(7, np.nan)
+
+    @property
+    def pose(self) -> Floats:
+        """Target pose, shape (7,) [m, x y z w]."""
+        return self._pose
+
+    @pose.setter
+    def pose(self, value: Pose | npt.ArrayLike) -> None:
+        self._pose[:] = value.array if isinstance(value, Pose) else value
+
+    @classmethod
+    def on(cls, q: Any, tau: Any, wrench: Any) -> Output:
+        """Make an output on existing memory."""
+        made = cls()
+        made.q, made.tau, made.wrench = (np.frombuffer(part, dtype=np.float64) for part in (q, tau, wrench))
+        return made
+
+
+class Params:
+    """Parameters of a law: numbers and arrays by name, updated all at once.
+
+    Args:
+        values: numbers and arrays, flattened.
+        schema: shape and position of each, by name.
+        changed: called after an assignment; None makes them read-only.
+    """
+
+    __slots__ = ("_changed", "_schema", "_values")
+
+    def __init__(
+        self,
+        values: Floats,
+        schema: Mapping[str, tuple[tuple[int, ...], int]],
+        *,
+        changed: Callable[[], None] | None = None,
+    ) -> None:
+        object.__setattr__(self, "_values", values)
+        object.__setattr__(self, "_schema", dict(schema))
+        object.__setattr__(self, "_changed", changed)
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            shape, start = self._schema[name]
+        except KeyError:
+            raise AttributeError(
+                f"no parameter {name!r}; there are {', '.join(self._schema) or 'none'}"
+            ) from None
+        if not shape:
+            return float(self._values[start])
+        part = self._values[start : start + int(np.prod(shape))].reshape(shape)
+        part.flags.writeable = False
+        return part
+
+    def __setattr__(self, name: str, value: npt.ArrayLike) -> None:
+        self.set(**{name: value})
+
+    def set(self, **values: npt.ArrayLike) -> None:
+        """Change several parameters at once: the law sees all changes or none.
+
+        Raises:
+            ShapeError: a value has a different shape than initially.
+            AttributeError: no such parameter, or they are read-only.
+        """
+        if self._changed is None:
+            raise AttributeError("parameters are read-only in a law")
+        checked = []
+        for name, value in values.items():
+            given: Floats = np.asarray(value, dtype=np.float64)
+            if name not in self._schema:
+                raise AttributeError(f"no parameter {name!r}; there are {', '.join(self._schema) or 'none'}")
+            shape, start = self._schema[name]
+            if given.shape != tuple(shape):
+                raise ShapeError(
+                    f"{name} must have shape {tuple(shape)}, as initially, got {given.shape}",
+                    parameter=name,
+                )
+            checked.append((start, given.reshape(-1)))
+        for start, given in checked:
+            self._values[start : start + given.size] = given
+        self._changed()
+
+    def replace(self, values: Floats) -> None:
+        """Replace all values."""
+        self._values[:] = values
+
+    @staticmethod
+    def flat(values: Mapping[str, npt.ArrayLike]) -> tuple[Floats, dict[str, tuple[tuple[int, ...], int]]]:
+        """Flatten a mapping into numbers and their schema.
+
+        Raises:
+            ShapeError: a value is neither a number nor an array of numbers.
+        """
+        parts: list[Floats] = []
+        schema: dict[str, tuple[tuple[int, ...], int]] = {}
+        start = 0
+        for name, value in values.items():
+            try:
+                given: Floats = np.asarray(value, dtype=np.float64)
+            except (TypeError, ValueError):
+                raise ShapeError(
+                    f"{name} must be a number or an array of numbers, got {value!r}", parameter=name
+                ) from None
+            schema[name] = (given.shape, start)
+            parts.append(given.reshape(-1))
+            start += given.size
+        return (np.concatenate(parts) if parts else np.zeros(0)), schema
+
+
+class State:
+    """One monitoring message and its answer. Arrays are NaN if the controller does not send them.
+
+    Args:
+        words: slot of the ring of states, shape (122,); it is not copied.
+        signals: signals of the session.
+
+    Attributes:
+        signals: signals of the session.
+    """
+
+    __slots__ = ("_floats", "_ints", "signals")
+
+    def __init__(self, words: Floats, signals: Signals | None = None) -> None:
+        self._floats = words
+        self._ints: Ints = words.view(np.int64)
+        self.signals = Signals() if signals is None else signals
+
+    @property
+    def q(self) -> Floats:
+        """Measured position, shape (7,) [rad]."""
+        return self._floats[at.S_Q : at.S_Q + 7]
+
+    @property
+    def tau(self) -> Floats:
+        """Measured torques, shape (7,) [Nm]."""
+        return self._floats[at.S_TAU : at.S_TAU + 7]
+
+    @property
+    def tau_cmd(self) -> Floats:
+        """Torques commanded by the controller, shape (7,) [Nm]."""
+        return self._floats[at.S_TAU_CMD : at.S_TAU_CMD + 7]
+
+    @property
+    def tau_ext(self) -> Floats:
+        """External torques, shape (7,) [Nm]."""
+        return self._floats[at.S_TAU_EXT : at.S_TAU_EXT + 7]
+
+    @property
+    def q_cmd(self) -> Floats:
+        """Position commanded by the controller, shape (7,) [rad]; FRI 1.x only."""
+        return self._floats[at.S_Q_CMD : at.S_Q_CMD + 7]
+
+    @property
+    def q_ipo(self) -> Floats:
+        """Interpolator's position, to which the overlay is added, shape (7,) [rad]."""
+        return self._floats[at.S_Q_IPO : at.S_Q_IPO + 7]
+
+    @property
+    def wrench(self) -> Floats:
+        """External wrench, shape (6,) [N, Nm]; FRI 2.7 only."""
+        return self._floats[at.S_WRENCH : at.S_WRENCH + 6]
+
+    @property
+    def pose(self) -> Pose:
+        """Measured pose; FRI 2.x only.
+
+        Raises:
+            CommandRejected: this version of FRI has none.
+        """
+        numbers = self._floats[at.S_POSE : at.S_POSE + 7]
+        if numbers[0] != numbers[0]:
+            raise CommandRejected(
+                "the controller sends no pose", hint="FRI 1.x has none: use heptarm.model.forward(robot, s.q)"
+            )
+        return _pose(numbers)
+
+    @property
+    def pose_ipo(self) -> Pose:
+        """Interpolator's pose, to which the overlay is added.
+
+        Raises:
+            CommandRejected: this session commands no pose, or not yet.
+        """
+        return _commanded(self._floats[at.S_POSE_IPO : at.S_POSE_IPO + 7])
+
+    @property
+    def e1(self) -> float:
+        """Redundancy angle of the pose [rad]; NaN if there is none."""
+        return float(self._floats[at.S_E1])
+
+    @property
+    def e1_ipo(self) -> float:
+        """Interpolator's redundancy angle [rad]; NaN if the session commands no pose."""
+        return float(self._floats[at.S_E1_IPO])
+
+    @property
+    def io(self) -> SignalValues:
+        """The session's signals in this message: `s.io["Flange.UserButton"]` or `s.io.user_button`."""
+        numbers = self._floats[at.S_IO : at.S_IO + len(self.signals)]
+        return SignalValues(self.stamp, self.signals.values(numbers.tolist()))
+
+    @property
+    def q_sent(self) -> Floats:
+        """Position in the answer, shape (7,) [rad]."""
+        return self._floats[at.S_Q_SENT : at.S_Q_SENT + 7]
+
+    @property
+    def tau_sent(self) -> Floats:
+        """Torques in the answer, shape (7,) [Nm]."""
+        return self._floats[at.S_TAU_SENT : at.S_TAU_SENT + 7]
+
+    @property
+    def wrench_sent(self) -> Floats:
+        """Wrench in the answer, shape (6,) [N, Nm]."""
+        return self._floats[at.S_WRENCH_SENT : at.S_WRENCH_SENT + 6]
+
+    @property
+    def pose_sent(self) -> Pose:
+        """Pose in the answer.
+
+        Raises:
+            CommandRejected: this session commands no pose, or not yet.
+        """
+        return _commanded(self._floats[at.S_POSE_SENT : at.S_POSE_SENT + 7])
+
+    @property
+    def e1_sent(self) -> float:
+        """Redundancy angle in the answer [rad]; NaN if it has none."""
+        return float(self._floats[at.S_E1_SENT])
+
+    @property
+    def session(self) -> SessionState:
+        """State of the session."""
+        return SessionState(int(self._ints[at.S_SESSION]))
+
+    @property
+    def is_commanding(self) -> bool:
+        """Whether commands are effective."""
+        return bool(self._ints[at.S_SESSION] == SessionState.COMMANDING_ACTIVE)
+
+    @property
+    def quality(self) -> Quality:
+        """Quality of the connection."""
+        return Quality(int(self._ints[at.S_QUALITY]))
+
+    @property
+    def mode(self) -> CommandMode:
+        """Client command mode."""
+        return CommandMode(int(self._ints[at.S_MODE]))
+
+    @property
+    def overlay(self) -> Overlay | None:
+        """Type of the overlay."""
+        value = int(self._ints[at.S_OVERLAY])
+        return None if value == at.ABSENT else Overlay(value)
+
+    @property
+    def safety(self) -> Safety | None:
+        """Safety state."""
+        value = int(self._ints[at.S_SAFETY])
+        return None if value == at.ABSENT else Safety(value)
+
+    @property
+    def operation_mode(self) -> OperationMode | None:
+        """Operation mode."""
+        value = int(self._ints[at.S_OPERATION])
+        return None if value == at.ABSENT else OperationMode(value)
+
+    @property
+    def control_mode(self) -> ControlMode | None:
+        """Control mode of the motion under the overlay."""
+        value = int(self._ints[at.S_CONTROL])
+        return None if value == at.ABSENT else ControlMode(value)
+
+    @property
+    def drive(self) -> DriveState | None:
+        """State of the drives; TRANSITIONING if they differ."""
+        value = int(self._ints[at.S_DRIVE])
+        return None if value == at.ABSENT else DriveState(value)
+
+    @property
+    def tracking(self) -> float:
+        """Tracking performance, 0 to 1; NaN outside COMMANDING_ACTIVE."""
+        return float(self._floats[at.S_TRACKING])
+
+    @property
+    def sequence(self) -> int:
+        """Controller's counter."""
+        return int(self._ints[at.S_SEQUENCE])
+
+    @property
+    def stamp(self) -> int:
+        """Controller's clock [ns since 1970]; 0 if it sends no time."""
+        return int(self._ints[at.S_STAMP])
+
+    @property
+    def received(self) -> int:
+        """Time of receipt, this machine's monotonic clock [ns]."""
+        return int(self._ints[at.S_RECEIVED])
+
+    @property
+    def age(self) -> float:
+        """Time since receipt [s]."""
+        return (time.monotonic_ns() - self.received) * 1e-9
+
+    @property
+    def period(self) -> float:
+        """Send period [s]."""
+        return float(self._ints[at.S_PERIOD]) * 1e-9
+
+    @property
+    def t(self) -> float:
+        """Controller's time since commands became effective [s]; 0 before."""
+        return float(self._ints[at.S_TICKS]) * self.period
+
+    @property
+    def latency(self) -> float:
+        """Time from receipt to answer [s]; 0 without an answer."""
+        return float(self._ints[at.S_LATENCY]) * 1e-9
+
+    @property
+    def is_answered(self) -> bool:
+        """Whether the message was answered."""
+        return bool(self._ints[at.S_FLAGS] & at.ANSWERED)
+
+    @property
+    def is_filled(self) -> bool:
+        """Whether the policy made the answer, because there was no fresh command."""
+        return bool(self._ints[at.S_FLAGS] & at.FILLED)
+
+    @property
+    def is_limited(self) -> bool:
+        """Whether the guard limited the answer."""
+        return bool(self._ints[at.S_FLAGS] & at.LIMITED)
+
+    def __repr__(self) -> str:
+        return (
+            f"State({self.sequence}, {self.session.name}, {self.quality.name}, q={self.q.round(4).tolist()})"
+        )
+
+
+def _pose(numbers: Floats) -> Pose:
+    """Make a pose of FRI's numbers: x y z [mm], w x y z."""
+    return Pose.of(numbers[:3] * 1e-3, numbers[[4, 5, 6, 3]])
+
+
+def _commanded(numbers: Floats) -> Pose:
+    """Make a pose of a session that commands poses."""
+    if numbers[0] != numbers[0]:
+        raise CommandRejected(
+            "no pose is commanded in this state",
+            hint="open a session that commands poses and wait for COMMANDING_ACTIVE",
+        )
+    return _pose(numbers)
+
+
+def information(full: Monitoring) -> tuple[int, ...]:
+    """Numbers of overlay, safety, operation mode, control mode, drive and multiplier of a message."""
+    robot, ipo = full.robot or RobotInfo(), full.ipo or IpoData()
+    drives = set(robot.drives)
+    drive = None if not drives else drives.pop() if len(drives) == 1 else DriveState.TRANSITIONING
+    multiplier = full.connection.multiplier if full.connection is not None else None
+    values = (ipo.overlay, robot.safety, robot.operation_mode, robot.control_mode, drive, multiplier)
+    return tuple(at.ABSENT if value is None else int(value) for value in values)
+
+
+@dataclass(frozen=True, slots=True)
+class Stats:
+    """Counts, latency and jitter over all sessions of the client.
+
+    Attributes:
+        received: messages of the controller.
+        answered: answers sent.
+        lost: messages that did not arrive.
+        missed: answers that the controller did not receive in time.
+        duplicated: messages received twice.
+        reordered: messages received after later ones.
+        malformed: datagrams that were no message.
+        restarts: restarts of the controller's counter.
+        commanded: answers whose commands were effective.
+        filled: of those, made by the policy without a fresh command.
+        limited: of those, limited by the guard.
+        quality: number of messages by their quality.
+        latency: time from receipt to answer [s]: median, 99 %, 99.9 %, longest.
+        jitter: deviation from the send period [s]: median, 99 %, 99.9 %, longest.
+    """
+
+    received: int
+    answered: int
+    lost: int
+    missed: int
+    duplicated: int
+    reordered: int
+    malformed: int
+    restarts: int
+    commanded: int
+    filled: int
+    limited: int
+    quality: dict[str, int]
+    latency: tuple[float, ...]
+    jitter: tuple[float, ...]
+
+    @classmethod
+    def of(cls, layout: at.Layout) -> Stats:
+        """Read the counts of a loop."""
+        counts = Counters()
+        counts.load(layout.header, at.COUNTS)
+        latency, jitter = Histogram(layout.latency), Histogram(layout.jitter)
+        fractions = (0.5, 0.99, 0.999)
+        return cls(
+            received=counts.received,
+            answered=counts.answered,
+            lost=counts.lost,
+            missed=counts.missed,
+            duplicated=counts.duplicated,
+            reordered=counts.reordered,
+            malformed=counts.malformed,
+            restarts=counts.restarts,
+            commanded=counts.commanded,
+            filled=counts.filled,
+            limited=counts.limited,
+            quality={name: getattr(counts, name) for name in ("poor", "fair", "good", "excellent")},
+            latency=(*latency.percentiles(*fractions), latency.longest),
+            jitter=(*jitter.percentiles(*fractions), jitter.longest),
+        )
