@@ -1,52 +1,52 @@
-"""Clocks: time is an interface, so that tests own it."""
+"""Clocks behind an interface, so that tests control the time."""
 
 from __future__ import annotations
 
 import time
 from typing import Protocol
 
-#: A sleeper is woken up to so much late [s]: Linux gives timers 50 us of slack, and waking takes time, too.
-_AWAKE = 100e-6
+#: Largest usual delay of a wake-up [s]: timer slack of Linux (50 us) and the time that waking takes.
+_WAKE_DELAY = 100e-6
 
 
 class Clock(Protocol):
     """A monotonic clock."""
 
     def nanos(self) -> int:
-        """The present time [ns]; its zero means nothing."""
+        """Read the time [ns]; its zero point is arbitrary."""
         ...
 
     def sleep(self, seconds: float) -> None:
-        """Let that much time pass."""
+        """Wait for a time [s]."""
         ...
 
     def sleep_until(self, nanos: int) -> None:
-        """Let time pass until the clock shows that [ns]: to the point, at the price of waiting awake at the end."""
+        """Wait until the clock reads a time [ns]; exact, because the last part is a busy wait."""
         ...
 
 
 class RealClock:
-    """The machine's monotonic clock."""
+    """Monotonic clock of the machine."""
 
     __slots__ = ()
 
     nanos = staticmethod(time.monotonic_ns)
 
     def sleep(self, seconds: float) -> None:
-        """Sleep."""
+        """Sleep for a time [s]; return at once if it is not positive."""
         if seconds > 0:
             time.sleep(seconds)
 
     def sleep_until(self, nanos: int) -> None:
-        """Sleep; then wait awake, because a sleeper is woken late."""
+        """Sleep, then busy-wait, because the system wakes a sleeper late."""
         now = self.nanos
-        self.sleep((nanos - now()) * 1e-9 - _AWAKE)
+        self.sleep((nanos - now()) * 1e-9 - _WAKE_DELAY)
         while now() < nanos:
             pass
 
 
 class StepClock:
-    """A clock that moves only when told; sleeping moves it.
+    """Clock that advances only in `step`, `sleep` and `sleep_until`.
 
     Args:
         start: first reading [ns].
@@ -58,17 +58,17 @@ class StepClock:
         self._now = start
 
     def nanos(self) -> int:
-        """The present time [ns]."""
+        """Read the time [ns]."""
         return self._now
 
     def sleep(self, seconds: float) -> None:
-        """Move on at once."""
+        """Advance the clock instead of waiting."""
         self.step(seconds)
 
     def sleep_until(self, nanos: int) -> None:
-        """Be there at once."""
+        """Advance the clock instead of waiting."""
         self._now = max(self._now, nanos)
 
     def step(self, seconds: float) -> None:
-        """Move on by that many seconds."""
+        """Advance the clock [s]."""
         self._now += max(0, round(seconds * 1e9))

@@ -1,8 +1,8 @@
-"""Memory that two processes share without locks: rings of slots, each guarded by a sequence word.
+"""Lock-free shared memory of two processes: rings of slots, each with a sequence word.
 
-One process writes a ring and any may read it. A slot's first word is odd while it is written and afterwards names the
-tick it holds, so a reader knows a torn or overwritten slot and nobody ever waits. Words have eight octets, native
-order.
+One process writes a ring and any process may read it. The first word of a slot is odd while the slot is written, and
+then holds twice its tick plus two; so a reader detects a slot that is incomplete or overwritten, and nobody ever waits.
+Words have eight bytes in native order.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ import numpy.typing as npt
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 
-#: Where files live in memory, on Linux.
+#: File system in memory, on Linux.
 _MEMORY = Path("/dev/shm")
 
 
-class Block:
-    """A piece of memory by the name of a file; both processes map the same one.
+class MemoryBlock:
+    """File that both processes map into their memory.
 
     Args:
-        words: its size in eight-octet words; 0 to map an existing one.
-        path: the file; None makes a new one, in memory where the system has a place for that.
+        words: size in words of eight bytes; 0 maps an existing file.
+        path: the file; None creates one, in memory where the system has a file system for that.
 
     Attributes:
         path: the file.
@@ -54,33 +54,32 @@ class Block:
         self.floats: Floats = np.frombuffer(self._map, dtype=np.float64)
 
     def view(self, start: int, size: int) -> memoryview:
-        """Integer words that Python reads and writes one by one, faster than through numpy."""
+        """View words as integers; faster than numpy for single words."""
         return memoryview(self._map)[8 * start : 8 * (start + size)].cast("q")
 
     def unlink(self) -> None:
-        """Take the file away; the memory lives on in those who have it mapped."""
-        with contextlib.suppress(
-            OSError
-        ):  # Windows keeps files that are in use; the other side may be faster
+        """Delete the file; processes that have mapped it keep the memory."""
+        # Windows keeps files that are in use, and the other process may have deleted it already
+        with contextlib.suppress(OSError):
             os.unlink(self.path)
 
 
 class Ring:
-    """Slots in a block.
+    """Ring of slots in a block.
 
     Args:
-        block: where.
+        block: the memory.
         head: word that counts the slots written so far.
         start: first word of the slots.
-        slots: how many.
-        width: words of a slot, its sequence word included.
+        slots: number of slots.
+        width: words of a slot, including its sequence word.
 
     Attributes:
         ints: shape (slots, width).
         floats: the same words.
     """
 
-    def __init__(self, block: Block, *, head: int, start: int, slots: int, width: int) -> None:
+    def __init__(self, block: MemoryBlock, *, head: int, start: int, slots: int, width: int) -> None:
         self._head = block.view(head, 1)
         self._marks = block.view(start, slots * width)
         self._slots, self._width = slots, width
@@ -90,30 +89,30 @@ class Ring:
 
     @property
     def count(self) -> int:
-        """Slots written so far; the newest tick is one less."""
+        """Number of slots written so far; the newest tick is one less."""
         return self._head[0]
 
     def begin(self) -> int:
-        """Open the next slot for writing; returns its index."""
+        """Open the next slot for writing and return its index."""
         tick = self._head[0]
         slot = tick % self._slots
         self._marks[slot * self._width] = 2 * tick + 1
         return slot
 
     def end(self) -> None:
-        """The opened slot is complete."""
+        """Mark the open slot as complete."""
         tick = self._head[0]
         self._marks[tick % self._slots * self._width] = 2 * tick + 2
         self._head[0] = tick + 1
 
     def write(self, floats: Sequence[float] | Floats, *, at: int = 1) -> None:
-        """Write a slot of floats from word `at` on."""
+        """Write a slot of floats, starting at word `at`."""
         slot = self.begin()
         self.floats[slot, at : at + len(floats)] = floats
         self.end()
 
     def read(self, tick: int) -> Floats | None:
-        """A copy of a tick's slot, shape (width,); None if it is not written, torn or overwritten."""
+        """Copy the slot of a tick, shape (width,); None if it is missing, incomplete or overwritten."""
         slot = tick % self._slots
         mark = slot * self._width
         if self._marks[mark] != 2 * tick + 2:
@@ -122,7 +121,7 @@ class Ring:
         return copy if self._marks[mark] == 2 * tick + 2 else None
 
     def newest(self) -> Floats | None:
-        """A copy of the newest slot; None if there is none. Readers of a ring that is overrun try again."""
+        """Copy the newest slot; None if there is none. Retry while the writer overtakes the reader."""
         for _ in range(16):
             count = self._head[0]
             if count == 0:
@@ -134,42 +133,42 @@ class Ring:
 
 
 class Note:
-    """A text that one process leaves for another; the last one stands.
+    """Text that one process writes and another reads; a new text replaces the old one.
 
     Args:
-        block: where.
+        block: the memory.
         start: first word.
-        words: size, two words of it for sequence and length.
+        words: size, including two words for sequence and length.
     """
 
-    def __init__(self, block: Block, *, start: int, words: int) -> None:
+    def __init__(self, block: MemoryBlock, *, start: int, words: int) -> None:
         self._words = block.view(start, 2)
         self._text = block.ints[start + 2 : start + words].view(np.uint8)
 
     @property
     def tick(self) -> int:
-        """Changes with every text."""
+        """Counter that changes with every text."""
         return self._words[0]
 
     def write(self, text: str) -> None:
-        """Leave a text.
+        """Write a text.
 
         Raises:
-            ValueError: it does not fit.
+            ValueError: the text does not fit.
         """
-        octets = text.encode()
-        if len(octets) > len(self._text):
-            raise ValueError(f"a text of {len(octets)} octets; {len(self._text)} fit")
+        encoded = text.encode()
+        if len(encoded) > len(self._text):
+            raise ValueError(f"text must have at most {len(self._text)} bytes, got {len(encoded)}")
         self._words[0] |= 1
-        self._text[: len(octets)] = np.frombuffer(octets, dtype=np.uint8)
-        self._words[1] = len(octets)
+        self._text[: len(encoded)] = np.frombuffer(encoded, dtype=np.uint8)
+        self._words[1] = len(encoded)
         self._words[0] += 1
 
     def read(self) -> str | None:
-        """The text; None if it is being written all the time."""
+        """Read the text; None if the writer keeps interrupting."""
         for _ in range(16):
             tick = self._words[0]
-            octets = self._text[: self._words[1]].tobytes()
+            encoded = self._text[: self._words[1]].tobytes()
             if not tick & 1 and self._words[0] == tick:
-                return octets.decode(errors="replace")
+                return encoded.decode(errors="replace")
         return None

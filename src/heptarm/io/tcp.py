@@ -1,4 +1,4 @@
-"""TCP: the transport to a cabinet. No OSError leaves this module."""
+"""TCP transport to a cabinet, listener for the cabinet's side, and warm-up of the send path."""
 
 from __future__ import annotations
 
@@ -12,10 +12,11 @@ from collections.abc import Iterator
 
 from heptarm.errors import ConnectFailed, ConnectionLost
 
-#: A cabinet that reads nothing for this long is lost [s].
+#: The connection is lost if the other side reads nothing for this long [s].
 SEND_TIMEOUT = 2.0
 _DO_NOT_WAIT: int = getattr(socket, "MSG_DONTWAIT", 0)  # without it, the patience bounds the wait
 _NO_DATA = (errno.EAGAIN, errno.EWOULDBLOCK, errno.ETIMEDOUT)
+_WARM_UP_BYTES = 4096
 
 
 def connect(host: str, port: int, *, timeout: float = 5.0) -> TcpTransport:
@@ -27,7 +28,7 @@ def connect(host: str, port: int, *, timeout: float = 5.0) -> TcpTransport:
         timeout: how long to try [s].
 
     Raises:
-        ConnectFailed: nobody answers there; the text says why and what to check.
+        ConnectFailed: no cabinet answers there; the text names the cause and what to check.
     """
     try:
         return TcpTransport(socket.create_connection((host, port), timeout=timeout))
@@ -38,10 +39,10 @@ def connect(host: str, port: int, *, timeout: float = 5.0) -> TcpTransport:
 
 
 class TcpTransport:
-    """A connected TCP socket.
+    """Transport over a connected TCP socket.
 
     Args:
-        sock: the socket; it belongs to the transport from now on.
+        sock: the socket; the transport closes it.
     """
 
     __slots__ = ("_closed", "_poll", "_sock", "peer")
@@ -51,7 +52,7 @@ class TcpTransport:
     def __init__(self, sock: socket.socket) -> None:
         self._sock = sock
         self._closed = False
-        # time-outs live in the kernel: Python's own cost a poll() before each call
+        # time-outs are set in the kernel: Python's own cost a poll() before each call
         sock.settimeout(None)
         sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
@@ -64,14 +65,14 @@ class TcpTransport:
         self.peer = f"{name[0]}:{name[1]}" if isinstance(name, tuple) else "peer"
 
     def send(self, data: bytes) -> None:
-        """Send all of it."""
+        """Send all the data."""
         try:
             self._sock.sendall(data)
         except OSError as error:
             raise self._lost(error) from error
 
     def receive_into(self, buffer: memoryview, *, wait: bool = True) -> int:
-        """Octets that came; with `wait`, for up to the patience."""
+        """Receive bytes; with `wait`, wait for up to the patience."""
         try:
             size = self._sock.recv_into(buffer, 0, 0 if wait else _DO_NOT_WAIT)
         except OSError as error:
@@ -83,35 +84,40 @@ class TcpTransport:
         return size
 
     def wait_readable(self, seconds: float) -> bool:
-        """Wait until there is something to receive."""
+        """Wait until bytes (or the end) can be received."""
         try:
             if self._poll is None:  # Windows
                 return bool(select.select([self._sock], [], [], seconds)[0])
             return bool(self._poll.poll(max(seconds, 0.0) * 1e3))
         except (OSError, ValueError):
-            return True  # closed: receiving tells
+            return True  # closed: receiving raises the error
 
     def set_patience(self, seconds: float) -> None:
-        """How long `receive_into` waits for octets."""
+        """Set how long `receive_into` waits for bytes [s]."""
         with contextlib.suppress(OSError):  # a lost connection shows at the next call
             self._sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, _interval(max(seconds, 1e-3)))
 
     def close(self) -> None:
-        """End it."""
+        """Close the connection. Closing twice is allowed."""
         self._closed = True
         with contextlib.suppress(OSError):  # the other side may have been faster
             self._sock.shutdown(socket.SHUT_RDWR)
         self._sock.close()
 
+    def abandon(self) -> None:
+        """Give up the copy that a fork of the process has; the connection of the original process stays."""
+        self._closed = True
+        self._sock.close()  # without shutdown, which would end the connection for both processes
+
     def _lost(self, error: OSError | None) -> ConnectionLost:
         if self._closed:
             return ConnectionLost(f"the connection to {self.peer} is closed")
-        reason = "it closed the connection" if error is None else _reason(error, SEND_TIMEOUT)
+        reason = "the other side closed it" if error is None else _reason(error, SEND_TIMEOUT)
         return ConnectionLost(f"the connection to {self.peer} is lost: {reason}")
 
 
 class TcpListener:
-    """A listening socket: the cabinet's side, for tests and tools.
+    """Listening socket: the cabinet's side, for tests and tools.
 
     Args:
         host: address to listen on.
@@ -128,16 +134,16 @@ class TcpListener:
         self.port: int = self._sock.getsockname()[1]
 
     def accept(self, *, timeout: float = 5.0) -> TcpTransport:
-        """The next client.
+        """Wait for the next client.
 
         Raises:
-            ConnectFailed: nobody came in time.
+            ConnectFailed: no client connected in time.
         """
         self._sock.settimeout(timeout)
         try:
             return TcpTransport(self._sock.accept()[0])
         except OSError as error:
-            raise ConnectFailed(f"nobody connected: {_reason(error, timeout)}") from error
+            raise ConnectFailed(f"no client connected: {_reason(error, timeout)}") from error
 
     def close(self) -> None:
         """Stop listening."""
@@ -146,7 +152,7 @@ class TcpListener:
 
 @contextlib.contextmanager
 def listening(*, host: str = "127.0.0.1", port: int = 0) -> Iterator[TcpListener]:
-    """A listener for the length of a block."""
+    """Listen for the duration of a `with` block."""
     listener = TcpListener(host=host, port=port)
     try:
         yield listener
@@ -154,8 +160,37 @@ def listening(*, host: str = "127.0.0.1", port: int = 0) -> Iterator[TcpListener
         listener.close()
 
 
+class WarmUpConnection:
+    """TCP connection from this process to itself, which keeps the caches of the send path warm.
+
+    Where the system allows no such connection, nothing is sent.
+    """
+
+    __slots__ = ("_far", "_near")
+
+    def __init__(self) -> None:
+        self._near = self._far = socket.socket()
+        with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", 0)) as server:
+            self._near.connect(server.getsockname())
+            self._far = server.accept()[0]
+            self._near.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._near.setblocking(False)
+        self._far.setblocking(False)
+
+    def send(self, data: bytes) -> None:
+        """Send data and receive it again."""
+        with contextlib.suppress(OSError):
+            self._near.send(data)
+            self._far.recv(_WARM_UP_BYTES)
+
+    def close(self) -> None:
+        """Close the connection. Closing twice is allowed."""
+        self._near.close()
+        self._far.close()
+
+
 def _interval(seconds: float) -> bytes | int:
-    """A time-out as the socket option wants it."""
+    """Value of a socket option for a time-out [s]."""
     if sys.platform == "win32":
         return max(1, round(seconds * 1000))
     micros = max(1, round(seconds * 1e6))
@@ -166,7 +201,7 @@ def _reason(error: OSError, timeout: float) -> str:
     if isinstance(error, TimeoutError) or error.errno in _NO_DATA:
         return f"no answer within {timeout:g} s"
     if isinstance(error, socket.gaierror):
-        return "there is no host of that name"
+        return "no host has that name"
     return (error.strerror or str(error)).lower()
 
 
@@ -174,5 +209,5 @@ def _advice(error: OSError) -> str:
     if isinstance(error, ConnectionRefusedError):
         return "start the heptarm application on the cabinet, or `heptarm sim`, and check the port"
     if isinstance(error, socket.gaierror):
-        return "check the spelling, or give the address in numbers"
+        return "check the spelling, or use the IP address"
     return "check the cable, the cabinet's address and this machine's own address in its network"

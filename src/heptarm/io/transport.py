@@ -1,52 +1,146 @@
-"""What every transport can do. `tcp` and `memory` are two; tests/transports/conformance.py is what each must pass."""
+"""Interface of a transport, and a connected pair in memory.
+
+`heptarm.io.tcp` has the TCP transport; tests/transports/conformance.py tests both.
+"""
 
 from __future__ import annotations
 
+import threading
 from typing import Protocol
+
+from heptarm.errors import ConnectionLost
 
 
 class Transport(Protocol):
-    """A reliable, ordered stream of octets in both directions.
+    """Reliable, ordered stream of bytes in both directions.
 
-    One thread may send while another one receives; two may not send, or receive, at the same time.
+    One thread may send while another one receives; two threads must not send, or receive, at the same time.
     """
 
     @property
     def peer(self) -> str:
-        """The other end, for people."""
+        """Name of the other end, for messages."""
         ...
 
     def send(self, data: bytes) -> None:
-        """Send all of it.
+        """Send all the data.
 
         Raises:
-            ConnectionLost: the other side is gone, or does not read within the time-out.
+            ConnectionLost: the other side has closed, or does not read within the time-out.
         """
         ...
 
     def receive_into(self, buffer: memoryview, *, wait: bool = True) -> int:
-        """Put octets that came into the buffer; nothing is lost when the call is interrupted while it waits.
+        """Receive bytes into a buffer; an interrupted wait loses nothing.
 
         Args:
-            buffer: where to put them.
-            wait: for up to the patience when there are none.
+            buffer: where to write them.
+            wait: wait for up to the patience if there are none.
 
         Returns:
-            How many came; 0 if none.
+            Number of bytes received; 0 if none.
 
         Raises:
-            ConnectionLost: the other side has closed, or was lost, or this side has closed.
+            ConnectionLost: the connection is lost, or either side has closed it.
         """
         ...
 
     def wait_readable(self, seconds: float) -> bool:
-        """Wait until octets (or the end) can be received, without receiving them; one thread at a time."""
+        """Wait until bytes (or the end) can be received, without receiving them; for one thread at a time."""
         ...
 
     def set_patience(self, seconds: float) -> None:
-        """How long `receive_into` waits for octets."""
+        """Set how long `receive_into` waits for bytes [s]."""
         ...
 
     def close(self) -> None:
-        """End it; a waiting `receive_into` ends with ConnectionLost. Closing twice is legal."""
+        """Close the connection; a waiting `receive_into` raises ConnectionLost. Closing twice is allowed."""
         ...
+
+    def abandon(self) -> None:
+        """Give up the copy that a fork of the process has; the connection of the original process stays."""
+        ...
+
+
+class _Pipe:
+    """One direction of a pair."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.changed = threading.Condition()
+        self.is_closed = False
+
+
+class MemoryTransport:
+    """One end of a connected pair; see `memory_pair`."""
+
+    def __init__(self, incoming: _Pipe, outgoing: _Pipe, *, peer: str, chunk: int | None) -> None:
+        self._in = incoming
+        self._out = outgoing
+        self._chunk = chunk
+        self._patience = 0.1
+        self._closed = False
+        self.peer = peer
+
+    def send(self, data: bytes) -> None:
+        """Send all the data."""
+        with self._out.changed:
+            if self._out.is_closed:
+                raise self._lost()
+            self._out.data += data
+            self._out.changed.notify_all()
+
+    def receive_into(self, buffer: memoryview, *, wait: bool = True) -> int:
+        """Receive bytes; with `wait`, wait for up to the patience."""
+        pipe = self._in
+        with pipe.changed:
+            if wait and not pipe.data and not pipe.is_closed:
+                pipe.changed.wait(self._patience)
+            if self._closed or (pipe.is_closed and not pipe.data):
+                raise self._lost()
+            size = min(len(buffer), len(pipe.data), self._chunk or len(buffer))
+            buffer[:size] = pipe.data[:size]
+            del pipe.data[:size]
+            return size
+
+    def wait_readable(self, seconds: float) -> bool:
+        """Wait until bytes (or the end) can be received."""
+        pipe = self._in
+        with pipe.changed:
+            if not pipe.data and not pipe.is_closed:
+                pipe.changed.wait(max(seconds, 0.0))
+            return bool(pipe.data) or pipe.is_closed
+
+    def set_patience(self, seconds: float) -> None:
+        """Set how long `receive_into` waits for bytes [s]."""
+        self._patience = seconds
+
+    def close(self) -> None:
+        """Close both directions."""
+        self._closed = True
+        for pipe in (self._in, self._out):
+            with pipe.changed:
+                pipe.is_closed = True
+                pipe.changed.notify_all()
+
+    def abandon(self) -> None:
+        """Give up the copy that a fork of the process has; its memory is a copy, too."""
+        self._closed = True
+
+    def _lost(self) -> ConnectionLost:
+        if self._closed:
+            return ConnectionLost(f"the connection to {self.peer} is closed")
+        return ConnectionLost(f"the connection to {self.peer} is lost: the other side closed it")
+
+
+def memory_pair(*, chunk: int | None = None) -> tuple[MemoryTransport, MemoryTransport]:
+    """Create two connected ends: (client, cabinet).
+
+    Args:
+        chunk: largest number of bytes delivered at once; None: no limit.
+    """
+    up, down = _Pipe(), _Pipe()
+    return (
+        MemoryTransport(down, up, peer="memory cabinet", chunk=chunk),
+        MemoryTransport(up, down, peer="memory client", chunk=chunk),
+    )

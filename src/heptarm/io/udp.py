@@ -1,4 +1,4 @@
-"""UDP with the kernel's receive times. No OSError leaves this module."""
+"""UDP socket with the receive times of the kernel."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import time
 
 from heptarm.errors import ConnectFailed, ConnectionLost
 
-#: Longer than any FRI datagram.
+#: Size of the receive buffer; longer than any FRI datagram.
 BUFFER = 2048
 Address = tuple[str, int]
 
@@ -19,12 +19,12 @@ _NO_DATA = (errno.EAGAIN, errno.EWOULDBLOCK, errno.ETIMEDOUT, errno.EINTR)
 _STAMPNS: int = getattr(socket, "SO_TIMESTAMPNS", 35) if sys.platform == "linux" else 0
 _STAMP = struct.Struct("@ll")
 _ANCILLARY = socket.CMSG_SPACE(_STAMP.size) if hasattr(socket, "CMSG_SPACE") else 0
-#: A stamp older than this means that the wall clock was set, not that a datagram waited [ns].
+#: Largest credible age of a time stamp [ns]; an older one means that the wall clock was set.
 _TOO_OLD = 10_000_000_000
 
 
 class UdpSocket:
-    """A bound UDP socket.
+    """Bound UDP socket.
 
     Args:
         port: UDP port; 0 for any free one.
@@ -32,12 +32,12 @@ class UdpSocket:
         patience: how long `receive` waits [s].
 
     Attributes:
-        port: the port that is bound.
-        stamps: the kernel tells when a datagram came.
-        sock: the socket itself, for what polls it.
+        port: bound port.
+        stamps: the kernel provides receive times.
+        sock: the socket, for polling.
 
     Raises:
-        ConnectFailed: the port cannot be had; the text says why and what to do.
+        ConnectFailed: the port cannot be bound; the text names the cause and the remedy.
     """
 
     def __init__(self, port: int, *, host: str = "0.0.0.0", patience: float = 0.1) -> None:
@@ -56,14 +56,14 @@ class UdpSocket:
         self.port: int = self.sock.getsockname()[1]
         self.stamps = False
         if _STAMPNS and _ANCILLARY:
-            with contextlib.suppress(OSError):  # then the time of the system call has to do
+            with contextlib.suppress(OSError):  # without it, the time of the system call is used
                 self.sock.setsockopt(socket.SOL_SOCKET, _STAMPNS, 1)
                 self.stamps = True
         self.set_patience(patience)
         self._buffer = bytearray(BUFFER)
 
     def set_patience(self, seconds: float) -> None:
-        """How long `receive` waits for a datagram."""
+        """Set how long `receive` waits for a datagram [s]."""
         if sys.platform == "win32":
             self.sock.settimeout(max(seconds, 1e-3))
             return
@@ -72,7 +72,7 @@ class UdpSocket:
         self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, interval)
 
     def receive(self) -> tuple[bytes, int, Address] | None:
-        """The next datagram, when it came [ns, monotonic clock] and who sent it; None if none came in time.
+        """Receive a datagram, its receive time [ns, monotonic clock] and its sender; None if none came in time.
 
         Raises:
             ConnectionLost: the socket is closed or broken.
@@ -85,22 +85,20 @@ class UdpSocket:
         except OSError as error:
             if isinstance(error, TimeoutError) or (error.errno in _NO_DATA and not self._closed):
                 return None
-            if (
-                error.errno == errno.ECONNREFUSED
-            ):  # an earlier answer found nobody: the other side is not there
+            if error.errno == errno.ECONNREFUSED:  # nobody received an earlier answer
                 return None
             raise self._lost(error) from error
         now = time.monotonic_ns()
-        for level, kind, octets in ancillary:
-            if level == socket.SOL_SOCKET and kind == _STAMPNS and len(octets) == _STAMP.size:
-                seconds, nanos = _STAMP.unpack(octets)
+        for level, kind, content in ancillary:
+            if level == socket.SOL_SOCKET and kind == _STAMPNS and len(content) == _STAMP.size:
+                seconds, nanos = _STAMP.unpack(content)
                 age = time.time_ns() - seconds * 1_000_000_000 - nanos
                 if 0 <= age < _TOO_OLD:
                     return data, now - age, sender
         return data, now, sender
 
     def send(self, data: bytes, address: Address) -> bool:
-        """Send a datagram; False if the network refused it, as it does where nobody listens.
+        """Send a datagram; False if the network refuses it, for example because nobody listens.
 
         Raises:
             ConnectionLost: the socket is closed.
@@ -114,7 +112,7 @@ class UdpSocket:
         return True
 
     def close(self) -> None:
-        """End it. Closing twice is legal."""
+        """Close the socket. Closing twice is allowed."""
         self._closed = True
         self.sock.close()
 
@@ -133,15 +131,15 @@ def _advice(error: OSError, port: int) -> str:
     if error.errno == errno.EADDRNOTAVAIL:
         return "no network card of this machine has that address"
     if error.errno == errno.EACCES:
-        return "ports below 1024 are for root; FRI uses 30200 to 30209"
+        return "ports below 1024 need root; FRI uses 30200 to 30209"
     return "choose another port here and in the cabinet's FRI configuration"
 
 
 def own_address(peer: str) -> str:
-    """The address of this machine from which it reaches another one; nothing is sent.
+    """Find the address from which this machine reaches another one; nothing is sent.
 
     Raises:
-        ConnectFailed: there is no way to that machine, or it has no IPv4 address.
+        ConnectFailed: the machine cannot be reached, or has no IPv4 address.
     """
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
@@ -149,6 +147,6 @@ def own_address(peer: str) -> str:
         except OSError as error:
             raise ConnectFailed(
                 f"this machine's address towards {peer} is not known: {(error.strerror or str(error)).lower()}",
-                hint="name the address under which the cabinet reaches this machine",
+                hint="pass the address under which the cabinet reaches this machine",
             ) from error
         return str(probe.getsockname()[0])
