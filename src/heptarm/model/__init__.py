@@ -1,4 +1,4 @@
-"""The arm as mathematics: kinematics, inverse kinematics with redundancy, dynamics. Needs no connection.
+"""Model of the arm: kinematics, inverse kinematics with redundancy, dynamics. Needs no connection.
 
 ::
 
@@ -19,7 +19,7 @@ from heptarm.model.dynamics import (
     inverse_dynamics,
     mass_matrix,
 )
-from heptarm.model.inverse import intervals, redundancy, solve, solve_all
+from heptarm.model.inverse_kinematics import intervals, redundancy, solve, solve_all
 from heptarm.model.kinematics import forward, jacobian, jacobian_derivative, manipulability, nullspace
 
 __all__ = [

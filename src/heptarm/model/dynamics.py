@@ -8,7 +8,7 @@ Newton's and Euler's laws of every link, projected on the joints by the Jacobian
     g = - sum m Jv' g0
 
 With this C the matrix dM/dt - 2 C is skew-symmetric. Gear friction and rotor inertia are not in it: the torque sensors
-sit behind the gears. The link data are nominal, see `heptarm.values.links`.
+sit behind the gears. The link data are nominal, see `heptarm.values.robot`.
 """
 
 from __future__ import annotations
@@ -19,8 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.values.arrays import Array, array
-from heptarm.values.links import LINKS, Body, symmetric
-from heptarm.values.robot import RobotModel
+from heptarm.values.robot import Body, RobotModel, symmetric
 
 #: Acceleration of gravity in the frame of an upright base [m/s²].
 GRAVITY = (0.0, 0.0, -9.81)
@@ -35,7 +34,7 @@ class _Posture:
     """Joints and bodies in the base frame; n bodies: seven links and perhaps a load.
 
     `axis` and `origin` of the joints have shape (7, 3); `mass` (n,), `com` (n, 3), `inertia` (n, 3, 3) of the bodies;
-    `moves` (n, 7) tells which joint moves which body.
+    `moves` (n, 7) is 1 where a joint moves a body.
     """
 
     axis: Array
@@ -59,7 +58,7 @@ class _Posture:
 
 
 def _posture(robot: RobotModel, q: npt.ArrayLike, load: Body | None) -> _Posture:
-    links = LINKS[robot.name]
+    links = robot.links
     turn, place = np.eye(3), np.zeros(3)
     turns, axis, origin = np.empty((7, 3, 3)), np.empty((7, 3)), np.empty((7, 3))
     for index, angle in enumerate(array(q, 7, "q").tolist()):
@@ -162,7 +161,7 @@ def _gravity(posture: _Posture, acceleration: npt.ArrayLike) -> Array:
 def gravity(
     robot: RobotModel, q: npt.ArrayLike, *, load: Body | None = None, acceleration: npt.ArrayLike = GRAVITY
 ) -> Array:
-    """Torques g(q) that hold the arm against gravity.
+    """Gravity torques g(q).
 
     Args:
         robot: the robot.
@@ -185,7 +184,7 @@ def inverse_dynamics(
     load: Body | None = None,
     acceleration: npt.ArrayLike = GRAVITY,
 ) -> Array:
-    """Torques that a movement takes: M ddq + C dq + g.
+    """Inverse dynamics: joint torques M ddq + C dq + g.
 
     Args:
         robot: the robot.
@@ -212,7 +211,7 @@ def forward_dynamics(
     load: Body | None = None,
     acceleration: npt.ArrayLike = GRAVITY,
 ) -> Array:
-    """Joint accelerations that torques give: M^-1 (tau - C dq - g).
+    """Forward dynamics: joint accelerations M^-1 (tau - C dq - g).
 
     Args:
         robot: the robot.

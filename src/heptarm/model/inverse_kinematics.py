@@ -17,10 +17,9 @@ import numpy as np
 
 from heptarm.errors import Unreachable
 from heptarm.model.kinematics import Columns, Vec, flange
-from heptarm.model.selfmotion import events
+from heptarm.model.null_space import events
 from heptarm.values.arrays import Array, array
-from heptarm.values.pose import Pose
-from heptarm.values.redundancy import Redundancy
+from heptarm.values.pose import Pose, Redundancy
 from heptarm.values.robot import RobotModel
 
 #: Rows of a rotation matrix.
@@ -303,12 +302,11 @@ def solve(
     status: int | None = None,
     near: Sequence[float] | None = None,
 ) -> Array:
-    """Joint positions within the limits that bring the flange to a pose.
+    """Solve the inverse kinematics: joint positions within the limits for a flange pose.
 
-    With E1 and Status given, exactly that arm. What is not given is kept from `near` if that leads to a
-    solution within the limits. Otherwise the solution next to `near` (without it: next to a usual bent arm)
-    is taken, in the same Status if it has one, then in any. If there is a solution within the limits, one is
-    found.
+    E1 and Status are kept if given; otherwise they are taken from `near` if that gives a solution within the limits. If
+    not, the result is the solution closest to `near` (by default a bent arm), in the same Status if possible, then in
+    any. If there is a solution within the limits, one is found.
 
     Args:
         robot: the robot.
@@ -321,8 +319,8 @@ def solve(
         Shape (7,) [rad].
 
     Raises:
-        LimitError: a value that is none, as Status 8.
-        Unreachable: no solution within the joint limits; the text says what is in the way.
+        LimitError: a value is outside its range, such as Status 8.
+        Unreachable: no solution within the joint limits; the text names the cause.
     """
     r, p = rows(pose)
     hint = None if near is None else array(near, 7, "near").tolist()
@@ -343,7 +341,7 @@ def solve(
     if best is None:
         fixed = " with that E1 or Status" if e1 is not None or status is not None else ""
         raise Unreachable(
-            f"the pose is within reach, but every arm position that leads there{fixed} breaks a joint limit",
+            f"the pose is within reach, but every arm position that reaches it{fixed} violates a joint limit",
             code=51,
             hint="change the orientation" + (", or leave E1 and Status free" if fixed else ""),
         )
@@ -377,7 +375,7 @@ def _samples(spans: Sequence[tuple[float, float]]) -> list[float]:
 
 
 def solve_all(robot: RobotModel, pose: Pose | Array, *, e1: float | None = None) -> list[Array]:
-    """Solutions within the joint limits.
+    """Find solutions within the joint limits.
 
     Args:
         robot: the robot.

@@ -1,9 +1,9 @@
-"""Where, on the circle of arm angles that keep a flange pose, joints meet their limits.
+"""Arm angles of a flange pose at which joints reach their limits.
 
-After Shimizu et al. (see `inverse`), section IV: with the wrist and the flange fixed, the rotations of
+After Shimizu et al. (see `inverse_kinematics`), section IV: with the wrist and the flange fixed, the rotations of
 shoulder and wrist are R(psi) = S sin(psi) + K cos(psi) + C, and every event is a root of s sin(psi) + k
 cos(psi) + c = 0 with coefficients from S, K and C. Between two neighbouring events nothing changes, so one
-look inside decides for the whole interval: no feasible interval is too narrow to be found.
+sample decides for the whole interval: no feasible interval is too narrow to be found.
 """
 
 from __future__ import annotations
