@@ -15,23 +15,20 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import LimitError, StaleState, StreamError
-from heptarm.rl.guard import Guard
-from heptarm.rl.pilot import Decides, Pilot
-from heptarm.rl.report import Report
+from heptarm.rl.pilot import Decides, Pilot, PolicyGuard
+from heptarm.rl.report import EpisodeReport
 from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import Array, array
-from heptarm.values.mode import Mode
-from heptarm.values.motion import ptp
+from heptarm.values.mode.mode import Mode
+from heptarm.values.motion.ptp import ptp
 
 if TYPE_CHECKING:
     from heptarm.arm.arm import Arm
-    from heptarm.arm.servo import JointServo
+    from heptarm.arm.motion.servo import JointServo
     from heptarm.values.state import State
 
 #: Where the target is, base frame, shape (3,) [m], at a time since the episode's beginning [s].
 Target = Callable[[float], Array]
-#: Without a command for so long the arm stops [s]; meanwhile it comes to rest at the last one, a step away.
-WATCHDOG = 0.2
 #: Ticks of the servo loop a decision where commands are delayed, so that a delay is met within a few milliseconds.
 _FINE = 4
 #: States a second per decision, so that what a decision sees is fresh.
@@ -39,7 +36,7 @@ _STATES = 8.0
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class DeploySettings:
     """How a policy is deployed.
 
     Attributes:
@@ -52,7 +49,7 @@ class Settings:
     """
 
     _: KW_ONLY
-    guard: Guard = Guard()  # noqa: RUF009  frozen
+    guard: PolicyGuard = PolicyGuard()  # noqa: RUF009  frozen
     mode: Mode | None = None
     speed: float = 0.5
     acceleration: float = 1.0
@@ -75,10 +72,10 @@ def deploy(
     policy: Decides,
     targets: npt.ArrayLike | Sequence[Target],
     *,
-    settings: Settings | None = None,
+    settings: DeploySettings | None = None,
     starts: npt.ArrayLike | None = None,
     progress: Callable[[int, float], object] | None = None,
-) -> Report:
+) -> EpisodeReport:
     """Run a policy on an arm, one episode a target, each from home.
 
     Args:
@@ -97,7 +94,7 @@ def deploy(
         StaleState: the states stopped coming; the arm was stopped.
         StreamError: the servo stream ended under way.
     """
-    task, settings = policy.task, settings or Settings()
+    task, settings = policy.task, settings or DeploySettings()
     if arm.robot.name != task.model.name:
         raise LimitError(
             f"the policy was trained for the {task.model.title}; this is a {arm.robot.title}",
@@ -130,7 +127,7 @@ def deploy(
         "guard": dict(pilot.watch.counts),
         "late_ticks": late,
     }
-    return Report(
+    return EpisodeReport(
         task,
         np.array([one.targets[-1] for one in episodes]),
         np.array([_distances(task, one) for one in episodes]),
@@ -140,7 +137,7 @@ def deploy(
     )
 
 
-def _run(arm: Arm, pilot: Pilot, goal: Target, settings: Settings) -> tuple[_Episode, int]:
+def _run(arm: Arm, pilot: Pilot, goal: Target, settings: DeploySettings) -> tuple[_Episode, int]:
     """One episode; also how many of its ticks came late."""
     task = pilot.task
     fine = _FINE if settings.latency > 0 else 1
@@ -152,7 +149,6 @@ def _run(arm: Arm, pilot: Pilot, goal: Target, settings: Settings) -> tuple[_Epi
     with arm.servo(
         "joint",
         rate=rate,
-        watchdog=WATCHDOG,
         mode=settings.mode,
         speed=settings.speed,
         acceleration=settings.acceleration,
@@ -183,7 +179,7 @@ def _send(sv: JointServo, waiting: deque[tuple[int, Array]], tick: int) -> None:
     sv.set(waiting[0][1] if waiting[0][0] <= tick else sv.start.q)
 
 
-def _fresh(arm: Arm, guard: Guard) -> State:
+def _fresh(arm: Arm, guard: PolicyGuard) -> State:
     state = arm.state
     if not state.age <= guard.stale:
         raise StaleState(
@@ -205,7 +201,7 @@ def _listed(targets: npt.ArrayLike | Sequence[Target]) -> list[npt.ArrayLike | T
     return list(np.atleast_2d(np.asarray(targets, dtype=np.float64)))
 
 
-def _target(target: npt.ArrayLike | Target, guard: Guard) -> Target:
+def _target(target: npt.ArrayLike | Target, guard: PolicyGuard) -> Target:
     """A target as a function of time, checked where it begins; a moving one is checked by the guard on the way."""
     if callable(target):
         moving: Target = target

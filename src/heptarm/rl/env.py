@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, NotReady, require
-from heptarm.rl.batch import BatchReach, Engine
-from heptarm.rl.plant import PlantEngine
-from heptarm.rl.randomise import NONE, Randomisation
+from heptarm.rl.sim.batch import BatchReach, Engine
+from heptarm.rl.sim.plant_engine import PlantEngine
+from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.task import COARSE, ReachTask
 from heptarm.values.arrays import array
 
@@ -35,7 +35,7 @@ def observation_space(task: ReachTask) -> spaces.Box:
 
 
 def action_space(task: ReachTask) -> spaces.Box:
-    """Actions are shares of the largest step."""
+    """Actions are fractions of the largest step."""
     return spaces.Box(-1.0, 1.0, (task.action_size,), dtype=np.float32)
 
 
@@ -113,7 +113,7 @@ class ReachEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is n
         wanted = dict(options or {})
         target = wanted.pop("target", None)
         if wanted:
-            raise CommandRejected(f"unknown options: {', '.join(wanted)}", hint="there is 'target'")
+            raise CommandRejected(f"unknown options: {', '.join(wanted)}", hint="the only option is 'target'")
         goals = None if target is None else array(target, 3, "target")[None]
         own = None if seed is None else int(self.np_random.integers(2**63))
         seen = self._arms.reset(goals, seed=own)
@@ -132,7 +132,7 @@ class ReachEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is n
             NotReady: the episode has ended, or none was begun.
         """
         if not self._open:
-            raise NotReady("no episode is under way", hint="call reset()")
+            raise NotReady("no episode is running", hint="call reset()")
         target = self._arms.target.copy()
         step = self._arms.step(np.asarray(action)[None])
         ended = bool(step.done[0])

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError
-from heptarm.rl.batch import BatchReach, Engine
 from heptarm.rl.policy import Policy
-from heptarm.rl.randomise import NONE, Randomisation
-from heptarm.rl.report import Report
+from heptarm.rl.report import EpisodeReport
+from heptarm.rl.sim.batch import BatchReach, Engine
+from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import Array
 
@@ -34,17 +34,17 @@ def evaluate(
     seed: int = 0,
     threads: int = 2,
     engine: Any = Engine,
-) -> Report:
+) -> EpisodeReport:
     """Run a policy, one episode a target.
 
     Args:
         policy: the policy, or any function of observations, shape (n, observations), to actions.
         targets: how many held-back ones, or the targets themselves, shape (n, 3) [m].
         task: None: the policy's.
-        randomisation: of the simulated robots; those of training are `heptarm.rl.randomise.LEVELS`.
+        randomisation: of the simulated robots; those of training are `heptarm.rl.sim.randomisation.LEVELS`.
         seed: of targets and starts.
         threads: of the simulation.
-        engine: class of the simulation's engine, as `heptarm.rl.plant.PlantEngine`.
+        engine: class of the simulation's engine, as `heptarm.rl.sim.plant_engine.PlantEngine`.
 
     Raises:
         CommandRejected: a function without its task.
@@ -57,7 +57,7 @@ def evaluate(
     task = task or known
     if isinstance(targets, int):
         if targets < 1:
-            raise LimitError(f"targets is {targets}; at least 1 is wanted", code=2, parameter="targets")
+            raise LimitError(f"targets must be at least 1, got {targets}", code=2, parameter="targets")
         goals = held_back(task, targets, seed=seed)
     else:
         goals = np.atleast_2d(np.asarray(targets, dtype=np.float64))
@@ -80,4 +80,4 @@ def evaluate(
         observation, distances[:, t] = step.observation, step.distance
         paths[:, t + 1], joints[:, t + 1] = step.tip, arms.q
     facts = {"engine": engine.__name__, "randomisation": randomisation.as_dict(), "seed": seed}
-    return Report(task, goals, distances, paths, joints=joints, facts=facts)
+    return EpisodeReport(task, goals, distances, paths, joints=joints, facts=facts)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from heptarm.errors import CommandRejected, LimitError, require
-from heptarm.rl.report import Report
+from heptarm.rl.report import EpisodeReport
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 
@@ -18,7 +18,7 @@ _SILVER, _ORANGE = "#9aa0a6", "#ff6a13"
 _WIDTHS = (13.0, 11.0, 9.0, 7.0)
 
 
-def film(report: Report, path: str | os.PathLike[str], *, episodes: int = 4, every: int = 2) -> Path:
+def film(report: EpisodeReport, path: str | os.PathLike[str], *, episodes: int = 4, every: int = 2) -> Path:
     """Draw the first episodes of a report one after the other; returns the path.
 
     Args:
@@ -37,7 +37,7 @@ def film(report: Report, path: str | os.PathLike[str], *, episodes: int = 4, eve
         raise CommandRejected(f"{target.name!r} ends neither in .gif nor in .png", parameter="path")
     for name, value in (("episodes", episodes), ("every", every)):
         if value < 1:
-            raise LimitError(f"{name} is {value}; at least 1 is wanted", code=2, parameter=name)
+            raise LimitError(f"{name} must be at least 1, got {value}", code=2, parameter=name)
     figures = require("matplotlib.figure", extra="rl")
     return (
         _row(report, target, figures)
@@ -46,7 +46,7 @@ def film(report: Report, path: str | os.PathLike[str], *, episodes: int = 4, eve
     )
 
 
-def _gif(report: Report, target: Path, figures: Any, episodes: int, every: int) -> Path:
+def _gif(report: EpisodeReport, target: Path, figures: Any, episodes: int, every: int) -> Path:
     animation = require("matplotlib.animation", extra="rl")
     require("PIL", extra="rl")
     figure = figures.Figure(figsize=(4.2, 4.2))
@@ -62,7 +62,7 @@ def _gif(report: Report, target: Path, figures: Any, episodes: int, every: int) 
     return target
 
 
-def _row(report: Report, target: Path, figures: Any, pictures: int = 6) -> Path:
+def _row(report: EpisodeReport, target: Path, figures: Any, pictures: int = 6) -> Path:
     figure = figures.Figure(figsize=(3.0 * pictures, 3.2))
     last = report.joints.shape[1] - 1
     # most happens in the first second
@@ -75,7 +75,7 @@ def _row(report: Report, target: Path, figures: Any, pictures: int = 6) -> Path:
     return target
 
 
-def _draw(axes: Any, report: Report, episode: int, step: int) -> None:
+def _draw(axes: Any, report: EpisodeReport, episode: int, step: int) -> None:
     axes.clear()
     points = chain(report.task.model, report.joints[episode, step])
     for index, width in enumerate(_WIDTHS):

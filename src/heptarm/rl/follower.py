@@ -9,13 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import ShapeError
-from heptarm.rl.guard import Guard
-from heptarm.rl.pilot import Decides, Pilot
+from heptarm.rl.pilot import Decides, Pilot, PolicyGuard
 from heptarm.values.arrays import Array, array
 
 
 class Follower:
-    """Follows the newest target with the newest joint states; without either it says nothing, and the arm brakes.
+    """Follows the newest target with the newest joint states; without either it sends nothing, and the arm brakes.
 
     One thread at a time.
 
@@ -25,8 +24,8 @@ class Follower:
         guard: limits; a joint state older than its `stale` is as good as none.
     """
 
-    def __init__(self, policy: Decides, joints: Sequence[str], *, guard: Guard | None = None) -> None:
-        self.guard = guard or Guard()
+    def __init__(self, policy: Decides, joints: Sequence[str], *, guard: PolicyGuard | None = None) -> None:
+        self.guard = guard or PolicyGuard()
         self.task = policy.task
         self._pilot = Pilot(policy, self.guard)
         self._joints = tuple(joints)

@@ -95,12 +95,12 @@ def jacobian(robot: RobotModel, q: Array) -> tuple[Array, Array, Array]:
 def step_towards(robot: RobotModel, q: Array, shift: Array, held: Array) -> Array:
     """Joint positions whose flange is shifted and turned back to a held rotation; one damped Newton step.
 
-    Where the pose is at the edge of the reach, rotation gives way instead of the joints running off.
+    Where the pose is at the edge of the reach, rotation is given up before joints move far.
 
     Args:
         robot: the robot.
         q: joint positions, shape (..., 7) [rad].
-        shift: wanted way of the flange, base axes, shape (..., 3) [m].
+        shift: requested displacement of the flange, base axes, shape (..., 3) [m].
         held: wanted rotation of the flange, shape (..., 3, 3).
 
     Returns:

@@ -1,15 +1,105 @@
-"""A policy at the wheel: what it decides becomes a command that a guard has passed. No arm, no loop, no clock."""
+"""A policy in command: its decisions become commands that a guard has passed. No arm, no loop, no clock."""
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import KW_ONLY, dataclass
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.rl.guard import Guard, Watch
+from heptarm.errors import LimitError
+from heptarm.rl import kinematics
 from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import Array
+from heptarm.values.robot import RobotModel
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyGuard:
+    """Limits of a deployment.
+
+    Attributes:
+        low: corner of the box that the flange stays in, base frame, shape (3,) [m].
+        high: the opposite corner [m].
+        margin: kept from every joint's limits [rad].
+        speed: of the commanded joints at most [rad/s].
+        stale: an older state ends the deployment [s].
+
+    Raises:
+        LimitError: a box without a volume, or a limit that is not positive.
+    """
+
+    _: KW_ONLY
+    low: tuple[float, float, float] = (0.30, -0.50, 0.10)
+    high: tuple[float, float, float] = (0.95, 0.50, 0.95)
+    margin: float = 0.05
+    speed: float = 1.3
+    stale: float = 0.25
+
+    def __post_init__(self) -> None:
+        if not all(a < b for a, b in zip(self.low, self.high, strict=True)):
+            raise LimitError(f"the box from {self.low} to {self.high} has no volume", code=2, parameter="low")
+        for name in ("speed", "stale"):
+            if not getattr(self, name) > 0:
+                raise LimitError(f"{name} is {getattr(self, name)}; it is positive", code=2, parameter=name)
+
+    def check(self, target: Array) -> Array:
+        """A target, base frame, shape (3,) [m], if it is inside the box.
+
+        Raises:
+            LimitError: it is outside.
+        """
+        if (target >= self.low).all() and (target <= self.high).all():
+            return target
+        raise LimitError(
+            f"the target {np.round(target, 3).tolist()} m is outside the guard's box",
+            code=2,
+            parameter="target",
+            value=target.tolist(),
+            allowed=f"{list(self.low)} to {list(self.high)} m",
+            hint="choose another target, or a guard with a larger box",
+        )
+
+
+class Watch:
+    """A guard on duty: passes commands on, or less than them, and counts what it did.
+
+    Args:
+        guard: the limits.
+        robot: the robot.
+        period: of the commands [s].
+
+    Attributes:
+        counts: how often it stepped in, by "joint", "speed", "box".
+    """
+
+    def __init__(self, guard: PolicyGuard, robot: RobotModel, *, period: float) -> None:
+        self._guard, self._robot = guard, robot
+        self._step = guard.speed * period
+        self._low, self._high = robot.q_min + guard.margin, robot.q_max - guard.margin
+        self.counts = Counter(joint=0, speed=0, box=0)
+
+    def allow(self, last: Array, wanted: Array) -> Array:
+        """What may be commanded, shape (7,) [rad].
+
+        A command outside the joints' margins or faster than allowed is brought back; one that moves the flange out
+        of the box (or farther out of it) is not taken at all: the arm holds its last command.
+        """
+        allowed = np.minimum(np.maximum(wanted, self._low), self._high)
+        self.counts["joint"] += bool((allowed != wanted).any())
+        bounded = np.minimum(np.maximum(allowed, last - self._step), last + self._step)
+        self.counts["speed"] += bool((bounded != allowed).any())
+        if self._outside(bounded) > self._outside(last):
+            self.counts["box"] += 1
+            return last
+        return bounded
+
+    def _outside(self, q: Array) -> float:
+        """How far the flange is out of the box [m]; 0 inside."""
+        tip = kinematics.tip(self._robot, q)
+        return float(np.maximum(np.maximum(self._guard.low - tip, tip - self._guard.high), 0.0).max())
 
 
 class Decides(Protocol):
@@ -33,9 +123,9 @@ class Pilot:
         watch: the guard on duty; its `counts` tell how often it stepped in.
     """
 
-    def __init__(self, policy: Decides, guard: Guard | None = None) -> None:
+    def __init__(self, policy: Decides, guard: PolicyGuard | None = None) -> None:
         self.task = policy.task
-        self.watch = Watch(guard or Guard(), self.task.model, period=1.0 / self.task.rate)
+        self.watch = Watch(guard or PolicyGuard(), self.task.model, period=1.0 / self.task.rate)
         self._policy = policy
         self._command = self._held = np.empty(0)
 

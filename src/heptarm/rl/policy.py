@@ -118,7 +118,7 @@ class Policy:
         """Read a file of `save`.
 
         Raises:
-            HeptarmError: it is not there, or not such a file.
+            HeptarmError: the file does not exist, or is not a policy.
         """
         try:
             with np.load(path, allow_pickle=False) as file:
@@ -136,11 +136,15 @@ class Policy:
                 facts=about["facts"],
             )
         except FileNotFoundError:
-            raise HeptarmError(f"there is no {path}", hint="`heptarm rl train` makes a policy") from None
+            raise HeptarmError(
+                f"policy file {path} does not exist", hint="train one with `heptarm rl train`"
+            ) from None
         except (KeyError, ValueError, TypeError, OSError, EOFError, BadZipFile) as error:
             if isinstance(error, HeptarmError):
                 raise
-            raise HeptarmError(f"{path} is no policy ({error})") from error
+            raise HeptarmError(
+                f"{path} must be a policy file (.npz) written by heptarm, got: {error}"
+            ) from error
 
 
 def shipped(*, feature: bool = False) -> Policy:

@@ -17,7 +17,7 @@ from heptarm.values.arrays import Array, frozen
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Report:
+class EpisodeReport:
     """Episodes of a policy; n of them, t decisions each.
 
     Attributes:
@@ -72,7 +72,7 @@ class Report:
 
     @property
     def success_rate(self) -> float:
-        """Share of `success`."""
+        """Fraction of `success`."""
         return float(self.success.mean())
 
     @property
@@ -91,7 +91,7 @@ class Report:
         return float(np.percentile(self.final, 95))
 
     def reached_within(self, seconds: float) -> float:
-        """Share of the episodes that came within the radius in that time."""
+        """Fraction of the episodes that came within the radius in that time."""
         return float((self.time_to_reach <= seconds + 1e-9).mean())
 
     def as_dict(self) -> dict[str, Any]:
@@ -157,7 +157,7 @@ class Report:
         return target
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Report:
+    def load(cls, path: str | os.PathLike[str]) -> EpisodeReport:
         """Read a `.npz` file of `save`."""
         with np.load(path, allow_pickle=False) as file:
             about = json.loads(str(file["about"]))

@@ -90,7 +90,7 @@ class ReachTask:
                     allowed="(0, inf)",
                 )
         if not self.spread >= 0:
-            raise LimitError(f"spread is {self.spread}; it is not negative", parameter="spread", code=2)
+            raise LimitError(f"spread must be 0 or more, got {self.spread}", parameter="spread", code=2)
 
     @property
     def model(self) -> RobotModel:
@@ -146,9 +146,9 @@ class ReachTask:
         result[..., 7:14] = 0.1 * np.asarray(dq)
         result[..., 14:17] = target
         if self.feature:
-            way = self.tip(q) - target
-            result[..., 17:20] = way / COARSE
-            result[..., 20:23] = np.clip(way / FINE, -1.0, 1.0)
+            offset = self.tip(q) - target
+            result[..., 17:20] = offset / COARSE
+            result[..., 20:23] = np.clip(offset / FINE, -1.0, 1.0)
         return result
 
     def advance(self, command: Array, q: Array, action: Array, held: Array | None = None) -> Array:
@@ -184,8 +184,8 @@ class ReachTask:
 
     def distance(self, tip: Array, target: Array) -> Array:
         """From the flange to the target, shapes (..., 3) to (...,) [m]."""
-        way = tip - target
-        result: Array = np.sqrt((way * way).sum(axis=-1))
+        offset = tip - target
+        result: Array = np.sqrt((offset * offset).sum(axis=-1))
         return result
 
     def reward(self, distance: Array) -> Array:

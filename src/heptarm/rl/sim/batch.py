@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, MissingExtra, ShapeError
-from heptarm.rl import simulation
-from heptarm.rl.randomise import NONE, Randomisation
+from heptarm.rl.sim import simulation
+from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import Array
 
@@ -121,7 +121,7 @@ class Engine:
 
 
 class BatchReach:
-    """The task on many simulated arms; episodes that end begin anew by themselves.
+    """The task on many simulated arms; episodes that end restart by themselves.
 
     Args:
         task: the task.
@@ -152,7 +152,7 @@ class BatchReach:
         for name, value in (("envs", envs), ("threads", threads)):
             if value < 1:
                 raise LimitError(
-                    f"{name} is {value}; at least 1 is wanted", code=2, parameter=name, value=value
+                    f"{name} must be at least 1, got {value}", code=2, parameter=name, value=value
                 )
         if starts not in ("staggered", "together"):
             raise CommandRejected(f"starts is {starts!r}; 'staggered' or 'together' is wanted", value=starts)
@@ -162,7 +162,7 @@ class BatchReach:
         self._all = np.arange(envs)
         if randomisation.payload[1] > 0:
             self.engine.payload(randomisation.draw_payload(self._random, envs))
-        if simulation.soft(randomisation.stiffness):
+        if simulation.is_compliant(randomisation.stiffness):
             self.engine.stiffness(randomisation.draw_stiffness(self._random, envs))
         self._staggered = starts == "staggered"
         self.target = np.zeros((envs, 3))

@@ -8,20 +8,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from heptarm.rl.batch import Index
-from heptarm.rl.simulation import GRAVITY, IMPEDANCE_DAMPING
+from heptarm.rl.sim.batch import Index
+from heptarm.rl.sim.simulation import GRAVITY, IMPEDANCE_DAMPING
 from heptarm.rl.task import ReachTask
+from heptarm.sim.planning.command import TICK, Order
+from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
-from heptarm.values.mode import JointImpedance
-from heptarm.virtual.order import Order
-from heptarm.virtual.plant import Plant
-from heptarm.virtual.tick import TICK
+from heptarm.values.mode.impedance import JointImpedance
 
 _SERVO = 1
 
 
 class PlantEngine:
-    """Plants side by side; same methods as `heptarm.rl.batch.Engine`.
+    """Plants side by side; same methods as `heptarm.rl.sim.batch.Engine`.
 
     Args:
         task: the task.
@@ -34,8 +33,8 @@ class PlantEngine:
         plants: the plants.
     """
 
-    #: Share of the axes' largest speed, acceleration and jerk that the servo uses.
-    share = 1.0
+    #: Fraction of the axes' largest speed, acceleration and jerk that the servo uses.
+    fraction = 1.0
 
     def __init__(self, task: ReachTask, *, envs: int, threads: int = 1) -> None:
         self.plants: list[Plant] = []
@@ -67,10 +66,12 @@ class PlantEngine:
             plant = Plant(self._name, q=tuple(start.tolist()))
             if self._payload[index]:
                 plant.apply_wrench((0.0, 0.0, -GRAVITY * float(self._payload[index])))
-            mode, share = None, (self.share,) * 7
+            mode, fraction = None, (self.fraction,) * 7
             if self._stiffness is not None:
                 mode = JointImpedance(float(self._stiffness[index]), damping=IMPEDANCE_DAMPING)
-            plant.submit(Order(_SERVO, "servo", joint_velocity=share, joint_acceleration=share, mode=mode))
+            plant.submit(
+                Order(_SERVO, "servo", joint_velocity=fraction, joint_acceleration=fraction, mode=mode)
+            )
             self.plants[index : index + 1] = [plant]
             self._time[index] = 0.0
             self.q[index], self.dq[index] = start, 0.0

@@ -1,4 +1,4 @@
-"""What differs from robot to robot, drawn anew in training so that a policy does not lean on it.
+"""Domain randomisation: what differs from robot to robot, drawn at random so that a policy does not depend on it.
 
 A precise policy trained without it swings around its target as soon as the robot answers later than the
 simulation did.

@@ -15,12 +15,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from heptarm import virtual
+from heptarm import sim
 from heptarm.rl.task import ReachTask
+from heptarm.sim.control.laws import BANDWIDTH, DAMPING
 from heptarm.values.arrays import Array
-from heptarm.virtual.law import BANDWIDTH, DAMPING
 
-_MODELS = Path(str(virtual.__file__)).parent / "models"
+_MODELS = Path(str(sim.__file__)).parent / "models"
 
 #: Steps of the engine in a decision.
 SUBSTEPS = 8
@@ -74,13 +74,13 @@ def gains(inertia: Array, stiffness: Array | None = None) -> tuple[Array, Array]
         return stiff, damp
     wanted = np.asarray(stiffness)[..., None]
     free = np.isfinite(wanted)
-    soft = np.where(free, wanted, 1.0)
+    compliant = np.where(free, wanted, 1.0)
     return (
-        np.where(free, soft, stiff),
-        np.where(free, 2 * IMPEDANCE_DAMPING * np.sqrt(soft * inertia), damp),
+        np.where(free, compliant, stiff),
+        np.where(free, 2 * IMPEDANCE_DAMPING * np.sqrt(compliant * inertia), damp),
     )
 
 
-def soft(bounds: tuple[float, float]) -> bool:
+def is_compliant(bounds: tuple[float, float]) -> bool:
     """Whether a range of stiffness asks for joint impedance."""
     return isfinite(bounds[1])

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from heptarm.errors import CommandRejected, require
-from heptarm.rl.batch import BatchReach
 from heptarm.rl.env import action_space, observation_space
+from heptarm.rl.sim.batch import BatchReach
 
 require("stable_baselines3", extra="rl")
 

@@ -1,6 +1,6 @@
 """MuJoCo Warp as an engine: the same arms, tens of thousands at once on an NVIDIA GPU.
 
-It also runs on the CPU, slower than `heptarm.rl.batch.Engine`, which serves to test it. Its numbers are of
+It also runs on the CPU, slower than `heptarm.rl.sim.batch.Engine`, which serves to test it. Its numbers are of
 single precision. The first step of a process compiles its kernels, up to two minutes; they are kept for the next.
 """
 
@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from heptarm.errors import require
-from heptarm.rl import simulation
-from heptarm.rl.batch import Index
+from heptarm.rl.sim import simulation
+from heptarm.rl.sim.batch import Index
 from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import Array
 
@@ -23,7 +23,7 @@ CONSTRAINTS = 40
 
 
 class WarpEngine:
-    """Arms that follow commanded joints; same methods as `heptarm.rl.batch.Engine`.
+    """Arms that follow commanded joints; same methods as `heptarm.rl.sim.batch.Engine`.
 
     Args:
         task: the task.

@@ -35,7 +35,7 @@ class Team:
         self.rank, self.size, self.device = rank, size, device
 
     @property
-    def leads(self) -> bool:
+    def is_first(self) -> bool:
         """This worker reports and writes."""
         return self.rank == 0
 
@@ -52,7 +52,7 @@ class Team:
         return result
 
     def any(self, flag: object) -> bool:
-        """Whether one of the workers says so."""
+        """Whether one of the workers reports it."""
         return bool(self.total(torch.tensor(float(bool(flag)), device=self.device)) > 0)
 
     def align(self, module: nn.Module) -> None:
@@ -75,7 +75,10 @@ def team(device: str) -> Iterator[Team]:
     """
     size, rank = _number("WORLD_SIZE", 1), _number("RANK", 0)
     if not 0 <= rank < size:
-        raise LimitError(f"RANK is {rank}, WORLD_SIZE {size}", hint="start the workers with torchrun")
+        raise LimitError(
+            f"RANK must be 0 to WORLD_SIZE - 1, got RANK {rank} and WORLD_SIZE {size}",
+            hint="start the workers with torchrun",
+        )
     place = _device(device)
     if size == 1:
         yield Team(0, 1, place)

@@ -20,7 +20,7 @@ from heptarm.rl.policy import CLIP
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class PpoSettings:
     """Numbers of the algorithm.
 
     Attributes:
@@ -29,7 +29,7 @@ class Settings:
         epochs: passes over the samples of an update.
         minibatches: parts that a pass is cut into.
         rate: ceiling of the learning rate at the beginning.
-        rate_end: share of that ceiling that is left at the end.
+        rate_end: fraction of that ceiling at the end.
         discount: of a reward one decision later.
         trace: lambda of the advantage estimate.
         clip: largest change of an action's likelihood that is rewarded.
@@ -93,7 +93,7 @@ class Settings:
             )
 
     def ceiling(self, progress: float) -> float:
-        """The most that `spread` may be after a share of the training, 0 to 1."""
+        """The most that `spread` may be after a fraction of the training, 0 to 1."""
         left = min(1.0, 2.0 * (1.0 - min(1.0, progress)))
         return self.spread_end + (self.spread - self.spread_end) * left
 
@@ -149,7 +149,7 @@ def network(inputs: int, hidden: tuple[int, ...], outputs: int, last: float) -> 
 class Agent(nn.Module):  # type: ignore[misc]
     """Scaler, policy network, value network."""
 
-    def __init__(self, observations: int, actions: int, settings: Settings) -> None:
+    def __init__(self, observations: int, actions: int, settings: PpoSettings) -> None:
         super().__init__()
         self.scaler = Scaler(observations)
         self.policy = network(observations, settings.hidden, actions, 0.01)
@@ -173,7 +173,7 @@ class Samples:
     advantage: Tensor
 
 
-def advantages(reward: Tensor, value: Tensor, after: Tensor, done: Tensor, settings: Settings) -> Tensor:
+def advantages(reward: Tensor, value: Tensor, after: Tensor, done: Tensor, settings: PpoSettings) -> Tensor:
     """Generalised advantage estimates (Schulman et al. 2016), shape (horizon, envs).
 
     Episodes end by their length only, so the value of what was seen last counts on: `after` holds it where an
@@ -199,7 +199,7 @@ class Learner:
     """
 
     def __init__(
-        self, agent: Agent, settings: Settings, mean: Callable[[Tensor], Tensor] | None = None
+        self, agent: Agent, settings: PpoSettings, mean: Callable[[Tensor], Tensor] | None = None
     ) -> None:
         self.agent, self.settings = agent, settings
         self._mean = mean
@@ -213,7 +213,7 @@ class Learner:
         Args:
             samples: what was experienced since the last.
             shuffle: draws the order of the samples.
-            progress: share of the training that is done, 0 to 1.
+            progress: fraction of the training that is done, 0 to 1.
 
         Returns:
             Mean "kl" and "loss" of the value, the learning "rate", the mean "spread" of the actions.
@@ -242,7 +242,7 @@ class Learner:
                 total = s.value * loss - better.mean() - s.entropy * agent.spread.sum()
                 self.optimiser.zero_grad(set_to_none=True)
                 total.backward()
-                self._share_gradients()
+                self._average_gradients()
                 nn.utils.clip_grad_norm_(self._trained, s.gradient)
                 with torch.no_grad():
                     kl = self._shared(divergence(mean[part], spread, now, agent.spread))
@@ -268,7 +268,7 @@ class Learner:
     def _shared(self, value: Tensor) -> Tensor:
         return value if self._mean is None else self._mean(value)
 
-    def _share_gradients(self) -> None:
+    def _average_gradients(self) -> None:
         if self._mean is None:
             return
         flat = self._mean(torch.cat([p.grad.flatten() for p in self._trained if p.grad is not None]))

@@ -6,9 +6,9 @@ from dataclasses import KW_ONLY, asdict, dataclass, field
 from typing import Any
 
 from heptarm.errors import LimitError
-from heptarm.rl import ppo
-from heptarm.rl.randomise import MILD, STRONG, Randomisation
+from heptarm.rl.sim.randomisation import MILD, STRONG, Randomisation
 from heptarm.rl.task import ReachTask
+from heptarm.rl.train import ppo
 
 #: Environment steps of a training by its task's feature; enough for some millimetres.
 STEPS = {"": 2_200_000, "kinematic": 1_300_000}
@@ -33,20 +33,20 @@ class Recipe:
     steps: int = 0
     seed: int = 0
     randomisation: Randomisation = STRONG
-    settings: ppo.Settings = field(default_factory=ppo.Settings)
+    settings: ppo.PpoSettings = field(default_factory=ppo.PpoSettings)
 
     def __post_init__(self) -> None:
         if self.steps == 0:
             object.__setattr__(self, "steps", STEPS[self.task.feature])
         if self.steps < 1:
-            raise LimitError(f"steps is {self.steps}; at least 1 is wanted", code=2, parameter="steps")
+            raise LimitError(f"steps must be at least 1, got {self.steps}", code=2, parameter="steps")
         if self.seed < 0:
-            raise LimitError(f"seed is {self.seed}; it is not negative", code=2, parameter="seed")
+            raise LimitError(f"seed must be 0 or more, got {self.seed}", code=2, parameter="seed")
 
     @classmethod
     def exact(cls, task: ReachTask | None = None, *, seed: int = 0) -> Recipe:
         """The paper's reward to the letter: no action costs; robots that are roughly known."""
-        settings = ppo.Settings(action_cost=0.0)
+        settings = ppo.PpoSettings(action_cost=0.0)
         return cls(task or ReachTask(), seed=seed, randomisation=MILD, settings=settings)
 
     def as_dict(self) -> dict[str, Any]:
@@ -59,7 +59,7 @@ class Recipe:
         given = dict(entries)
         given["task"] = ReachTask.from_dict(given["task"])
         given["randomisation"] = Randomisation(**{k: _tuple(v) for k, v in given["randomisation"].items()})
-        given["settings"] = ppo.Settings(**{k: _tuple(v) for k, v in given["settings"].items()})
+        given["settings"] = ppo.PpoSettings(**{k: _tuple(v) for k, v in given["settings"].items()})
         return cls(**given)
 
 

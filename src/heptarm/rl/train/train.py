@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from heptarm.errors import CommandRejected, HeptarmError, LimitError, require
-from heptarm.rl.batch import BatchReach, Engine
 from heptarm.rl.policy import Policy
+from heptarm.rl.sim.batch import BatchReach, Engine
 
 torch = require("torch", extra="rl")
 
-from heptarm.rl import ppo  # noqa: E402  needs torch
-from heptarm.rl.recipe import Recipe  # noqa: E402
+from heptarm.rl.train import ppo  # noqa: E402  needs torch
+from heptarm.rl.train.recipe import Recipe  # noqa: E402
 
 __all__ = ["Recipe", "Row", "Trained", "Training", "beside", "train"]
 
@@ -35,7 +35,7 @@ class Row:
         seconds: wall time so far, simulation and learning.
         reward: mean of a decision.
         distance: mean at the end of the episodes that ended, actions still noisy [m]; NaN: none ended.
-        success: share of those that ended within the task's radius; NaN: none ended.
+        success: fraction of those that ended within the task's radius; NaN: none ended.
         kl: how far the update moved the policy.
         loss: of the value.
         rate: learning rate.
@@ -243,7 +243,7 @@ class Training:
 
     def save(self, path: Path) -> None:
         """Write the policy, and beside it what is needed to go on."""
-        if self.team.leads:
+        if self.team.is_first:
             path.parent.mkdir(parents=True, exist_ok=True)
             self.policy().save(path)
         state = {
@@ -297,7 +297,7 @@ def train(
     """Train a policy.
 
     Started by `torchrun`, every worker simulates `settings.envs` arms and all learn one policy; see
-    `heptarm.rl.distributed`.
+    `heptarm.rl.train.distributed`.
 
     Args:
         recipe: what to train; None: the defaults, or with `resume` what was begun.
@@ -319,9 +319,9 @@ def train(
     if path is not None and path.suffix != ".npz":
         raise CommandRejected(f"{path.name!r} does not end in .npz", parameter="out", value=str(path))
     if checkpoint < 1:
-        raise LimitError(f"checkpoint is {checkpoint}; at least 1 is wanted", code=2, parameter="checkpoint")
+        raise LimitError(f"checkpoint must be at least 1, got {checkpoint}", code=2, parameter="checkpoint")
     torch.set_num_threads(1)  # more threads only fight with the simulation's
-    from heptarm.rl import distributed
+    from heptarm.rl.train import distributed
 
     with distributed.team(device) as team:
         state = _state(Path(resume), team) if resume is not None else None
@@ -329,7 +329,7 @@ def train(
             begun = Recipe.from_dict(state["recipe"])
             if recipe is not None and replace(recipe, steps=begun.steps) != begun:
                 raise CommandRejected(
-                    "the recipe differs from that of the checkpoint", hint="leave it out, or start anew"
+                    "the recipe differs from that of the checkpoint", hint="leave it out, or start again"
                 )
             recipe = recipe or begun
         recipe = recipe or Recipe()
@@ -341,8 +341,8 @@ def train(
         stopped = False
         while not training.done and not stopped:
             row = training.update()
-            wish = progress(row) if progress is not None and team.leads else None
-            stopped = team.any(wish is False)
+            answer = progress(row) if progress is not None and team.is_first else None
+            stopped = team.any(answer is False)
             if path is not None and (training.done or stopped or len(training.history) % checkpoint == 0):
                 training.save(path)
         return Trained(training.policy(), tuple(training.history), done=training.done)
@@ -354,7 +354,7 @@ def _state(path: Path, team: Any) -> dict[str, Any]:
         state: dict[str, Any] = torch.load(file, weights_only=True, map_location="cpu")
     except FileNotFoundError:
         raise HeptarmError(
-            f"there is no {file} to go on from", hint="give the .npz file that a training wrote"
+            f"checkpoint {file} does not exist", hint="give the .npz file of an earlier training"
         ) from None
     except Exception as error:
         raise HeptarmError(f"{file} cannot be read ({error})") from error
