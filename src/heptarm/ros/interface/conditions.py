@@ -1,6 +1,6 @@
-"""Conditions as texts, in the words of heptarm.when: `(force.along('z') > 15) | io.user_button`.
+"""Conditions as texts, with the names of heptarm.when: `(force.along('z') > 15) | io.user_button`.
 
-A text is read, never run: the signals, their comparisons and & | ^ ~ are all there is.
+A text is parsed, never executed: it may contain signals, comparisons, and & | ^ ~.
 """
 
 from __future__ import annotations
@@ -11,10 +11,20 @@ from collections.abc import Callable
 from typing import Any
 
 from heptarm.errors import CommandRejected, HeptarmError
-from heptarm.values.condition import Condition, SignalIs, check_condition
-from heptarm.values.signals import Component, Force, Io, Path, Torque, force, io, path, torque
+from heptarm.values.condition.condition import Condition, SignalIs, check_condition
+from heptarm.values.condition.signals import (
+    Component,
+    Force,
+    IoSignals,
+    Path,
+    Torque,
+    force,
+    io,
+    path,
+    torque,
+)
 
-#: Longest text.
+#: Most characters of a text.
 _LONGEST = 2000
 _SIGNALS: dict[str, object] = {"force": force, "torque": torque, "io": io, "path": path}
 _METHODS: dict[type, tuple[str, ...]] = {
@@ -33,29 +43,29 @@ _COMPARE: dict[type, Callable[[Any, Any], Any]] = {ast.Gt: operator.gt, ast.Lt: 
 
 
 def condition_of(text: str, parameter: str = "until") -> Condition | None:
-    """The condition that a text says; None: it is empty.
+    """Parse a condition; None: the text is empty.
 
     Args:
         text: such as "force > 10", or "(abs(torque[3]) > 8) | io['MediaFlange.UserButton']".
-        parameter: what the text was given as.
+        parameter: name of the text in errors.
 
     Raises:
-        CommandRejected: it is none; a number outside its range raises as in heptarm.when.
+        CommandRejected: not a condition; a number out of range raises as in heptarm.when.
     """
     if not text.strip():
         return None
     try:
         if len(text) > _LONGEST:
-            raise ValueError(f"it has {len(text)} characters; allowed are {_LONGEST}")
+            raise ValueError(f"at most {_LONGEST} characters are allowed, got {len(text)}")
         value = _value(ast.parse(text.strip(), mode="eval").body)
         if isinstance(value, Condition):
             return check_condition(value, parameter)
-        raise ValueError("it is a signal or a number, not yet compared to anything")
+        raise ValueError("it is a signal or a number; compare it with something")
     except HeptarmError:
-        raise  # a number outside its range: its own words tell more
+        raise  # a number out of range: its own text has more detail
     except (SyntaxError, ValueError, TypeError, RecursionError, MemoryError) as error:
         raise CommandRejected(
-            f"{parameter} is {text[:80]!r}, which is no condition: {getattr(error, 'msg', None) or error}",
+            f"{parameter} must be a condition, got {text[:80]!r}: {getattr(error, 'msg', None) or error}",
             parameter=parameter,
             value=text,
             hint="for example (force.along('z') > 15) | (abs(torque[3]) > 8) | io.user_button",
@@ -63,11 +73,11 @@ def condition_of(text: str, parameter: str = "until") -> Condition | None:
 
 
 def _value(node: ast.expr) -> Any:
-    """What a part of the text stands for.
+    """Evaluate a part of the text.
 
     Raises:
-        ValueError: nothing that belongs into a condition.
-        TypeError: two things that do not go together.
+        ValueError: not allowed in a condition.
+        TypeError: operands that do not fit together.
     """
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float | str):
         return node.value
@@ -85,19 +95,19 @@ def _value(node: ast.expr) -> Any:
         return _COMPARE[type(node.ops[0])](_value(node.left), _value(node.comparators[0]))
     if isinstance(node, ast.Subscript):
         whole = _value(node.value)
-        if isinstance(whole, Torque | Io):
+        if isinstance(whole, Torque | IoSignals):
             return whole[_value(node.slice)]
     if isinstance(node, ast.Attribute) and not node.attr.startswith("_") and _value(node.value) is io:
         return getattr(io, node.attr)
     if isinstance(node, ast.Call):
         return _call(node)
-    raise ValueError(f"{ast.unparse(node)!r} does not belong into one")
+    raise ValueError(f"{ast.unparse(node)!r} is not allowed in a condition")
 
 
 def _condition(node: ast.expr) -> Condition:
     value = _value(node)
     if not isinstance(value, Condition):
-        raise ValueError(f"{ast.unparse(node)!r} is no condition; put comparisons in brackets")
+        raise ValueError(f"{ast.unparse(node)!r} is not a condition; put comparisons in brackets")
     return value
 
 
@@ -105,7 +115,7 @@ def _call(node: ast.Call) -> Any:
     given = [_value(one) for one in node.args]
     named = {one.arg: _value(one.value) for one in node.keywords if one.arg is not None}
     if len(named) != len(node.keywords):
-        raise ValueError("** does not belong into one")
+        raise ValueError("** is not allowed in a condition")
     called = node.func
     if isinstance(called, ast.Name) and called.id == "abs" and len(given) == 1 and not named:
         if isinstance(given[0], Component):
@@ -116,4 +126,4 @@ def _call(node: ast.Call) -> Any:
         whole = _value(called.value)
         if called.attr in _METHODS.get(type(whole), ()):
             return getattr(whole, called.attr)(*given, **named)
-    raise ValueError(f"{ast.unparse(node)!r} does not belong into one")
+    raise ValueError(f"{ast.unparse(node)!r} is not allowed in a condition")

@@ -1,48 +1,50 @@
-"""Triggers and collisions as messages: what the cabinet is to do on the way, and what becomes of a program."""
+"""Converts triggers from messages, and motion events and collisions to messages."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
-from heptarm.bridge.conditions import condition_of
-from heptarm.bridge.messages import Ros, class_of, put
 from heptarm.errors import CommandRejected, HeptarmError
-from heptarm.values.collision import Collision
-from heptarm.values.event import MotionEvent
-from heptarm.values.motion import Motion
-from heptarm.values.trigger import Notify, SetOutput, Triggered
+from heptarm.ros.interface.conditions import condition_of
+from heptarm.ros.interface.messages import RosAdapter, class_of, put
+from heptarm.values.condition.collision import Collision
+from heptarm.values.condition.trigger import Notify, SetOutput, Triggered
+from heptarm.values.motion.motion import Motion
+from heptarm.values.result import MotionEvent
 
 
 def with_triggers(motion: Motion, messages: Sequence[Any]) -> Motion:
-    """A motion with the triggers of several heptarm_msgs/Trigger.
+    """Add several heptarm_msgs/Trigger to a motion.
 
     Raises:
-        CommandRejected: one is none, or this motion has none.
+        CommandRejected: one is invalid, or this motion cannot have triggers.
     """
     if not len(messages):
         return motion
     if not isinstance(motion, Triggered):
-        raise CommandRejected("hand guiding has no triggers", parameter="triggers")
+        raise CommandRejected("hand guiding cannot have triggers", parameter="triggers")
     for index, one in enumerate(messages):
         name = f"triggers[{index}].condition"
         condition = condition_of(one.condition, name)
         if condition is None:
             raise CommandRejected(
-                f"{name} is empty", parameter=name, hint='give one, such as "path.before_end(0.02)"'
+                f"{name} must be a condition, got an empty text",
+                parameter=name,
+                hint='such as "path.before_end(0.02)"',
             )
         action = SetOutput(one.signal, float(one.value)) if one.signal else Notify(one.label)
         motion = motion.trigger(condition, action)
     return motion
 
 
-def event_message(ros: Ros, number: int, event: MotionEvent) -> Any:
-    """What has become of a program, as heptarm_msgs/MotionEvent.
+def event_message(ros: RosAdapter, number: int, event: MotionEvent) -> Any:
+    """Make a heptarm_msgs/MotionEvent.
 
     Args:
-        ros: of which ROS.
-        number: the cabinet's, of the program.
-        event: what has happened.
+        ros: types and time of the ROS.
+        number: of the program, as the cabinet counts.
+        event: of the program.
     """
     action = None if event.trigger is None else event.trigger.action
     return _stamped(
@@ -63,20 +65,20 @@ def event_message(ros: Ros, number: int, event: MotionEvent) -> Any:
     )
 
 
-def collision_message(ros: Ros, found: Collision, joints: Sequence[str]) -> Any:
-    """What the collision guard has met, as heptarm_msgs/Collision.
+def collision_message(ros: RosAdapter, found: Collision, joints: Sequence[str]) -> Any:
+    """Make a heptarm_msgs/Collision.
 
     Args:
-        ros: of which ROS.
-        found: what it has met.
+        ros: types and time of the ROS.
+        found: the collision.
         joints: names.
     """
-    place: list[float] = []
+    position: list[float] = []
     if found.state is not None:
         try:
-            place = found.state.q.tolist()
-        except HeptarmError:  # the cabinet did not tell
-            place = []
+            position = found.state.q.tolist()
+        except HeptarmError:  # the state has no joint positions
+            position = []
     return _stamped(
         ros,
         "heptarm_msgs/Collision",
@@ -84,13 +86,13 @@ def collision_message(ros: Ros, found: Collision, joints: Sequence[str]) -> Any:
             "joint": joints[found.joint],
             "torque": float(found.torque),
             "allowed": float(found.allowed),
-            "position": place,
+            "position": position,
             "text": str(found),
         },
     )
 
 
-def _stamped(ros: Ros, kind: str, fields: dict[str, Any]) -> Any:
+def _stamped(ros: RosAdapter, kind: str, fields: dict[str, Any]) -> Any:
     message = class_of(kind, "msg")()
     put(message, {"header": {"stamp": ros.time(ros.now())}, **fields})
     return message

@@ -1,8 +1,8 @@
-"""Messages of either ROS to values of heptarm and back: their types differ, their fields do not.
+"""Converts messages of either ROS to values of heptarm and back: their types differ, their fields do not.
 
-A node says once what it has, and its modules only publish and subscribe::
+A node names its types once::
 
-    ros = Ros(joint_state=JointState, ..., seconds=seconds, duration=duration)
+    ros = RosAdapter(joint_state=JointState, ..., seconds=seconds, duration=duration)
     message = feedback(ros, value, names)
 """
 
@@ -15,20 +15,20 @@ from typing import Any, Literal
 
 import numpy as np
 
-from heptarm.bridge.goal import Goal, Point, Tolerance
-from heptarm.bridge.report import Report
-from heptarm.bridge.runner import Feedback
-from heptarm.bridge.trajectory import Sample
+from heptarm.ros.node.diagnostics import Diagnosis
+from heptarm.ros.trajectory.goal import Tolerance, TrajectoryGoal, TrajectoryPoint
+from heptarm.ros.trajectory.runner import GoalFeedback
+from heptarm.ros.trajectory.trajectory import KinematicState
 from heptarm.values.pose import Pose
 from heptarm.values.state import State
 
-#: Fields of a goal that only ROS 2 has, and that no server of an arm's joints can follow.
+#: Fields of a goal that only ROS 2 has, and that are not supported.
 _EXTRAS = ("component_path_tolerance", "component_goal_tolerance")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Ros:
-    """What differs between ROS 1 and ROS 2, and between versions.
+class RosAdapter:
+    """Types and time of one ROS: all that differs between ROS 1 and ROS 2.
 
     Attributes:
         joint_state: type sensor_msgs/JointState.
@@ -38,11 +38,11 @@ class Ros:
         wrench: type geometry_msgs/Wrench.
         diagnostic: type diagnostic_msgs/DiagnosticStatus.
         key_value: type diagnostic_msgs/KeyValue.
-        now: ROS' clock [ns].
-        time: a time of a message, of [ns].
-        seconds: a time or a duration of a message [s].
-        duration: a duration of a message, of [s].
-        level: a level of diagnostics as its message has it.
+        now: ROS time [ns].
+        time: makes a time of a message from [ns].
+        seconds: converts a time or a duration of a message to [s].
+        duration: makes a duration of a message from [s].
+        level: makes a level of a diagnostic message.
     """
 
     joint_state: Any
@@ -60,18 +60,18 @@ class Ros:
 
 
 def class_of(kind: str, part: Literal["msg", "srv", "action"]) -> Any:
-    """The class that ROS' generators made of a "package/Type".
+    """Import the generated class of a "package/Type".
 
     Args:
         kind: the type.
-        part: in which module of the package it is.
+        part: module of the package.
     """
     package, _, name = kind.partition("/")
     return getattr(importlib.import_module(f"{package}.{part}"), name)
 
 
 def put(message: Any, fields: Mapping[str, Any]) -> None:
-    """Give fields of a message values; those of a message in it are a mapping."""
+    """Set fields of a message; a mapping sets the fields of a nested message."""
     for name, value in fields.items():
         if isinstance(value, Mapping):
             put(getattr(message, name), value)
@@ -82,19 +82,19 @@ def put(message: Any, fields: Mapping[str, Any]) -> None:
 # -------------------------------------------------------------------------------------- trajectories
 
 
-def trajectory_goal(ros: Ros, message: Any, *, now: float) -> Goal:
-    """A trajectory without tolerances.
+def trajectory_goal(ros: RosAdapter, message: Any, *, now: float) -> TrajectoryGoal:
+    """Convert a trajectory without tolerances.
 
     Args:
-        ros: whose message it is.
+        ros: types and time of the ROS.
         message: trajectory_msgs/JointTrajectory.
-        now: the time on the runner's clock [s].
+        now: current time on the clock of the execution [s].
     """
     stamp = ros.seconds(message.header.stamp)
-    return Goal(
+    return TrajectoryGoal(
         joints=tuple(message.joint_names),
         points=tuple(
-            Point(
+            TrajectoryPoint(
                 ros.seconds(point.time_from_start),
                 tuple(point.positions),
                 tuple(point.velocities),
@@ -107,13 +107,13 @@ def trajectory_goal(ros: Ros, message: Any, *, now: float) -> Goal:
     )
 
 
-def action_goal(ros: Ros, message: Any, *, now: float) -> Goal:
-    """A goal of control_msgs/FollowJointTrajectory; see `trajectory_goal`."""
+def action_goal(ros: RosAdapter, message: Any, *, now: float) -> TrajectoryGoal:
+    """Convert a goal of control_msgs/FollowJointTrajectory; see `trajectory_goal`."""
     plain = trajectory_goal(ros, message.trajectory, now=now)
     several = getattr(message, "multi_dof_trajectory", None)
     extras = ["multi_dof_trajectory"] if several and (several.joint_names or several.points) else []
     extras += [name for name in _EXTRAS if getattr(message, name, None)]
-    return Goal(
+    return TrajectoryGoal(
         plain.joints,
         plain.points,
         plain.start,
@@ -128,8 +128,8 @@ def _tolerances(messages: Sequence[Any]) -> tuple[Tolerance, ...]:
     return tuple(Tolerance(one.name, one.position, one.velocity, one.acceleration) for one in messages)
 
 
-def feedback(ros: Ros, value: Feedback, names: Sequence[str]) -> Any:
-    """Feedback of control_msgs/FollowJointTrajectory."""
+def feedback(ros: RosAdapter, value: GoalFeedback, names: Sequence[str]) -> Any:
+    """Make feedback of control_msgs/FollowJointTrajectory."""
     message = ros.feedback()
     message.header.stamp = ros.time(ros.now())
     message.joint_names = list(names)
@@ -145,7 +145,7 @@ def feedback(ros: Ros, value: Feedback, names: Sequence[str]) -> Any:
     return message
 
 
-def _point(ros: Ros, sample: Sample, time: float) -> Any:
+def _point(ros: RosAdapter, sample: KinematicState, time: float) -> Any:
     return ros.point(
         positions=sample.q.tolist(),
         velocities=np.nan_to_num(sample.dq).tolist(),
@@ -157,8 +157,8 @@ def _point(ros: Ros, sample: Sample, time: float) -> Any:
 # -------------------------------------------------------------------------------------------- states
 
 
-def joint_state(ros: Ros, state: State, names: Sequence[str], *, external: bool = False) -> Any:
-    """Measured positions, velocities and torques, or the external torques in place of these."""
+def joint_state(ros: RosAdapter, state: State, names: Sequence[str], *, external: bool = False) -> Any:
+    """Make a joint state of measured positions, velocities and torques; `external`: of external torques."""
     message = ros.joint_state(
         name=list(names), position=state.q.tolist(), velocity=np.nan_to_num(state.dq).tolist()
     )
@@ -167,8 +167,8 @@ def joint_state(ros: Ros, state: State, names: Sequence[str], *, external: bool 
     return message
 
 
-def pose_message(ros: Ros, pose: Pose) -> Any:
-    """A pose."""
+def pose_message(ros: RosAdapter, pose: Pose) -> Any:
+    """Make a pose."""
     message = ros.pose()
     place, turn = message.position, message.orientation
     place.x, place.y, place.z = pose.xyz.tolist()
@@ -176,8 +176,8 @@ def pose_message(ros: Ros, pose: Pose) -> Any:
     return message
 
 
-def wrench_message(ros: Ros, state: State) -> Any:
-    """Force and torque acting on the robot at the flange, in base axes."""
+def wrench_message(ros: RosAdapter, state: State) -> Any:
+    """Make the wrench acting on the robot at the flange, in base axes."""
     message = ros.wrench()
     f, t = message.force, message.torque
     f.x, f.y, f.z = state.wrench.force.tolist()
@@ -185,8 +185,8 @@ def wrench_message(ros: Ros, state: State) -> Any:
     return message
 
 
-def diagnostic(ros: Ros, value: Report, *, name: str, hardware: str) -> Any:
-    """A diagnostic status."""
+def diagnostic(ros: RosAdapter, value: Diagnosis, *, name: str, hardware: str) -> Any:
+    """Make a diagnostic status."""
     return ros.diagnostic(
         level=ros.level(value.level),
         name=name,

@@ -1,7 +1,4 @@
-"""Motions from the fields of messages, which both ROS call the same; free of ROS.
-
-What is 0 or empty in a message is not given, and keeps the cabinet's default.
-"""
+"""Converts message fields, which are named alike in both ROS, to motions, poses and joints in the arm's order."""
 
 from __future__ import annotations
 
@@ -9,22 +6,102 @@ from collections.abc import Sequence
 from math import inf
 from typing import Any
 
-from heptarm.bridge.driver import Driver
-from heptarm.bridge.events import with_triggers
-from heptarm.bridge.order import positions
-from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.arrays import Array
-from heptarm.values.circ import circ
-from heptarm.values.guiding import hand_guide
-from heptarm.values.lines import LinRel, lin, lin_rel
-from heptarm.values.motion import TOOL, Motion, hold, ptp, ptp_home
-from heptarm.values.pose import Pose
-from heptarm.values.redundancy import Redundancy
-from heptarm.values.spline import Segment, spl, spline, spline_joints
+import numpy as np
 
-#: Kinds of motions, as heptarm_msgs/Motion numbers them; heptarm_msgs/MovePose has the first four.
+from heptarm.errors import CommandRejected, ShapeError
+from heptarm.ros.interface.events import with_triggers
+from heptarm.ros.node.driver import Driver
+from heptarm.values.arrays import Array
+from heptarm.values.frames import TOOL
+from heptarm.values.motion.circle import circ
+from heptarm.values.motion.hand_guiding import hand_guide
+from heptarm.values.motion.line import LinRel, lin, lin_rel
+from heptarm.values.motion.motion import Motion, hold
+from heptarm.values.motion.ptp import ptp, ptp_home
+from heptarm.values.motion.spline import Segment, spl, spline, spline_joints
+from heptarm.values.pose import Pose, Redundancy
+
+
+def positions(driver: Driver, names: Sequence[str], values: Sequence[float]) -> Array:
+    """Put joint positions into the arm's order, shape (7,) [rad]; missing joints keep their positions.
+
+    Args:
+        driver: of the arm.
+        names: of the joints, in any order; empty: all, in the arm's order.
+        values: positions [rad].
+
+    Raises:
+        ShapeError: an unknown name, a name twice, or not as many numbers as names.
+    """
+    return _ordered(driver, names, values, driver.arm.state.q_cmd)
+
+
+def partial_joints(driver: Driver, names: Sequence[str], values: Sequence[float]) -> Array:
+    """Put values of joints into the arm's order, shape (7,); those of missing joints are NaN."""
+    return _ordered(driver, names, values, np.full(7, np.nan))
+
+
+def velocities(driver: Driver, names: Sequence[str], values: Sequence[float]) -> Array:
+    """Put joint velocities into the arm's order, shape (7,) [rad/s]; those of missing joints are 0."""
+    return _ordered(driver, names, values, np.zeros(7))
+
+
+def _ordered(driver: Driver, names: Sequence[str], values: Sequence[float], others: Array) -> Array:
+    joints = driver.configuration.joints
+    order = list(names) or list(joints)
+    if len(order) != len(values) or len(set(order)) != len(order):
+        raise ShapeError(
+            f"each of the joints {order} must have one number and appear once, got {len(values)} numbers"
+        )
+    result = others.copy()
+    for name, value in zip(order, values):
+        if name not in joints:
+            raise ShapeError(f"unknown joint {name!r}", hint=f"the joints are {', '.join(joints)}")
+        result[joints.index(name)] = value
+    return result
+
+
+def joint_target(driver: Driver, names: Sequence[str], values: Sequence[float]) -> Array:
+    """Convert joint positions of libiiwa, shape (7,) [rad]: NaN keeps the position of a joint.
+
+    Args:
+        driver: of the arm.
+        names: of the joints, in any order; empty: all, in the arm's order.
+        values: positions [rad].
+
+    Raises:
+        ShapeError: an unknown name, a name twice, or not as many numbers as names.
+    """
+    target = positions(driver, names, values)
+    return np.where(np.isnan(target), driver.arm.state.q_cmd, target)
+
+
+def pose_target(driver: Driver, xyz: Sequence[float], quat: Sequence[float]) -> Pose:
+    """Convert a pose of libiiwa: NaN keeps a coordinate; all NaN or all 0 keeps the orientation.
+
+    Args:
+        driver: of the arm.
+        xyz: position of the flange in the base, shape (3,) [m].
+        quat: orientation x, y, z, w.
+
+    Raises:
+        ShapeError: some numbers of the quaternion are NaN and others are not, or it is not a rotation.
+    """
+    here = driver.arm.state.pose_cmd
+    place = np.where(np.isnan(xyz), here.xyz, xyz)
+    turn = np.asarray(quat, dtype=np.float64)
+    if np.isnan(turn).all() or not turn.any():
+        return Pose.of(place, here.quat)
+    if np.isnan(turn).any():
+        raise ShapeError(
+            f"orientation must be four numbers, got {turn.tolist()}", hint="all NaN keeps the orientation"
+        )
+    return Pose.of(place, turn)
+
+
+#: Kinds of motions in heptarm_msgs/Motion; heptarm_msgs/MovePose has the first four.
 PTP, LIN, CIRC, LIN_REL, SPLINE, JOINT_SPLINE, HOLD, HOME, GUIDE = range(9)
-#: Kinds of a spline's segments, as heptarm_msgs/Segment numbers them.
+#: Kinds of spline segments in heptarm_msgs/Segment.
 _SPL, _LIN, _CIRC = range(3)
 _PATH = (
     "speed_mps",
@@ -39,10 +116,10 @@ _JOINTS = ("joint_speed", "joint_acceleration", "joint_jerk")
 
 
 def pose_of(message: Any) -> Pose:
-    """The value of a geometry_msgs/Pose; a quaternion of nothing but 0 is no rotation.
+    """Convert a geometry_msgs/Pose; a zero quaternion is the identity.
 
     Raises:
-        ShapeError: numbers that are no pose.
+        ShapeError: not a pose.
     """
     place, turn = message.position, message.orientation
     quat = (turn.x, turn.y, turn.z, turn.w)
@@ -50,45 +127,45 @@ def pose_of(message: Any) -> Pose:
 
 
 def stamped_pose(message: Any, base: str) -> Pose:
-    """The value of a geometry_msgs/PoseStamped in the base.
+    """Convert a geometry_msgs/PoseStamped in the base.
 
     Args:
         message: the message.
-        base: name of the base's frame.
+        base: name of the base frame.
 
     Raises:
-        ShapeError: it is given in another frame, or its quaternion is none.
+        ShapeError: it is in another frame, or its quaternion is not a rotation.
     """
     frame = message.header.frame_id.lstrip("/")
     if frame not in ("", base):
-        raise ShapeError(f"the pose is given in {frame!r}", hint=f"give it in {base!r}")
+        raise ShapeError(f"frame of the pose must be {base!r}, got {frame!r}", hint="transform it with tf")
     place, turn = message.pose.position, message.pose.orientation
     return Pose.of([place.x, place.y, place.z], [turn.x, turn.y, turn.z, turn.w])
 
 
 def joint_points(driver: Driver, names: Sequence[str], values: Sequence[float]) -> list[Array]:
-    """Joint positions one after the other, each of shape (7,) [rad]; joints left out stay where they are.
+    """Split consecutive joint positions, each of shape (7,) [rad]; missing joints keep their positions.
 
     Raises:
-        ShapeError: not as many numbers as a multiple of the names.
+        ShapeError: the count of numbers is not a multiple of the count of joints.
     """
     width = len(names) or 7
     if not values or len(values) % width:
         raise ShapeError(
-            f"position has {len(values)} numbers; {width} for each point are wanted", parameter="position"
+            f"position must have {width} numbers for each point, got {len(values)}", parameter="position"
         )
     rows = range(0, len(values), width)
     return [positions(driver, names, list(values)[start : start + width]) for start in rows]
 
 
 def program_of(driver: Driver, messages: Sequence[Any]) -> tuple[Motion, ...]:
-    """The motions of several heptarm_msgs/Motion.
+    """Convert several heptarm_msgs/Motion.
 
     Raises:
-        HeptarmError: one of them is none; the text says which.
+        HeptarmError: one of them is invalid; the text names it.
     """
     if not messages:
-        raise ShapeError("the program has no motions", parameter="motions")
+        raise ShapeError("a program must have motions, got no motions", parameter="motions")
     return tuple(
         with_triggers(motion_of(driver, one, f"motions[{index}]"), one.triggers)
         for index, one in enumerate(messages)
@@ -96,18 +173,20 @@ def program_of(driver: Driver, messages: Sequence[Any]) -> tuple[Motion, ...]:
 
 
 def motion_of(driver: Driver, message: Any, name: str = "motion") -> Motion:
-    """The value of a heptarm_msgs/Motion.
+    """Convert a heptarm_msgs/Motion.
 
     Args:
-        driver: whose arm it is.
+        driver: of the arm.
         message: the message.
-        name: what to call it in errors.
+        name: its name in errors.
 
     Raises:
-        CommandRejected: it is none, or a number is outside its range.
+        CommandRejected: unknown kind, or a number out of range.
     """
     kind = message.kind
-    joints: dict[str, Any] = {key: _joints(getattr(message, key)) for key in _JOINTS if len(getattr(message, key))}
+    joints: dict[str, Any] = {
+        key: _joints(getattr(message, key)) for key in _JOINTS if len(getattr(message, key))
+    }
     plain = {key.removeprefix("joint_"): value for key, value in joints.items()}
     blending = _given(message, _BLENDING)
     if kind == HOLD:
@@ -139,11 +218,11 @@ def motion_of(driver: Driver, message: Any, name: str = "motion") -> Motion:
         return circ(pose_of(message.via), _pose(driver, message.pose), **near, **how)
     if kind == LIN_REL:
         return offset(message.pose, how)
-    raise CommandRejected(f"{name} is of kind {kind}; 0 to {GUIDE} are known", parameter="kind", value=kind)
+    raise CommandRejected(f"kind of {name} must be 0 to {GUIDE}, got {kind}", parameter="kind", value=kind)
 
 
 def offset(message: Any, how: dict[str, Any] | None = None) -> LinRel:
-    """A line by an offset, a geometry_msgs/PoseStamped whose frame says whose axes: "tool", "base", or a frame.
+    """Make a line by an offset: a geometry_msgs/PoseStamped whose frame gives the axes, "tool", "base" or a frame.
 
     Args:
         message: the offset.
@@ -155,10 +234,10 @@ def offset(message: Any, how: dict[str, Any] | None = None) -> LinRel:
 
 
 def segment_of(message: Any) -> Segment:
-    """The value of a heptarm_msgs/Segment.
+    """Convert a heptarm_msgs/Segment.
 
     Raises:
-        CommandRejected: it is none.
+        CommandRejected: unknown kind, or a number out of range.
     """
     how: dict[str, Any] = _given(message, _PATH[:3])
     if message.orientation:
@@ -171,7 +250,7 @@ def segment_of(message: Any) -> Segment:
     if message.kind == _CIRC:
         return circ(pose_of(message.via), pose, **how)
     raise CommandRejected(
-        f"a segment is of kind {message.kind}; 0 (SPL), 1 (LIN) or 2 (CIRC) is wanted",
+        f"kind of a segment must be 0 (SPL), 1 (LIN) or 2 (CIRC), got {message.kind}",
         parameter="kind",
         value=message.kind,
     )
@@ -182,17 +261,19 @@ def _pose(driver: Driver, message: Any) -> Pose:
 
 
 def guiding(message: Any) -> Motion:
-    """Guiding by hand, of a message with the limits of it: heptarm_msgs/Motion, a goal of Guide or Teach."""
-    limits = {name: list(getattr(message, name)) for name in ("q_min", "q_max") if len(getattr(message, name))}
-    words = {name: getattr(message, name) for name in ("at_limit", "outside") if getattr(message, name)}
-    how: dict[str, Any] = limits | words
+    """Make a hand guiding motion of a heptarm_msgs/Motion, or of a goal of Guide or Teach."""
+    limits = {
+        name: list(getattr(message, name)) for name in ("q_min", "q_max") if len(getattr(message, name))
+    }
+    options = {name: getattr(message, name) for name in ("at_limit", "outside") if getattr(message, name)}
+    how: dict[str, Any] = limits | options
     return hand_guide(**how, **_given(message, ("joint_velocity", "cartesian_velocity")))
 
 
 def _redundancy(values: Sequence[float]) -> Redundancy:
     if len(values) > 3:
         raise ShapeError(
-            f"redundancy has {len(values)} numbers; E1, Status and Turn are wanted", parameter="redundancy"
+            f"redundancy must have E1, Status and Turn, got {len(values)} numbers", parameter="redundancy"
         )
     return Redundancy(float(values[0]), *(round(value) for value in values[1:]))
 
@@ -203,5 +284,5 @@ def _joints(values: Sequence[float]) -> float | list[float]:
 
 
 def _given(message: Any, names: Sequence[str]) -> dict[str, Any]:
-    """Those that are not 0."""
+    """Collect the fields that are not 0."""
     return {name: getattr(message, name) for name in names if getattr(message, name)}

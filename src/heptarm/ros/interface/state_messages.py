@@ -1,18 +1,58 @@
-"""What a node publishes of its arm: messages made of states and reports, for the publishers of either ROS."""
+"""Messages that a node publishes: made of states and diagnoses, for either ROS."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from heptarm.bridge import messages
-from heptarm.bridge.messages import Ros
-from heptarm.bridge.names import Entry, Meaning
-from heptarm.bridge.parameters import Configuration
-from heptarm.bridge.report import Report
+from heptarm.model.kinematics import forward
+from heptarm.ros.interface import messages
+from heptarm.ros.interface.messages import RosAdapter
+from heptarm.ros.interface.names import NameRole, PresetName
+from heptarm.ros.node.diagnostics import Diagnosis
+from heptarm.ros.node.parameters import NodeConfiguration
+from heptarm.values.pose import Pose
+from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
 
-#: What heptarm_msgs/Status has of the safety controller.
+
+class TransformMessages:
+    """Makes messages of /tf.
+
+    Args:
+        ros: types and time of the ROS.
+        configuration: names of the frames.
+        robot: for the pose of the flange, which states lack while a tool is attached.
+        types: tf2_msgs/TFMessage and geometry_msgs/TransformStamped.
+    """
+
+    def __init__(
+        self, ros: RosAdapter, configuration: NodeConfiguration, robot: RobotModel, types: tuple[Any, Any]
+    ) -> None:
+        self._ros, self._robot = ros, robot
+        self._array, self._transform = types
+        self._base, self._flange, self._tool = (
+            configuration.frame(which) for which in ("base", "flange", "tool")
+        )
+
+    def of(self, state: State) -> Any:
+        """Make the transforms from the base to the flange and to the motion frame."""
+        stamp = self._ros.time(max(0, self._ros.now() - max(0, round(state.age * 1e9))))
+        frames = [(self._flange, Pose.from_matrix(forward(self._robot, state.q)))]
+        if state.groups.pose is not None:
+            frames.append((self._tool, state.pose))
+        return self._array(transforms=[self._one(name, pose, stamp) for name, pose in frames])
+
+    def _one(self, name: str, pose: Pose, stamp: Any) -> Any:
+        message = self._transform(child_frame_id=name)
+        message.header.stamp, message.header.frame_id = stamp, self._base
+        place, turn = message.transform.translation, message.transform.rotation
+        place.x, place.y, place.z = pose.xyz.tolist()
+        turn.x, turn.y, turn.z, turn.w = pose.quat.tolist()
+        return message
+
+
+#: Fields of heptarm_msgs/Status from the safety controller.
 _SAFETY = (
     "ready_to_move",
     "paused",
@@ -21,49 +61,55 @@ _SAFETY = (
     "protective_stop",
     "recovery_required",
 )
-#: Stamps never go back, though the estimate of the cabinet's clock is corrected now and then [ns].
-_AFTER = 1000
+#: Least step between stamps [ns]: they never go back when the estimate of the cabinet's clock is corrected.
+_STAMP_STEP = 1000
 
 
-class Outputs:
-    """Makes messages.
+class StateMessages:
+    """Makes messages of states, status and diagnostics.
 
     Args:
-        ros: of which ROS.
-        configuration: what the node's parameters say.
+        ros: types and time of the ROS.
+        configuration: the node's parameters.
         stamped: types geometry_msgs/PoseStamped and WrenchStamped.
         state: type heptarm_msgs/RobotState.
         status: type heptarm_msgs/Status.
     """
 
     def __init__(
-        self, ros: Ros, configuration: Configuration, *, stamped: tuple[Any, Any], state: Any, status: Any
+        self,
+        ros: RosAdapter,
+        configuration: NodeConfiguration,
+        *,
+        stamped: tuple[Any, Any],
+        state: Any,
+        status: Any,
     ) -> None:
         self._ros = ros
         self._joints, self._base = configuration.joints, configuration.frame("base")
         self._pose_stamped, self._wrench_stamped = stamped
         self._state, self._status = state, status
         self._last: Any = None
-        self._moment = 0
+        self._stamp = 0
 
     def states(self, state: State, *, full: bool) -> Iterator[tuple[str, Any]]:
-        """Messages of a state by topic, stamped with ROS' time of its measurement.
+        """Make the messages of a state by topic, stamped with the ROS time of its measurement.
 
         Args:
             state: the state.
-            full: with the full state, too.
+            full: also the topic with the full state.
         """
         ros = self._ros
-        self._moment = max(self._moment + _AFTER, _measured(ros, state))
-        stamp = ros.time(self._moment)
+        self._stamp = max(self._stamp + _STAMP_STEP, _measured(ros, state))
+        stamp = ros.time(self._stamp)
         yield "joint_states", _stamped(messages.joint_state(ros, state, self._joints), stamp)
         if state.torques is not None:
             external = ros.joint_state(name=list(self._joints), effort=state.tau_ext.tolist())
             yield "external_torques", _stamped(external, stamp)
-        if state.cartesian is not None:
+        if state.groups.pose is not None:
             pose = self._pose_stamped(pose=messages.pose_message(ros, state.pose))
             yield "pose", _stamped(pose, stamp, self._base)
-        if state.external is not None:
+        if state.groups.wrench is not None:
             wrench = self._wrench_stamped(wrench=messages.wrench_message(ros, state))
             yield "wrench", _stamped(wrench, stamp, self._base)
         if full:
@@ -79,11 +125,11 @@ class Outputs:
         )
         if state.torques is not None:
             message.torque, message.torque_external = state.tau.tolist(), state.tau_ext.tolist()
-        if state.cartesian is not None:
+        if state.groups.pose is not None:
             message.pose = messages.pose_message(ros, state.pose)
             message.pose_command = messages.pose_message(ros, state.pose_cmd)
             message.redundancy = float(state.redundancy.e1)
-        if state.external is not None:
+        if state.groups.wrench is not None:
             message.wrench = messages.wrench_message(ros, state)
             wrench = state.wrench
             message.wrench_inaccuracy = [
@@ -94,11 +140,11 @@ class Outputs:
             message.motion, message.queued = state.motion.id, state.motion.queued
         return message
 
-    def status(self, report: Report, state: State | None, *, connected: bool, active: bool) -> Any:
-        """The status; None: nothing has changed since the last one."""
-        message = self._status(connected=connected, active=active, text=report.text)
-        if state is not None and state.status is not None:
-            safety = state.status
+    def status(self, diagnosis: Diagnosis, state: State | None, *, connected: bool, active: bool) -> Any:
+        """Make the status; None: nothing has changed since the last one."""
+        message = self._status(connected=connected, active=active, text=diagnosis.text)
+        if state is not None and state.groups.safety is not None:
+            safety = state.groups.safety
             for name in _SAFETY:
                 setattr(message, name, getattr(safety, name))
             message.operation_mode = getattr(self._status, f"MODE_{safety.mode.name}")
@@ -112,17 +158,17 @@ class Outputs:
         self._last = _stamped(message, self._ros.time(self._ros.now()))
         return message
 
-    def diagnostics(self, array: Any, report: Report, *, name: str, hardware: str) -> Any:
-        """Diagnostics.
+    def diagnostics(self, array: Any, diagnosis: Diagnosis, *, name: str, hardware: str) -> Any:
+        """Make the diagnostics.
 
         Args:
             array: type diagnostic_msgs/DiagnosticArray.
-            report: how the arm is.
+            diagnosis: of the arm.
             name: of the node.
             hardware: which arm.
         """
         ros = self._ros
-        status = messages.diagnostic(ros, report, name=f"{name.lstrip('/')}: arm", hardware=hardware)
+        status = messages.diagnostic(ros, diagnosis, name=f"{name.lstrip('/')}: arm", hardware=hardware)
         return _stamped(array(status=[status]), ros.time(ros.now()))
 
 
@@ -131,16 +177,16 @@ def _stamped(message: Any, stamp: Any, frame: str = "") -> Any:
     return message
 
 
-def theirs(ros: Ros, entry: Entry, state: State, names: Sequence[str]) -> Any:
-    """A message of a state for a topic of another driver; None: the state has not got what it needs."""
-    if entry.meaning is Meaning.POSE:
-        return None if state.cartesian is None else messages.pose_message(ros, state.pose)
-    if entry.meaning is Meaning.WRENCH:
-        return None if state.external is None else messages.wrench_message(ros, state)
+def preset_message(ros: RosAdapter, entry: PresetName, state: State, names: Sequence[str]) -> Any:
+    """Make a message for a topic of another driver; None: the state lacks what it needs."""
+    if entry.role is NameRole.POSE:
+        return None if state.groups.pose is None else messages.pose_message(ros, state.pose)
+    if entry.role is NameRole.WRENCH:
+        return None if state.groups.wrench is None else messages.wrench_message(ros, state)
     message = messages.joint_state(ros, state, names, external=entry.external)
     return _stamped(message, ros.time(_measured(ros, state)))
 
 
-def _measured(ros: Ros, state: State) -> int:
-    """When a state was measured, by ROS' clock [ns]; 0 if that had not begun."""
+def _measured(ros: RosAdapter, state: State) -> int:
+    """Convert the time of measurement to the ROS clock [ns]; at least 0, for a simulated clock that just started."""
     return max(0, ros.now() - max(0, round(state.age * 1e9)))

@@ -1,4 +1,4 @@
-"""How the arm is, for diagnostics and for people."""
+"""Diagnosis of the arm, for /diagnostics and the status topic."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enum import IntEnum
 from heptarm.values.state import State
 
 
-class Level(IntEnum):
+class DiagnosticLevel(IntEnum):
     """Levels of diagnostic_msgs/DiagnosticStatus."""
 
     OK = 0
@@ -18,43 +18,45 @@ class Level(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
-    """How the arm is.
+class Diagnosis:
+    """Condition of the arm.
 
     Attributes:
-        level: how bad.
-        text: the most important thing, in words.
-        values: everything, by name.
+        level: severity.
+        text: the most important fact.
+        values: all facts by name.
     """
 
-    level: Level
+    level: DiagnosticLevel
     text: str
     values: dict[str, str]
 
 
-def report(state: State | None, *, trouble: str = "", active: bool = True, age: float = 0.0) -> Report:
-    """How the arm is.
+def diagnose(
+    state: State | None, *, link_error: str = "", active: bool = True, age: float = 0.0
+) -> Diagnosis:
+    """Derive level and text from the newest state.
 
     Args:
         state: the newest state; None: there is none.
-        trouble: why there is no connection; empty: there is one.
-        active: whether the node takes goals.
+        link_error: why there is no connection; empty: connected.
+        active: whether the node accepts goals.
         age: of the state [s].
     """
-    values = {"connected": _words(not trouble), "active": _words(active)}
-    if trouble:
-        return Report(Level.ERROR, f"no connection: {trouble}", values)
+    values = {"connected": _yes_no(not link_error), "active": _yes_no(active)}
+    if link_error:
+        return Diagnosis(DiagnosticLevel.ERROR, f"no connection: {link_error}", values)
     if state is None:
-        return Report(Level.STALE, "no state has come yet", values)
+        return Diagnosis(DiagnosticLevel.STALE, "no robot state received yet", values)
     values["state age"] = f"{age:.3f} s"
     if age > 1.0:
-        return Report(Level.STALE, f"the newest state is {age:.1f} s old", values)
+        return Diagnosis(DiagnosticLevel.STALE, f"the newest state is {age:.1f} s old", values)
     if state.motion is not None:
         values["motion"] = str(state.motion.id) if state.motion.active else "none"
         values["override"] = f"{state.motion.override:g}"
-    safety = state.status
+    safety = state.groups.safety
     if safety is None:
-        return Report(Level.OK, "connected", values)
+        return Diagnosis(DiagnosticLevel.OK, "connected", values)
     values["operation mode"] = safety.mode.name
     for name in (
         "ready_to_move",
@@ -69,21 +71,21 @@ def report(state: State | None, *, trouble: str = "", active: bool = True, age: 
         "position_referenced",
         "recovery_required",
     ):
-        values[name.replace("_", " ")] = _words(getattr(safety, name))
-    for bad, text in (
-        (safety.emergency_stop, "emergency stop: release it and confirm it at the smartPAD"),
-        (safety.protective_stop, "safety stop: clear what caused it and confirm it at the smartPAD"),
-        (safety.recovery_required, "the robot has to be recovered at the smartPAD"),
+        values[name.replace("_", " ")] = _yes_no(getattr(safety, name))
+    for active_fault, text in (
+        (safety.emergency_stop, "emergency stop: release it and acknowledge it on the smartPAD"),
+        (safety.protective_stop, "safety stop: remove its cause and acknowledge it on the smartPAD"),
+        (safety.recovery_required, "the robot needs recovery on the smartPAD"),
         (not safety.mastered, "not mastered"),
     ):
-        if bad:
-            return Report(Level.ERROR, text, values)
+        if active_fault:
+            return Diagnosis(DiagnosticLevel.ERROR, text, values)
     if safety.paused:
-        return Report(Level.WARN, "paused", values)
+        return Diagnosis(DiagnosticLevel.WARN, "paused", values)
     if not safety.ready_to_move:
-        return Report(Level.WARN, "not ready to move", values)
-    return Report(Level.OK, "ready" if active else "ready, inactive", values)
+        return Diagnosis(DiagnosticLevel.WARN, "not ready to move", values)
+    return Diagnosis(DiagnosticLevel.OK, "ready" if active else "ready, inactive", values)
 
 
-def _words(value: bool) -> str:
+def _yes_no(value: bool) -> str:
     return "yes" if value else "no"

@@ -1,7 +1,4 @@
-"""One arm behind a node: its life, goals, commands, services; free of ROS.
-
-A node makes one, converts messages for it, and is told of states and goals from the driver's own threads.
-"""
+"""One arm behind a node: its connection, goals, motions and servo topics, and which of them may move it."""
 
 from __future__ import annotations
 
@@ -9,68 +6,93 @@ import logging
 import os
 import socket
 from collections.abc import Callable, Sequence
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.arm.connect import connect
-from heptarm.arm.groups import GROUPS
-from heptarm.arm.handle import MotionHandle
-from heptarm.bridge.collision import CollisionWatch
-from heptarm.bridge.execution import Execution
-from heptarm.bridge.feed import Feed
-from heptarm.bridge.fri_execution import FriExecution
-from heptarm.bridge.fri_session import FriSession
-from heptarm.bridge.goal import End, Goal, GoalRefused
-from heptarm.bridge.listener import DriverListener
-from heptarm.bridge.parameters import Configuration
-from heptarm.bridge.report import Report, report
-from heptarm.bridge.runner import Feedback
-from heptarm.bridge.servo_execution import ServoExecution
-from heptarm.bridge.spline_execution import SplineExecution
-from heptarm.bridge.stream import Stream
-from heptarm.bridge.task import Task
-from heptarm.bridge.trajectory import Sample
+from heptarm.arm.link.state_stream import GROUPS
+from heptarm.arm.motion.handle import MotionHandle
 from heptarm.errors import HeptarmError, NotReady
+from heptarm.ros.node.collision_guard import CollisionReaction
+from heptarm.ros.node.diagnostics import Diagnosis, diagnose
+from heptarm.ros.node.fri_session import NodeFriSession
+from heptarm.ros.node.parameters import NodeConfiguration
+from heptarm.ros.node.state_feed import ReconnectingStates
+from heptarm.ros.node.target_stream import TargetStream
+from heptarm.ros.node.task import ArmTask
+from heptarm.ros.trajectory.execution import Execution, GoalListener
+from heptarm.ros.trajectory.fri_execution import FriExecution
+from heptarm.ros.trajectory.goal import GoalRefused, GoalResult, TrajectoryGoal
+from heptarm.ros.trajectory.runner import GoalFeedback
+from heptarm.ros.trajectory.servo_execution import ServoExecution
+from heptarm.ros.trajectory.spline_execution import SplineExecution
+from heptarm.ros.trajectory.trajectory import KinematicState
 from heptarm.values.arrays import Array
-from heptarm.values.collision import Collision
-from heptarm.values.condition import Condition
-from heptarm.values.mode import Mode
-from heptarm.values.motion import Motion
+from heptarm.values.condition.collision import Collision
+from heptarm.values.condition.condition import Condition
+from heptarm.values.mode.mode import Mode
+from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose
+from heptarm.values.result import MotionEvent
 from heptarm.values.state import State
 
-_log = logging.getLogger("heptarm.bridge")
+
+class DriverListener(GoalListener, Protocol):
+    """Receives all events, from the driver's threads; it must not block."""
+
+    def on_state(self, state: State) -> None:
+        """New robot state."""
+        ...
+
+    def on_link(self, error: str) -> None:
+        """Connected (empty), or why the connection was lost."""
+        ...
+
+    def on_key(self, slot: int, down: bool) -> None:
+        """A user key of the smartPAD was pressed or released."""
+        ...
+
+    def on_event(self, number: int, event: MotionEvent) -> None:
+        """Event of the program with that number."""
+        ...
+
+    def on_collision(self, found: Collision) -> None:
+        """The collision guard detected a collision."""
+        ...
+
+
+_log = logging.getLogger("heptarm.ros")
 
 #: How long a motion may take to come to rest before a goal [s].
-_REST = 5.0
+_REST_TIMEOUT = 5.0
 
 
 class Driver:
     """One arm behind a node.
 
     Args:
-        configuration: what the node's parameters say.
-        listener: hears of everything.
+        configuration: the node's parameters.
+        listener: receives all events.
 
     Attributes:
-        configuration: what the node's parameters say now.
-        fri: the session that services open.
-        collisions: the guard against them.
+        configuration: current parameters of the node.
+        fri: the FRI session that services open.
+        collisions: the collision guard.
 
     Raises:
-        ConnectFailed: nobody answers.
+        ConnectFailed: the cabinet does not answer.
         NotInControl: another client controls the robot.
     """
 
-    def __init__(self, configuration: Configuration, listener: DriverListener) -> None:
+    def __init__(self, configuration: NodeConfiguration, listener: DriverListener) -> None:
         values = configuration.values
         self.configuration = configuration
         self._listener = listener
         self._active = False
         self._handle: MotionHandle | None = None
-        self._task: Task | None = None
+        self._task: ArmTask | None = None
         self._arm = connect(
             values["target"] or None,
             key=values["key"] or None,
@@ -80,29 +102,29 @@ class Driver:
             watchdog=values["watchdog"],
         )
         self._arm.pad.on_key(listener.on_key)
-        self.fri = FriSession(self._arm)
-        self.collisions = CollisionWatch(self._arm, tell=self._on_collision, start=self.start)
-        self._told = (0, 0.0)  # the last feedback: of which goal, and when
-        self._execution = self._way()
-        self._stream = Stream(
+        self.fri = NodeFriSession(self._arm)
+        self.collisions = CollisionReaction(self._arm, notify=self._on_collision, start=self.start)
+        self._last_feedback = (0, 0.0)  # number of its goal, and its time
+        self._execution = self._make_execution()
+        self._stream = TargetStream(
             self._arm,
             timeout=values["command_timeout"],
             options=configuration.servo,
             line_speed=values["servo.line_speed"],
         )
-        self._feed = Feed(self._arm, on_state=self._on_state, on_link=listener.on_link)
+        self._feed = ReconnectingStates(self._arm, on_state=self._on_state, on_link=listener.on_link)
 
-    def _way(self) -> Execution:
-        """The way of execution that the parameters choose."""
-        known = self.configuration
-        if known.values["execution"] == "spline":
-            speed = known.values["servo.speed"]
-            return SplineExecution(self._arm, known.joints, self, speed=speed, settings=known.settings)
-        if known.values["execution"] == "fri":
-            return FriExecution(self._arm, known.joints, self, options=known.fri, settings=known.settings)
-        return ServoExecution(self._arm, known.joints, self, options=known.servo, settings=known.settings)
+    def _make_execution(self) -> Execution:
+        """Make the execution that the parameters select."""
+        config = self.configuration
+        if config.values["execution"] == "spline":
+            speed = config.values["servo.speed"]
+            return SplineExecution(self._arm, config.joints, self, speed=speed, settings=config.settings)
+        if config.values["execution"] == "fri":
+            return FriExecution(self._arm, config.joints, self, options=config.fri, settings=config.settings)
+        return ServoExecution(self._arm, config.joints, self, options=config.servo, settings=config.settings)
 
-    # ------------------------------------------------------------------------------------ life
+    # -------------------------------------------------------------------------------- life cycle
 
     @property
     def arm(self) -> Arm:
@@ -110,21 +132,21 @@ class Driver:
         return self._arm
 
     @property
-    def trouble(self) -> str:
-        """Why there is no connection; empty: there is one."""
-        return self._feed.trouble
+    def link_error(self) -> str:
+        """Why there is no connection; empty: connected."""
+        return self._feed.link_error
 
     @property
     def active(self) -> bool:
-        """Whether goals and commands are taken."""
+        """Whether goals and commands are accepted."""
         return self._active
 
     def activate(self) -> None:
-        """Take goals and commands from now on."""
+        """Accept goals and commands."""
         self._active = True
 
     def deactivate(self) -> None:
-        """Take no more; what runs comes to rest."""
+        """Accept nothing more, and bring the arm to rest."""
         self._active = False
         self._end_task("the node was deactivated")
         self._execution.abort("the node was deactivated")
@@ -135,7 +157,7 @@ class Driver:
                 self._arm.stop()
             except HeptarmError as error:
                 _log.warning("deactivating: %s", error)
-        self._execution.wait_idle(_REST)
+        self._execution.wait_idle(_REST_TIMEOUT)
 
     def close(self) -> None:
         """Leave the arm at rest and disconnect. Closing twice is legal."""
@@ -143,119 +165,126 @@ class Driver:
             return
         self.deactivate()
         self._feed.end()
-        self.collisions.off()
+        self.collisions.disable()
         self._execution.close()
         self._arm.close()
         self._feed.join()
 
-    def configure(self, configuration: Configuration) -> None:
-        """Take other values of those parameters that count at once."""
+    def configure(self, configuration: NodeConfiguration) -> None:
+        """Apply changed parameters, of those that apply at once."""
         self.configuration = configuration
         self._execution.settings = configuration.settings
 
-    def report(self) -> Report:
-        """How the arm is."""
-        state = None
+    @property
+    def state(self) -> State | None:
+        """Newest state; None: not connected, or none received yet."""
+        if self.link_error:
+            return None
+        try:
+            return self._arm.state
+        except HeptarmError:
+            return None
+
+    def diagnosis(self) -> Diagnosis:
+        """Diagnose the arm."""
         try:
             state = self._arm.state
         except HeptarmError as error:
-            return report(None, trouble=self.trouble or str(error), active=self._active)
-        return report(state, trouble=self.trouble, active=self._active, age=state.age)
+            return diagnose(None, link_error=self.link_error or str(error), active=self._active)
+        return diagnose(state, link_error=self.link_error, active=self._active, age=state.age)
 
     def _on_state(self, state: State) -> None:
-        """A stop of the safety controller ends the goal: its time would stand still, and it would go on by surprise."""
-        safety = state.status
+        safety = state.groups.safety
         if safety is not None and (safety.emergency_stop or safety.protective_stop) and self._execution.goal:
-            self._execution.drop(report(state).text)
+            # the time of the goal would stand still, and the arm would continue unexpectedly after the stop
+            self._execution.drop(diagnose(state).text)
         self._listener.on_state(state)
 
     # ------------------------------------------------------------------------------------ goals
 
     @property
     def now(self) -> float:
-        """The time on the clock that goals start by [s]."""
+        """Current time on the clock of goal starts [s]."""
         return self._execution.now
 
-    def accept(self, goal: Goal) -> int:
-        """Take a goal of FollowJointTrajectory; whatever else moves the arm comes to rest first.
+    def accept(self, goal: TrajectoryGoal) -> int:
+        """Accept a goal of FollowJointTrajectory, after bringing any other motion to rest.
 
         Returns:
             Its number.
 
         Raises:
-            GoalRefused: it makes no sense, or the node is not active, or the arm cannot follow.
+            GoalRefused: it is invalid, the node is not active, or the arm cannot follow.
         """
         if not self._active:
             raise GoalRefused("the node is not active", hint="activate it")
-        if self.trouble:
-            raise GoalRefused(f"no connection: {self.trouble}")
+        if self.link_error:
+            raise GoalRefused(f"no connection: {self.link_error}")
         try:
             self._check_ready()
-            self._hold_control()
-            self._clear("a trajectory took the place of it")
+            self._regain_control()
+            self._end_motions("preempted by a trajectory")
         except HeptarmError as error:
             raise GoalRefused(str(error)) from error
         return self._execution.accept(goal)
 
-    def begin(self, what: str, work: Callable[[], object]) -> Task:
-        """Begin a call that moves the arm several times; whatever else moves it comes to rest first.
+    def run_task(self, name: str, work: Callable[[], object]) -> ArmTask:
+        """Run a function that moves the arm several times, after bringing any other motion to rest.
 
         Args:
-            what: what it is, in words.
-            work: the call.
+            name: what it does, for messages, such as "the touch".
+            work: the function.
 
         Raises:
-            HeptarmError: refused; the text says why.
+            HeptarmError: refused; the text gives the reason.
         """
         self._check_active()
         self._check_ready()
-        self._execution.abort(f"{what} took the place of this goal")
-        self._execution.wait_idle(_REST)
-        self._clear(f"{what} took the place of it")
-        self._task = Task(self._arm, what, work)
+        self._execution.abort(f"preempted by {name}")
+        self._execution.wait_idle(_REST_TIMEOUT)
+        self._end_motions(f"preempted by {name}")
+        self._task = ArmTask(self._arm, name, work)
         return self._task
 
-    def _clear(self, why: str) -> None:
-        """Bring to rest what moves the arm beside goals."""
-        self._end_task(why)
+    def _end_motions(self, reason: str) -> None:
+        """Bring to rest what moves the arm besides goals."""
+        self._end_task(reason)
         self._stream.close()
         if self._handle is not None and not self._handle.done:
             self._handle.cancel()
-            self._arm.wait_for_rest(timeout=_REST)
+            self._arm.wait_for_rest(timeout=_REST_TIMEOUT)
 
-    def _end_task(self, why: str) -> None:
+    def _end_task(self, reason: str) -> None:
         if self._task is not None:
-            self._task.end(why)
+            self._task.end(reason)
 
-    def at(self, time: float) -> Sample | None:
-        """What the goal under way wants at a time on the clock of `now` [s]; None: nothing."""
+    def at(self, time: float) -> KinematicState | None:
+        """Evaluate the active goal at a time on the clock of `now` [s]; None: there is none at that time."""
         return self._execution.at(time)
 
     def cancel(self, number: int) -> bool:
-        """End a goal early; the arm brakes. False: it is not under way."""
+        """Cancel a goal; the arm brakes. False: it is not active."""
         return self._execution.cancel(number)
 
-    def on_feedback(self, feedback: Feedback) -> None:
-        """From the execution: goes on to the listener as often as the parameter `action_monitor_rate` says."""
-        number, then = self._told
-        if (
-            number != feedback.number
-            or self.now - then >= 1.0 / self.configuration.values["action_monitor_rate"]
-        ):
-            self._told = feedback.number, self.now
+    def on_feedback(self, feedback: GoalFeedback) -> None:
+        """Forward feedback of the execution at the rate of the parameter `action_monitor_rate`."""
+        number, time = self._last_feedback
+        period = 1.0 / self.configuration.values["action_monitor_rate"]
+        if number != feedback.number or self.now - time >= period:
+            self._last_feedback = feedback.number, self.now
             self._listener.on_feedback(feedback)
 
-    def on_end(self, end: End) -> None:
-        """From the execution."""
-        self._listener.on_end(end)
+    def on_result(self, result: GoalResult) -> None:
+        """Forward a result of the execution."""
+        self._listener.on_result(result)
 
     def _check_ready(self) -> None:
-        safety = self._arm.state.status
+        safety = self._arm.state.groups.safety
         if safety is not None and (safety.emergency_stop or safety.protective_stop):
-            raise NotReady("a stop is active", hint=report(self._arm.state).text)
+            raise NotReady("a safety stop is active", hint=diagnose(self._arm.state).text)
 
-    def _hold_control(self) -> None:
-        """Take control again if it was lost, by a moment of silence, and nobody else has taken it."""
+    def _regain_control(self) -> None:
+        """Take control again if it was lost during a short silence and no other client has taken it."""
         if not self._arm.in_control and not self._arm.controller:
             self._arm.take_control()
             _log.warning("took control again")
@@ -271,40 +300,40 @@ class Driver:
         until: Condition | None = None,
         when: Literal["queue", "replace", "reject"] = "replace",
     ) -> MotionHandle:
-        """Start any motion, or several as one program.
+        """Start a motion, or several as one program.
 
         Args:
-            motion: what to do.
-            mode: control mode; None: that of the services.
-            speed: ceiling for this one, (0, 1]; None: that of the parameter `speed`.
+            motion: one or more.
+            mode: control mode; None: the one that the services have set.
+            speed: speed limit for this one, (0, 1]; None: that of the parameter `speed`.
             until: condition that ends it; None: that of `guard`.
-            when: while something runs: "replace" it, "queue" behind it, or "reject" this one.
+            when: while another motion runs: "replace" it, "queue" behind it, or "reject" this one.
 
         Raises:
-            HeptarmError: refused; the text says why.
+            HeptarmError: refused; the text gives the reason.
         """
         self._check_active()
         if when == "replace":
-            self._end_task("a command took the place of it")
-            self._execution.abort("a command took the place of this goal")
+            self._end_task("preempted by a command")
+            self._execution.abort("preempted by a command")
             self._stream.close()
-        self._check_task()
-        ceiling = self.configuration.values["speed"] if speed is None else speed
-        ends = self.guard if until is None else until
-        handle = self._handle = self._arm.start(motion, mode=mode, speed=ceiling, until=ends, when=when)
+        self._check_no_task()
+        limit = self.configuration.values["speed"] if speed is None else speed
+        condition = self.guard if until is None else until
+        handle = self._handle = self._arm.start(motion, mode=mode, speed=limit, until=condition, when=when)
         handle.add_event_callback(lambda event: self._listener.on_event(handle.id, event))
         return handle
 
     def follow(self, target: Array | Pose, dq: Array | None = None, *, straight: bool = False) -> None:
-        """Follow a target of a servo topic until none comes for `command_timeout`.
+        """Follow a target of a servo topic until none arrives for `command_timeout`.
 
         Args:
             target: joint positions, shape (7,) [rad], or a pose of the flange in the base.
-            dq: velocity to pass the joint positions at, shape (7,) [rad/s].
-            straight: to a pose on straight lines.
+            dq: velocity to pass the joint positions with, shape (7,) [rad/s].
+            straight: move to a pose on straight lines.
 
         Raises:
-            HeptarmError: refused; the text says why.
+            HeptarmError: refused; the text gives the reason.
         """
         self._prepare_stream()
         if isinstance(target, Pose):
@@ -313,36 +342,36 @@ class Driver:
             self._stream.joints(target, dq)
 
     def follow_velocity(self, dq: Array) -> None:
-        """Move at joint velocities, shape (7,) [rad/s], until none come for `command_timeout`.
+        """Move with joint velocities, shape (7,) [rad/s], until none arrive for `command_timeout`.
 
         Raises:
-            HeptarmError: refused; the text says why.
+            HeptarmError: refused; the text gives the reason.
         """
         self._prepare_stream()
         self._stream.velocity(np.asarray(dq, dtype=np.float64))
 
     def _prepare_stream(self) -> None:
         self._check_active()
-        self._check_task()
+        self._check_no_task()
         if not self._stream.active:
             if self._execution.busy:
-                self._execution.abort("a servo command took the place of this goal")
-            self._execution.wait_idle(_REST)
+                self._execution.abort("preempted by a servo topic")
+            self._execution.wait_idle(_REST_TIMEOUT)
 
     def _check_active(self) -> None:
         if not self._active:
             raise NotReady("the node is not active", hint="activate it")
-        self._hold_control()
+        self._regain_control()
 
-    def _check_task(self) -> None:
+    def _check_no_task(self) -> None:
         if self._task is not None and not self._task.done:
-            raise NotReady(f"{self._task.what} is under way", hint="cancel it first")
+            raise NotReady(f"{self._task.name} is running", hint="cancel it first")
 
     # --------------------------------------------------------------------------------- services
 
     @property
     def guard(self) -> Condition | None:
-        """Condition that ends motions that bring none, and servo topics; None: there is none."""
+        """Condition that ends servo topics, and motions without a condition of their own; None: there is none."""
         return self._stream.guard
 
     @guard.setter
@@ -350,17 +379,17 @@ class Driver:
         self._stream.guard = value
 
     def stop(self, kind: Literal["path", "fast", "after_motion"] = "path") -> None:
-        """Stop whatever runs; see `Arm.stop`. A task is one motion: "after_motion" lets it finish.
+        """Stop the arm, see `Arm.stop`. A task counts as one motion: "after_motion" lets it finish.
 
         Raises:
-            HeptarmError: it cannot be stopped; the text says why.
+            HeptarmError: the arm cannot be stopped; the text gives the reason.
         """
         if kind != "after_motion":
-            self._end_task("it was stopped")
+            self._end_task("stopped")
         self._arm.stop(kind)
 
     def _on_collision(self, found: Collision) -> None:
-        self._stream.latch(str(found))
+        self._stream.block(str(found))
         self._listener.on_collision(found)
 
 

@@ -1,4 +1,4 @@
-"""One FRI session of a node, opened and closed by services and commanded by topics; free of ROS."""
+"""The FRI session of a node, opened and closed by services and commanded by topics."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ import threading
 from typing import Any, Literal
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.fri import Fri
+from heptarm.arm.fri.session import Fri
 from heptarm.errors import HeptarmError, ModeConflict, NotReady
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 
-_log = logging.getLogger("heptarm.bridge")
+_log = logging.getLogger("heptarm.ros")
 
-#: What may be asked for.
+#: Kinds of sessions.
 Kind = Literal["position", "torque", "wrench", "pose", "monitor"]
 
 
-class FriSession:
-    """At most one session at a time.
+class NodeFriSession:
+    """Holds at most one FRI session at a time.
 
     Args:
         arm: in control, unless the session only monitors.
@@ -33,34 +33,38 @@ class FriSession:
 
     @property
     def active(self) -> bool:
-        """Whether a session stands."""
+        """Whether a session is open."""
         session = self._session
         return session is not None and session.active
 
     def open(self, kind: Kind, **settings: Any) -> str:
-        """Open a session; what is commanded is a hold until the first command comes.
+        """Open a session; it holds the arm until the first command.
 
         Args:
-            kind: as of `Arm.fri`.
-            **settings: likewise.
+            kind: see `Arm.fri`.
+            **settings: see `Arm.fri`.
 
         Returns:
-            What was opened, in words.
+            What was opened.
 
         Raises:
-            ModeConflict: one is open.
-            HeptarmError: refused, or no session came to stand; the text says what to do.
+            ModeConflict: another one is open.
+            HeptarmError: refused, or not established; the text has the remedy.
         """
         with self._lock:
             if self.active:
-                raise ModeConflict("an FRI session is open", hint="close it first")
+                raise ModeConflict("another FRI session is open", hint="close it first")
             self.close()
             self._text = ""
             self._session = self._arm.fri(kind, **settings).__enter__()
-            return f"the session of kind {kind} stands"
+            return f"{kind} session is open"
 
     def close(self) -> str:
-        """End it; why it ended earlier, in words. Closing twice is legal."""
+        """Close the session; closing twice is legal.
+
+        Returns:
+            Why it ended before; empty: it did not.
+        """
         with self._lock:
             session, self._session = self._session, None
             if session is not None:
@@ -69,7 +73,7 @@ class FriSession:
                     self._text = ""
                 except HeptarmError as error:
                     self._text = str(error)
-                    _log.warning("the FRI session ended: %s", error)
+                    _log.warning("FRI session ended: %s", error)
             return self._text
 
     def command(
@@ -80,32 +84,34 @@ class FriSession:
         wrench: Array | None = None,
         pose: Pose | None = None,
     ) -> None:
-        """Give a command, see `Fri.command`.
+        """Send a command, see `Fri.command`.
 
         Raises:
-            NotReady: no session stands.
-            ModeConflict: this session commands something else.
+            NotReady: no session is open.
+            ModeConflict: this session is of another kind.
         """
-        self._standing().command(q=q, tau=tau, wrench=wrench, pose=pose)
+        self._open_session().command(q=q, tau=tau, wrench=wrench, pose=pose)
 
     def output(self, name: str, value: float) -> None:
-        """Set an output that the session offers.
+        """Write an output that the session carries.
 
         Raises:
-            NotReady: no session stands.
+            NotReady: no session is open.
         """
-        self._standing().output(name, value)
+        self._open_session().output(name, value)
 
-    def _standing(self) -> Fri:
+    def _open_session(self) -> Fri:
         session = self._session
         if session is None or not session.active:
-            raise NotReady(f"no FRI session stands{f': {self._text}' if self._text else ''}", hint="open one")
+            raise NotReady(
+                f"no FRI session is open{f': {self._text}' if self._text else ''}", hint="open one"
+            )
         return session
 
     def status(self) -> dict[str, Any]:
-        """How it is, by the fields of heptarm_msgs/FriStatus; a session that has ended is closed."""
+        """Fields of heptarm_msgs/FriStatus; closes a session that has ended."""
         if not self._lock.acquire(blocking=False):
-            return {"text": "an FRI session is being opened or closed"}
+            return {"text": "an FRI session is opening or closing"}
         try:
             session = self._session
             if session is None:

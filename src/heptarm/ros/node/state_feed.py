@@ -1,4 +1,4 @@
-"""The states of an arm from one connection after the other: what a node publishes, whatever becomes of the network."""
+"""Robot states across reconnections: what a node publishes, even if the network fails for a while."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from heptarm.arm.arm import Arm
 from heptarm.errors import HeptarmError
 from heptarm.values.state import State
 
-_log = logging.getLogger("heptarm.bridge")
+_log = logging.getLogger("heptarm.ros")
 
-#: Pauses between attempts to reconnect [s].
+#: First and longest pause between attempts to reconnect [s].
 _BACK_OFF, _LONGEST_BACK_OFF = 0.2, 2.0
-#: How long to wait for the thread at the end [s].
-_PATIENCE = 5.0
+#: How long to wait for the thread when closing [s].
+_JOIN_TIMEOUT = 5.0
 
 
-class Feed:
-    """Tells of every state, from a thread of its own, and connects again when the connection is lost.
+class ReconnectingStates:
+    """Forwards every state from its own thread, and reconnects when the connection is lost.
 
     Args:
         arm: connected.
-        on_state: told of a new state; it must not block.
-        on_link: told that the connection came (empty) or went (why); it must not block.
+        on_state: receives each new state; it must not block.
+        on_link: receives "" when connected, otherwise why the connection was lost; it must not block.
     """
 
     def __init__(
@@ -33,15 +33,15 @@ class Feed:
         self._arm = arm
         self._on_state, self._on_link = on_state, on_link
         self._ended = threading.Event()
-        self._trouble = ""
+        self._link_error = ""
         self._thread = threading.Thread(target=self._run, name="heptarm-states")
         self._thread.start()
         on_link("")
 
     @property
-    def trouble(self) -> str:
-        """Why there is no connection; empty: there is one."""
-        return self._trouble
+    def link_error(self) -> str:
+        """Why there is no connection; empty: connected."""
+        return self._link_error
 
     @property
     def ended(self) -> bool:
@@ -49,12 +49,12 @@ class Feed:
         return self._ended.is_set()
 
     def end(self) -> None:
-        """From now on a loss of the connection is meant."""
+        """Stop reconnecting: from now on the connection is closed on purpose."""
         self._ended.set()
 
     def join(self) -> None:
         """Wait for the thread, once the arm's connection is closed."""
-        self._thread.join(_PATIENCE)
+        self._thread.join(_JOIN_TIMEOUT)
 
     def _run(self) -> None:
         while not self._ended.is_set():
@@ -64,15 +64,15 @@ class Feed:
             except HeptarmError as error:
                 if self._ended.is_set():
                     return
-                self._lost(str(error))
+                self._lose(str(error))
             except Exception:
                 _log.exception("publishing a state")
             if not self._ended.is_set():
                 self._reconnect()
 
-    def _lost(self, why: str) -> None:
-        self._trouble = why
-        _log.error("the connection is lost: %s", why)
+    def _lose(self, why: str) -> None:
+        self._link_error = why
+        _log.error("connection lost: %s", why)
         self._on_link(why)
 
     def _reconnect(self) -> None:
@@ -80,11 +80,11 @@ class Feed:
         while not self._ended.is_set() and not self._arm.connected:
             try:
                 self._arm.reconnect()
-                _log.warning("reconnected; nothing moves until it is told to")
+                _log.warning("reconnected; nothing moves until the next command")
             except HeptarmError as error:
-                self._trouble = str(error)
+                self._link_error = str(error)
                 self._ended.wait(pause)
                 pause = min(2 * pause, _LONGEST_BACK_OFF)
-        if self._arm.connected and self._trouble:
-            self._trouble = ""
+        if self._arm.connected and self._link_error:
+            self._link_error = ""
             self._on_link("")

@@ -1,4 +1,4 @@
-"""Targets that come one by one as messages: the first one opens a servo motion, silence ends it."""
+"""Servo topics: the first target opens a servo motion, and the cabinet's watchdog ends it when targets stop."""
 
 from __future__ import annotations
 
@@ -9,34 +9,32 @@ from typing import Any, Literal
 import numpy as np
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.servo import JointServo, PoseServo
-from heptarm.bridge.servo_execution import ServoOptions
+from heptarm.arm.motion.servo import JointServo, PoseServo
 from heptarm.errors import HeptarmError, NotReady
 from heptarm.io.clock import RealClock
+from heptarm.ros.trajectory.servo_execution import ServoOptions
 from heptarm.values.arrays import Array, array
-from heptarm.values.condition import Condition
+from heptarm.values.condition.condition import Condition
 from heptarm.values.pose import Pose
 from heptarm.values.result import Cause
 
-_log = logging.getLogger("heptarm.bridge")
+_log = logging.getLogger("heptarm.ros")
 
-#: A velocity is turned into a target so far ahead [s]; the cabinet keeps a target's velocity longer than that.
+#: A velocity command becomes a target this far ahead [s]; the cabinet keeps the velocity of a target for longer.
 _AHEAD = 0.05
 
 
-class Stream:
-    """Targets that come one by one; the cabinet's own watchdog brakes the arm when they stay away.
+class TargetStream:
+    """Follows targets one by one; the cabinet's own watchdog brakes the arm when they stop.
 
     Args:
         arm: in control.
-        timeout: within this time after a target the next one has to come [s].
-        options: ceilings.
-        line_speed: along each axis of the base, of straight lines [m/s].
+        timeout: the arm brakes if no target arrives for this time [s].
+        options: speed and acceleration limits.
+        line_speed: along each axis of the base, on straight lines [m/s].
     """
 
-    def __init__(
-        self, arm: Arm, *, timeout: float, options: ServoOptions, line_speed: float = 0.25
-    ) -> None:
+    def __init__(self, arm: Arm, *, timeout: float, options: ServoOptions, line_speed: float = 0.25) -> None:
         self._arm = arm
         self._timeout = timeout
         self._options = options
@@ -47,40 +45,40 @@ class Stream:
         self._q = np.zeros(7)
         self._last = 0
         self._guard: Condition | None = None
-        self._fired = ""
+        self._blocked = ""  # what ended the last servo motion; setting a guard clears it
         self._kind = ""  # of poses
 
     @property
     def guard(self) -> Condition | None:
-        """Condition that ends what comes next; setting one lets the arm follow again after it has fired."""
+        """Condition that ends servo motions; setting one re-enables following after it has fired."""
         return self._guard
 
     @guard.setter
     def guard(self, value: Condition | None) -> None:
         with self._lock:
-            self._guard, self._fired = value, ""
+            self._guard, self._blocked = value, ""
 
-    def latch(self, why: str) -> None:
-        """Follow no more until somebody sets the guard anew; it waits for nothing."""
-        self._fired = why
+    def block(self, reason: str) -> None:
+        """Follow no more targets until a guard is set again; does not wait for the lock."""
+        self._blocked = reason
 
     @property
     def active(self) -> bool:
-        """Whether the arm follows."""
+        """Whether a servo motion is open."""
         servo = self._servo
         return servo is not None and servo.active
 
     def joints(self, q: Array, dq: Array | None = None) -> None:
-        """Follow joint positions, shape (7,) [rad], passed at `dq` [rad/s]."""
+        """Follow joint positions, shape (7,) [rad], passed with `dq` [rad/s]."""
         with self._lock:
-            wanted = array(q, 7, "position")
-            self._q = self._joint_servo().set(wanted, None if dq is None else array(dq, 7, "velocity"))
+            target = array(q, 7, "position")
+            self._q = self._joint_servo().set(target, None if dq is None else array(dq, 7, "velocity"))
 
     def velocity(self, dq: Array) -> None:
-        """Move at joint velocities, shape (7,) [rad/s], at most the robot's."""
+        """Move with joint velocities, shape (7,) [rad/s], clamped to the limits of the robot."""
         with self._lock:
             robot = self._arm.robot
-            wanted = np.clip(array(dq, 7, "velocity"), -robot.dq_max, robot.dq_max)
+            command = np.clip(array(dq, 7, "velocity"), -robot.dq_max, robot.dq_max)
             was_active = self.active
             servo = self._joint_servo()
             now = self._clock.nanos()
@@ -88,32 +86,32 @@ class Stream:
                 self._q, self._last = servo.start.q.copy(), now
             passed = min((now - self._last) * 1e-9, self._timeout)
             self._last = now
-            self._q = np.clip(self._q + wanted * passed, robot.q_min, robot.q_max)
-            servo.set(self._q + wanted * _AHEAD, wanted)
+            self._q = np.clip(self._q + command * passed, robot.q_min, robot.q_max)
+            servo.set(self._q + command * _AHEAD, command)
 
     def pose(self, pose: Pose, *, straight: bool = False) -> None:
-        """Follow a pose of the flange in the base, on straight lines or as the joints go."""
+        """Follow a pose of the flange in the base, on straight lines or by interpolating joints."""
         kind: Literal["pose", "lin"] = "lin" if straight else "pose"
         with self._lock:
             servo = self._servo
             if not isinstance(servo, PoseServo) or not servo.active or self._kind != kind:
                 self._prepare()
-                servo = self._servo = self._arm.servo(kind, **self._of(kind)).__enter__()
+                servo = self._servo = self._arm.servo(kind, **self._settings_of(kind)).__enter__()
                 self._kind = kind
             servo.set(pose)
 
     def close(self) -> None:
-        """End it at rest; what ended it earlier is told to the log."""
+        """End the servo motion at rest; if it ended earlier, log why."""
         with self._lock:
             servo, self._servo = self._servo, None
             if servo is not None:
                 try:
                     servo.close()
                 except HeptarmError as error:
-                    _log.info("the stream of targets ended: %s", error)
+                    _log.info("servo topic ended: %s", error)
                 result = servo.result
                 if result is not None and result.cause is Cause.CONDITION:
-                    self._fired = "the guard" if result.stopped_by is None else str(result.stopped_by)
+                    self._blocked = "the guard" if result.stopped_by is None else str(result.stopped_by)
 
     def _joint_servo(self) -> JointServo:
         servo = self._servo
@@ -123,17 +121,19 @@ class Stream:
         return servo
 
     def _prepare(self) -> None:
-        """End the last one; after the guard has fired the arm follows no more, until somebody sets a guard anew.
+        """End the last servo motion.
 
         Raises:
-            NotReady: the guard has fired.
+            NotReady: the guard has fired and was not set again.
         """
         self.close()
-        if self._fired:
-            raise NotReady(f"ended by {self._fired}", hint="set the guard anew, or none")
+        if self._blocked:
+            raise NotReady(
+                f"servo topics are blocked: {self._blocked}", hint="set the guard again, or an empty one"
+            )
 
-    def _of(self, kind: str) -> dict[str, Any]:
-        """Settings of a servo motion of poses: a straight one has limits along its path."""
+    def _settings_of(self, kind: str) -> dict[str, Any]:
+        """Settings of a servo motion of poses: on straight lines the limits hold along the path."""
         settings = self._settings
         if kind == "lin":
             for name in ("speed", "acceleration", "engine"):

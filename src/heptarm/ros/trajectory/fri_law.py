@@ -1,20 +1,20 @@
-"""The law of the way `fri`: set-points by the controller's time, so that no process' schedule is in them."""
+"""FRI law of the execution `fri`: set-points by controller time, independent of the scheduling of any process."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from heptarm.rt import Output, Params, State
+from heptarm.fri.loop.user_api import Output, Params, State
 
 
 def follow(state: State, out: Output, params: Params) -> None:
-    """Command the set-point of the controller's time; after the last one brake along the way.
+    """Command the set-point of the current controller time; after the last one brake along the path.
 
     Args:
         state: the message to answer.
-        out: what to command; before the first set-points it stays the interpolator's.
-        params: `begin`, the controller's time of the first set-point [s], negative: there are none; `q`, set-points
-            a send period apart, shape (n, 7) [rad]; `deceleration` after the last one [rad/s²].
+        out: the command; before the first set-points it stays that of the interpolator.
+        params: `begin`, controller time of the first set-point [s], negative: there is none; `q`, set-points one
+            send period apart, shape (n, 7) [rad]; `deceleration` after the last one [rad/s²].
     """
     if params.begin < 0.0:
         return

@@ -1,4 +1,4 @@
-"""A goal of FollowJointTrajectory as it came, unchecked, and how it can end."""
+"""A goal of FollowJointTrajectory: its points, its tolerances, and how it can end."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enum import Enum, IntEnum
 from heptarm.errors import CommandRejected
 
 
-class Code(IntEnum):
+class ErrorCode(IntEnum):
     """Error codes of control_msgs/FollowJointTrajectory."""
 
     SUCCESSFUL = 0
@@ -19,8 +19,8 @@ class Code(IntEnum):
     GOAL_TOLERANCE_VIOLATED = -5
 
 
-class Outcome(Enum):
-    """In what state a goal ends. ROS 2 has no "preempted": its nodes abort such a goal."""
+class GoalOutcome(Enum):
+    """Final state of a goal. ROS 2 has no "preempted": its nodes abort such a goal."""
 
     SUCCEEDED = "succeeded"
     ABORTED = "aborted"
@@ -32,19 +32,19 @@ class GoalRefused(CommandRejected):
     """A goal was refused before anything moved.
 
     Args:
-        text: why, naming the joint, the value and what is allowed.
+        text: why: the joint, the value and the allowed range.
         reason: code for the client.
         hint: what to do.
     """
 
-    def __init__(self, text: str, *, reason: Code = Code.INVALID_GOAL, hint: str = "") -> None:
+    def __init__(self, text: str, *, reason: ErrorCode = ErrorCode.INVALID_GOAL, hint: str = "") -> None:
         super().__init__(text, hint=hint)
         self.reason = reason
 
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """How far a joint may be off; 0: the default; -1: not enforced.
+    """Allowed errors of one joint; 0: the default; -1: not enforced.
 
     Attributes:
         joint: name.
@@ -60,8 +60,8 @@ class Tolerance:
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
-    """A way-point; its numbers are in the order of the goal's joints.
+class TrajectoryPoint:
+    """A point of a trajectory; its numbers are in the order of the goal's joints.
 
     Attributes:
         time: from the start of the trajectory [s].
@@ -79,40 +79,42 @@ class Point:
 
 
 @dataclass(frozen=True, slots=True)
-class Goal:
+class TrajectoryGoal:
     """A goal.
 
     Attributes:
         joints: names, in any order.
-        points: way-points.
-        start: when it starts, on the runner's clock [s]; None: now.
-        path_tolerance: while the arm is under way.
-        goal_tolerance: at the end.
-        goal_time: how long after the end it may take to arrive [s]; 0: the default; -1: for ever.
-        extras: names of filled fields that this server cannot follow.
+        points: of the trajectory.
+        start: start time on the clock of the execution [s]; None: now.
+        path_tolerance: while the trajectory is executed.
+        goal_tolerance: at its end.
+        goal_time: how long after its end the arm may take to reach the goal [s]; 0: the default; -1: no limit.
+        extras: names of filled fields that this server does not support.
+        from_topic: received by topic, so it may be a point of a stream; see `stream`.
     """
 
     joints: tuple[str, ...]
-    points: tuple[Point, ...]
+    points: tuple[TrajectoryPoint, ...]
     start: float | None = None
     path_tolerance: tuple[Tolerance, ...] = ()
     goal_tolerance: tuple[Tolerance, ...] = ()
     goal_time: float = 0.0
     extras: tuple[str, ...] = ()
+    from_topic: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class End:
+class GoalResult:
     """How a goal ended.
 
     Attributes:
         number: of the goal.
-        outcome: its last state.
+        outcome: its final state.
         code: for the client.
-        text: what happened, in words.
+        text: what happened.
     """
 
     number: int
-    outcome: Outcome
-    code: Code
+    outcome: GoalOutcome
+    code: ErrorCode
     text: str

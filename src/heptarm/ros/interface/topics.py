@@ -1,0 +1,207 @@
+"""The topics that both nodes subscribe to: handlers, and `TOPICS`, the table of them.
+
+A new topic is a function and a row of the table. A node subscribes to every row of `topics_of`::
+
+    topics = TopicDispatcher(context)
+    for row in topics_of(names):
+        ...                       # under row.name with row.type: topics.handle(row, message); log a refusal
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from heptarm.ros.interface.context import NodeContext
+from heptarm.ros.interface.messages import trajectory_goal
+from heptarm.ros.interface.motions import (
+    joint_target,
+    partial_joints,
+    pose_target,
+    positions,
+    stamped_pose,
+    velocities,
+)
+from heptarm.ros.interface.names import PRESETS, NameRole
+from heptarm.values.motion.line import lin
+from heptarm.values.motion.ptp import ptp
+
+#: Handles a message of a topic.
+Handler = Callable[[NodeContext, Any], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A topic that the nodes subscribe to.
+
+    Attributes:
+        name: as in ROS 2, "~/" for the node's own.
+        type: "package/Type".
+        handler: handles a message; raises HeptarmError to refuse it.
+        at_once: never waits for another topic.
+    """
+
+    name: str
+    type: str
+    handler: Handler
+    at_once: bool = False
+
+
+class TopicDispatcher:
+    """Calls the handlers of topics, one at a time unless a topic is `at_once`.
+
+    Args:
+        context: of the node.
+    """
+
+    def __init__(self, context: NodeContext) -> None:
+        self._context = context
+        self._lock = threading.Lock()
+
+    def handle(self, topic: Topic, message: Any) -> None:
+        """Handle a message.
+
+        Args:
+            topic: its row.
+            message: of its type.
+
+        Raises:
+            HeptarmError: refused; the text gives the reason.
+        """
+        with contextlib.nullcontext() if topic.at_once else self._lock:
+            topic.handler(self._context, message)
+
+
+def stop(context: NodeContext, message: Any) -> None:
+    """Stop the arm on its path."""
+    context.driver.stop()
+
+
+# --------------------------------------------------------------------------------- motions
+
+
+def command_joint(context: NodeContext, message: Any) -> None:
+    """Move to the positions of a sensor_msgs/JointState."""
+    context.driver.start(ptp(positions(context.driver, message.name, message.position)))
+
+
+def command_pose(context: NodeContext, message: Any) -> None:
+    """Move to a geometry_msgs/PoseStamped."""
+    context.driver.start(ptp(stamped_pose(message, context.base)))
+
+
+def command_lin(context: NodeContext, message: Any) -> None:
+    """Move on a straight line to a geometry_msgs/PoseStamped."""
+    context.driver.start(lin(stamped_pose(message, context.base)))
+
+
+def joint_trajectory(context: NodeContext, message: Any) -> None:
+    """Execute a trajectory_msgs/JointTrajectory, or follow a stream of single points; an empty one stops the arm."""
+    if not message.points and not message.joint_names:
+        context.driver.stop()
+        return
+    goal = trajectory_goal(context.ros, message, now=context.driver.now)
+    context.driver.accept(replace(goal, from_topic=True))
+
+
+def libiiwa_joint(context: NodeContext, message: Any) -> None:
+    """Move to the positions of a sensor_msgs/JointState by the rules of libiiwa."""
+    context.driver.start(ptp(joint_target(context.driver, message.name, message.position)))
+
+
+def libiiwa_pose(context: NodeContext, message: Any) -> None:
+    """Move to a geometry_msgs/Pose by the rules of libiiwa."""
+    place, turn = message.position, message.orientation
+    xyz, quat = (place.x, place.y, place.z), (turn.x, turn.y, turn.z, turn.w)
+    context.driver.start(ptp(pose_target(context.driver, xyz, quat)))
+
+
+# ----------------------------------------------------------------------------------- servo
+
+
+def servo_joint(context: NodeContext, message: Any) -> None:
+    """Follow the positions, and the velocities if there are any, of a sensor_msgs/JointState."""
+    target = positions(context.driver, message.name, message.position)
+    speed = velocities(context.driver, message.name, message.velocity) if len(message.velocity) else None
+    context.driver.follow(target, speed)
+
+
+def servo_velocity(context: NodeContext, message: Any) -> None:
+    """Move with the velocities of a sensor_msgs/JointState."""
+    context.driver.follow_velocity(velocities(context.driver, message.name, message.velocity))
+
+
+def servo_pose(context: NodeContext, message: Any) -> None:
+    """Follow a geometry_msgs/PoseStamped."""
+    context.driver.follow(stamped_pose(message, context.base))
+
+
+def servo_lin(context: NodeContext, message: Any) -> None:
+    """Follow a geometry_msgs/PoseStamped on straight lines."""
+    context.driver.follow(stamped_pose(message, context.base), straight=True)
+
+
+# ------------------------------------------------------------------------------------- FRI
+
+
+def fri_joint(context: NodeContext, message: Any) -> None:
+    """Command positions and torques of a sensor_msgs/JointState; missing joints keep their last command."""
+    q, tau = (
+        partial_joints(context.driver, message.name, values) if len(values) else None
+        for values in (message.position, message.effort)
+    )
+    context.driver.fri.command(q=q, tau=tau)
+
+
+def fri_wrench(context: NodeContext, message: Any) -> None:
+    """Command force and torque of a geometry_msgs/WrenchStamped."""
+    f, t = message.wrench.force, message.wrench.torque
+    context.driver.fri.command(wrench=np.array([f.x, f.y, f.z, t.x, t.y, t.z]))
+
+
+def fri_pose(context: NodeContext, message: Any) -> None:
+    """Command the pose of the flange in the base by a geometry_msgs/PoseStamped."""
+    context.driver.fri.command(pose=stamped_pose(message, context.base))
+
+
+_JOINTS, _POSE = "sensor_msgs/JointState", "geometry_msgs/PoseStamped"
+
+#: All topics with heptarm's own names.
+TOPICS = (
+    Topic("~/stop", "std_msgs/Empty", stop, at_once=True),
+    Topic("~/command/joint", _JOINTS, command_joint),
+    Topic("~/command/pose", _POSE, command_pose),
+    Topic("~/command/lin", _POSE, command_lin),
+    Topic("~/joint_trajectory", "trajectory_msgs/JointTrajectory", joint_trajectory),
+    Topic("~/servo/joint", _JOINTS, servo_joint),
+    Topic("~/servo/velocity", _JOINTS, servo_velocity),
+    Topic("~/servo/pose", _POSE, servo_pose),
+    Topic("~/servo/lin", _POSE, servo_lin),
+    Topic("~/fri/joint", _JOINTS, fri_joint),
+    Topic("~/fri/wrench", "geometry_msgs/WrenchStamped", fri_wrench),
+    Topic("~/fri/pose", _POSE, fri_pose),
+)
+#: Handlers of topics with the names of other drivers.
+_PRESET_HANDLERS: Mapping[NameRole, Handler] = MappingProxyType(
+    {
+        NameRole.STOP: stop,
+        NameRole.JOINT: libiiwa_joint,
+        NameRole.CARTESIAN: libiiwa_pose,
+        NameRole.TRAJECTORY: joint_trajectory,
+    }
+)
+
+
+def topics_of(names: str) -> tuple[Topic, ...]:
+    """List heptarm's own topics, and those that the parameter `names` adds."""
+    return TOPICS + tuple(
+        Topic(entry.name, entry.type, _PRESET_HANDLERS[entry.role], at_once=entry.role is NameRole.STOP)
+        for entry in PRESETS[names].entries
+        if entry.role in _PRESET_HANDLERS
+    )

@@ -1,0 +1,1 @@
+"""One arm behind a node: connection, goals, servo topics, FRI session, parameters, diagnostics, published messages."""
