@@ -1,25 +1,13 @@
-"""Cartesian impedance: the moved frame hangs on its set-point by a spring and a damper in each direction.
+"""Cartesian impedance: the tool frame is attached to its set-point by a spring and a damper in each direction.
 
-The control force F = -K e - D de/dt, with what is added to it, acts through the transposed Jacobian; gravity, friction,
-Coriolis torques and the commanded acceleration are compensated, the arm's inertia is not shaped (Ott, "Cartesian
-Impedance Control of Redundant and Flexible-Joint Robots", 2008, chapter 3).
-
-The damper follows from stiffness K and Cartesian inertia Λ by double diagonalisation (Albu-Schäffer, Ott, Frese,
-Hirzinger, "Cartesian impedance control of redundant robots", ICRA 2003): with Λ = Q Q' and K = Q B Q' it is
-D = 2 Q √B Q'. That is twice the geometric mean of K and Λ, hence also D = 2 √K (√K Λ^-1 √K)^-½ √K: it takes no inverse
-of Λ, which does not exist in a singularity. Damping ratios enter as D → √ζ D √ζ: D stays positive, and directions that
-are not coupled have their own ratio each.
-
-The elbow hangs on its set-point by a spring in joint space, through the dynamically consistent null space (Khatib, "A
-unified approach for motion and force control of robot manipulators", 1987): with M = L L' it is spanned by those a for
-which J a = 0 and a' M a = 1, and torques M a do not accelerate the moved frame.
+The overlaid forces of Cartesian sine impedance are a `OverlaidForce` on top of it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import atan2, cos, sin, sqrt
+from math import atan2, cos, inf, isnan, pi, sin, sqrt
 
 import mujoco
 import numpy as np
@@ -27,32 +15,96 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected
 from heptarm.model.kinematics import joints
+from heptarm.sim.control.laws import MeasuredState
+from heptarm.sim.planning.command import TICK
 from heptarm.values.arrays import Array
-from heptarm.values.mode import CartesianImpedance, SineImpedance
-from heptarm.values.motion import BASE, TOOL
+from heptarm.values.frames import BASE, TOOL
+from heptarm.values.mode.impedance import CartesianImpedance
+from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.pose import quaternion, rotation
 from heptarm.values.robot import RobotModel
-from heptarm.virtual.law import Sensed
-from heptarm.virtual.sine import Pattern
-from heptarm.virtual.tick import TICK
 
-#: Parameters that change while the law is in force do so within this time [s]; added forces set in likewise.
+#: In this last fraction of the distance to the position limit a force towards it fades out.
+FADE = 0.2
+#: In place of no limit [N, Nm, m, rad]; infinity would make NaN of it.
+_NONE = 1e9
+
+
+class OverlaidForce:
+    """The overlaid force of a sine impedance over time.
+
+    Args:
+        mode: its parameters.
+
+    Attributes:
+        mode: the same.
+        end: time at which the force ends [s]; infinite: never.
+        stays: the motion must not end before that.
+    """
+
+    def __init__(self, mode: SineImpedance) -> None:
+        self.mode = mode
+        duration = mode.duration
+        self.end = inf if isnan(duration) else duration
+        self.stays = mode.stay_active
+        self._pulsation = 2.0 * pi * mode.frequency
+        self._limited = not bool(np.isnan(mode.force_limit).all())
+        self._most = np.nan_to_num(mode.force_limit, nan=_NONE)
+        self._bounded = not bool(np.isnan(mode.position_limit).all())
+        self._reach = np.nan_to_num(mode.position_limit, nan=_NONE)
+        self._slope = 1.0 / np.maximum(FADE * self._reach, 1.0 / _NONE)
+
+    def fraction(self, time: float) -> float:
+        """Fraction of the force that acts at a time since its start [s], 0 to 1."""
+        if time < 0.0 or time >= self.end:
+            return 0.0
+        rise, fall, left = self.mode.rise_time, self.mode.fall_time, self.end - time
+        risen = time / rise if time < rise else 1.0
+        fallen = left / fall if left < fall else 1.0
+        return min(risen, fallen)
+
+    def force(self, time: float, deviation: Array) -> Array:
+        """The force on the tool frame.
+
+        Args:
+            time: since the beginning [s].
+            deviation: of the tool frame from its set-point, shape (6,) [m, rad].
+
+        Returns:
+            Shape (6,) [N, Nm], in the axes of the mode's frame.
+        """
+        fraction, mode = self.fraction(time), self.mode
+        if fraction == 0.0:
+            return np.zeros(6)
+        force: Array = mode.amplitude * np.sin(self._pulsation * time + mode.phase)
+        force += mode.bias
+        force *= fraction
+        if self._limited:
+            np.minimum(force, self._most, out=force)
+            np.maximum(force, -self._most, out=force)
+        if self._bounded:
+            room = np.minimum(np.maximum((self._reach - np.abs(deviation)) * self._slope, 0.0), 1.0)
+            force *= np.where(force * deviation > 0.0, room, 1.0)  # a force that pulls back acts in full
+        return force
+
+
+#: Duration of a parameter change while the law is in force, and of the rise of added forces [s].
 RAMP = 0.05
-#: A direction without stiffness is damped like one of this stiffness [N/m, Nm/rad], or a touch would set the arm
-#: adrift for good.
+#: A direction without stiffness is damped like one of this stiffness [N/m, Nm/rad], or a touch would make the arm
+#: drift forever.
 LEAST_STIFFNESS = np.array([10.0, 10.0, 10.0, 0.5, 0.5, 0.5])
-#: The null space's damper is at least that of this pulsation [rad/s], for the same reason; no Cartesian mode counts as
-#: slower, which bounds the damper near singularities.
+#: Least natural frequency for the damper of the null space, for the same reason, and of the Cartesian modes, which
+#: bounds the damper near singularities [rad/s].
 LEAST_PULSATION = 1.0
-#: Directions in which the arm's inertia is above 1 / HEAVY² [kg, kg m²] are as good as blocked: what the Cartesian
-#: spring does not hold there, the joint spring takes over.
+#: Directions in which the arm's inertia is above 1 / HEAVY² [kg, kg m²] are practically blocked: there the joint spring
+#: replaces the Cartesian one.
 HEAVY = 0.05
 
 _ALONG = ("along x", "along y", "along z", "about x", "about y", "about z")
 _NO_TOOL = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
-class Flange:
+class FlangeKinematics:
     """Pose and Jacobian of the flange of a simulated arm.
 
     Args:
@@ -75,27 +127,27 @@ class Flange:
         self.position: Array = data.site_xpos[self._site]
 
     def update(self) -> None:
-        """Take the Jacobian of the present state; the rest is up to date by itself."""
+        """Update the Jacobian; MuJoCo updates the pose."""
         mujoco.mj_jacSite(self._model, self._data, self._linear, self._angular, self._site)
 
 
-class CartesianSpring:
+class CartesianImpedanceLaw:
     """Cartesian impedance, with or without an overlaid force.
 
     Args:
         mode: its parameters.
         robot: the robot.
         flange: of the simulated arm.
-        tcp: flange to moved frame, x y z [m], quaternion x y z w.
+        tcp: flange to tool frame, x y z [m], quaternion x y z w.
         axes: of the mode's frame, columns in the base frame, shape (3, 3); needed for frames other than "tool" and
             "base".
 
     Attributes:
-        violation: which limit that stops the motion was exceeded first, in words; "" while none was.
+        violation: text of the first exceeded limit that stops the motion; "" while there is none.
         force: control force of the last tick, shape (6,) [N, Nm], in the axes of the mode's frame.
         overlay: the overlaid part of it.
-        deviation: of the moved frame from its set-point, shape (6,) [m, rad], in the same axes.
-        velocity: of the moved frame, shape (6,) [m/s, rad/s], in the same axes.
+        deviation: of the tool frame from its set-point, shape (6,) [m, rad], in the same axes.
+        velocity: of the tool frame, shape (6,) [m/s, rad/s], in the same axes.
 
     Raises:
         CommandRejected: the axes of the mode's frame are not given.
@@ -107,7 +159,7 @@ class CartesianSpring:
         self,
         mode: CartesianImpedance | SineImpedance,
         robot: RobotModel,
-        flange: Flange,
+        flange: FlangeKinematics,
         *,
         tcp: Sequence[float] = _NO_TOOL,
         axes: npt.ArrayLike | None = None,
@@ -115,7 +167,7 @@ class CartesianSpring:
         base = _base(mode)
         if axes is None and base.frame not in (TOOL, BASE):
             raise CommandRejected(
-                f"the axes of frame {base.frame!r} are not known",
+                f"frame of a Cartesian impedance must be {TOOL!r}, {BASE!r} or given with its axes, got {base.frame!r}",
                 code=42,
                 parameter="frame",
                 value=base.frame,
@@ -128,28 +180,26 @@ class CartesianSpring:
         self.violation = ""
         self.force, self.overlay = np.zeros(6), np.zeros(6)
         self.deviation, self.velocity = np.zeros(6), np.zeros(6)
-        self._shift = np.zeros((6, 6))  # from the flange's Jacobian to the moved frame's, in the mode's axes
+        self._shift = np.zeros((6, 6))  # from the flange's Jacobian to the tool frame's, in the mode's axes
         self._seen: list[float] = []  # joints of the set-point whose pose is known
         self._goal_rotation, self._goal = np.eye(3), np.zeros(3)
         self._axes_of: list[tuple[float, float, float]] = []
         self._points: list[tuple[float, float, float]] = []
-        self._pattern: Pattern | None = None
-        self._old_pattern: Pattern | None = None
+        self._pattern: OverlaidForce | None = None
+        self._old_pattern: OverlaidForce | None = None
         self._time = self._old_time = 0.0
         self._take(mode)
         self._present = self._wanted.copy()
-        self._present[12:18] = 0.0  # added forces set in gently
+        self._present[12:18] = 0.0  # added forces rise on a ramp
         self._tune()
 
-    # ------------------------------------------------------------------------------ parameters
-
     def change(self, mode: CartesianImpedance | SineImpedance) -> None:
-        """Take other parameters, on a short ramp; the frame stays. An overlaid force that differs begins anew."""
+        """Change the parameters on a short ramp; the frame stays. A different overlaid force starts again."""
         self._take(mode)
 
     @property
     def stays(self) -> bool:
-        """The overlaid force has not ended, and the motion is not to end before."""
+        """Whether the motion must not end yet, because its overlaid force has not ended."""
         pattern = self._pattern
         return pattern is not None and pattern.stays and self._time < pattern.end
 
@@ -184,13 +234,13 @@ class CartesianSpring:
         ):
             return
         self._old_pattern, self._old_time = now, self._time
-        self._pattern, self._time = (Pattern(mode) if isinstance(mode, SineImpedance) else None), 0.0
+        self._pattern, self._time = (OverlaidForce(mode) if isinstance(mode, SineImpedance) else None), 0.0
 
     def _tune(self) -> None:
-        """Bring the parameters that change on a ramp a tick further."""
+        """Advance the parameters on their ramp by one tick."""
         self._ramp += TICK
-        share = min(1.0, self._ramp / RAMP)
-        if share == 1.0:
+        fraction = min(1.0, self._ramp / RAMP)
+        if fraction == 1.0:
             self._present = self._wanted
         else:
             self._present = self._present + (self._wanted - self._present) * (
@@ -201,16 +251,14 @@ class CartesianSpring:
         self._weight = np.sqrt(self._present[6:12])
         self._elbow, self._elbow_damping = float(self._present[18]), float(self._present[19])
 
-    # ------------------------------------------------------------------------------ the tick
-
-    def torque(self, sensed: Sensed) -> Array:
+    def torque(self, sensed: MeasuredState) -> Array:
         """Torques of the motors, shape (7,) [Nm]."""
         if self._ramp < RAMP:
             self._tune()
         flange = self._flange
         flange.update()
         speed = (sensed.after - sensed.before) * 500.0
-        goal_velocity = self._lead(sensed.now.tolist(), speed.tolist())
+        goal_velocity = self._update_goal(sensed.now.tolist(), speed.tolist())
         axes = self._goal_rotation if self._axes is None else self._axes
         to_axes = axes.T
         lever = flange.rotation @ self._offset
@@ -239,7 +287,7 @@ class CartesianSpring:
         self._old_time += TICK
         return torque
 
-    def _lead(self, q: list[float], dq: list[float]) -> Array:
+    def _update_goal(self, q: list[float], dq: list[float]) -> Array:
         """Pose of the set-point, if it is a new one, and its velocity: linear and angular as columns, shape (3, 2)."""
         if q != self._seen:
             axes, points, tip = joints(self._robot, q)
@@ -264,7 +312,7 @@ class CartesianSpring:
         return np.array(((vx, wx), (vy, wy), (vz, wz)))
 
     def _jacobian(self, to_axes: Array, lever: list[float]) -> Array:
-        """Of the moved frame, in the mode's axes."""
+        """Of the tool frame, in the mode's axes."""
         x, y, z = lever
         shift = self._shift
         shift[:3, :3] = shift[3:, 3:] = to_axes
@@ -273,7 +321,7 @@ class CartesianSpring:
         return result
 
     def _spring(self, deviation: Array, rate: Array, mobility: Array) -> Array:
-        """Force of spring, damper and what is added; mobility: Λ^-1, shape (6, 6)."""
+        """Force of spring and damper with the added forces; mobility: Λ^-1, shape (6, 6)."""
         root = self._root
         pulsation2, modes = np.linalg.eigh(root[:, None] * mobility * root)
         np.maximum(pulsation2, LEAST_PULSATION**2, out=pulsation2)
@@ -286,20 +334,20 @@ class CartesianSpring:
         return force
 
     def _overlaid(self, deviation: Array) -> Array:
-        """The overlaid force; a new one sets in gently, as the one before it fades out."""
+        """The overlaid force; a new one rises on a ramp while the one before it fades out."""
         new, old = self._pattern, self._old_pattern
         force = np.zeros(6) if new is None else new.force(self._time, deviation)
         if self._time >= RAMP:
             self._old_pattern = None
             return force
-        share = self._time / RAMP
-        force *= share
+        fraction = self._time / RAMP
+        force *= fraction
         if old is not None:
-            force += (1.0 - share) * old.force(self._old_time, deviation)
+            force += (1.0 - fraction) * old.force(self._old_time, deviation)
         return force
 
     def _null(self, mobility: Array, root: Array, mass: Array, error: Array, rate: Array) -> Array:
-        """Torques that hold the elbow without accelerating the moved frame."""
+        """Torques that hold the elbow without accelerating the tool frame."""
         squares, vectors = np.linalg.eigh(mobility.T @ mobility)
         torque = np.zeros(7)
         for index in range(7):
@@ -307,17 +355,17 @@ class CartesianSpring:
             if square >= HEAVY * HEAVY:
                 break
             weight = (1.0 - sqrt(max(0.0, square)) / HEAVY) ** 2
-            way = vectors[:, index] @ root  # J way = 0, way' M way = 1
-            push = mass @ way
-            pulsation = max(LEAST_PULSATION, sqrt(self._elbow * float(way @ way)))
-            pull = self._elbow * float(way @ error) + 2.0 * self._elbow_damping * pulsation * float(
+            direction = vectors[:, index] @ root  # J direction = 0, direction' M direction = 1
+            push = mass @ direction
+            pulsation = max(LEAST_PULSATION, sqrt(self._elbow * float(direction @ direction)))
+            pull = self._elbow * float(direction @ error) + 2.0 * self._elbow_damping * pulsation * float(
                 push @ rate
             )
             torque += weight * pull * push
         return torque
 
     def _watch(self) -> None:
-        """Find out whether a limit that stops the motion is exceeded."""
+        """Check the limits that stop the motion."""
         for name, what, most, units in self._limits:
             values = getattr(self, what)
             over = np.abs(values) > most
@@ -335,14 +383,14 @@ def _base(mode: CartesianImpedance | SineImpedance) -> CartesianImpedance:
 
 
 def _unless_open(limits: Array) -> Array | None:
-    """Limits with infinity where there is none; None: there is none at all."""
+    """Limits with infinity for open ones; None: all are open."""
     return None if np.isnan(limits).all() else np.where(np.isnan(limits), np.inf, limits)
 
 
 def _turning(matrix: Array) -> Array:
     """Rotation vector of a rotation matrix, shape (3,) [rad]."""
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix.tolist()
-    if xx + yy + zz < -0.5:  # beyond 138 degrees the difference of the sides does not tell the axis well
+    if xx + yy + zz < -0.5:  # beyond 138 degrees the skew-symmetric part does not determine the axis well
         quat = quaternion(matrix)
         sine = float(np.linalg.norm(quat[:3]))
         return np.asarray(quat[:3] * (2.0 * atan2(sine, float(quat[3])) / sine), dtype=np.float64)

@@ -1,27 +1,28 @@
-"""The control law in force, and the one that takes its place when the control mode changes."""
+"""The control law in force, and its replacement when the control mode changes."""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
 
+from heptarm.sim.control.cartesian_impedance import CartesianImpedanceLaw, FlangeKinematics
+from heptarm.sim.control.hand_guiding_law import HandGuidingLaw
+from heptarm.sim.control.laws import ControlLaw, JointImpedanceLaw, MeasuredState, PositionLaw, Superposition
+from heptarm.sim.planning.command import Order
 from heptarm.values.arrays import Array
-from heptarm.values.guiding import HandGuide
-from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, SineImpedance
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
+from heptarm.values.mode.mode import Mode
+from heptarm.values.mode.sine import SineImpedance
+from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.pose import rotation
 from heptarm.values.robot import RobotModel
-from heptarm.virtual.fri.overlay import Superposition
-from heptarm.virtual.guiding import HandLaw
-from heptarm.virtual.impedance import CartesianSpring, Flange
-from heptarm.virtual.law import JointSpring, Law, PositionLaw, Sensed
-from heptarm.virtual.order import Order
 
-#: Flange to moved frame, axes of the mode's frame: what a Cartesian spring keeps for its life.
-_Fitting = tuple[tuple[float, ...], str, tuple[float, ...] | None]
+#: Flange to tool frame, axes of the mode's frame: fixed for a Cartesian impedance law.
+_Frames = tuple[tuple[float, ...], str, tuple[float, ...] | None]
 
 
-class Control:
-    """Holds the law in force.
+class ActiveLaw:
+    """The control law in force.
 
     Args:
         robot: the robot.
@@ -31,31 +32,31 @@ class Control:
 
     def __init__(self, robot: RobotModel, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         self._robot = robot
-        self._flange = Flange(model, data)
-        self._law: Law = PositionLaw()
-        self._fitting: _Fitting | None = None
+        self._flange = FlangeKinematics(model, data)
+        self._law: ControlLaw = PositionLaw()
+        self._frames: _Frames | None = None
 
     @property
     def is_stiff(self) -> bool:
-        """Whether the arm follows its set-points stiffly."""
+        """Whether the arm tracks its set-points closely."""
         return self._law.is_stiff
 
     @property
     def stays(self) -> bool:
-        """Whether a motion must not end yet, because a force laid over it has not."""
+        """Whether a motion must not end yet, because its overlaid force has not ended."""
         return self._law.stays
 
     @property
     def violation(self) -> str:
-        """Which limit that stops the motion is exceeded, in words; "" while none is."""
+        """Text of the exceeded limit that stops the motion; "" while there is none."""
         return self._law.violation
 
-    def torque(self, sensed: Sensed) -> Array:
+    def torque(self, sensed: MeasuredState) -> Array:
         """Torques of the motors, shape (7,) [Nm]."""
         return self._law.torque(sensed)
 
     def superpose(self, torque: Array, action: Superposition) -> None:
-        """Add to the motors' torques, shape (7,) [Nm], what an FRI overlay lays on them."""
+        """Add the load of an FRI overlay to the motors' torques, shape (7,) [Nm]."""
         if action.tau is not None:
             torque += action.tau
         if action.wrench is not None:
@@ -63,50 +64,50 @@ class Control:
             torque += self._flange.jacobian.T @ action.wrench
 
     def take(self, order: Order) -> bool:
-        """Bring the law of an order's mode into force.
+        """Switch to the law of a command's control mode.
 
         Returns:
-            Whether it takes the place of another one under which the arm yielded: the set-points then have to become
-            what it has yielded to, or the new law would pull it back with a jerk.
+            Whether it replaces a law under which the arm was compliant: the set-points then have to be reset to the
+            measured position, or the new law would pull the arm back with a jerk.
         """
-        mode, yielding = order.mode, not self._law.is_stiff
+        mode, was_compliant = order.mode, not self._law.is_stiff
         if isinstance(mode, JointImpedance):
             if self.retune(mode):
                 return False
-            self._law, self._fitting = JointSpring(mode.stiffness, mode.damping), None
+            self._law, self._frames = JointImpedanceLaw(mode.stiffness, mode.damping), None
         elif isinstance(mode, CartesianImpedance | SineImpedance):
             frame = mode.base.frame if isinstance(mode, SineImpedance) else mode.frame
-            fitting = (order.tcp, frame, order.axes)
-            if fitting == self._fitting and self.retune(mode):
+            frames = (order.tcp, frame, order.axes)
+            if frames == self._frames and self.retune(mode):
                 return False
             axes = None if order.axes is None else rotation(np.array(order.axes))
-            self._law = CartesianSpring(mode, self._robot, self._flange, tcp=order.tcp, axes=axes)
-            self._fitting = fitting
+            self._law = CartesianImpedanceLaw(mode, self._robot, self._flange, tcp=order.tcp, axes=axes)
+            self._frames = frames
         else:
             return self.stiffen()
-        return yielding
+        return was_compliant
 
-    def guide(self, guide: HandGuide, q: Array, *, tcp: tuple[float, ...], ceiling: float) -> HandLaw:
-        """The law for a hand guiding that begins at joints of shape (7,) [rad]; `lead` brings it into force."""
-        return HandLaw(guide, self._robot, self._flange, q=q, tcp=tcp, ceiling=ceiling)
+    def guide(self, guide: HandGuide, q: Array, *, tcp: tuple[float, ...], ceiling: float) -> HandGuidingLaw:
+        """The law for a hand guiding that begins at joints of shape (7,) [rad]; `follow_hand` switches to it."""
+        return HandGuidingLaw(guide, self._robot, self._flange, q=q, tcp=tcp, ceiling=ceiling)
 
-    def lead(self, law: HandLaw) -> None:
-        """Bring a hand guiding's law into force."""
-        self._law, self._fitting = law, None
+    def follow_hand(self, law: HandGuidingLaw) -> None:
+        """Switch to the law of a hand guiding."""
+        self._law, self._frames = law, None
 
     def stiffen(self) -> bool:
-        """Return to position control; says whether the arm was yielding, as `take` does."""
+        """Switch to position control; returns whether the arm was compliant, as `take` does."""
         if self._law.is_stiff:
             return False
-        self._law, self._fitting = PositionLaw(), None
+        self._law, self._frames = PositionLaw(), None
         return True
 
     def retune(self, mode: Mode) -> bool:
-        """Give the law in force other parameters; says whether the mode is of its kind."""
+        """Change the parameters of the law in force; returns whether the mode is of its kind."""
         law = self._law
-        if isinstance(law, JointSpring) and isinstance(mode, JointImpedance):
+        if isinstance(law, JointImpedanceLaw) and isinstance(mode, JointImpedance):
             law.change(mode.stiffness, mode.damping)
-        elif isinstance(law, CartesianSpring) and isinstance(mode, CartesianImpedance | SineImpedance):
+        elif isinstance(law, CartesianImpedanceLaw) and isinstance(mode, CartesianImpedance | SineImpedance):
             law.change(mode)
         else:
             return False

@@ -1,58 +1,50 @@
-"""Hand guiding: the arm gives way to a hand as if it had no weight, and no more than its limits allow.
+"""Hand guiding: the arm follows a hand without weight, within joint and speed limits.
 
-The law works on accelerations: what is unwanted in the joints' speeds decays with a short time constant, and the
-inertia matrix makes torques of it, so that a limit of one axis does not disturb the others. Towards a limit an axis
-may be only so fast that it can still stop before it.
+The law works on accelerations: excess joint velocities decay with a short time constant, and the inertia matrix turns
+that into torques, so that a limit of one axis does not disturb the others. Towards a limit an axis may be only so fast
+that it can still stop before it.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
+from heptarm.sim.control.cartesian_impedance import FlangeKinematics
+from heptarm.sim.control.laws import MeasuredState
 from heptarm.values.arrays import Array
-from heptarm.values.guiding import HandGuide
+from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.robot import RobotModel
-from heptarm.virtual.impedance import Flange
-from heptarm.virtual.law import Sensed
-from heptarm.virtual.servo import ServoTerms, SmartFollower
 
-#: Speeds that nobody limits decay at this rate, so that the arm does not drift [1/s].
+#: Decay rate of allowed velocities, so that the arm does not drift [1/s].
 CALM = 5.0
-#: Unwanted speed decays at this rate [1/s].
+#: Decay rate of excess velocities [1/s].
 STRICT = 600.0
-#: Share of an axis' speed that a hand may use where nobody says less.
+#: Default speed limit of an axis, as a fraction of its maximum.
 ROOM = 0.9
-#: Share of an axis' acceleration that is reckoned with for stopping before a limit.
+#: Fraction of an axis' acceleration assumed for stopping before a limit.
 RESERVE = 0.4
-#: An axis is held so far before its limit [rad].
+#: Distance before its limit at which an axis is held [rad].
 MARGIN = 0.02
-#: One that was pushed beyond that place returns at this speed [rad/s], one that began beyond it at that speed; near
-#: the place at a speed proportional to the distance [1/s].
+#: Speed of return of an axis that was pushed beyond that position, and of one that began beyond it [rad/s]; close to
+#: the position the speed is proportional to the distance [1/s].
 RETURN, PULL, NEARING = 1.0, 0.3, 20.0
-#: An axis that comes so near to the place where it is held has reached its limit [rad].
+#: An axis this close to the position where it is held has reached its limit [rad].
 REACHED = 2e-3
 
-#: Braking may jerk so many times more than a motion.
-QUICK = 20.0
 
-_FULL = (1.0,) * 7
-
-
-class HandLaw:
-    """The law while somebody leads.
+class HandGuidingLaw:
+    """The law while the enabling switch is held.
 
     Args:
         guide: the limits.
         robot: the robot.
         flange: of the simulated arm.
-        q: where it begins, shape (7,) [rad].
-        tcp: flange to moved frame, x y z [m].
-        ceiling: the moved frame is never led faster [m/s].
+        q: joint positions at the start, shape (7,) [rad].
+        tcp: flange to tool frame, x y z [m].
+        ceiling: largest speed of the tool frame [m/s].
 
     Attributes:
-        is_frozen: an axis has reached its limit, and that is to hold all of them.
+        is_frozen: an axis has reached its limit, and the guide holds all axes then.
     """
 
     is_stiff = False
@@ -63,7 +55,7 @@ class HandLaw:
         self,
         guide: HandGuide,
         robot: RobotModel,
-        flange: Flange,
+        flange: FlangeKinematics,
         *,
         q: Array,
         tcp: tuple[float, ...],
@@ -79,14 +71,14 @@ class HandLaw:
         self._slowing = 2.0 * RESERVE * robot.ddq_max
         self._inside = (low < q) & (q < high)
         pulls = guide.outside == "pull"
-        # the walls of an axis that is beyond its limit and may stay there follow it inwards
+        # the limits of an axis that begins beyond its limit and may stay there follow it inwards
         self._floor: Array = low if pulls else np.minimum(low, q)
         self._roof: Array = high if pulls else np.maximum(high, q)
         self._back = -np.where(self._inside, RETURN, PULL)
         self._freezes = guide.at_limit == "all"
         self.is_frozen = False
 
-    def torque(self, sensed: Sensed) -> Array:
+    def torque(self, sensed: MeasuredState) -> Array:
         """Torques of the motors, shape (7,) [Nm]."""
         q, dq = sensed.q, sensed.dq
         self._floor = np.minimum(self._low, np.maximum(self._floor, q))
@@ -96,8 +88,8 @@ class HandLaw:
             self.is_frozen = True
         allowed = np.minimum(np.maximum(dq, -self._speed(below)), self._speed(above))
         allowed *= self._slower(allowed)
-        wanted = -CALM * allowed - STRICT * (dq - allowed)
-        torque: Array = sensed.mass @ wanted + sensed.bias - sensed.passive
+        acceleration = -CALM * allowed - STRICT * (dq - allowed)
+        torque: Array = sensed.mass @ acceleration + sensed.bias - sensed.passive
         return torque
 
     def _speed(self, room: Array) -> Array:
@@ -108,7 +100,7 @@ class HandLaw:
         return result
 
     def _slower(self, dq: Array) -> float:
-        """Factor that brings the moved frame down to its highest speed."""
+        """Factor that limits the speed of the tool frame."""
         if self._ceiling == np.inf:
             return 1.0
         flange = self._flange
@@ -116,31 +108,3 @@ class HandLaw:
         twist = flange.jacobian @ dq
         speed = float(np.linalg.norm(twist[:3] + np.cross(twist[3:], flange.rotation @ self._offset)))
         return 1.0 if speed <= self._ceiling else self._ceiling / speed
-
-
-class Guidance:
-    """A hand guiding under way.
-
-    Args:
-        law: the law while somebody leads.
-        robot: the robot.
-
-    Attributes:
-        law: see above.
-        has_begun: somebody has led.
-        rest: brings an arm to rest that nobody leads any more, and keeps it there; None: it is led, or was not yet.
-    """
-
-    def __init__(self, law: HandLaw, robot: RobotModel) -> None:
-        self.law = law
-        terms = ServoTerms.of(robot, velocity=_FULL, acceleration=_FULL)
-        self._terms = replace(terms, jerk=QUICK * terms.jerk)
-        self.has_begun = False
-        self.rest: SmartFollower | None = None
-
-    def halt(self, q: Array, dq: Array) -> SmartFollower:
-        """Come to rest from a position [rad] and a velocity [rad/s], shape (7,) each."""
-        if self.rest is None:
-            self.rest = SmartFollower(self._terms, q)
-            self.rest.brake(scale=1.0, rate=0.0, speed=np.clip(dq, -self._terms.velocity, self._terms.velocity))
-        return self.rest

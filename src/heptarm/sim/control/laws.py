@@ -1,7 +1,7 @@
 """Control laws: from set-points and the measured state to torques.
 
-Position control is a computed-torque law that tracks tightly. Impedance laws let the arm yield: a spring and a
-damper to the set-point, on top of what gravity and the commanded motion need.
+Position control is a computed-torque law. Impedance laws make the arm compliant: a spring and a damper to the
+set-point, in addition to the torques for gravity and the commanded motion.
 """
 
 from __future__ import annotations
@@ -11,32 +11,31 @@ from typing import Protocol
 
 import numpy as np
 
+from heptarm.sim.planning.command import TICK
 from heptarm.values.arrays import Array
-from heptarm.virtual.tick import TICK
 
 #: Bandwidth of the position controller [rad/s] and its damping ratio.
 BANDWIDTH = 90.0
 DAMPING = 1.0
-#: Integral action: what a lasting load would bend the arm by is taken back, up to this angle [rad].
+#: Integral action compensates the deflection under a constant load, up to this angle [rad].
 INTEGRAL = 0.2 * BANDWIDTH
 INTEGRAL_REACH = 0.01
-#: No joint moves freer than with this much damping [Nm s/rad], not even one without stiffness.
+#: Least damping of a joint, also of one without stiffness [Nm s/rad].
 LEAST_DAMPER = 0.5
-#: Stiffness that changes while a law is in force does so within this time [s].
+#: Duration of a stiffness change while a law is in force [s].
 RAMP = 0.05
 
 
-
 @dataclass(slots=True)
-class Sensed:
-    """What a law works on, in one tick; arrays are views that the plant keeps up to date.
+class MeasuredState:
+    """Measured state and set-points of one tick; arrays are views that the plant updates.
 
     Attributes:
         q: measured positions, shape (7,) [rad].
         dq: measured velocities [rad/s].
         mass: inertia matrix with rotors, shape (7, 7) [kg m²].
         bias: Coriolis, centrifugal and gravity torques [Nm].
-        passive: what friction gives [Nm].
+        passive: friction torques [Nm].
         before: set-point of the last tick [rad], then of this and of the next one.
         is_overlaid: the set-points are an FRI client's; an impedance law then follows them by its spring alone.
     """
@@ -52,10 +51,25 @@ class Sensed:
     is_overlaid: bool = False
 
 
-class Law(Protocol):
+@dataclass(frozen=True, slots=True, eq=False)
+class Superposition:
+    """Set-point and load of an FRI overlay for the next tick, instead of the interpolator's set-point.
+
+    Attributes:
+        q: set-point of the next tick, shape (7,) [rad].
+        tau: additional torques, shape (7,) [Nm]; None: none.
+        wrench: additional force and torque of the arm at the flange, base axes, shape (6,) [N, Nm]; None: none.
+    """
+
+    q: Array
+    tau: Array | None = None
+    wrench: Array | None = None
+
+
+class ControlLaw(Protocol):
     """A control law in force."""
 
-    #: Whether the arm follows its set-points stiffly, so that a motion can wait for its arrival.
+    #: Whether the arm tracks its set-points closely, so that a motion can wait for its arrival.
     is_stiff: bool
 
     @property
@@ -64,9 +78,9 @@ class Law(Protocol):
 
     @property
     def violation(self) -> str:
-        """Which limit that stops the motion is exceeded, in words; "" while none is."""
+        """Text of the exceeded limit that stops the motion; "" while there is none."""
 
-    def torque(self, sensed: Sensed) -> Array:
+    def torque(self, sensed: MeasuredState) -> Array:
         """Torques of the motors, shape (7,) [Nm]."""
 
 
@@ -74,38 +88,38 @@ class PositionLaw:
     """Stiff position control.
 
     Args:
-        lasting: what its integral action begins with, shape (7,) [rad]; None: nothing.
+        integral: initial value of the integral action, shape (7,) [rad]; None: zero.
     """
 
     is_stiff = True
     stays = False
     violation = ""
 
-    def __init__(self, lasting: Array | None = None) -> None:
-        self._lasting = np.zeros(7) if lasting is None else lasting
+    def __init__(self, integral: Array | None = None) -> None:
+        self._integral = np.zeros(7) if integral is None else integral
 
     @classmethod
-    def that_goes_on(cls, torque: Array, sensed: Sensed) -> PositionLaw:
-        """The law that gives the torques [Nm] which another gives now, with the arm at rest at its set-point."""
-        wanted = np.linalg.solve(sensed.mass, torque - sensed.bias + sensed.passive)
-        return cls(np.asarray(wanted / BANDWIDTH**2, dtype=np.float64))
+    def continuing(cls, torque: Array, sensed: MeasuredState) -> PositionLaw:
+        """The law that continues with the present torques [Nm] of another one; the arm rests at its set-point."""
+        acceleration = np.linalg.solve(sensed.mass, torque - sensed.bias + sensed.passive)
+        return cls(np.asarray(acceleration / BANDWIDTH**2, dtype=np.float64))
 
-    def torque(self, sensed: Sensed) -> Array:
+    def torque(self, sensed: MeasuredState) -> Array:
         """Torques of the motors, shape (7,) [Nm]."""
-        wanted = (sensed.after - 2 * sensed.now + sensed.before) * 1e6
+        acceleration = (sensed.after - 2 * sensed.now + sensed.before) * 1e6
         error = sensed.now - sensed.q
-        self._lasting += INTEGRAL * TICK * error
-        np.minimum(self._lasting, INTEGRAL_REACH, out=self._lasting)  # np.clip takes three times as long
-        np.maximum(self._lasting, -INTEGRAL_REACH, out=self._lasting)
-        wanted += BANDWIDTH * BANDWIDTH * (error + self._lasting)
-        wanted += 2 * DAMPING * BANDWIDTH * ((sensed.after - sensed.before) * 500.0 - sensed.dq)
-        return sensed.mass @ wanted + sensed.bias - sensed.passive
+        self._integral += INTEGRAL * TICK * error
+        np.minimum(self._integral, INTEGRAL_REACH, out=self._integral)  # np.clip takes three times as long
+        np.maximum(self._integral, -INTEGRAL_REACH, out=self._integral)
+        acceleration += BANDWIDTH * BANDWIDTH * (error + self._integral)
+        acceleration += 2 * DAMPING * BANDWIDTH * ((sensed.after - sensed.before) * 500.0 - sensed.dq)
+        return sensed.mass @ acceleration + sensed.bias - sensed.passive
 
 
-class JointSpring:
+class JointImpedanceLaw:
     """Joint impedance: a spring and a damper in every joint.
 
-    The damping ratio is that of each joint by itself, with the inertia that it moves at its present posture:
+    The damping ratio is that of each joint alone, with its inertia at the present posture:
     d = 2 ζ √(k m).
 
     Args:
@@ -123,21 +137,19 @@ class JointSpring:
         self._ramp = RAMP
 
     def change(self, stiffness: Array, damping: Array) -> None:
-        """Take other values; the stiffness changes on a short ramp."""
+        """Change the parameters; the stiffness changes on a short ramp."""
         self._from, self._goal, self._damping, self._ramp = self._stiffness, stiffness, damping, 0.0
 
-    def torque(self, sensed: Sensed) -> Array:
+    def torque(self, sensed: MeasuredState) -> Array:
         """Torques of the motors, shape (7,) [Nm]."""
         if self._ramp < RAMP:
             self._ramp += TICK
-            share = min(1.0, self._ramp / RAMP)
-            self._stiffness = self._from + share * (self._goal - self._from)
+            fraction = min(1.0, self._ramp / RAMP)
+            self._stiffness = self._from + fraction * (self._goal - self._from)
         damper = 2.0 * self._damping * np.sqrt(self._stiffness * sensed.mass.diagonal())
         np.maximum(damper, LEAST_DAMPER, out=damper)
         torque = sensed.bias - sensed.passive + self._stiffness * (sensed.now - sensed.q) - damper * sensed.dq
-        if (
-            not sensed.is_overlaid
-        ):  # a client's set-points may jump, and the arm shall not be thrown after them
+        if not sensed.is_overlaid:  # no feed-forward of a client's set-points, which may jump
             torque += sensed.mass @ ((sensed.after - 2 * sensed.now + sensed.before) * 1e6)
             torque += damper * ((sensed.after - sensed.before) * 500.0)
         return torque

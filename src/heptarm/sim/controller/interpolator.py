@@ -1,97 +1,214 @@
-"""The interpolator of a simulated controller: turns orders into set-points, one a tick.
-
-It takes orders from its queue, runs their time at the pace that overrides, pauses and stops allow, leads the set-points
-along their paths or after servo targets, and brakes on the path or off it where something ends a motion early.
-"""
+"""The interpolator of the simulated controller: from commands to one set-point per tick."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
 from math import inf, nan
+from typing import Protocol
 
 import numpy as np
 
 from heptarm.errors import Unreachable
+from heptarm.sim.control.controller import ActiveLaw
+from heptarm.sim.control.laws import MeasuredState, Superposition
+from heptarm.sim.controller.condition_monitor import ConditionMonitor, LoadEstimate, WatchedCondition
+from heptarm.sim.controller.hand_guiding import GuidedMotion
+from heptarm.sim.controller.queue import Cancellation, MotionQueue
+from heptarm.sim.controller.safety import SafetyController
+from heptarm.sim.controller.servo import Follower, SmartFollower, follower
+from heptarm.sim.controller.setpoints import SetPoints
+from heptarm.sim.controller.speed_override import SpeedOverride
+from heptarm.sim.planning.command import TICK, Order
+from heptarm.sim.planning.jerk_profile import ProfileLimits, TimeLaw, brake
+from heptarm.sim.planning.path import JointLine, JointPath
+from heptarm.sim.planning.plan import Plan
+from heptarm.sim.seam import OperationMode
 from heptarm.values.arrays import Array
-from heptarm.values.guiding import HandGuide
-from heptarm.values.mode import Mode as ControlMode
+from heptarm.values.mode.mode import Mode as ControlMode
+from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.robot import RobotModel
-from heptarm.virtual import ring
-from heptarm.virtual.condition import Lookout, Watching
-from heptarm.virtual.control import Control
-from heptarm.virtual.fri.overlay import Superposition
-from heptarm.virtual.guiding import Guidance
-from heptarm.virtual.law import Sensed
-from heptarm.virtual.load import Load
-from heptarm.virtual.order import Order
-from heptarm.virtual.pace import Pace
-from heptarm.virtual.queue import Cancellation, Queue
-from heptarm.virtual.run import Run
-from heptarm.virtual.safety import Mode, Safety
-from heptarm.virtual.servo import Follower, SmartFollower, follower
-from heptarm.virtual.setpoints import SetPoints
-from heptarm.virtual.tick import TICK
 
-#: A motion is done when every measured joint is this near to its command [rad] and this slow [rad/s] ...
+
+class RunningMotion:
+    """The command that is being executed.
+
+    Args:
+        planned: its plan.
+        serial: its number among all accepted commands.
+        watches: its conditions.
+    """
+
+    __slots__ = (
+        "braking",
+        "broken",
+        "cancelled",
+        "ended",
+        "failure",
+        "follower",
+        "guided",
+        "part",
+        "path",
+        "plan",
+        "profile",
+        "serial",
+        "settling",
+        "started",
+        "time",
+        "watches",
+    )
+
+    def __init__(self, planned: Plan, serial: int, watches: tuple[WatchedCondition, ...]) -> None:
+        self.plan = planned
+        self.serial = serial
+        self.watches = watches
+        self.path: JointPath | None = planned.path
+        self.profile: TimeLaw | None = None if planned.timing is None else planned.timing.profile
+        self.failure = ""
+        self.part = 0
+        self.time = 0.0
+        self.braking = False
+        self.cancelled = False
+        self.ended = False
+        self.settling = 0
+        self.started = False
+        self.follower: Follower | None = None
+        self.guided: GuidedMotion | None = None
+        self.broken = False
+
+    def brake(self, *, scale: float, rate: float) -> None:
+        """Come to rest on the path, as fast as its limits allow.
+
+        Args:
+            scale: speed as a fraction of full speed; the stop itself runs at full speed.
+            rate: change of that fraction [1/s].
+        """
+        if self.follower is not None:
+            self.follower.brake(scale=scale, rate=rate)
+            self.braking = True
+            return
+        if self.ended or self.profile is None or self.path is None:
+            self.ended = self.ended or self.path is None
+            return
+        assert self.plan.timing is not None
+        self.profile = self.plan.timing.stop(self.time, scale, rate)
+        self.time, self.braking = 0.0, True
+
+    def halt(self, here: Array, speed: Array, hardest: tuple[float, float]) -> None:
+        """Come to rest off the path: every axis brakes by itself, in the direction of the present velocity.
+
+        Args:
+            here: present set-point, shape (7,) [rad].
+            speed: its velocity, shape (7,) [rad/s].
+            hardest: acceleration [rad/s²] and jerk [rad/s³] of the fastest axis.
+        """
+        self.braking, self.follower, self.guided = True, None, None
+        full = float(np.abs(speed).max())
+        self.ended = full < 1e-9
+        if self.ended:
+            self.path = None
+            return
+        self.path = JointLine(here.copy(), here + speed)
+        limits = ProfileLimits(2.0, hardest[0] / full, hardest[1] / full)
+        self.profile, self.time = brake((0.0, 1.0, 0.0), limits), 0.0
+
+
+#: A motion is done when every measured joint is within this distance of its command [rad] and this slow [rad/s] ...
 SETTLED = 5e-5
 SETTLED_SPEED = 1e-3
 #: ... or after this many ticks.
 SETTLE_TICKS = 500
 
-#: Highest speed of the moved frame in T1 [m/s], a trifle less than the standard's 250 mm/s.
+#: Highest speed of the tool frame in T1 [m/s], slightly below the standard's 250 mm/s.
 REDUCED_SPEED = 0.249
-#: A fast stop may jerk so many times more than a motion.
+#: Jerk of a fast stop relative to that of a motion.
 FAST_JERK = 20.0
 
 
+class ServoTarget(Protocol):
+    """A target of a servo motion: see `heptarm.sim.plant.shared_state.NewestTarget`."""
+
+    @property
+    def order(self) -> int:
+        """Id of the servo motion that it is for."""
+
+    @property
+    def q(self) -> Array:
+        """Joint positions [rad], or x y z [m] and quaternion of the tool frame, shape (7,)."""
+
+    @property
+    def dq(self) -> Array | None:
+        """Velocity at the target, shape (7,) [rad/s]; None: rest."""
+
+
+class ControllerInputs(Protocol):
+    """What the controller reads in each tick."""
+
+    @property
+    def override(self) -> float:
+        """Factor on every programmed speed, 0 to 1."""
+
+    @property
+    def signals(self) -> Array:
+        """Values of the IO image, shape (n,)."""
+
+    def target(self) -> ServoTarget | None:
+        """The newest servo target; None: no new one."""
+
+
 class Interpolator:
-    """Leads the set-points of a plant.
+    """Computes the set-points of a plant.
 
     Args:
         robot: the robot.
-        shared: ring with the override, the servo targets and the signals.
-        sensed: what the plant measures; the arrays of its positions and speeds stay the same.
+        inputs: override, servo targets and IO image.
+        sensed: measured state; the arrays of its positions and velocities stay the same.
         load: external load of the arm.
         control: the control law in force.
-        safety: what safety demands.
+        safety: stop requests and operation mode.
 
     Attributes:
-        queue: orders that wait.
-        lookout: looks at the conditions.
+        queue: waiting commands.
+        condition_monitor: evaluates the conditions.
         command: the set-points.
-        run: the order under way; None: nothing runs.
-        is_paused: come to rest on the path, keeping all orders.
-        action: what an FRI overlay wants of the next tick.
+        run: the command that is being executed; None: nothing runs.
+        is_paused: come to rest on the path, keeping all commands.
+        action: command of an FRI overlay for the next tick.
         is_overlaid: whether the last set-point was an overlay's.
     """
 
     def __init__(
-        self, robot: RobotModel, shared: ring.Ring, sensed: Sensed, load: Load, control: Control, safety: Safety
+        self,
+        robot: RobotModel,
+        inputs: ControllerInputs,
+        sensed: MeasuredState,
+        load: LoadEstimate,
+        control: ActiveLaw,
+        safety: SafetyController,
     ) -> None:
-        self._robot, self._ring, self._load = robot, shared, load
+        self._robot, self._inputs, self._load = robot, inputs, load
         self._control, self._safety = control, safety
         self._q, self._dq = sensed.q, sensed.dq
         self.command = SetPoints(robot, self._q)
-        self.queue = Queue(robot, self._rest)
-        self.lookout = Lookout(robot, shared.signals)
-        self._pace = Pace(robot)
-        self._changes: deque[tuple[int, ControlMode]] = deque()  # of the control mode of an order
-        # orders that somebody else ends by an error; 0: whichever runs
+        self.queue = MotionQueue(robot, self._rest)
+        self.condition_monitor = ConditionMonitor(robot, inputs.signals)
+        self._speed_override = SpeedOverride(robot)
+        self._changes: deque[tuple[int, ControlMode]] = deque()  # of the control mode of a command
+        # commands to end by an error; 0: whichever runs
         self._aborts: deque[tuple[int, str]] = deque()
-        self.run: Run | None = None
+        self.run: RunningMotion | None = None
         self.is_paused = False
         self.action: Superposition | None = None
         self.is_overlaid = False
 
     @property
     def order(self) -> int:
-        """Id of the running order, 0 if none."""
+        """Id of the running command, 0 if none."""
         return 0 if self.run is None else self.run.plan.order.id
 
     @property
     def interpolated(self) -> Array:
-        """Set-point of the next tick without an overlay, shape (7,) [rad]: where a held arm was when the hold began."""
+        """Set-point of the next tick without an overlay, shape (7,) [rad]; of a hold: its start."""
         return self.run.plan.end if self.is_overlaid and self.run is not None else self.command.after
 
     @property
@@ -103,19 +220,17 @@ class Interpolator:
         return self.command.after.copy()
 
     def change_mode(self, order_id: int, mode: ControlMode) -> None:
-        """Change the parameters of a running order's control mode, from any thread; see `Plant.change_mode`."""
+        """Change the parameters of the running command's control mode, from any thread; see `Plant.change_mode`."""
         self._changes.append((order_id, mode))
 
     def abort(self, order_id: int, text: str) -> None:
-        """End a running order (0: whichever runs) by an error, from any thread."""
+        """End a running command (0: whichever runs) by an error, from any thread."""
         self._aborts.append((order_id, text))
-
-    # ------------------------------------------------------------------------------ the tick
 
     def advance(self) -> tuple[float, float]:
         """Shift the set-points and compute the next one; returns progress and remaining time."""
-        while (wish := self.queue.cancelled()) is not None:
-            self._cancel(wish)
+        while (cancellation := self.queue.cancelled()) is not None:
+            self._cancel(cancellation)
         while self._aborts:
             order_id, text = self._aborts.popleft()
             if self.run is not None and order_id in (0, self.order) and not self.run.failure:
@@ -126,9 +241,9 @@ class Interpolator:
             order_id, mode = self._changes.popleft()
             if order_id == self.order:
                 self._control.retune(mode)
-        self._keep_pace()
-        if self.lookout.is_busy or (self.run is not None and self.run.watches):
-            self._look()
+        self._advance_override()
+        if self.condition_monitor.is_busy or (self.run is not None and self.run.watches):
+            self._check_conditions()
         run = self.run
         if run is None:
             run = None if self._safety.latched else self._next()
@@ -142,10 +257,10 @@ class Interpolator:
             if run.plan.order.listener is not None:
                 run.plan.order.listener.started()
         if self._control.violation:
-            self._catch(run, self._control.violation)
+            self._stop_at_limit(run, self._control.violation)
         return self._follow(run)
 
-    def _next(self) -> Run | None:
+    def _next(self) -> RunningMotion | None:
         while (accepted := self.queue.take()) is not None:
             order = accepted.order
             if self._control.take(order):
@@ -153,22 +268,22 @@ class Interpolator:
             planned = self.queue.planned(accepted, self.command.after)
             if planned is None:
                 continue
-            self.run = run = Run(planned, accepted.serial, self.lookout.begin(planned))
+            self.run = run = RunningMotion(planned, accepted.serial, self.condition_monitor.begin(planned))
             if order.is_servo:
                 run.follower = follower(self._robot, order, self.command.after)
             if order.guide is not None:
-                run.guidance = self._guidance(order, order.guide)
+                run.guided = self._guided(order, order.guide)
             return run
         return None
 
-    def _look(self) -> None:
-        """Look at the conditions; one that breaks the running motion brakes it on its path."""
+    def _check_conditions(self) -> None:
+        """Evaluate the conditions; a break condition stops the running motion on its path."""
         run = self.run
-        watches: Sequence[Watching] = () if run is None or run.braking else run.watches
-        if run is not None and run.ended:  # nothing is left to break, but a trigger may sit at the very end
+        watches: Sequence[WatchedCondition] = () if run is None or run.braking else run.watches
+        if run is not None and run.ended:  # nothing is left to break, but a trigger may be at the very end
             watches = [one for one in watches if not one.breaks]
         elapsed, part = (0.0, 0) if run is None else (run.time, run.part)
-        breaks = self.lookout.look(
+        breaks = self.condition_monitor.check(
             self._q, self._load.torque, self._load.wrench, watches=watches, elapsed=elapsed, part=part
         )
         if breaks and run is not None and not run.cancelled and not run.failure:
@@ -176,32 +291,34 @@ class Interpolator:
             self.queue.diverge()
             self._brake(run)
 
-    def _keep_pace(self) -> None:
-        """How fast time runs in this tick, by overrides, pauses, stops and the operation mode."""
+    def _advance_override(self) -> None:
+        """Advance the speed override by one tick: overrides, pauses, stops, operation mode."""
         safety = self._safety
         held = self.is_paused or safety.latched
-        goal = 0.0 if held else safety.manual * min(1.0, max(0.0, float(self._ring.reals[ring.OVERRIDE])))
-        if safety.mode is Mode.T1 and self.run is not None:
+        goal = 0.0 if held else safety.manual * min(1.0, max(0.0, self._inputs.override))
+        if safety.mode is OperationMode.T1 and self.run is not None:
             tcp = self.run.plan.order.tcp[:3]
-            self._pace.advance(goal, self.command, halts=safety.latched, ceiling=REDUCED_SPEED, tcp=tcp)
+            self._speed_override.advance(
+                goal, self.command, halts=safety.latched, ceiling=REDUCED_SPEED, tcp=tcp
+            )
         else:
-            self._pace.advance(goal, self.command, halts=safety.latched)
+            self._speed_override.advance(goal, self.command, halts=safety.latched)
 
-    def _follow(self, run: Run) -> tuple[float, float]:
+    def _follow(self, run: RunningMotion) -> tuple[float, float]:
         planned = run.plan
         if run.cancelled and not (run.ended or run.braking or self.is_overlaid):
-            if self._pace.rests:
+            if self._speed_override.rests:
                 run.ended = True
-            elif not self._safety.latched:  # the stop is over before it was one
+            elif not self._safety.latched:  # the stop ended before the motion was at rest
                 self._brake_on_path(run)
         if run.ended:
             return self._settle(run)
-        if run.guidance is not None:
-            self._give_way(run, run.guidance)
-            if run.guidance is not None:
+        if run.guided is not None:
+            self._follow_hand(run, run.guided)
+            if run.guided is not None:
                 return nan, nan
         if run.follower is not None:
-            return self._serve(run, run.follower)
+            return self._follow_targets(run, run.follower)
         if self.action is not None and planned.order.kind == "hold" and not (run.cancelled or run.failure):
             self.is_overlaid = True
             self.command.after = self.action.q
@@ -209,7 +326,7 @@ class Interpolator:
         if self.is_overlaid:
             self.is_overlaid = False
             self._halt(run)
-        run.time += TICK if run.braking else TICK * self._pace.factor
+        run.time += TICK if run.braking else TICK * self._speed_override.factor
         if run.path is None or run.profile is None:
             if run.cancelled or run.time >= planned.duration or planned.order.kind != "hold":
                 run.ended = True
@@ -220,40 +337,40 @@ class Interpolator:
             run.ended = True
         s = min(max(s, 0.0), 1.0)
         self._reach(run, s)
-        # at the very end take the planned joints: the path's samples may end a rounding error beside them
+        # at the very end take the planned joints: the path itself may end a rounding error beside them
         if s == 1.0 and run.path is planned.path:
             self.command.after = planned.end
         else:
-            self._lead(run, s)
+            self._follow_path(run, s)
         return (nan if run.failure else planned.progress(s, run.part)), run.profile.duration - run.time
 
-    def _reach(self, run: Run, s: float) -> None:
-        """Tell of the parts that have begun at s."""
+    def _reach(self, run: RunningMotion, s: float) -> None:
+        """Report the parts that have begun at s."""
         marks, listener = run.plan.marks, run.plan.order.part_listener
         while run.part < len(marks) and s >= marks[run.part]:
             run.part += 1
             if listener is not None:
                 listener.reached(run.part)
 
-    def _lead(self, run: Run, s: float) -> None:
-        """Set the next set-point; one that no axis could follow ends the motion."""
+    def _follow_path(self, run: RunningMotion, s: float) -> None:
+        """Set the next set-point from the path; one that an axis could not follow ends the motion."""
         assert run.path is not None
         try:
             there = run.path.at(s, self.command.after)
         except Unreachable as error:
             self._fail(run, f"the path is not reachable: {error.text}")
             return
-        self._go(run, there)
+        self._set(run, there)
 
-    def _go(self, run: Run, there: Array) -> None:
-        """Take a set-point unless an axis could not follow it."""
+    def _set(self, run: RunningMotion, there: Array) -> None:
+        """Set the next set-point; one that an axis could not follow ends the motion."""
         axis = self.command.leap(there)
         if axis is not None and not run.failure:
             self._fail(run, f"Command Velocity violates limit A{axis + 1} (singularity)")
             return
         self.command.after = there
 
-    def _settle(self, run: Run) -> tuple[float, float]:
+    def _settle(self, run: RunningMotion) -> tuple[float, float]:
         if self._control.stays and not run.cancelled and not run.failure:
             return 1.0, 0.0
         run.settling += 1
@@ -265,92 +382,88 @@ class Interpolator:
             self.queue.close(run.plan.order, "error" if run.failure else cause, run.failure)
         return (nan if run.cancelled or run.failure else 1.0), 0.0
 
-    # ------------------------------------------------------------------------------ braking
-
-    def _fail(self, run: Run, text: str) -> None:
-        """Brake every axis by itself, off the path: straight on from where the last set-points led."""
+    def _fail(self, run: RunningMotion, text: str) -> None:
+        """End the motion by an error: every axis brakes by itself, off the path."""
         run.failure = text
         self._halt(run)
 
-    def _halt(self, run: Run, *, jerk: float = 1.0) -> None:
-        """Brake every axis by itself, straight on from where the last set-points led."""
-        if run.guidance is not None:
+    def _halt(self, run: RunningMotion, *, jerk: float = 1.0) -> None:
+        """Brake every axis by itself, in the direction of the present velocity."""
+        if run.guided is not None:
             self._control.stiffen()
         hardest = float(self._robot.ddq_max.min()), jerk * float(self._robot.dddq_max.min())
         run.halt(self.command.after, self.command.speed, hardest)
 
-    def _cancel(self, wish: Cancellation) -> None:
-        """Carry out a cancellation."""
+    def _cancel(self, cancellation: Cancellation) -> None:
+        """Execute a cancellation."""
         run = self.run
-        if run is not None and wish.concerns(run.serial, run.plan.order):
-            (self._brake_fast if wish.fast else self._brake)(run)
-        self.queue.drop(wish)
+        if run is not None and cancellation.affects(run.serial, run.plan.order):
+            (self._brake_fast if cancellation.fast else self._brake)(run)
+        self.queue.drop(cancellation)
 
-    def _brake(self, run: Run) -> None:
+    def _brake(self, run: RunningMotion) -> None:
         if run.cancelled or run.failure:
             return
         run.cancelled = True
-        # a stop in force brings a motion to rest sooner, but its pace is not that of a hand
-        if run.guidance is not None or not self._safety.latched:
+        # a stop in force brings a motion to rest sooner, but it does not act on hand guiding
+        if run.guided is not None or not self._safety.latched:
             self._brake_on_path(run)
 
-    def _brake_on_path(self, run: Run) -> None:
-        if run.guidance is not None:
-            self._let_go(run, run.guidance)
+    def _brake_on_path(self, run: RunningMotion) -> None:
+        if run.guided is not None:
+            self._let_go(run, run.guided)
             return
-        if run.follower is not None or not self.is_overlaid:  # else the next tick brakes from the overlay's speed
-            run.brake(scale=self._pace.scale, rate=self._pace.rate)
+        if (
+            run.follower is not None or not self.is_overlaid
+        ):  # else the next tick brakes from the overlay's speed
+            run.brake(scale=self._speed_override.scale, rate=self._speed_override.rate)
 
-    def _brake_fast(self, run: Run) -> None:
-        if run.failure or run.ended or run.guidance is not None:
+    def _brake_fast(self, run: RunningMotion) -> None:
+        if run.failure or run.ended or run.guided is not None:
             self._brake(run)
             return
         run.cancelled = True
         if not self.is_overlaid:  # else the next tick brakes from the overlay's speed
             self._halt(run, jerk=FAST_JERK)
 
-    # ------------------------------------------------------------------------------ hand guiding
-
-    def _guidance(self, order: Order, guide: HandGuide) -> Guidance:
-        ceiling = REDUCED_SPEED if self._safety.mode is Mode.T1 else inf
+    def _guided(self, order: Order, guide: HandGuide) -> GuidedMotion:
+        ceiling = REDUCED_SPEED if self._safety.mode is OperationMode.T1 else inf
         law = self._control.guide(guide, self._q, tcp=order.tcp[:3], ceiling=ceiling)
-        return Guidance(law, self._robot)
+        return GuidedMotion(law, self._robot)
 
-    def _give_way(self, run: Run, guidance: Guidance) -> None:
-        """Give way while the switch is held and nothing else stops the arm; end when it has been let go."""
+    def _follow_hand(self, run: RunningMotion, guided: GuidedMotion) -> None:
+        """Follow the hand while the enabling switch is held and nothing stops the arm; end when it is released."""
         safety = self._safety
-        if guidance.has_begun and not safety.guides:
-            self._let_go(run, guidance)
-        elif safety.guides and not (safety.latched or self.is_paused or guidance.law.is_frozen):
-            guidance.has_begun, guidance.rest = True, None
-            self._control.lead(guidance.law)
+        if guided.has_begun and not safety.guides:
+            self._let_go(run, guided)
+        elif safety.guides and not (safety.latched or self.is_paused or guided.law.is_frozen):
+            guided.has_begun, guided.rest = True, None
+            self._control.follow_hand(guided.law)
             self.command.after = self._q + self._dq * TICK
-        elif guidance.has_begun:
-            self._go(run, self._stopped(guidance).advance(TICK))
+        elif guided.has_begun:
+            self._set(run, self._stopped(guided).advance(TICK))
 
-    def _let_go(self, run: Run, guidance: Guidance) -> None:
-        """Come to rest, and end."""
-        if guidance.has_begun:
-            run.follower = self._stopped(guidance)
+    def _let_go(self, run: RunningMotion, guided: GuidedMotion) -> None:
+        """Come to rest, then end."""
+        if guided.has_begun:
+            run.follower = self._stopped(guided)
         else:
             run.ended = True
-        run.braking, run.guidance = True, None
+        run.braking, run.guided = True, None
 
-    def _stopped(self, guidance: Guidance) -> SmartFollower:
-        """What brings an arm to rest that nobody leads any more."""
+    def _stopped(self, guided: GuidedMotion) -> SmartFollower:
+        """The trajectory to rest after the switch was released."""
         self._control.stiffen()
-        return guidance.halt(self._q.copy(), self._dq)
+        return guided.halt(self._q.copy(), self._dq)
 
-    # ------------------------------------------------------------------------------ servo motions and yielding
-
-    def _serve(self, run: Run, follower: Follower) -> tuple[float, float]:
-        """Lead the set-point to the newest target."""
-        target = self._ring.target()
+    def _follow_targets(self, run: RunningMotion, follower: Follower) -> tuple[float, float]:
+        """Move the set-point towards the newest target."""
+        target = self._inputs.target()
         order = run.plan.order
         if target is not None and target.order == order.id and not run.cancelled:
             follower.aim(target.q, target.dq)
         try:
-            there = follower.advance(TICK if run.braking else TICK * self._pace.factor)
+            there = follower.advance(TICK if run.braking else TICK * self._speed_override.factor)
         except Unreachable as error:
             self._fail(run, f"the path is not reachable: {error.text}")
             return nan, nan
@@ -359,12 +472,12 @@ class Interpolator:
         if axis is not None:
             self._fail(run, f"Command Position violates limit A{axis + 1}")
         else:
-            self._go(run, there)
+            self._set(run, there)
         return nan, follower.remaining
 
-    def _catch(self, run: Run, text: str) -> None:
-        """A limit of the control mode is exceeded: become stiff and brake from the measured speed."""
+    def _stop_at_limit(self, run: RunningMotion, text: str) -> None:
+        """A limit of the control mode is exceeded: switch to position control and brake from the measured velocity."""
         self._control.stiffen()
-        self.command.go_on(self._q, self._dq)
+        self.command.continue_from(self._q, self._dq)
         run.settling = 0
         self._fail(run, text)

@@ -1,4 +1,4 @@
-"""The queue of a simulated controller: orders that were accepted and have not begun, planned one behind the other."""
+"""The queue of the simulated controller: accepted commands, each planned from the end of the one before."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from heptarm.sim.planning.command import Order, PlanError
+from heptarm.sim.planning.plan import Plan
+from heptarm.sim.planning.planner import plan
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
-from heptarm.virtual.order import Order, PlanError
-from heptarm.virtual.planner import Plan
-from heptarm.virtual.route import plan
 
 
-class Accepted(NamedTuple):
-    """An order that waits.
+class QueuedMotion(NamedTuple):
+    """A waiting command.
 
     Attributes:
-        serial: its number among all accepted orders.
-        order: the order.
-        plan: from the end of the one before it; None: where that is is not known.
+        serial: its number among all accepted commands.
+        order: the command.
+        plan: from the end of the one before it; None: that end is not known.
     """
 
     serial: int
@@ -31,52 +31,52 @@ class Accepted(NamedTuple):
 
 
 class Cancellation(NamedTuple):
-    """A wish that the next tick carries out.
+    """A cancellation that the next tick executes.
 
     Attributes:
-        newest: serial of the newest order at that time; later ones are not concerned.
+        newest: serial of the newest command at that time; later ones are not affected.
         order_id: which one; None: all.
-        fast: what runs leaves its path.
+        fast: the running motion leaves its path.
     """
 
     newest: int
     order_id: int | None
     fast: bool
 
-    def concerns(self, serial: int, order: Order) -> bool:
-        """Whether it is about an order."""
+    def affects(self, serial: int, order: Order) -> bool:
+        """Whether it cancels a command."""
         return serial <= self.newest and self.order_id in (None, order.id)
 
 
-class Queue:
-    """Orders that wait; they come and are cancelled from any thread, and are taken by the tick's.
+class MotionQueue:
+    """Waiting commands; added and cancelled from any thread, taken by the tick's thread.
 
     Args:
         robot: the robot.
-        rest: set-point of an arm that has nothing to do, shape (7,) [rad].
+        rest: set-point while no command runs, shape (7,) [rad].
     """
 
     def __init__(self, robot: RobotModel, rest: Callable[[], Array]) -> None:
         self._robot, self._rest = robot, rest
         self._planning = threading.Lock()  # one caller plans at a time; the tick never waits for it
         self._lock = threading.Lock()  # held for a few instructions only
-        self._serial = 0  # of the newest accepted order
-        self._inbox: deque[Accepted] = deque()
+        self._serial = 0  # of the newest accepted command
+        self._inbox: deque[QueuedMotion] = deque()
         self._cancels: deque[Cancellation] = deque()
-        self._tail: Array | None = None  # where the last accepted order ends; None: not known
-        self._open = 0  # accepted orders that have not ended
+        self._tail: Array | None = None  # end of the last accepted command; None: not known
+        self._open = 0  # accepted commands that have not ended
         self._cancel_count = 0
 
     @property
     def idle(self) -> bool:
-        """No order is running or waiting."""
+        """Whether no command is running or waiting."""
         return self._open == 0
 
     def submit(self, order: Order) -> None:
-        """Plan an order from the end of what is queued and append it.
+        """Plan a command from the end of the queue and append it.
 
-        While the arm brakes, the place it will come to rest at is not known; then the order is planned when
-        its turn comes, and a planning error reaches its listener.
+        While the arm brakes, its final position is not known; then the command is planned when its turn comes, and
+        its listener receives a planning error.
 
         Raises:
             PlanError: it cannot be planned; nothing has changed.
@@ -88,32 +88,30 @@ class Queue:
             planned = None if start is None else plan(self._robot, order, start)
             with self._lock:
                 if cancels != self._cancel_count:
-                    planned = None  # where the arm comes to rest is not known any more
+                    planned = None  # the end of the running motion is not known any more
                 self._tail = None if planned is None else planned.end
                 self._open += 1
                 self._serial += 1
-                self._inbox.append(Accepted(self._serial, order, planned))
+                self._inbox.append(QueuedMotion(self._serial, order, planned))
 
     def cancel(self, order_id: int | None, *, fast: bool) -> None:
-        """Wish the end of an order (None: of all)."""
+        """Cancel a command (None: all) in the next tick."""
         with self._lock:
             self._tail = None
             self._cancel_count += 1
             self._cancels.append(Cancellation(self._serial, order_id, fast))
 
-    # ------------------------------------------------------------------------------ from the tick's thread
-
     def cancelled(self) -> Cancellation | None:
-        """The next wish to carry out; None: there is none."""
+        """The next cancellation to execute; None: there is none."""
         return self._cancels.popleft() if self._cancels else None
 
-    def drop(self, wish: Cancellation) -> None:
-        """Drop what waits and is cancelled."""
+    def drop(self, cancellation: Cancellation) -> None:
+        """Drop the waiting commands that are cancelled."""
         dropped: list[Order] = []
         with self._lock:
             for _ in range(len(self._inbox)):
                 one = self._inbox.popleft()
-                if wish.concerns(one.serial, one.order):
+                if cancellation.affects(one.serial, one.order):
                     dropped.append(one.order)
                 else:
                     self._inbox.append(one._replace(plan=None))
@@ -121,16 +119,16 @@ class Queue:
             self.close(order, "cancelled", "")
 
     def diverge(self) -> None:
-        """The running order will not end where it was planned to."""
+        """Forget the planned end of the running command: it will end elsewhere."""
         with self._lock:
             self._tail = None
 
-    def take(self) -> Accepted | None:
-        """The next order; None: none waits."""
+    def take(self) -> QueuedMotion | None:
+        """The next command; None: none waits."""
         return self._inbox.popleft() if self._inbox else None
 
-    def planned(self, one: Accepted, here: Array) -> Plan | None:
-        """The plan of an order whose turn has come, from where the arm is [rad]; None: it has ended for want of one."""
+    def planned(self, one: QueuedMotion, here: Array) -> Plan | None:
+        """The plan of the next command from the present position [rad]; None: it ended by a planning error."""
         if one.plan is not None and float(np.abs(one.plan.start - here).max()) <= 1e-9:
             return one.plan
         try:
@@ -144,7 +142,7 @@ class Queue:
         return planned
 
     def close(self, order: Order, cause: str, text: str) -> None:
-        """An order has ended: tell its listener."""
+        """Report the end of a command to its listener."""
         with self._lock:
             self._open -= 1
         if order.listener is not None:

@@ -1,25 +1,19 @@
-"""The safety controller of the virtual cabinet: who demands a stop, and what it tells of it.
+"""The safety controller of the virtual cabinet: stop requests, enabling switches, operation mode.
 
-A stop holds execution; it goes on only when nobody demands a stop any more and somebody, the operator's Start key or
-the application, resumes it. The plant looks at it in every tick; everybody else may call it from any thread.
+A stop holds execution. Execution continues only when no stop is requested any more and the operator's Start key or
+the application resumes it. The plant reads the state in every tick; all methods may be called from any thread.
 """
 
 from __future__ import annotations
 
 import threading
-from enum import Enum, IntEnum
+from enum import Enum
+
+from heptarm.sim.seam import OperationMode
 
 
-class Mode(IntEnum):
-    """Operation mode, as the cabinet numbers it."""
-
-    T1 = 0
-    T2 = 1
-    AUT = 2
-
-
-class Demand(Enum):
-    """Who demands a stop."""
+class StopRequest(Enum):
+    """Source of a stop request."""
 
     EMERGENCY_STOP = "emergency_stop"  # the button of the smartPAD
     EXTERNAL_EMERGENCY_STOP = "external_emergency_stop"  # a button beside the robot
@@ -28,30 +22,30 @@ class Demand(Enum):
     DRIVE_ERROR = "drive_error"  # the drives are off until the error is acknowledged
 
 
-class Safety:
-    """What the safety controller knows.
+class SafetyController:
+    """State of the safety controller.
 
     Attributes:
         mode: operation mode.
         manual: override at the smartPAD, a factor on every speed, 0 to 1.
-        halts: a stop is demanded now.
-        latched: execution is held by a stop that was or is demanded.
+        stop_requested: a stop is requested now.
+        latched: execution is held by a stop that is or was requested.
     """
 
     def __init__(self) -> None:
-        self.mode = Mode.AUT
+        self.mode = OperationMode.AUT
         self.manual = 1.0
-        self.halts = False
+        self.stop_requested = False
         self.latched = False
         self._enabled = False
         self._guides = False
-        self._demands: frozenset[Demand] = frozenset()
+        self._requests: frozenset[StopRequest] = frozenset()
         self._lock = threading.Lock()
 
     @property
-    def demands(self) -> frozenset[Demand]:
-        """Who demands a stop now; the enabling switch is not among them."""
-        return self._demands
+    def stop_requests(self) -> frozenset[StopRequest]:
+        """The stop requests in force; a released enabling switch is not among them."""
+        return self._requests
 
     @property
     def enabled(self) -> bool:
@@ -65,19 +59,19 @@ class Safety:
 
     @property
     def lacks_enabling(self) -> bool:
-        """Whether an enabling switch would have to be held."""
-        return self.mode is not Mode.AUT and not (self._enabled or self._guides)
+        """Whether the operation mode needs an enabling switch and none is held."""
+        return self.mode is not OperationMode.AUT and not (self._enabled or self._guides)
 
-    def demand(self, what: Demand) -> None:
-        """Demand a stop until `withdraw`."""
+    def request_stop(self, what: StopRequest) -> None:
+        """Request a stop until `withdraw`."""
         with self._lock:
-            self._demands |= {what}
+            self._requests |= {what}
             self._settle()
 
-    def withdraw(self, *what: Demand) -> None:
-        """Demand a stop no more; without a name: nobody does."""
+    def withdraw(self, *what: StopRequest) -> None:
+        """Withdraw stop requests; without a name all of them."""
         with self._lock:
-            self._demands = self._demands - set(what) if what else frozenset()
+            self._requests = self._requests - set(what) if what else frozenset()
             self._settle()
 
     def enable(self) -> None:
@@ -87,7 +81,7 @@ class Safety:
             self._settle()
 
     def release(self) -> None:
-        """Let the enabling switch go."""
+        """Release the enabling switch."""
         with self._lock:
             self._enabled = False
             self._settle()
@@ -99,12 +93,12 @@ class Safety:
             self._settle()
 
     def let_go(self) -> None:
-        """Let the enabling switch of the hand guiding device go."""
+        """Release the enabling switch of the hand guiding device."""
         with self._lock:
             self._guides = False
             self._settle()
 
-    def choose(self, mode: Mode) -> None:
+    def choose(self, mode: OperationMode) -> None:
         """Choose the operation mode; a change holds execution, as on the cabinet."""
         with self._lock:
             self.latched = self.latched or mode is not self.mode
@@ -112,11 +106,11 @@ class Safety:
             self._settle()
 
     def resume(self) -> None:
-        """Let execution go on, unless a stop is demanded."""
+        """Continue execution, unless a stop is requested."""
         with self._lock:
-            self.latched = self.halts
+            self.latched = self.stop_requested
 
     def _settle(self) -> None:
-        """Under the lock: draw the conclusions."""
-        self.halts = bool(self._demands) or self.lacks_enabling
-        self.latched = self.latched or self.halts
+        """Update the stop state; called with the lock held."""
+        self.stop_requested = bool(self._requests) or self.lacks_enabling
+        self.latched = self.latched or self.stop_requested

@@ -1,4 +1,4 @@
-"""The set-points of a simulated controller, and what its axes could not follow."""
+"""The set-points of a simulated controller, checked against velocity and position limits."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from heptarm.sim.planning.command import TICK
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
-from heptarm.virtual.tick import TICK
 
-#: Set-points this far behind a limit are rounding errors [rad].
+#: Set-points this far beyond a limit are rounding errors [rad].
 ON_LIMIT = 1e-9
-#: A set-point that asks for more than this many times an axis' speed is not followed.
+#: Largest velocity of a set-point, relative to the axis' limit.
 OVERSPEED = 1.2
 
 
 class SetPoints:
-    """Those of the last, this and the next tick; iterates over them.
+    """Set-points of the last, this and the next tick; iterates over them.
 
     Args:
-        robot: whose axes have to follow.
-        here: where they begin, at rest, shape (7,) [rad].
+        robot: its limits hold.
+        here: first set-point, at rest, shape (7,) [rad].
 
     Attributes:
         before: of the last tick, shape (7,) [rad].
@@ -48,35 +48,35 @@ class SetPoints:
 
     @property
     def rests(self) -> bool:
-        """Whether the next one is where this one is."""
+        """Whether the next one equals this one."""
         return bool((self.after == self.now).all())
 
     @property
     def speed(self) -> Array:
-        """How fast they move, within the axes' limits, shape (7,) [rad/s]; the same before and after a shift."""
+        """Their velocity, within the axes' limits, shape (7,) [rad/s]; the same before and after a shift."""
         step = self.after - (self.before if self.now is self.after else self.now)
         speed: Array = np.clip(step / TICK, -self._fastest, self._fastest)
         return speed
 
     def shift(self) -> None:
-        """A tick goes by; the next set-point is the same until another one is set."""
+        """Advance by a tick; the next set-point stays the same until another one is set."""
         self.before, self.now = self.now, self.after
 
     def stay(self, here: Array) -> None:
         """Rest at a position."""
         self.before, self.now, self.after = here.copy(), here.copy(), here.copy()
 
-    def go_on(self, here: Array, speed: Array) -> None:
-        """Be at a position, having come there at a speed [rad/s]; called after a shift."""
+    def continue_from(self, here: Array, speed: Array) -> None:
+        """Continue from a position and a velocity [rad/s]; called after a shift."""
         self.before = here - speed * TICK
         self.now = self.after = here.copy()
 
     def leap(self, there: Array) -> int | None:
-        """The fastest axis of those that could not follow to a next set-point, from 0; None: all could."""
+        """The fastest axis that a next set-point would move too fast, from 0; None: there is none."""
         leap = np.abs(there - self.after) > self._leap
         return int(leap.argmax()) if leap.any() else None
 
     def beyond(self, there: Array) -> int | None:
-        """The first axis that a set-point would lead beyond its limits, from 0; None: there is none."""
+        """The first axis that a set-point would move beyond its limits, from 0; None: there is none."""
         beyond = (there > self._highest) | (there < self._lowest)
         return int(beyond.argmax()) if beyond.any() else None

@@ -1,8 +1,4 @@
-"""How fast the time of motions runs: overrides, pauses, stops on the path, reduced speed.
-
-A motion is never planned anew for any of these. Its own time runs slower, so the arm stays on its path, whatever kind
-of path that is, and goes on along it afterwards.
-"""
+"""The speed override: how fast motion time runs under overrides, pauses, stops on the path and T1."""
 
 from __future__ import annotations
 
@@ -11,25 +7,25 @@ from math import inf
 import numpy as np
 
 from heptarm.model.kinematics import flange, jacobian
+from heptarm.sim.controller.setpoints import SetPoints
+from heptarm.sim.planning.command import TICK
+from heptarm.sim.planning.jerk_profile import JerkProfile, ProfileLimits, change
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
-from heptarm.virtual.profile import Limits, Profile, change
-from heptarm.virtual.setpoints import SetPoints
-from heptarm.virtual.tick import TICK
 
-#: How fast the application override and pausing change the speed: [1/s], [1/s²], [1/s³].
-OVERRIDE_SLEW = Limits(4.0, 40.0, 800.0)
-#: Below this factor the speed at full pace cannot be told from the set-points any more.
+#: Rate at which overrides and pauses change the speed: [1/s], [1/s²], [1/s³].
+OVERRIDE_SLEW = ProfileLimits(4.0, 40.0, 800.0)
+#: Below this factor the full speed cannot be computed from the set-points any more.
 _FAINT = 1e-4
-#: How sharply the speed bends towards its ceiling; the higher, the sharper.
-_BEND = 8
+#: Sharpness of the transition to the speed ceiling; higher is sharper.
+_SHARPNESS = 8
 
 
-class Pace:
-    """Runs the time of motions.
+class SpeedOverride:
+    """Scales the time of motions.
 
     Args:
-        robot: whose limits hold.
+        robot: its acceleration limits hold during stops.
 
     Attributes:
         factor: motion time per plant time in the running tick, 0 to 1.
@@ -42,16 +38,16 @@ class Pace:
         self._step = robot.ddq_max * TICK
         self._free = 1.0  # the factor before a ceiling
         self._goal = 1.0
-        self._slew: Profile | None = None  # while it changes
+        self._slew: JerkProfile | None = None  # while it changes
         self._slew_time = 0.0
-        self._full = np.zeros(7)  # speed that the last set-points would have at full pace [rad/s]
+        self._full = np.zeros(7)  # velocity of the last set-points at full speed [rad/s]
         self._before = 1.0  # the factor of the last tick but one
         self.factor = self.scale = 1.0
         self.rate = 0.0
 
     @property
     def rests(self) -> bool:
-        """Whether time stands still."""
+        """Whether motion time does not advance."""
         return self.scale == 0.0 and self.factor == 0.0
 
     def advance(
@@ -63,13 +59,13 @@ class Pace:
         ceiling: float = inf,
         tcp: tuple[float, ...] = (0.0, 0.0, 0.0),
     ) -> None:
-        """One tick.
+        """Advance by one tick.
 
         Args:
-            goal: factor to come to without a jerk.
+            goal: factor to reach smoothly.
             command: the set-points so far.
-            halts: come to a standstill instead, as fast as the axes may brake along the path.
-            ceiling: what the speed of a point on the flange never exceeds [m/s].
+            halts: come to rest instead, as fast as the axes may brake along the path.
+            ceiling: largest speed of a point on the flange [m/s].
             tcp: that point, in the flange's axes [m].
         """
         if halts:
@@ -78,16 +74,16 @@ class Pace:
         full = self._ahead(command) if ceiling < inf else None
         before, self._before = self._free, self.factor
         if goal != self._goal or self._slew is not None:
-            self._bend(goal)
-        # trapezoidal, so that speed is scale times the profile's
+            self._ramp(goal)
+        # trapezoidal, so that the speed is scale times the profile's
         self.factor, self.scale = 0.5 * (before + self._free), self._free
         self.rate = 0.0 if self._slew is None else self._slew.at(self._slew_time)[1]
         if full is None:
             return
         axes, origin = flange(self._robot, command.after.tolist())
         point = np.array(origin) + np.array(axes).T @ np.array(tcp)
-        way = float(np.linalg.norm(jacobian(self._robot, command.after, point)[:3] @ full))
-        cap = (1.0 + (way / ceiling) ** _BEND) ** (-1.0 / _BEND)
+        speed = float(np.linalg.norm(jacobian(self._robot, command.after, point)[:3] @ full))
+        cap = (1.0 + (speed / ceiling) ** _SHARPNESS) ** (-1.0 / _SHARPNESS)
         self.factor *= cap
         self.scale *= cap
         self.rate *= cap
@@ -105,14 +101,14 @@ class Pace:
         self._slew = None
 
     def _ahead(self, command: SetPoints) -> Array:
-        """Speed that the next set-point would have at full pace, shape (7,) [rad/s]."""
+        """Velocity of the next set-point at full speed, shape (7,) [rad/s]."""
         if self.factor < _FAINT or self._before < _FAINT:
             return self._full
         before, now, after = command
         self._full = (after - now) / (TICK * self.factor)
         return 2.0 * self._full - (now - before) / (TICK * self._before)
 
-    def _bend(self, goal: float) -> None:
+    def _ramp(self, goal: float) -> None:
         if goal != self._goal or self._slew is None:
             state = (self._free, 0.0, 0.0) if self._slew is None else self._slew.at(self._slew_time)
             self._goal, self._slew, self._slew_time = goal, change(state, goal, OVERRIDE_SLEW), 0.0

@@ -1,4 +1,4 @@
-"""Cartesian poses as FRI writes them, and the joints that reach one at a given A3.
+"""Cartesian poses in FRI's representation, and inverse kinematics at a given A3.
 
 FRI's poses are x y z [mm] and a quaternion w x y z, of the flange in the robot's base; its redundancy value is the
 angle of A3 [rad].
@@ -11,22 +11,22 @@ from math import sqrt
 import numpy as np
 
 from heptarm.errors import Unreachable
-from heptarm.fri import messages as m
+from heptarm.fri.protocol import messages as m
 from heptarm.model.kinematics import flange, forward, jacobian
 from heptarm.values.arrays import Array
 from heptarm.values.pose import quaternion, rotation
 from heptarm.values.robot import RobotModel
 
-#: What FRI calls the flange.
+#: FRI's name of the flange.
 NAME = "Flange"
 
-#: A quaternion whose norm is further than this from 1 is none.
+#: Largest deviation of a quaternion's norm from 1.
 NORM = 1e-3
-#: The joints are found when the pose is met to this [m, rad].
-MET = 1e-9
+#: Largest error of a solution [m, rad].
+TOLERANCE = 1e-9
 STEPS = 8
-#: No step of the search turns a joint further [rad].
-STRIDE = 0.2
+#: Largest step of a joint in one iteration [rad].
+LARGEST_STEP = 0.2
 
 
 def transformation(robot: RobotModel, q: tuple[float, ...]) -> m.Transformation:
@@ -40,12 +40,12 @@ def matrix(pose: m.Transformation) -> Array:
     """The pose as a homogeneous matrix, shape (4, 4) [m].
 
     Raises:
-        ValueError: a number is not finite, or the quaternion has not the norm 1.
+        ValueError: a number is not finite, or the norm of the quaternion is not 1.
     """
     values = np.array(pose.values)
     norm = sqrt(float(values[3:] @ values[3:])) if np.isfinite(values).all() else 0.0
     if abs(norm - 1.0) > NORM:
-        raise ValueError(f"Cartesian pose {values.tolist()}: no finite pose with a unit quaternion")
+        raise ValueError(f"Cartesian pose must be finite with a unit quaternion, got {values.tolist()}")
     w, x, y, z = (values[3:] / norm).tolist()
     result = np.eye(4)
     result[:3, :3] = rotation(np.array((x, y, z, w)))
@@ -53,7 +53,7 @@ def matrix(pose: m.Transformation) -> Array:
     return result
 
 
-def apart(first: Array, second: Array) -> tuple[float, float]:
+def distance(first: Array, second: Array) -> tuple[float, float]:
     """Distance [m] and angle [rad] between two poses, shape (4, 4)."""
     error = _error(first, second)
     return float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
@@ -69,7 +69,7 @@ def _error(goal: Array, here: Array) -> Array:
 
 
 def joints(robot: RobotModel, goal: Array, a3: float, near: Array) -> Array:
-    """Joint positions next to `near` that bring the flange to a pose with A3 at an angle.
+    """Joint positions next to `near` for a pose of the flange with A3 at an angle.
 
     Newton's method on the pose and A3 together: seven equations, seven joints.
 
@@ -77,27 +77,27 @@ def joints(robot: RobotModel, goal: Array, a3: float, near: Array) -> Array:
         robot: the robot.
         goal: shape (4, 4) [m].
         a3: angle of A3 [rad].
-        near: where to begin, shape (7,) [rad]; poses of a session lie close together.
+        near: start of the iteration, shape (7,) [rad]; successive poses of a session are close together.
 
     Returns:
         Shape (7,) [rad].
 
     Raises:
-        Unreachable: there is none near by.
+        Unreachable: there is no solution nearby.
     """
     q = near.copy()
     equations = np.zeros((7, 7))
     equations[6, 2] = 1.0
     for _ in range(STEPS):
-        wanted = np.append(_error(goal, forward(robot, q)), a3 - q[2])
-        if float(np.abs(wanted).max()) <= MET:
+        error = np.append(_error(goal, forward(robot, q)), a3 - q[2])
+        if float(np.abs(error).max()) <= TOLERANCE:
             return q
         equations[:6] = jacobian(robot, q)
         try:
-            step = np.linalg.solve(equations, wanted)
+            step = np.linalg.solve(equations, error)
         except np.linalg.LinAlgError:
             break
-        q = q + step * min(1.0, STRIDE / max(float(np.abs(step).max()), 1e-12))
+        q = q + step * min(1.0, LARGEST_STEP / max(float(np.abs(step).max()), 1e-12))
     raise Unreachable(
-        f"no joint position near the present one leads to the Cartesian pose with A3 at {np.degrees(a3):.2f} deg"
+        f"the Cartesian pose with A3 at {np.degrees(a3):.2f} deg is not reachable near the present joint position"
     )

@@ -1,4 +1,4 @@
-"""One FRI session as the cabinet leads it, sans IO: datagrams and time in, datagrams, set-points and events out.
+"""The controller side of one FRI session, sans IO: datagrams and time in, datagrams, set-points and events out.
 
 ::
 
@@ -7,8 +7,8 @@
                                                  COMMANDING_WAIT --mirrored--> COMMANDING_ACTIVE
 
 The overlay ends, and with it both commanding states, when the application stops it, the quality falls below GOOD, a
-command is illegal, the client does not synchronise, or a safety stop comes; the session then monitors again. `close`
-leads to IDLE from everywhere, with one last message that says so.
+command is illegal, the client does not synchronise, or a safety stop occurs; the session then monitors again. `close`
+returns to IDLE from every state, with one last message that reports it.
 
 Times are nanoseconds on any clock, the same for all calls.
 """
@@ -22,41 +22,46 @@ from math import isfinite
 import numpy as np
 
 from heptarm.errors import ModeConflict, Unreachable
-from heptarm.fri import messages as m
-from heptarm.fri.codec import decode_command
-from heptarm.fri.protobuf import MalformedMessage
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.codec import decode_command
+from heptarm.fri.protocol.protobuf import MalformedMessage
+from heptarm.sim.control.laws import Superposition
+from heptarm.sim.fri import cartesian
+from heptarm.sim.fri.io import SessionIo
+from heptarm.sim.fri.limits import COAST, CommandInterpolator, CommandLimits
+from heptarm.sim.fri.monitoring import MonitoringEncoder, SessionStatus, report
+from heptarm.sim.fri.overlay import MotionOverlay, Reading, missing
+from heptarm.sim.fri.quality import QualityMeter
+from heptarm.sim.fri.settings import (
+    Event,
+    OverlayEnded,
+    QualityChanged,
+    Refused,
+    SessionConfiguration,
+    StateChanged,
+)
+from heptarm.sim.seam import TICK_NS
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
-from heptarm.virtual.fri import cartesian
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.events import Event, OverlayEnded, QualityChanged, Refused, StateChanged
-from heptarm.virtual.fri.exchange import Exchange
-from heptarm.virtual.fri.limits import Limits
-from heptarm.virtual.fri.overlay import MotionOverlay, Reading, Superposition, missing
-from heptarm.virtual.fri.quality import Meter
-from heptarm.virtual.fri.report import Status, report
-from heptarm.virtual.fri.setpoint import COAST, SetPoint
-from heptarm.virtual.fri.writer import Writer
-from heptarm.virtual.tick import TICK_NS
 
-#: Answers in a row that mirror the interpolator before commands are carried out.
+#: Successive answers that have to mirror the interpolator before commands are executed.
 MIRRORED = 10
-#: What counts as mirrored [rad; m and rad].
+#: Largest deviation of a mirrored position [rad; m and rad].
 MIRROR = 1e-3
-#: A client that has not synchronised after so long will not [ns].
+#: Time limit of the synchronisation [ns].
 SYNCHRONISATION = 3_000_000_000
 
-#: Messages that are remembered until they are answered.
+#: Number of sent messages that an answer may refer to.
 KEPT = 512
-#: Different reasons to refuse that are told in one session.
-TOLD = 20
+#: Largest number of different refusals that a session reports.
+MOST_REFUSALS = 20
 
 _WORD = 0xFFFFFFFF
 
 
 @dataclass(slots=True)
-class _Asked:
-    """A message that was sent, and what it said."""
+class _SentMessage:
+    """A sent message: its time, session state and interpolator data."""
 
     at: int
     state: m.SessionState
@@ -64,8 +69,8 @@ class _Asked:
 
 
 @dataclass(slots=True)
-class Traffic:
-    """Datagrams of a session: sent, taken as answers, too old (duplicates among them), refused."""
+class DatagramCounts:
+    """Datagrams of a session: sent, accepted as answers, too old (or duplicates), refused."""
 
     sent: int = 0
     taken: int = 0
@@ -74,54 +79,52 @@ class Traffic:
 
 
 class Controller:
-    """The cabinet's side of one session.
+    """The controller side of one session.
 
     Args:
         configuration: as the application set it up.
-        robot: whose limits hold.
-        epoch_ns: what the stamps of messages are counted from, UNIX time of the clock's zero [ns].
+        robot: its limits hold.
+        epoch_ns: UNIX time of the clock's zero, for the time stamps of messages [ns].
 
     Attributes:
         state: of the session.
-        overlay: in force or waiting to be; None without one.
-        superposition: what the arm does in the next tick; None unless commanding is active.
+        overlay: active, or waiting for synchronisation; None without one.
+        superposition: overlay of the next tick; None unless commanding is active.
         meter: quality of the connection, its counts, latency and jitter.
         traffic: counts of datagrams.
         exchange: signals and frames.
     """
 
-    def __init__(self, configuration: Configuration, robot: RobotModel, *, epoch_ns: int = 0) -> None:
+    def __init__(self, configuration: SessionConfiguration, robot: RobotModel, *, epoch_ns: int = 0) -> None:
         self.configuration = configuration
         self.state = m.SessionState.IDLE
         self.overlay: MotionOverlay | None = None
         self.superposition: Superposition | None = None
-        self.meter = Meter(configuration.receive_ms * TICK_NS)
-        self.traffic = Traffic()
-        self.exchange = Exchange(configuration)
-        self._writer = Writer(configuration.version)
+        self.meter = QualityMeter(configuration.receive_ms * TICK_NS)
+        self.traffic = DatagramCounts()
+        self.exchange = SessionIo(configuration)
+        self._writer = MonitoringEncoder(configuration.version)
         self._robot = robot
         self._epoch = epoch_ns
         self._events: deque[Event] = deque(maxlen=1000)
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         self._ticks = 0
         self._farewell = False
         self._used = False
         self._next = 0  # number of the next message
-        self._asked: list[_Asked | None] = [None] * KEPT
-        self._heard = -1  # number of the newest message that was answered
+        self._asked: list[_SentMessage | None] = [None] * KEPT
+        self._heard = -1  # number of the newest answered message
         self._reflected = 0  # the client's counter in its newest answer
-        self._since: int | None = None  # when synchronising began
+        self._since: int | None = None  # start of the synchronisation
         self._mirrored = 0
         self._fault = ""  # why the client is not synchronised
-        self._limits: Limits | None = None
-        self._set_point: SetPoint | None = None
+        self._limits: CommandLimits | None = None
+        self._set_point: CommandInterpolator | None = None
         self._last: Array | None = None  # joints of the newest command
         self._last_number = 0
         self._a3 = 0.0
         self._tau: Array | None = None
         self._wrench: Array | None = None
-
-    # ------------------------------------------------------------------------------ the application
 
     @property
     def quality(self) -> m.Quality:
@@ -129,14 +132,14 @@ class Controller:
         return self.meter.quality
 
     def open(self) -> None:
-        """Begin to send.
+        """Open the session and start to send.
 
         Raises:
-            ModeConflict: it was open before; a session is opened once.
+            ModeConflict: it was opened before.
         """
         if self._used:
             raise ModeConflict(
-                "an FRI session is opened once", parameter="session", hint="make another controller"
+                "an FRI session can be opened only once", parameter="session", hint="create a new session"
             )
         self._used = True
         self._go(m.SessionState.MONITORING_WAIT)
@@ -150,7 +153,7 @@ class Controller:
         self._farewell = True
 
     def start(self, overlay: MotionOverlay) -> None:
-        """The motion with the overlay begins: wait for the client to synchronise.
+        """Start an overlay with its motion: wait for the client to synchronise.
 
         Raises:
             CommandRejected: this session cannot have such an overlay.
@@ -167,24 +170,22 @@ class Controller:
                 else "one overlay at a time",
             )
         self.overlay = overlay
-        self._limits = Limits(self._robot, overlay.mode)
+        self._limits = CommandLimits(self._robot, overlay.mode)
         self._since, self._mirrored, self._fault = None, 0, "it has not answered yet"
         self._go(m.SessionState.COMMANDING_WAIT)
 
     def stop(self) -> None:
-        """The motion under the overlay has ended or was cancelled; does nothing without an overlay."""
+        """End the overlay after its motion; does nothing without an overlay."""
         self._end("cancelled", "")
 
     def events(self) -> list[Event]:
-        """What has happened since the last call, oldest first."""
+        """Events since the last call, oldest first."""
         events = list(self._events)
         self._events.clear()
         return events
 
-    # ------------------------------------------------------------------------------ the client
-
     def receive(self, datagram: bytes, now: int) -> None:
-        """Take a datagram of the client that arrived at `now` [ns]; what is wrong with it is told by an event."""
+        """Take a datagram of the client that arrived at `now` [ns]; a refusal is reported as an event."""
         if self.state is m.SessionState.IDLE:
             self.traffic.stale += 1
             return
@@ -197,7 +198,7 @@ class Controller:
         number = self._next - 1 - age
         asked = self._asked[number % KEPT] if age < KEPT and number >= 0 else None
         if asked is None:
-            self._refuse("an answer to a message that this session has not sent, or long ago")
+            self._refuse("an answer to a message that this session did not send, or sent too long ago")
             return
         fresh = self.meter.answered(number // self.configuration.multiplier, now - asked.at)
         if number <= self._heard:
@@ -207,50 +208,50 @@ class Controller:
         self.traffic.taken += fresh
         for event in self.exchange.take(command):
             if isinstance(event, Refused):
-                self._tell(event.text)
+                self._report_refusal(event.text)
             else:
                 self._events.append(event)
         if asked.state is self.state:
             if self.state is m.SessionState.COMMANDING_WAIT:
                 self._synchronise(command, asked)
             elif self.state is m.SessionState.COMMANDING_ACTIVE:
-                self._obey(command, number)
+                self._execute(command, number)
 
     def _refuse(self, text: str) -> None:
         self.traffic.refused += 1
-        self._tell(text)
+        self._report_refusal(text)
 
-    def _tell(self, text: str) -> None:
-        if text not in self._told and len(self._told) < TOLD:
-            self._told.add(text)
+    def _report_refusal(self, text: str) -> None:
+        if text not in self._reported and len(self._reported) < MOST_REFUSALS:
+            self._reported.add(text)
             self._events.append(Refused(text))
 
-    def _synchronise(self, command: m.Command, asked: _Asked) -> None:
+    def _synchronise(self, command: m.Command, asked: _SentMessage) -> None:
         assert self.overlay is not None
         lacks = missing(self.overlay.mode, command)
-        self._fault = f"its answers carry no {lacks}" if lacks else self._beside(command, asked)
+        self._fault = f"its answers carry no {lacks}" if lacks else self._deviation(command, asked)
         self._mirrored = 0 if self._fault else self._mirrored + 1
 
-    def _beside(self, command: m.Command, asked: _Asked) -> str:
-        """How a command differs from the interpolator's position that it answers; empty if it mirrors it."""
+    def _deviation(self, command: m.Command, asked: _SentMessage) -> str:
+        """How a command differs from the interpolator's position that it has to mirror; empty if it does not."""
         ipo = asked.ipo
         assert ipo is not None and ipo.q is not None
         if ipo.pose is not None and command.pose is not None:
             try:
-                way, turn = cartesian.apart(cartesian.matrix(command.pose), cartesian.matrix(ipo.pose))
+                gap, turn = cartesian.distance(cartesian.matrix(command.pose), cartesian.matrix(ipo.pose))
             except ValueError as error:
                 return str(error)
-            if max(way, turn) <= MIRROR:
+            if max(gap, turn) <= MIRROR:
                 return ""
-            return f"its pose is {1e3 * way:.1f} mm and {np.degrees(turn):.2f} deg beside the interpolator's"
+            return f"its pose is {1e3 * gap:.1f} mm and {np.degrees(turn):.2f} deg off the interpolator's"
         delta = np.abs(np.array(command.q) - np.array(ipo.q))
         if (delta <= MIRROR).all():  # a NaN is not
             return ""
         axis = int(np.argmax(~(delta <= MIRROR)))
-        return f"its A{axis + 1} is {np.degrees(delta[axis]):.2f} deg beside the interpolator's"
+        return f"its A{axis + 1} is {np.degrees(delta[axis]):.2f} deg off the interpolator's"
 
-    def _obey(self, command: m.Command, number: int) -> None:
-        """Take a command, or end the overlay by it."""
+    def _execute(self, command: m.Command, number: int) -> None:
+        """Execute a command; an illegal one ends the overlay."""
         assert self.overlay is not None and self._limits is not None
         assert self._set_point is not None and self._last is not None
         lacks = missing(self.overlay.mode, command)
@@ -283,26 +284,24 @@ class Controller:
             return np.array(command.q)
         if command.redundancy is not None and command.redundancy.strategy is m.RedundancyStrategy.E1:
             if not isfinite(command.redundancy.value):
-                raise ValueError("its redundancy is no finite number")
+                raise ValueError("its redundancy value must be finite")
             self._a3 = command.redundancy.value
         return cartesian.joints(self._robot, cartesian.matrix(command.pose), self._a3, self._last)
 
-    # ------------------------------------------------------------------------------ the tick
-
     def tick(self, reading: Reading, now: int) -> bytes | None:
-        """One millisecond of the plant's time at `now` [ns]; returns the datagram to send, if one is due."""
+        """Advance by one millisecond of plant time at `now` [ns]; returns the datagram to send, if one is due."""
         if self.state is m.SessionState.IDLE:
             farewell, self._farewell = self._farewell, False
             return self._message(reading, now) if farewell else None
-        self._judge(now)
+        self._rate(now)
         if self.overlay is not None:
-            self._lead(reading, now)
+            self._advance_overlay(reading, now)
         self.superposition = self._superpose()
         due = self._ticks % self.configuration.period_ms == 0
         self._ticks += 1
         return self._message(reading, now) if due else None
 
-    def _judge(self, now: int) -> None:
+    def _rate(self, now: int) -> None:
         before = self.meter.quality
         quality = self.meter.advance(now)
         if quality is not before:
@@ -320,8 +319,8 @@ class Controller:
         elif enough != (self.state is m.SessionState.MONITORING_READY):
             self._go(m.SessionState.MONITORING_READY if enough else m.SessionState.MONITORING_WAIT)
 
-    def _lead(self, reading: Reading, now: int) -> None:
-        """From waiting to active, or to the end of the overlay."""
+    def _advance_overlay(self, reading: Reading, now: int) -> None:
+        """Activate a synchronised overlay, or end one."""
         if reading.safety is not m.Safety.NORMAL_OPERATION:
             self._end("safety", f"the motion with the FRI overlay was ended by a {_STOPS[reading.safety]}")
         elif self.state is m.SessionState.COMMANDING_WAIT:
@@ -337,7 +336,7 @@ class Controller:
 
     def _activate(self, reading: Reading) -> None:
         start = np.array(reading.q_ipo)
-        self._set_point = SetPoint(self._robot, start, ticks=self.configuration.receive_ms)
+        self._set_point = CommandInterpolator(self._robot, start, ticks=self.configuration.receive_ms)
         self._last, self._last_number = start, self._heard
         self._a3 = reading.q_ipo[2]
         self._tau = self._wrench = None
@@ -348,7 +347,7 @@ class Controller:
             return None
         q = self._set_point.tick()
         if self._set_point.age > max(COAST, 2 * self.configuration.receive_ms):
-            self._tau = self._wrench = None  # a load that nobody renews would push for ever
+            self._tau = self._wrench = None  # a load without new commands would push forever
         return Superposition(q, self._tau, self._wrench)
 
     def _end(self, cause: str, text: str) -> None:
@@ -363,8 +362,6 @@ class Controller:
         self._events.append(StateChanged(state, self.state))
         self.state = state
 
-    # ------------------------------------------------------------------------------ messages
-
     def _message(self, reading: Reading, now: int) -> bytes:
         configuration = self.configuration
         number, self._next = self._next, self._next + 1
@@ -374,13 +371,15 @@ class Controller:
             reading,
             header=m.Header(number & _WORD, self._reflected & _WORD),
             stamp=stamp,
-            status=Status(self.state, self.quality, self.overlay, self.meter.share if active else None),
+            status=SessionStatus(
+                self.state, self.quality, self.overlay, self.meter.fraction if active else None
+            ),
             configuration=configuration,
             robot=self._robot,
             signals=tuple(self.exchange.signals.values()),
             requested=self.exchange.requested(stamp),
         )
-        self._asked[number % KEPT] = _Asked(now, self.state, message.ipo)
+        self._asked[number % KEPT] = _SentMessage(now, self.state, message.ipo)
         if self.state is not m.SessionState.IDLE and number % configuration.multiplier == 0:
             self.meter.asked(number // configuration.multiplier, now)
         self.traffic.sent += 1

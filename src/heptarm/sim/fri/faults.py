@@ -1,7 +1,7 @@
-"""Faults of a line and of a robot, injected on purpose: seeded, so that a run can be repeated to the datagram.
+"""Fault injection on the network and the robot; seeded, so that a run is repeatable to the datagram.
 
-A `Line` carries datagrams in one direction and does to them what its `Faults` say. Times are nanoseconds on the
-caller's clock, those of `Faults` and `Scenario` seconds since the line's first datagram.
+A `FaultyLink` transports datagrams in one direction and applies its `LinkFaults`. Times are nanoseconds on the
+caller's clock, those of `LinkFaults` and `FaultScenario` seconds since the link's first datagram.
 """
 
 from __future__ import annotations
@@ -11,31 +11,31 @@ from dataclasses import dataclass, field, fields, replace
 from random import Random
 
 from heptarm.errors import LimitError
-from heptarm.fri import messages as m
-from heptarm.fri.codec import decode_monitoring, encode_monitoring
-from heptarm.fri.version import Version
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.codec import decode_monitoring, encode_monitoring
+from heptarm.fri.protocol.version import Version
 
 Span = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Faults:
-    """What happens to datagrams under way; shares are probabilities of each datagram by itself.
+class LinkFaults:
+    """Faults of a network link; probabilities are independent for each datagram.
 
     Args:
-        loss: share that never arrives.
-        duplicate: share that arrives twice.
-        corrupt: share with one to four octets changed.
-        reorder: share that is held back until the next one has passed.
+        loss: probability of a loss.
+        duplicate: probability of arriving twice.
+        corrupt: probability of one to four changed bytes.
+        reorder: probability of being overtaken by the next datagram.
         delay: of every datagram [s].
-        jitter: more delay, evenly between 0 and this [s].
-        burst: share at which a burst begins: all of the next `burst_time` arrives together at its end.
+        jitter: additional delay, uniform between 0 and this [s].
+        burst: probability that a burst begins: all datagrams of the next `burst_time` arrive together at its end.
         burst_time: [s].
-        silence: spans in which nothing arrives that is sent in them [s].
+        silence: spans in which all datagrams are lost [s].
         seed: of the random numbers.
 
     Raises:
-        LimitError: a share is no probability, or a time negative.
+        LimitError: a probability is outside [0, 1], or a time is negative.
     """
 
     loss: float = 0.0
@@ -55,40 +55,40 @@ class Faults:
             is_time = one.name in ("delay", "jitter", "burst_time")
             if not 0.0 <= value <= (float("inf") if is_time else 1.0):
                 raise LimitError(
-                    f"{one.name} is {value}; {'a time' if is_time else 'a share'} is wanted",
+                    f"{one.name} must be in {'[0, inf) s' if is_time else '[0, 1]'}, got {value}",
                     parameter=one.name,
                     value=value,
                     allowed="[0, inf) s" if is_time else "[0, 1]",
                 )
 
 
-NONE = Faults()
+NONE = LinkFaults()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Scenario:
-    """What goes wrong in a session.
+class FaultScenario:
+    """Faults of a session.
 
     Args:
-        to_client: faults of the cabinet's messages under way.
-        from_client: faults of the answers under way.
+        to_client: faults of the cabinet's messages.
+        from_client: faults of the client's answers.
         stops: safety stops, each with its span [s].
-        strange: spans in which the cabinet speaks `version` instead of its own [s].
-        version: the wrong one; None: never.
+        strange: spans in which the cabinet sends in `version` instead of its own [s].
+        version: the wrong version; None: never.
     """
 
-    to_client: Faults = NONE
-    from_client: Faults = NONE
+    to_client: LinkFaults = NONE
+    from_client: LinkFaults = NONE
     stops: tuple[tuple[Span, m.Safety], ...] = ()
     strange: tuple[Span, ...] = ((0.0, float("inf")),)
     version: Version | None = None
 
     def safety(self, elapsed: float) -> m.Safety | None:
-        """The safety stop in force after so many seconds, if there is one."""
+        """The safety stop at a time [s], if there is one."""
         return next((stop for span, stop in self.stops if _within(span, elapsed)), None)
 
-    def spoken(self, datagram: bytes, version: Version, elapsed: float) -> bytes:
-        """A monitoring datagram of a version as it leaves the cabinet after so many seconds."""
+    def sent(self, datagram: bytes, version: Version, elapsed: float) -> bytes:
+        """A monitoring datagram of a version as the cabinet sends it at a time [s]."""
         if self.version is None or not any(_within(span, elapsed) for span in self.strange):
             return datagram
         return translate(datagram, version, self.version)
@@ -99,7 +99,7 @@ def _within(span: Span, time: float) -> bool:
 
 
 def translate(datagram: bytes, version: Version, other: Version) -> bytes:
-    """A monitoring datagram as a cabinet of another version would have sent it, without what that one lacks."""
+    """A monitoring datagram as a cabinet of another version would send it, without fields that one lacks."""
     message = decode_monitoring(datagram, version)
     traits = other.traits
     monitor, ipo = message.monitor or m.MonitorData(), message.ipo or m.IpoData()
@@ -115,8 +115,8 @@ def translate(datagram: bytes, version: Version, other: Version) -> bytes:
 
 
 @dataclass(slots=True)
-class Damage:
-    """Datagrams so far, by what was done to them."""
+class LinkFaultCounts:
+    """Datagrams so far, by fault."""
 
     passed: int = 0
     lost: int = 0
@@ -126,36 +126,36 @@ class Damage:
 
 
 @dataclass(order=True, slots=True)
-class _UnderWay:
+class _InTransit:
     due: int
     rank: int
     datagram: bytes = field(compare=False)
 
 
-class Line:
-    """One direction of a network with faults.
+class FaultyLink:
+    """One direction of a network link with faults.
 
     Attributes:
-        damage: counts of what was done.
+        damage: counts of faults.
     """
 
-    def __init__(self, faults: Faults = NONE) -> None:
+    def __init__(self, faults: LinkFaults = NONE) -> None:
         self._faults = faults
         self._random = Random(faults.seed)
-        self._under_way: list[_UnderWay] = []
+        self._in_transit: list[_InTransit] = []
         self._held: list[bytes] = []
         self._rank = 0
         self._start: int | None = None
-        self._gate = -1  # until then a burst holds everything back
-        self.damage = Damage()
+        self._gate = -1  # a burst holds everything back until this time
+        self.damage = LinkFaultCounts()
 
     def send(self, datagram: bytes, now: int) -> None:
-        """Put a datagram on the line at `now` [ns]."""
+        """Send a datagram at `now` [ns]."""
         faults, chance = self._faults, self._random.random
         if self._start is None:
             self._start = now
         # every random number is drawn for every datagram, so that one fault does not shift the others
-        lost, twice, broken, late, bursts, share = (chance() for _ in range(6))
+        lost, twice, broken, late, bursts, portion = (chance() for _ in range(6))
         elapsed = (now - self._start) * 1e-9
         if lost < faults.loss or any(_within(span, elapsed) for span in faults.silence):
             self.damage.lost += 1
@@ -164,7 +164,7 @@ class Line:
             datagram = self._corrupted(datagram)
         if bursts < faults.burst and now >= self._gate:
             self._gate = now + round(faults.burst_time * 1e9)
-        due = max(now + round((faults.delay + share * faults.jitter) * 1e9), self._gate)
+        due = max(now + round((faults.delay + portion * faults.jitter) * 1e9), self._gate)
         if late < faults.reorder:
             self.damage.reordered += 1
             self._held.append(datagram)
@@ -177,25 +177,25 @@ class Line:
         self._held.clear()
 
     def arrived(self, now: int) -> list[bytes]:
-        """What has arrived by `now` [ns], in order of arrival."""
+        """Datagrams that have arrived by `now` [ns], in order of arrival."""
         return [datagram for datagram, _ in self.taken(now)]
 
     def taken(self, now: int) -> list[tuple[bytes, int]]:
-        """What has arrived by `now` [ns], in order of arrival, each with its time of arrival."""
+        """Datagrams that have arrived by `now` [ns], in order of arrival, with their times of arrival."""
         found = []
-        while self._under_way and self._under_way[0].due <= now:
-            one = heapq.heappop(self._under_way)
+        while self._in_transit and self._in_transit[0].due <= now:
+            one = heapq.heappop(self._in_transit)
             found.append((one.datagram, one.due))
         self.damage.passed += len(found)
         return found
 
     def _push(self, datagram: bytes, due: int) -> None:
         self._rank += 1
-        heapq.heappush(self._under_way, _UnderWay(due, self._rank, datagram))
+        heapq.heappush(self._in_transit, _InTransit(due, self._rank, datagram))
 
     def _corrupted(self, datagram: bytes) -> bytes:
-        octets = bytearray(datagram)
+        data = bytearray(datagram)
         for _ in range(self._random.randint(1, 4)):
-            octets[self._random.randrange(len(octets))] ^= self._random.randint(1, 255)
+            data[self._random.randrange(len(data))] ^= self._random.randint(1, 255)
         self.damage.corrupted += 1
-        return bytes(octets)
+        return bytes(data)

@@ -1,28 +1,93 @@
-"""Writes the monitoring messages of one session, a thousand times a second.
-
-The octets are those of `heptarm.fri.codec.encode_monitoring`; what seldom changes (robot, connection, modes, signals)
-is encoded once and kept, joint arrays are packed in one call.
-"""
+"""Monitoring messages of a session: their content in each version, encoded at up to 1 kHz."""
 
 from __future__ import annotations
 
 import struct
+from dataclasses import dataclass
 
-from heptarm.fri import messages as m
-from heptarm.fri.codec import encode_monitoring
-from heptarm.fri.protobuf import fields, put_bytes, put_double, put_packed, put_varint, varint
-from heptarm.fri.version import MONITORING_ID, Version, unwrap, wrap
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.codec import encode_monitoring
+from heptarm.fri.protocol.protobuf import fields, put_bytes, put_double, put_packed, put_varint, varint
+from heptarm.fri.protocol.version import MONITORING_ID, Version, unwrap, wrap
+from heptarm.sim.fri import cartesian
+from heptarm.sim.fri.overlay import MotionOverlay, Reading
+from heptarm.sim.fri.settings import SessionConfiguration
+from heptarm.values.robot import RobotModel
+
+
+@dataclass(frozen=True, slots=True)
+class SessionStatus:
+    """State of the session in its messages; `tracking` only while commanding is active."""
+
+    state: m.SessionState
+    quality: m.Quality
+    overlay: MotionOverlay | None
+    tracking: float | None
+
+
+def report(
+    reading: Reading,
+    *,
+    header: m.Header,
+    stamp: m.TimeStamp,
+    status: SessionStatus,
+    configuration: SessionConfiguration,
+    robot: RobotModel,
+    signals: tuple[m.IoValue, ...],
+    requested: tuple[m.Transformation, ...],
+) -> m.Monitoring:
+    """The monitoring message of a tick."""
+    traits = configuration.version.traits
+    return m.Monitoring(
+        header,
+        robot=m.RobotInfo(
+            7, reading.safety, (reading.drives,) * 7, reading.operation_mode, reading.control_mode
+        ),
+        monitor=m.MonitorData(
+            q=reading.q,
+            tau=reading.tau,
+            q_cmd=None if traits.quaternions else reading.q_cmd,
+            tau_cmd=reading.tau_cmd,
+            tau_ext=reading.tau_ext,
+            wrench=reading.wrench if traits.framed else None,
+            io=signals,
+            pose=cartesian.transformation(robot, reading.q) if traits.quaternions else None,
+            redundancy=_redundancy(reading.q) if traits.quaternions else None,
+            stamp=stamp,
+        ),
+        connection=m.ConnectionInfo(
+            status.state, status.quality, configuration.period_ms, configuration.multiplier
+        ),
+        ipo=_ipo(reading, status, robot),
+        requested=requested,
+    )
+
+
+def _ipo(reading: Reading, status: SessionStatus, robot: RobotModel) -> m.IpoData:
+    """Interpolator's data, with positions only while there is an overlay."""
+    overlay = status.overlay
+    if overlay is None:
+        return m.IpoData(command_mode=m.CommandMode.NO_COMMAND, overlay=m.Overlay.NONE)
+    pose = redundancy = None
+    if overlay.kind is m.Overlay.CARTESIAN:
+        pose, redundancy = cartesian.transformation(robot, reading.q_ipo), _redundancy(reading.q_ipo)
+    return m.IpoData(reading.q_ipo, pose, redundancy, overlay.mode, overlay.kind, status.tracking)
+
+
+def _redundancy(q: tuple[float, ...]) -> m.Redundancy:
+    return m.Redundancy(m.RedundancyStrategy.E1, q[2])
+
 
 _ARRAY = struct.Struct("<BB" + "Bd" * 7)
 _FIXED64 = 1 << 3 | 1
 _HEAD = put_varint(1, MONITORING_ID) + b"\x10"
 
-#: Different sections that are kept.
+#: Size of the cache of encoded sections.
 KEPT = 64
 
 
 def _array(tag: int, joints: m.Joints | None) -> bytes:
-    """A joint array as a field, 65 octets."""
+    """A joint array as a field, 65 bytes."""
     if joints is None:
         return b""
     a, b, c, d, e, f, g = joints
@@ -44,13 +109,13 @@ def _pose(tag: int, pose: m.Transformation | None) -> bytes:
     )
 
 
-def _redundancy(tag: int, value: m.Redundancy | None) -> bytes:
+def _redundancy_writer(tag: int, value: m.Redundancy | None) -> bytes:
     return (
         b"" if value is None else put_bytes(tag, put_varint(1, value.strategy) + put_double(2, value.value))
     )
 
 
-class Writer:
+class MonitoringEncoder:
     """Encodes monitoring messages of one version."""
 
     def __init__(self, version: Version) -> None:
@@ -61,7 +126,7 @@ class Writer:
         """The datagram of a message.
 
         Raises:
-            ValueError: the version cannot carry a field, or a name or list is too long.
+            ValueError: the version has no such field, or a name or list is too long.
         """
         counters = varint(message.header.sequence) + b"\x18" + varint(message.header.reflected)
         parts = [bytes((0x0A, len(_HEAD) + len(counters))), _HEAD, counters]
@@ -91,7 +156,7 @@ class Writer:
             or ((data.pose or data.redundancy) and not traits.quaternions)
             or (data.wrench is not None and not traits.framed)
         ):
-            encode_monitoring(m.Monitoring(header, monitor=data), self._version)  # says what is wrong
+            encode_monitoring(m.Monitoring(header, monitor=data), self._version)  # raises the error
         signals = b""
         if data.io:
             only = m.Monitoring(header, monitor=m.MonitorData(io=data.io))
@@ -111,7 +176,7 @@ class Writer:
             + (b"" if data.wrench is None else put_bytes(6, put_packed(1, data.wrench)))
             + signals
             + _pose(9, data.pose)
-            + _redundancy(10, data.redundancy)
+            + _redundancy_writer(10, data.redundancy)
             + _stamp(15, data.stamp),
         )
 
@@ -121,18 +186,18 @@ class Writer:
             5,
             _array(1, ipo.q)
             + _pose(2, ipo.pose)
-            + _redundancy(3, ipo.redundancy)
+            + _redundancy_writer(3, ipo.redundancy)
             + self._section(5, modes, m.Monitoring(header, ipo=modes), inside=True)
             + (b"" if ipo.tracking is None else put_double(12, ipo.tracking)),
         )
 
     def _section(self, tag: int, value: object, only: m.Monitoring, *, inside: bool = False) -> bytes:
-        """The octets of a section, from a message that has only it; `inside`: without key and length."""
+        """The bytes of a section, from a message with only that section; `inside`: without key and length."""
         key = (tag, value)
         kept = self._kept.get(key)
         if kept is None:
-            octets = self._values(encode_monitoring(only, self._version), tag)[0]
-            kept = octets if inside else put_bytes(tag, octets)
+            content = self._values(encode_monitoring(only, self._version), tag)[0]
+            kept = content if inside else put_bytes(tag, content)
             if len(self._kept) >= KEPT:
                 self._kept.clear()
             self._kept[key] = kept

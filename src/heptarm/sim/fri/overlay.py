@@ -1,4 +1,4 @@
-"""Overlays: what an FRI client lays on a motion, as values, and what carries them out.
+"""Overlays of an FRI client on a motion, as values, and the arm that executes them.
 
 Position and pose overlays move the set-point of whatever control mode is in force; torque and wrench overlays do that
 too, and add a load on top of what the control mode gives.
@@ -10,17 +10,18 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from heptarm.errors import CommandRejected, ModeConflict
-from heptarm.fri import messages as m
-from heptarm.fri.version import Version
-from heptarm.values.arrays import Array
-from heptarm.values.mode import Mode
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.version import Version
+from heptarm.sim.control.laws import Superposition
+from heptarm.sim.fri.settings import SessionConfiguration
+from heptarm.values.mode.impedance import JointImpedance
+from heptarm.values.mode.mode import Mode, Position
 from heptarm.values.robot import RobotModel
-from heptarm.virtual.fri.configuration import Configuration
 
 Seven = tuple[float, ...]
 _ZEROS: Seven = (0.0,) * 7
 
-#: A torque overlay wants a command at least this often [ms].
+#: Longest receive period of a torque overlay [ms].
 TORQUE_MS = 5
 
 _ANY = (m.ControlMode.POSITION, m.ControlMode.JOINT_IMPEDANCE, m.ControlMode.CARTESIAN_IMPEDANCE)
@@ -35,10 +36,10 @@ CONTROLS: dict[m.CommandMode, tuple[m.ControlMode, ...]] = {
 
 @dataclass(frozen=True, slots=True)
 class MotionOverlay:
-    """What the application adds to a motion so that the client may command.
+    """The overlay that the application adds to a motion so that the client may command.
 
     Attributes:
-        mode: what the client commands.
+        mode: client command mode.
         control: control mode of the motion underneath.
     """
 
@@ -50,7 +51,7 @@ class MotionOverlay:
         """Whether joints or a pose are superposed."""
         return m.Overlay.CARTESIAN if self.mode is m.CommandMode.CARTESIAN_POSE else m.Overlay.JOINT
 
-    def check(self, configuration: Configuration) -> None:
+    def check(self, configuration: SessionConfiguration) -> None:
         """Check that the overlay is legal in a session.
 
         Raises:
@@ -61,7 +62,7 @@ class MotionOverlay:
         legal = CONTROLS.get(self.mode)
         if legal is None:
             raise CommandRejected(
-                f"client command mode {name}: with it the client commands nothing",
+                f"client command mode {name} commands nothing",
                 parameter="mode",
                 hint="choose " + ", ".join(mode.name for mode in CONTROLS),
             )
@@ -69,26 +70,38 @@ class MotionOverlay:
             raise CommandRejected(
                 f"FRI {configuration.version.value} has no command mode {name}",
                 parameter="mode",
-                hint=f"it came with FRI {Version.V2_5.value}",
+                hint=f"use FRI {Version.V2_5.value} or later",
             )
         if self.control not in legal:
             raise ModeConflict(
-                f"client command mode {name} under control mode {self.control.name}",
+                f"client command mode {name} is not possible in control mode {self.control.name}",
                 parameter="mode",
                 allowed=" or ".join(control.name for control in legal),
                 hint=f"hold the position in control mode {' or '.join(c.name for c in legal)}",
             )
         if self.mode is m.CommandMode.TORQUE and configuration.receive_ms > TORQUE_MS:
             raise CommandRejected(
-                f"client command mode TORQUE with an answer every {configuration.receive_ms} ms",
+                f"client command mode TORQUE: receive period must be in [1, {TORQUE_MS}] ms, got "
+                f"{configuration.receive_ms} ms",
                 parameter="period_ms",
                 value=configuration.receive_ms,
                 allowed=f"[1, {TORQUE_MS}] ms",
             )
 
 
+def control_mode(mode: Mode) -> m.ControlMode:
+    """The control mode as FRI numbers it."""
+    if isinstance(mode, Position):
+        return m.ControlMode.POSITION
+    return (
+        m.ControlMode.JOINT_IMPEDANCE
+        if isinstance(mode, JointImpedance)
+        else m.ControlMode.CARTESIAN_IMPEDANCE
+    )
+
+
 def missing(mode: m.CommandMode, command: m.Command) -> str:
-    """The field that a command of this mode lacks, in words; empty if it has all."""
+    """Name of the field that a command of this mode lacks; empty if it has all."""
     if mode is m.CommandMode.CARTESIAN_POSE:
         return "" if command.pose is not None else "Cartesian pose"
     if command.q is None:
@@ -131,23 +144,8 @@ class Reading:
     control_mode: m.ControlMode = m.ControlMode.POSITION
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Superposition:
-    """What the arm does in the next tick instead of following its interpolator.
-
-    Attributes:
-        q: set-point of the next tick, shape (7,) [rad].
-        tau: torques on top, shape (7,) [Nm]; None: none.
-        wrench: force and torque on top, acting by the arm at the flange, base axes, shape (6,) [N, Nm]; None: none.
-    """
-
-    q: Array
-    tau: Array | None = None
-    wrench: Array | None = None
-
-
 class OverlayTarget(Protocol):
-    """An arm that overlays act on; all calls come from the thread that ticks it, between two ticks."""
+    """An arm with overlays; all calls come from the thread that ticks it, between two ticks."""
 
     @property
     def robot(self) -> RobotModel:
@@ -157,14 +155,14 @@ class OverlayTarget(Protocol):
         """The state after the last tick."""
 
     def overlay(self, action: Superposition | None) -> None:
-        """Take what the next tick does; None: no overlay acts (any more), the arm rests where it can.
+        """Set the overlay of the next tick; None: none.
 
-        The first None after an overlay brakes every axis within its limits; the interpolator then is where they rest.
+        The first None after an overlay brakes every axis within its limits; the interpolator continues from there.
         """
 
 
 class HoldingTarget(OverlayTarget, Protocol):
-    """An arm that can also hold its position in a control mode by itself, without an application."""
+    """An arm that can also hold its position in a control mode without an application."""
 
     def hold(self, mode: Mode) -> None:
         """Hold the present position in a control mode, until `release`."""

@@ -1,16 +1,16 @@
-"""How good a connection is, from how the client answers.
+"""Quality of the connection, from the client's answers.
 
-KUKA names four classes and publishes no thresholds. The rule here is heptarm's own:
+KUKA names four classes and publishes no thresholds. These rules are heptarm's own:
 
 * The client owes one answer in each receive period (send period times multiplier).
 * An answer within one receive period of its message is on time and earns 4 points; a later one earns 3; one that is
-  not there after `LOST_PERIODS` receive periods, at least `LOST_TIME`, is lost and earns none.
-* The window is the last 100 receive periods; where they would last longer than a second, as many as a second holds, at
-  least 20. What has not been answered since the session opened counts as lost, so that quality is earned.
-* EXCELLENT from 99 % of the window's points on, GOOD from 95 %, FAIR from 75 %, POOR below.
+  missing after `LOST_PERIODS` receive periods, at least `LOST_TIME`, is lost and earns none.
+* The window is the last 100 receive periods; where they would take longer than a second, those of the last second, at
+  least 20. When the session opens, the window counts as lost, so that the quality has to be earned.
+* EXCELLENT from 99 % of the window's points, GOOD from 95 %, FAIR from 75 %, POOR below.
 
-So 1 lost or 4 late answers in a hundred leave it EXCELLENT, 5 lost or 20 late ones GOOD, and GOOD is what commanding
-needs; a client that is always late never has it. Silence at 1 kHz is noticed after 26 ms.
+With 1 lost or 4 late answers in a hundred it stays EXCELLENT, with 5 lost or 20 late ones GOOD. Commanding needs GOOD;
+a client that is always late never reaches it. At 1 kHz a silent client is detected after 26 ms.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from heptarm.fri.messages import Quality
+from heptarm.fri.protocol.messages import Quality
 
 #: Points of an answer.
 ON_TIME, LATE, LOST = 4, 3, 0
-#: Share of the window's points from which a class is reached.
-SHARES = ((Quality.EXCELLENT, 0.99), (Quality.GOOD, 0.95), (Quality.FAIR, 0.75))
+#: Fraction of the window's points from which a class is reached.
+THRESHOLDS = ((Quality.EXCELLENT, 0.99), (Quality.GOOD, 0.95), (Quality.FAIR, 0.75))
 
 WINDOW = 100
 WINDOW_LEAST = 20
 WINDOW_NS = 1_000_000_000
 
-#: An answer is lost after so many receive periods, but not before so long [ns].
+#: An answer is lost after this many receive periods, but not before this time [ns].
 LOST_PERIODS = 5
 LOST_TIME = 20_000_000
 
@@ -37,16 +37,16 @@ _SMOOTH = 1.0 / 16.0
 
 
 @dataclass(slots=True)
-class Counts:
-    """Receive periods so far, by what became of them."""
+class AnswerCounts:
+    """Receive periods so far, by outcome."""
 
     on_time: int = 0
     late: int = 0
     lost: int = 0
 
 
-class Meter:
-    """Judges the answers of one session.
+class QualityMeter:
+    """Rates the answers of one session.
 
     Args:
         receive_ns: receive period [ns].
@@ -64,18 +64,20 @@ class Meter:
         self._marks: deque[int] = deque([LOST] * self.window, maxlen=self.window)
         self._points = 0
         self._open: dict[int, int] = {}  # receive period -> when its answer counts as lost; oldest first
-        self.counts = Counts()
+        self.counts = AnswerCounts()
         self.latency_ns = self.jitter_ns = 0.0
         self._before: float | None = None
-        self._thresholds = [(quality, share * ON_TIME * self.window - 1e-9) for quality, share in SHARES]
+        self._thresholds = [
+            (quality, fraction * ON_TIME * self.window - 1e-9) for quality, fraction in THRESHOLDS
+        ]
         self.quality = Quality.POOR
 
     def asked(self, period: int, now: int) -> None:
-        """The first message of a receive period was sent, at `now` [ns]."""
+        """Count the first message of a receive period, sent at `now` [ns]."""
         self._open[period] = now + self._receive_ns + self._lost_ns
 
     def answered(self, period: int, latency: int) -> bool:
-        """An answer came, `latency` [ns] after its message; False if its period was judged before."""
+        """Count an answer `latency` [ns] after its message; False if its period was rated before."""
         if self._open.pop(period, None) is None:
             return False
         if latency <= self._receive_ns:
@@ -105,8 +107,8 @@ class Meter:
         return self.quality
 
     @property
-    def share(self) -> float:
-        """Points of the window, 0 to 1."""
+    def fraction(self) -> float:
+        """Points of the window as a fraction of the maximum, 0 to 1."""
         return self._points / (ON_TIME * self.window)
 
     def _mark(self, points: int) -> None:

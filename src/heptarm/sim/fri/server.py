@@ -1,4 +1,4 @@
-"""Carries a session over UDP from one fixed port, in step with the plant and never waiting for anybody."""
+"""Transports a session over UDP from one fixed port, synchronous with the plant, without blocking."""
 
 from __future__ import annotations
 
@@ -12,14 +12,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from heptarm.errors import ConnectFailed
-from heptarm.fri.messages import DriveState
-from heptarm.fri.version import MAX_DATAGRAM
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.controller import TOLD, Controller
-from heptarm.virtual.fri.events import Event, Refused
-from heptarm.virtual.fri.faults import Line, Scenario
-from heptarm.virtual.fri.overlay import MotionOverlay, OverlayTarget, Reading
-from heptarm.virtual.tick import TICK_NS
+from heptarm.fri.protocol.messages import DriveState
+from heptarm.fri.protocol.version import MAX_DATAGRAM
+from heptarm.sim.fri.controller import MOST_REFUSALS, Controller
+from heptarm.sim.fri.faults import FaultScenario, FaultyLink
+from heptarm.sim.fri.overlay import MotionOverlay, OverlayTarget, Reading
+from heptarm.sim.fri.settings import Event, Refused, SessionConfiguration
+from heptarm.sim.seam import TICK_NS
 
 #: The port of FRI on both sides; KUKA advises the next nine for further sessions and robots.
 PORT = 30200
@@ -27,16 +26,16 @@ PORTS = range(PORT, PORT + 10)
 
 Address = tuple[str, int]
 
-#: Datagrams that are read in one tick at most, so that a flood cannot hold the plant up.
+#: Largest number of datagrams that one tick reads, so that a flood cannot delay the plant.
 MOST = 64
 
-# Linux: the kernel stamps what arrives (SO_TIMESTAMPNS), so that latency is not rounded up to the next tick
+# Linux: the kernel time-stamps datagrams (SO_TIMESTAMPNS), so that latency is not rounded up to the next tick
 _STAMPS = 35 if sys.platform.startswith("linux") else None
 _STAMP = struct.Struct("@qq")
 
 
 def source_port(client: Address) -> int:
-    """The cabinet's port for a client: the client's own, as on a cabinet, unless both are this machine."""
+    """The cabinet's port for a client: the client's own, as on a cabinet, unless both are on this machine."""
     host, port = client
     if host != "localhost" and not host.startswith("127."):
         return port
@@ -44,35 +43,35 @@ def source_port(client: Address) -> int:
 
 
 class Server:
-    """One session, its socket, and the arm that its overlay acts on.
+    """One session, its socket, and the arm under its overlay.
 
-    `tick` belongs to the thread that ticks the arm, and comes before each tick of it. `open`, `close`, `start` and
+    `tick` is called before each tick of the arm, in the same thread. `open`, `close`, `start` and
     `stop` may be called from any thread.
 
     Args:
         configuration: of the session.
-        arm: what overlays act on.
-        client: where the messages go, IPv4.
-        port: where they come from; None: see `source_port`; 0: any free one.
+        arm: the arm under the overlays.
+        client: destination of the messages, IPv4.
+        port: source port; None: see `source_port`; 0: any free one.
         bind: own address; empty: all.
-        speed: seconds of the arm's time per second; 0: the arm's time is no function of the clock.
+        speed: seconds of the arm's time per second; 0: the arm's time does not depend on the clock.
         clock: monotonic time [ns].
-        scenario: faults on purpose.
-        listener: hears of events, called by `tick`; must not block.
+        scenario: faults to inject.
+        listener: receives events, called by `tick`; must not block.
 
     Attributes:
         controller: the session.
         listener: see above.
         port: the own port.
-        strangers: datagrams from elsewhere than the client.
+        strangers: datagrams from other senders than the client.
 
     Raises:
-        ConnectFailed: the port is taken, or the client's address is none.
+        ConnectFailed: the port is in use, or the client's address does not resolve.
     """
 
     def __init__(
         self,
-        configuration: Configuration,
+        configuration: SessionConfiguration,
         arm: OverlayTarget,
         *,
         client: Address,
@@ -80,39 +79,37 @@ class Server:
         bind: str = "",
         speed: float = 1.0,
         clock: Callable[[], int] = time.monotonic_ns,
-        scenario: Scenario | None = None,
+        scenario: FaultScenario | None = None,
         listener: Callable[[Event], None] | None = None,
     ) -> None:
         self._arm = arm
         self._client = _resolved(client)
         self._socket = _beside(bind, client) if port is None else _bound(bind, port)
         self.port: int = self._socket.getsockname()[1]
-        self._stamped = _ask_for_stamps(self._socket)
+        self._stamped = _request_stamps(self._socket)
         self._clock, self._speed, self._origin = clock, speed, clock()
         self.listener = listener
-        self._scenario = scenario or Scenario()
-        self._there, self._back = Line(self._scenario.to_client), Line(self._scenario.from_client)
+        self._scenario = scenario or FaultScenario()
+        self._there, self._back = FaultyLink(self._scenario.to_client), FaultyLink(self._scenario.from_client)
         self._lock = threading.Lock()
         self._ticks = 0
         self._before = 0  # time of the last tick
-        self._troubles: list[Event] = []
-        self._told: set[str] = set()
+        self._refusals: list[Event] = []
+        self._reported: set[str] = set()
         self.strangers = 0
         self.controller = Controller(configuration, arm.robot, epoch_ns=time.time_ns())
 
-    # ------------------------------------------------------------------------------ from any thread
-
     def open(self) -> None:
-        """Begin to send.
+        """Open the session and start to send.
 
         Raises:
-            ModeConflict: it was open before.
+            ModeConflict: it was opened before.
         """
         with self._lock:
             self.controller.open()
 
     def start(self, overlay: MotionOverlay) -> None:
-        """The motion with the overlay begins.
+        """Start an overlay with its motion.
 
         Raises:
             CommandRejected: this session cannot have such an overlay.
@@ -122,12 +119,12 @@ class Server:
             self.controller.start(overlay)
 
     def stop(self) -> None:
-        """The motion with the overlay has ended or was cancelled."""
+        """End the overlay after its motion."""
         with self._lock:
             self.controller.stop()
 
     def set(self, name: str, value: float) -> None:
-        """Give a signal another value, as the cabinet's side.
+        """Set a signal from the cabinet's side.
 
         Raises:
             CommandRejected: it is not registered, or cannot have that value.
@@ -144,10 +141,8 @@ class Server:
         """Free the port, after the last tick."""
         self._socket.close()
 
-    # ------------------------------------------------------------------------------ the arm's thread
-
     def tick(self) -> None:
-        """What comes before a tick of the arm: take answers, send a message if one is due, act on the arm."""
+        """Before a tick of the arm: take answers, send a message if one is due, set the overlay."""
         wall = self._clock()
         now = self._ticks * TICK_NS if self._speed == 0.0 else round((wall - self._origin) * self._speed)
         with self._lock:
@@ -156,12 +151,12 @@ class Server:
             datagram = self.controller.tick(reading, now)
             if datagram is not None:
                 version = self.controller.configuration.version
-                self._there.send(self._scenario.spoken(datagram, version, now * 1e-9), now)
+                self._there.send(self._scenario.sent(datagram, version, now * 1e-9), now)
             for message in self._there.arrived(now):
                 self._send(message)
             action = self.controller.superposition
-            events = self.controller.events() + self._troubles
-            self._troubles = []
+            events = self.controller.events() + self._refusals
+            self._refusals = []
         self._arm.overlay(action)
         self._ticks, self._before = self._ticks + 1, now
         if self.listener is not None:
@@ -180,11 +175,11 @@ class Server:
             except BlockingIOError:
                 break
             except OSError as error:
-                self._tell(f"nothing can be received on port {self.port}: {error}")
+                self._report(f"receiving on port {self.port} failed: {error}")
                 break
             if address != self._client:
                 self.strangers += 1
-                self._tell(
+                self._report(
                     f"a datagram from {address[0]}:{address[1]} was ignored; the session's client is "
                     f"{self._client[0]}:{self._client[1]}"
                 )
@@ -194,7 +189,7 @@ class Server:
             self.controller.receive(answer, at)
 
     def _arrival(self, ancillary: list[tuple[int, int, bytes]], wall: int, now: int) -> int:
-        """When a datagram arrived: by the kernel's stamp, or else in the middle between the last tick and this."""
+        """Arrival time of a datagram: the kernel's time stamp, or else halfway between the last tick and this one."""
         if not self._stamped or self._speed == 0.0 or not ancillary:
             return (self._before + now) // 2
         seconds, nanoseconds = _STAMP.unpack(ancillary[0][2])
@@ -206,19 +201,19 @@ class Server:
         try:
             self._socket.sendto(datagram, self._client)
         except OSError as error:
-            self._tell(f"nothing can be sent to {self._client[0]}:{self._client[1]}: {error}")
+            self._report(f"sending to {self._client[0]}:{self._client[1]} failed: {error}")
 
-    def _tell(self, text: str) -> None:
-        if text not in self._told and len(self._told) < TOLD:
-            self._told.add(text)
-            self._troubles.append(Refused(text))
+    def _report(self, text: str) -> None:
+        if text not in self._reported and len(self._reported) < MOST_REFUSALS:
+            self._reported.add(text)
+            self._refusals.append(Refused(text))
 
 
 def _resolved(client: Address) -> Address:
     host, port = client
     if not 0 < port < 65536:
         raise ConnectFailed(
-            f"the FRI client's port {port} is none", hint=f"it is {PORT} unless set otherwise"
+            f"the FRI client's port must be in [1, 65535], got {port}", hint=f"the default is {PORT}"
         )
     try:
         return socket.gethostbyname(host), port
@@ -233,8 +228,8 @@ def _bound(bind: str, port: int) -> socket.socket:
     except (OSError, OverflowError) as error:
         sock.close()
         raise ConnectFailed(
-            f"the FRI controller cannot have UDP port {port}: {error}",
-            hint=f"end the program that has it, or choose another of {PORTS[0]} to {PORTS[-1]}",
+            f"UDP port {port} of the FRI controller is not available: {error}",
+            hint=f"end the program that uses it, or choose another of {PORTS[0]} to {PORTS[-1]}",
         ) from error
     sock.setblocking(False)
     return sock
@@ -243,7 +238,7 @@ def _bound(bind: str, port: int) -> socket.socket:
 def _beside(bind: str, client: Address) -> socket.socket:
     """A socket on the port that belongs to a client; on another one if the client is on this machine.
 
-    Many sessions of one machine share the ten ports; a client answers to wherever the messages come from.
+    Several sessions on one machine use the same ten ports; a client answers to the source of the messages.
     """
     port = source_port(client)
     try:
@@ -252,7 +247,7 @@ def _beside(bind: str, client: Address) -> socket.socket:
         return _bound(bind, source_port(("localhost", port)) if port == client[1] else 0)
 
 
-def _ask_for_stamps(sock: socket.socket) -> bool:
+def _request_stamps(sock: socket.socket) -> bool:
     if _STAMPS is None:
         return False
     with contextlib.suppress(OSError):

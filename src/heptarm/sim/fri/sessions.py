@@ -1,59 +1,156 @@
-"""The FRI sessions that an application on the virtual cabinet opens, and the motions that their clients overlay."""
+"""The FRI sessions that an application on the virtual cabinet opens, and the motions under their overlays."""
 
 from __future__ import annotations
 
 import logging
 import threading
 from collections.abc import Callable
+from itertools import count
 
 from heptarm.errors import CommandRejected, HeptarmError
-from heptarm.fri.messages import CommandMode, IoValue
-from heptarm.fri.version import Version
-from heptarm.values.mode import Mode, Position
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.events import Event, OutputWritten, OverlayEnded, QualityChanged, StateChanged
-from heptarm.virtual.fri.overlay import MotionOverlay, Superposition
-from heptarm.virtual.fri.plant_arm import PlantArm
-from heptarm.virtual.fri.server import Address, Server
-from heptarm.virtual.fri.signals import Bridge, SessionSignal
-from heptarm.virtual.fri.standalone import control_of, words
-from heptarm.virtual.order import Listener
-from heptarm.virtual.plant import Plant
-from heptarm.virtual.safety import Demand
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.messages import CommandMode, IoValue
+from heptarm.fri.protocol.version import Version
+from heptarm.sim.control.laws import Superposition
+from heptarm.sim.controller.safety import StopRequest
+from heptarm.sim.fri.io import IoImageSync, SessionSignal
+from heptarm.sim.fri.overlay import MotionOverlay, Reading, control_mode
+from heptarm.sim.fri.server import Address, Server
+from heptarm.sim.fri.settings import (
+    Event,
+    OutputWritten,
+    OverlayEnded,
+    QualityChanged,
+    SessionConfiguration,
+    StateChanged,
+    describe,
+)
+from heptarm.sim.planning.command import MotionListener, Order
+from heptarm.sim.plant.plant import Plant
+from heptarm.sim.plant.shared_state import SharedState
+from heptarm.values.mode.mode import Mode, Position
+from heptarm.values.robot import RobotModel
 
-_log = logging.getLogger("heptarm.virtual.fri")
+_numbers = count(-1, -1)  # of own commands, distinct from those of the application
 
-#: Hears of a session: numbers of state and quality as FRI transmits them, latency and jitter [s].
+
+class PlantArm:
+    """A plant that holds its position for overlays.
+
+    Args:
+        plant: the plant; must be ticked through this object.
+    """
+
+    def __init__(self, plant: Plant) -> None:
+        self.plant = plant
+        self._order = 0
+        self._control = m.ControlMode.POSITION
+
+    @property
+    def robot(self) -> RobotModel:
+        """Dimensions and limits."""
+        return self.plant.robot
+
+    @property
+    def ring(self) -> SharedState:
+        """The plant's shared memory."""
+        return self.plant.ring
+
+    def reading(self) -> Reading:
+        """The state after the last tick."""
+        state, safety = self.plant.snapshot, self.plant.safety
+        return Reading(
+            tuple(state.q.tolist()),
+            tuple(state.q_cmd.tolist()),
+            tuple(self.plant.interpolated.tolist()),
+            tau=tuple(state.tau.tolist()),
+            tau_cmd=tuple(state.tau_cmd.tolist()),
+            tau_ext=tuple(state.tau_ext.tolist()),
+            wrench=tuple(state.wrench.tolist()),
+            safety=m.Safety.STOP_1
+            if safety.stop_requested
+            else m.Safety.NORMAL_OPERATION,  # stops stay on the path
+            drives=m.DriveState.OFF
+            if StopRequest.DRIVE_ERROR in safety.stop_requests
+            else m.DriveState.ACTIVE,
+            operation_mode=m.OperationMode(int(safety.mode)),
+            control_mode=self._control,
+        )
+
+    def overlay(self, action: Superposition | None) -> None:
+        """Set the overlay of the next tick."""
+        self.plant.overlay(action)
+
+    def hold(self, mode: Mode) -> None:
+        """Hold the present position in a control mode, until `release`."""
+        self._order, self._control = next(_numbers), control_mode(mode)
+        self.plant.submit(Order(self._order, "hold", mode=mode))
+
+    def release(self) -> None:
+        """End the hold; the arm rests in position control."""
+        self.plant.cancel(self._order)
+        self._control = m.ControlMode.POSITION
+
+    def tick(self) -> None:
+        """Advance by one millisecond."""
+        self.plant.tick()
+
+
+_log = logging.getLogger("heptarm.sim.fri")
+
+#: Receives changes of a session: state and quality as FRI numbers them, latency and jitter [s].
 Channel = Callable[[int, int, float, float], None]
-#: During these a cabinet writes no outputs.
-_STOPS = {Demand.EMERGENCY_STOP, Demand.EXTERNAL_EMERGENCY_STOP}
-#: Ticks after `close` in which the last message leaves.
+#: During these stops a cabinet writes no outputs.
+_STOPS = {StopRequest.EMERGENCY_STOP, StopRequest.EXTERNAL_EMERGENCY_STOP}
+#: Ticks after `close` for the last message to be sent.
 _FAREWELL = 2
 
 
 class _Arm(PlantArm):
-    """The plant as one of several sessions sees it: a session that only monitors does not end another one's overlay."""
+    """The plant as one of several sessions uses it: a session that only monitors does not end another's overlay."""
 
     def __init__(self, plant: Plant) -> None:
         super().__init__(plant)
         self._acts = False
 
     def overlay(self, action: Superposition | None) -> None:
-        """Take what the next tick does."""
+        """Set the overlay of the next tick."""
         if action is not None or self._acts:
             super().overlay(action)
         self._acts = action is not None
 
-    def takes(self, mode: Mode) -> None:
-        """The motion under the overlay has this control mode."""
-        self._control = control_of(mode)
+    def set_mode(self, mode: Mode) -> None:
+        """Set the control mode of the motion under the overlay."""
+        self._control = control_mode(mode)
 
 
 class _Session:
-    def __init__(self, server: Server, arm: _Arm, bridge: Bridge) -> None:
-        self.server, self.arm, self.bridge = server, arm, bridge
-        self.order = 0  # whose motion is overlaid
+    """One session: forwards its events to the plant, the IO image and the application."""
+
+    def __init__(self, plant: Plant, server: Server, arm: _Arm, sync: IoImageSync, channel: Channel) -> None:
+        self._plant, self._channel = plant, channel
+        self.server, self.arm, self.sync = server, arm, sync
+        self.order = 0  # id of the overlaid command
         self.farewell = -1  # ticks until the port is free; -1: not closing
+        server.listener = self._on_event
+        server.controller.exchange.veto = self._veto
+
+    def _on_event(self, event: Event) -> None:
+        text = describe(event)
+        if text:
+            _log.info("FRI: %s", text)
+        if isinstance(event, OutputWritten):
+            self.sync.write(event.value)
+        if isinstance(event, OverlayEnded) and event.is_error and self.order:
+            self._plant.abort(self.order, event.text)
+        if isinstance(event, StateChanged | QualityChanged):
+            controller = self.server.controller
+            meter = controller.meter
+            latency, jitter = 1e-9 * meter.latency_ns, 1e-9 * meter.jitter_ns
+            self._channel(int(controller.state), int(controller.quality), latency, jitter)
+
+    def _veto(self, value: IoValue) -> str:
+        return self.sync.veto(value, stopped=not _STOPS.isdisjoint(self._plant.safety.stop_requests))
 
 
 class Sessions:
@@ -85,10 +182,10 @@ class Sessions:
         """Open a session to a client; returns its number.
 
         Raises:
-            HeptarmError: an illegal configuration, a port that is taken, an address that is none.
+            HeptarmError: an illegal configuration, a port in use, an address that does not resolve.
         """
         image = self._plant.ring.signals
-        configuration = Configuration(
+        configuration = SessionConfiguration(
             self._version,
             period_ms=period_ms,
             multiplier=multiplier,
@@ -97,31 +194,7 @@ class Sessions:
         )
         arm = _Arm(self._plant)
         server = Server(configuration, arm, client=client, port=port, speed=self._speed)
-        session = _Session(server, arm, Bridge(signals, image))
-
-        def hear(event: Event) -> None:
-            text = words(event)
-            if text:
-                _log.info("FRI: %s", text)
-            if isinstance(event, OutputWritten):
-                session.bridge.write(event.value)
-            if isinstance(event, OverlayEnded) and event.is_error and session.order:
-                self._plant.abort(session.order, event.text)
-            if isinstance(event, StateChanged | QualityChanged):
-                controller = server.controller
-                meter = controller.meter
-                channel(
-                    int(controller.state),
-                    int(controller.quality),
-                    1e-9 * meter.latency_ns,
-                    1e-9 * meter.jitter_ns,
-                )
-
-        def veto(value: IoValue) -> str:
-            return session.bridge.veto(value, stopped=not _STOPS.isdisjoint(self._plant.safety.demands))
-
-        server.listener = hear
-        server.controller.exchange.veto = veto
+        session = _Session(self._plant, server, arm, IoImageSync(signals, image), channel)
         server.open()
         with self._lock:
             self._last += 1
@@ -137,16 +210,16 @@ class Sessions:
             session.farewell = _FAREWELL
 
     @property
-    def any(self) -> bool:
-        """Whether a session stands."""
+    def is_any_open(self) -> bool:
+        """Whether a session is open."""
         return bool(self._sessions)
 
     def tick(self) -> None:
-        """What comes before a tick of the plant."""
+        """Advance all sessions; called before each tick of the plant."""
         if not self._sessions:
             return
         for number, session in list(self._sessions.items()):
-            session.bridge.show(session.server.controller.exchange)
+            session.sync.update(session.server.controller.exchange)
             session.server.tick()
             if session.farewell > 0:
                 session.farewell -= 1
@@ -156,9 +229,9 @@ class Sessions:
                     del self._sessions[number]
 
     def overlaid(
-        self, number: int, command: int, order: int, mode: Mode | None, listener: Listener
-    ) -> Listener:
-        """The listener of a motion that a session's client overlays; it begins and ends the overlay with the motion.
+        self, number: int, command: int, order: int, mode: Mode | None, listener: MotionListener
+    ) -> MotionListener:
+        """The listener of a motion under a session's overlay; it starts and stops the overlay with the motion.
 
         Raises:
             CommandRejected: there is no such session.
@@ -166,12 +239,14 @@ class Sessions:
         with self._lock:
             session = self._sessions.get(number)
         if session is None:
-            raise CommandRejected(f"FRI session {number} is not open", parameter="session", value=number)
+            raise CommandRejected(
+                f"FRI session {number} is not open; open it first", parameter="session", value=number
+            )
         return _Overlaid(self._plant, session, CommandMode(command), order, mode or Position(), listener)
 
 
 class _Overlaid:
-    """Listens to a motion for a session, and passes on what it hears."""
+    """Starts and stops a session's overlay with its motion, and forwards the motion's events."""
 
     def __init__(
         self,
@@ -180,18 +255,18 @@ class _Overlaid:
         command: CommandMode,
         order: int,
         mode: Mode,
-        listener: Listener,
+        listener: MotionListener,
     ) -> None:
         self._plant, self._session, self._command = plant, session, command
         self._order, self._mode, self._listener = order, mode, listener
 
     def started(self) -> None:
-        """The motion has begun: wait for the client's commands."""
+        """The motion has begun: start the overlay."""
         self._listener.started()
         self._session.order = self._order
-        self._session.arm.takes(self._mode)
+        self._session.arm.set_mode(self._mode)
         try:
-            self._session.server.start(MotionOverlay(self._command, control_of(self._mode)))
+            self._session.server.start(MotionOverlay(self._command, control_mode(self._mode)))
         except HeptarmError as error:
             self._plant.abort(self._order, str(error))
 
@@ -200,5 +275,5 @@ class _Overlaid:
         if self._session.order == self._order:
             self._session.order = 0
             self._session.server.stop()
-            self._session.arm.takes(Position())
+            self._session.arm.set_mode(Position())
         self._listener.finished(cause, text)

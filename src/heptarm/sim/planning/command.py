@@ -1,4 +1,4 @@
-"""What the plant is asked to do: one motion with all its parameters, in SI, and who wants to hear of it."""
+"""The command of one motion to the plant, in SI units, and the receivers of its events."""
 
 from __future__ import annotations
 
@@ -7,29 +7,33 @@ from dataclasses import dataclass, field
 from math import nan
 from typing import Protocol
 
-from heptarm.values.guiding import HandGuide
-from heptarm.values.mode import Mode
-from heptarm.values.orientation import VARIABLE, Orientation
+from heptarm.sim.seam import TICK_NS, Condition, StraightLimits
+from heptarm.values.mode.mode import Mode
+from heptarm.values.motion.hand_guiding import HandGuide
+from heptarm.values.motion.orientation import VARIABLE, Orientation
+
+#: Length of one tick [s].
+TICK = TICK_NS / 1e9
 
 Seven = tuple[float, ...]
 _FULL: Seven = (1.0,) * 7
 
 
-class Listener(Protocol):
-    """Hears of an order; called by the thread that ticks the plant, must not block."""
+class MotionListener(Protocol):
+    """Receives the events of a command; called by the thread that ticks the plant, must not block."""
 
     def started(self) -> None:
         """The motion begins."""
 
     def finished(self, cause: str, text: str) -> None:
-        """The motion has ended: "done", "cancelled", "condition" (one broke it) or "error" with its text."""
+        """The motion has ended: "done", "cancelled", "condition" (a break condition) or "error" with its text."""
 
 
-class PartListener(Listener, Protocol):
-    """Hears of the parts of a batch or a spline, too."""
+class PartListener(MotionListener, Protocol):
+    """Also receives the parts of a batch or a spline."""
 
     def reached(self, part: int) -> None:
-        """A part begins, another than the first."""
+        """A part begins, other than the first."""
 
 
 class PlanError(ValueError):
@@ -45,17 +49,17 @@ class PlanError(ValueError):
 
 
 @dataclass(frozen=True, slots=True)
-class Watch:
-    """A condition that is watched while a motion runs.
+class ConditionWatch:
+    """A condition that is evaluated while a motion runs.
 
     Attributes:
-        condition: as heptarm.virtual.condition reads it.
+        condition: the condition.
         fired: called when it holds for the first time, by the thread that ticks the plant; must not block.
         breaks: it ends the motion.
-        part: of a batch or a spline which part it is watched in; -1: in all of them.
+        part: the part of a batch or a spline in which it is evaluated; -1: all of them.
     """
 
-    condition: tuple[float, ...]
+    condition: Condition
     fired: Callable[[], None]
     breaks: bool = False
     part: int = -1
@@ -63,7 +67,7 @@ class Watch:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """One motion. NaN stands for "the default".
+    """The command of one motion. NaN stands for "the default".
 
     Attributes:
         id: chosen by the caller, unique.
@@ -71,29 +75,29 @@ class Order:
             "spline" and "spline_joints"; "guide"; or a servo motion: "servo", "direct" or "straight". Of a spline only:
             "spl".
         joints: target of a ptp [rad]; None: `pose` is the target.
-        pose: target of the moved frame in the base: x y z [m], quaternion x y z w.
+        pose: target of the tool frame in the base: x y z [m], quaternion x y z w.
         via: of a circ: the auxiliary point, as `pose`.
-        orientation: how it is led along a Cartesian path.
+        orientation: orientation control along a Cartesian path.
         redundancy: E1 [rad] (NaN: keep), Status and Turn (-1: keep).
-        tcp: flange to moved frame, x y z [m], quaternion.
+        tcp: flange to tool frame, x y z [m], quaternion.
         offset: of a lin_rel: translation and rotation in the axes of the reference.
-        reference: axes of a lin_rel's offset as a quaternion in the base; None: the moved frame's own. Of a straight
+        reference: axes of a lin_rel's offset as a quaternion in the base; None: the tool frame's own. Of a straight
             servo motion: those of its limits; None: the base's.
         joint_velocity: fractions of each axis' maximum, as the next two.
         cart_velocity: [m/s]; then [m/s²], [m/s³]; orientation [rad/s], [rad/s²], [rad/s³].
-        blending: where it may turn into the next part of its batch: fraction of the path, distance from its end
-            [m], rotation from its end [rad]; zeros: nowhere.
-        parts: motions of a batch, segments of a spline; mode, tcp and listener of the whole count.
+        blending: where the transition to the next part of its batch may begin: fraction of the path, distance from
+            its end [m], rotation from its end [rad]; zeros: no blending.
+        parts: motions of a batch, segments of a spline; mode, tcp and listener are those of the whole.
         guide: limits of a hand guiding.
         duration: of a hold [s]; NaN: until cancelled.
         mode: control mode; None: position.
-        axes: of the mode's frame as a quaternion in the base; None: as the mode says, "tool" or "base".
-        minimum_time: no trajectory to a servo target is shorter [s].
-        goal_timeout: a servo motion ends so long after its target was reached and no other came [s].
-        speed_timeout: how long a servo target's velocity is kept after it was passed [s].
-        straight: of a straight servo motion: largest velocity x y z, about x y z, then acceleration; NaN: the usual.
-        listener: hears of start and end.
-        part_listener: hears of the parts of a batch or a spline.
+        axes: of the mode's frame as a quaternion in the base; None: as in the mode, "tool" or "base".
+        minimum_time: least duration of a trajectory to a servo target [s].
+        goal_timeout: a servo motion ends this long after it reached its target, without a new one [s].
+        speed_timeout: how long the velocity of a servo target is held after it was passed [s].
+        straight: limits of a straight servo motion; None: the defaults.
+        listener: receives start and end.
+        part_listener: receives the parts of a batch or a spline.
         watches: break conditions and triggers, of the parts as well.
     """
 
@@ -125,12 +129,12 @@ class Order:
     minimum_time: float = 0.02
     goal_timeout: float = 30.0
     speed_timeout: float = 0.1
-    straight: Seven | None = None
-    listener: Listener | None = field(default=None, compare=False)
+    straight: StraightLimits | None = None
+    listener: MotionListener | None = field(default=None, compare=False)
     part_listener: PartListener | None = field(default=None, compare=False)
-    watches: tuple[Watch, ...] = field(default=(), compare=False)
+    watches: tuple[ConditionWatch, ...] = field(default=(), compare=False)
 
     @property
     def is_servo(self) -> bool:
-        """Whether it follows targets that come while it runs."""
+        """Whether it follows targets that arrive while it runs."""
         return self.kind in ("servo", "direct", "straight")

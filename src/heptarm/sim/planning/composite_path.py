@@ -1,9 +1,9 @@
-"""Paths put together from pieces, and what bounds the speed along them."""
+"""Paths of several segments: their samples, and the limits along them."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from math import inf
 
@@ -11,32 +11,29 @@ import numpy as np
 
 from heptarm.errors import Unreachable
 from heptarm.model.kinematics import forward
+from heptarm.sim.planning.command import PlanError
+from heptarm.sim.planning.path import JointPath
+from heptarm.sim.planning.time_scaling import PathConstraints
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, quaternion
 from heptarm.values.robot import RobotModel
-from heptarm.virtual.order import PlanError
-from heptarm.virtual.path import JointPath
-from heptarm.virtual.profile import Rest, TimeLaw, brake
-from heptarm.virtual.timing import Course, Relay
 
-#: More than this between two samples is a jump to another branch [rad].
+#: A larger step between two samples is a jump to another branch of the inverse kinematics [rad].
 LARGEST_STEP = 0.35
 _STENCIL = 7
-#: Of its speed, where it does not matter any more.
-_BARELY = 1e-3
-#: How much more jerk that may take than it needs.
-_SOONER = 1.05
+#: Limit of a speed that the program does not bound.
+UNBOUND = 1e9
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
-    """What a program allows on a piece, beside its nominal speed.
+class SegmentLimits:
+    """What a program allows on a segment, beside its speed along the path.
 
     Attributes:
         joint_velocity: fractions of the axes' maxima, shape (7,).
         joint_acceleration: likewise.
         joint_jerk: likewise.
-        line: acceleration and jerk of the moved frame [m/s², m/s³]; infinite: only the joints count.
+        line: acceleration and jerk of the tool frame [m/s², m/s³]; infinite: only the joints are limited.
         turn: of its rotation [rad/s², rad/s³].
     """
 
@@ -46,9 +43,9 @@ class Bounds:
     line: tuple[float, float] = (inf, inf)
     turn: tuple[float, float] = (inf, inf)
 
-    def least(self, other: Bounds) -> Bounds:
+    def least(self, other: SegmentLimits) -> SegmentLimits:
         """The stricter of two, each by each."""
-        return Bounds(
+        return SegmentLimits(
             np.minimum(self.joint_velocity, other.joint_velocity),
             np.minimum(self.joint_acceleration, other.joint_acceleration),
             np.minimum(self.joint_jerk, other.joint_jerk),
@@ -58,38 +55,38 @@ class Bounds:
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
-    """Part of a chain.
+class Segment:
+    """Part of a composite path.
 
     Attributes:
         path: over its own parameter in [0, 1].
-        length: what the chain's parameter grows by on it.
-        bounds: what the program allows.
-        pace: largest speed of the chain's parameter, at samples that are evenly spaced.
+        length: growth of the composite path's parameter along it.
+        limits: what the program allows.
+        speed_limit: largest speed of the composite path's parameter, at evenly spaced samples.
         samples: how many to take.
     """
 
     path: JointPath
     length: float
-    bounds: Bounds
-    pace: tuple[float, ...] = (1.0, 1.0)
+    limits: SegmentLimits
+    speed_limit: tuple[float, ...] = (1.0, 1.0)
     samples: int = 61
 
 
-class Chain:
-    """Path over s in [0, 1] made of pieces.
+class CompositePath:
+    """Path over s in [0, 1] made of segments.
 
     Args:
-        pieces: one after the other; each begins where the one before it ends, in position, slope and curvature,
+        segments: one after the other; each begins where the one before it ends, in position, slope and curvature,
             unless the arm rests there.
 
     Attributes:
-        marks: s at which each piece begins, and 1.
+        marks: s at which each segment begins, and 1.
     """
 
-    def __init__(self, pieces: list[Piece]) -> None:
-        self.pieces = pieces
-        ends = np.cumsum([piece.length for piece in pieces])
+    def __init__(self, segments: list[Segment]) -> None:
+        self.segments = segments
+        ends = np.cumsum([segment.length for segment in segments])
         self.total = float(ends[-1])
         self.marks: list[float] = [0.0, *(ends / self.total).tolist()]
         self.marks[-1] = 1.0
@@ -100,106 +97,104 @@ class Chain:
         Raises:
             Unreachable: the path leaves the workspace.
         """
-        index = min(bisect_right(self.marks, s), len(self.pieces)) - 1
+        index = min(bisect_right(self.marks, s), len(self.segments)) - 1
         low, high = self.marks[index], self.marks[index + 1]
-        return self.pieces[index].path.at(min(1.0, (s - low) / (high - low)), near)
+        return self.segments[index].path.at(min(1.0, (s - low) / (high - low)), near)
 
 
-class Stretch:
-    """Part of a path."""
+class SubPath:
+    """The part of a path between two values of its parameter."""
 
-    __slots__ = ("_first", "_path", "_way")
+    __slots__ = ("_first", "_path", "_span")
 
     def __init__(self, path: JointPath, first: float, last: float) -> None:
-        self._path, self._first, self._way = path, first, last - first
+        self._path, self._first, self._span = path, first, last - first
 
     def at(self, s: float, near: Array) -> Array:
         """Joint positions next to `near`, shape (7,) [rad]."""
-        return self._path.at(self._first + s * self._way, near)
+        return self._path.at(self._first + s * self._span, near)
 
 
 @dataclass(frozen=True, slots=True)
-class Surveyed:
-    """Samples of a chain.
+class PathSamples:
+    """Samples of a composite path.
 
     Attributes:
-        q: of each piece, shapes (n, 7) [rad].
-        poses: of the moved frame, as positions (n, 3) [m] and quaternions (n, 4).
+        q: of each segment, shapes (n, 7) [rad].
+        positions: of the tool frame, shapes (n, 3) [m].
+        orientations: of the flange, quaternions, shapes (n, 4).
     """
 
     q: list[Array]
-    poses: list[tuple[Array, Array]]
+    positions: list[Array]
+    orientations: list[Array]
 
 
-def survey(robot: RobotModel, chain: Chain, start: Array, tcp: Pose) -> Surveyed:
-    """Go along a chain once.
+def sample(robot: RobotModel, path: CompositePath, start: Array, tcp: Pose) -> PathSamples:
+    """Follow a path once from joint positions of shape (7,) [rad].
 
     Raises:
-        PlanError: it leaves the workspace or the joints' limits, or would have to jump.
+        PlanError: it leaves the workspace, or passes a singularity.
     """
-    joints, poses, near = [], [], start
-    for index, piece in enumerate(chain.pieces):
-        seen = []
-        for k in range(piece.samples):
-            share = 100 * (chain.marks[index] + (chain.marks[index + 1] - chain.marks[index]) * k / piece.samples)
+    result, near = PathSamples([], [], []), start
+    for index, segment in enumerate(path.segments):
+        low, high = path.marks[index], path.marks[index + 1]
+        joints = []
+        for k in range(segment.samples):
+            fraction = k / (segment.samples - 1)
+            percent = 100 * (low + (high - low) * fraction)
             try:
-                q = piece.path.at(k / (piece.samples - 1), near)
+                q = segment.path.at(fraction, near)
             except Unreachable as error:
                 raise PlanError(
-                    "unreachable", f"Can not plan motion: the path is not reachable at {share:.0f} %: {error.text}"
+                    "unreachable",
+                    f"Can not plan motion: the path is not reachable at {percent:.0f} %: {error.text}",
                 ) from None
             step = np.abs(q - near)
             if step.max() > LARGEST_STEP:
                 raise PlanError(
                     "planning",
-                    f"Can not plan motion: A{int(step.argmax()) + 1} would have to jump at {share:.0f} % of the path "
+                    f"Can not plan motion: A{int(step.argmax()) + 1} would have to jump at {percent:.0f} % of the path "
                     "(singularity)",
                 )
             near = q
-            seen.append(q)
-        joints.append(np.array(seen))
-        frames = [forward(robot, q) for q in seen]
-        places = np.array([f[:3, :3] @ tcp.xyz + f[:3, 3] for f in frames])
-        poses.append((places, np.array([quaternion(f[:3, :3]) for f in frames])))
-    return Surveyed(joints, poses)
+            joints.append(q)
+        frames = np.array([forward(robot, q) for q in joints])
+        result.q.append(np.array(joints))
+        result.positions.append(frames[:, :3, :3] @ tcp.xyz + frames[:, :3, 3])
+        result.orientations.append(np.array([quaternion(frame[:3, :3]) for frame in frames]))
+    return result
 
 
-def course(robot: RobotModel, chain: Chain, seen: Surveyed, first: int, last: int) -> Course:
-    """What bounds the speed along the pieces first to last - 1 of a chain; where two meet there are two samples."""
+def constraints(
+    robot: RobotModel, path: CompositePath, samples: PathSamples, first: int, last: int
+) -> PathConstraints:
+    """What bounds the motion along the segments first to last - 1; where two meet there are two samples."""
     columns: list[list[Array]] = [[] for _ in range(8)]
+    none = [inf] * 4
     for index in range(first, last):
-        piece, low = chain.pieces[index], chain.marks[index]
-        n, span = piece.samples, chain.marks[index + 1] - chain.marks[index]
+        segment, low = path.segments[index], path.marks[index]
+        n, span = segment.samples, path.marks[index + 1] - path.marks[index]
         step = span / (n - 1)
-        places, quats = seen.poses[index]
-        values = np.column_stack([seen.q[index], places, _turned(quats)])
+        positions, turned = samples.positions[index], _turned(samples.orientations[index])
+        length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
+        values = np.column_stack([samples.q[index], positions, length, turned])
         slopes = [matrix @ values / step**k for k, matrix in enumerate(_derivatives(n), start=1)]
-        line, turn = piece.bounds.line, piece.bounds.turn
-        pace = np.interp(np.linspace(0, 1, n), np.linspace(0, 1, len(piece.pace)), piece.pace) / chain.total
+        line, turn, limits = segment.limits.line, segment.limits.turn, segment.limits
+        given = np.linspace(0, 1, len(segment.speed_limit))
+        fastest = np.interp(np.linspace(0, 1, n), given, segment.speed_limit) / path.total
         rows = (
-            np.concatenate([robot.dq_max * piece.bounds.joint_velocity, [inf] * 4]),
-            np.concatenate(
-                [robot.ddq_max * piece.bounds.joint_acceleration, [line[0]] * 3, [turn[0]]]
-            ),
-            np.concatenate([robot.dddq_max * piece.bounds.joint_jerk, [line[1]] * 3, [turn[1]]]),
+            np.concatenate([robot.dq_max * limits.joint_velocity, [inf], none]),
+            np.concatenate([robot.ddq_max * limits.joint_acceleration, [line[0]] * 4, [turn[0]]]),
+            np.concatenate([robot.dddq_max * limits.joint_jerk, [line[1]] * 4, [turn[1]]]),
         )
-        new = [low + step * np.arange(n), *slopes, pace, *(np.tile(row, (n, 1)) for row in rows)]
+        new = [low + step * np.arange(n), *slopes, fastest, *(np.tile(row, (n, 1)) for row in rows)]
         for column, part in zip(columns, new, strict=True):
             column.append(part)
     merged = [np.concatenate(column) for column in columns]
-    none = [inf] * 4
-    return Course(
-        merged[0],
-        merged[1],
-        merged[2],
-        merged[3],
-        merged[4],
-        merged[5],
-        merged[6],
-        merged[7],
-        np.concatenate([robot.ddq_max, none]),
-        np.concatenate([robot.dddq_max, none]),
-    )
+    merged.append(np.concatenate([robot.ddq_max, [inf], none]))
+    merged.append(np.concatenate([robot.dddq_max, [inf], none]))
+    return PathConstraints(*merged)
 
 
 @lru_cache(maxsize=64)
@@ -209,7 +204,7 @@ def _derivatives(count: int) -> tuple[Array, Array, Array]:
     for index in range(count):
         low = min(max(0, index - _STENCIL // 2), count - _STENCIL)
         powers = np.arange(low - index, low - index + _STENCIL)[None, :] ** np.arange(_STENCIL)[:, None]
-        weights = np.linalg.inv(powers.astype(float))  # row j: the share of each power in sample j
+        weights = np.linalg.inv(powers.astype(float))  # row j: the weight of each power in sample j
         for order, factor in ((1, 1.0), (2, 2.0), (3, 6.0)):
             result[order - 1, index, low : low + _STENCIL] = factor * weights[:, order]
     return result[0], result[1], result[2]
@@ -220,40 +215,3 @@ def _turned(quats: Array) -> Array:
     signs = np.where(np.einsum("ij,ij->i", quats[1:], quats[:-1]) < 0, -1.0, 1.0)
     chords = np.linalg.norm(quats[1:] * signs[:, None] - quats[:-1], axis=1)
     return np.concatenate([[0.0], np.cumsum(4 * np.arcsin(np.minimum(1.0, chords / 2)))])
-
-
-@dataclass(frozen=True, slots=True)
-class Halts:
-    """A path with places where the arm rests on its way.
-
-    Attributes:
-        marks: s of the rests, ascending; the last is 1.
-        courses: what bounds the speed from one rest to the next.
-        law: s over time at full speed.
-    """
-
-    marks: tuple[float, ...]
-    courses: tuple[Course, ...]
-    law: Relay
-
-    def brake(self, time: float, scale: float, rate: float) -> TimeLaw:
-        """How it comes to rest.
-
-        Args:
-            time: how far it has come on its law [s].
-            scale: share of the law's speed that it goes at.
-            rate: how fast that share changes [1/s].
-        """
-        s, speed, acceleration = self.law.at(time)
-        leg = self._leg(s)
-        state = (s, speed * scale, acceleration * scale * scale + speed * rate)
-        limits = self.courses[leg].brakes(s, state[1])
-        if state[1] > 0.0 > state[2]:  # it brakes already: end that early enough not to turn round
-            limits = replace(limits, jerk=max(limits.jerk, _SOONER * state[2] ** 2 / (2 * state[1])))
-        stop = brake(state, limits)
-        if stop.at(stop.duration)[0] <= self.marks[leg] or scale < _BARELY:
-            return stop
-        return Rest(self.law, time, self.law.rest(time), scale)  # it would rest sooner anyway
-
-    def _leg(self, s: float) -> int:
-        return min(bisect_right(self.marks, s), len(self.courses) - 1)

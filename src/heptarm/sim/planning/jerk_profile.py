@@ -12,69 +12,72 @@ from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class ProfileLimits:
     """Largest velocity, acceleration and jerk of s, all positive."""
 
     velocity: float
     acceleration: float
     jerk: float
 
-    def least(self, other: Limits) -> Limits:
+    def least(self, other: ProfileLimits) -> ProfileLimits:
         """The stricter of two, each by each."""
-        return Limits(
+        return ProfileLimits(
             min(self.velocity, other.velocity),
             min(self.acceleration, other.acceleration),
             min(self.jerk, other.jerk),
         )
 
+    def slower(self, factor: float) -> ProfileLimits:
+        """The limits of the same motion in a time longer by a factor."""
+        return ProfileLimits(self.velocity / factor, self.acceleration / factor**2, self.jerk / factor**3)
+
 
 class TimeLaw(Protocol):
-    """s over time; the attribute duration is when it has come to its end [s]."""
+    """s over time; the attribute duration is the time until it rests at its end [s]."""
 
     duration: float
 
     def at(self, time: float) -> tuple[float, float, float]:
-        """s, ds/dt, d²s/dt² at a time [s]; beyond the end it keeps its last values."""
+        """s, ds/dt, d²s/dt² at a time [s]; constant after the end."""
 
 
-class Rest:
-    """What is left of a law up to a time [s], gone through at a share of its speed."""
+class ScaledProfile:
+    """The remainder of a profile between two times [s], at a fraction of its speed."""
 
-    __slots__ = ("_begin", "_law", "_scale", "duration")
+    __slots__ = ("_begin", "_profile", "_scale", "duration")
 
-    def __init__(self, law: TimeLaw, begin: float, end: float, scale: float) -> None:
-        self._law, self._begin, self._scale = law, begin, scale
+    def __init__(self, profile: TimeLaw, begin: float, end: float, scale: float) -> None:
+        self._profile, self._begin, self._scale = profile, begin, scale
         self.duration = (end - begin) / scale
 
     def at(self, time: float) -> tuple[float, float, float]:
         """s, ds/dt, d²s/dt² at a time [s]."""
-        place, speed, acceleration = self._law.at(self._begin + min(time, self.duration) * self._scale)
+        place, speed, acceleration = self._profile.at(self._begin + min(time, self.duration) * self._scale)
         return place, speed * self._scale, acceleration * self._scale**2
 
 
 #: Where two kinds of profile meet exactly, as for 0.2 rad at 10 rad/s² and 100 rad/s³, Ruckig may find
-#: neither; with a little less acceleration it is not on the edge any more.
-_SHARES = (1.0, 0.9999, 0.999, 0.99)
+#: neither; with a little less acceleration the case is not on the edge any more.
+_FRACTIONS = (1.0, 0.9999, 0.999, 0.99)
 
-
-#: Numbers of a path of next to no length are huge; beyond this jerk Ruckig is asked in another unit of s.
+#: The limits of s of a very short path are huge; above this jerk Ruckig computes in another unit of s.
 _COARSE = 1e6
 
 
-def _unit(limits: Limits) -> float:
+def _unit(limits: ProfileLimits) -> float:
     return 1.0 if limits.jerk <= _COARSE else limits.jerk / _COARSE
 
 
-class Profile:
-    """s over time; the parameters are in a unit of s."""
+class JerkProfile:
+    """A jerk-limited profile of s; the parameters are in a unit of s."""
 
     __slots__ = ("_trajectory", "_unit", "duration")
 
     def __init__(self, parameters: InputParameter, unit: float) -> None:
         self._unit = unit
         acceleration = parameters.max_acceleration[0]
-        for share in _SHARES:
-            parameters.max_acceleration = [acceleration * share]
+        for fraction in _FRACTIONS:
+            parameters.max_acceleration = [acceleration * fraction]
             trajectory = Trajectory(1)
             try:
                 result = Ruckig(1).calculate(parameters, trajectory)
@@ -84,16 +87,16 @@ class Profile:
                 self._trajectory = trajectory
                 self.duration = float(trajectory.duration)
                 return
-        raise ValueError("no profile for these limits")
+        raise ValueError("no jerk-limited profile exists for these limits")
 
     def at(self, time: float) -> tuple[float, float, float]:
-        """s, ds/dt, d²s/dt² at a time [s]; beyond the end it keeps its last values."""
+        """s, ds/dt, d²s/dt² at a time [s]; constant after the end."""
         position, velocity, acceleration = self._trajectory.at_time(min(time, self.duration))
         unit = self._unit
         return position[0] * unit, velocity[0] * unit, acceleration[0] * unit
 
 
-def _parameters(state: tuple[float, float, float], limits: Limits) -> InputParameter:
+def _parameters(state: tuple[float, float, float], limits: ProfileLimits) -> InputParameter:
     unit = _unit(limits)
     parameters = InputParameter(1)
     parameters.current_position = [state[0] / unit]
@@ -105,24 +108,19 @@ def _parameters(state: tuple[float, float, float], limits: Limits) -> InputParam
     return parameters
 
 
-def travel(limits: Limits) -> Profile:
-    """From rest at 0 to rest at 1."""
-    return change((0.0, 0.0, 0.0), 1.0, limits)
-
-
-def change(state: tuple[float, float, float], goal: float, limits: Limits) -> Profile:
+def change(state: tuple[float, float, float], goal: float, limits: ProfileLimits) -> JerkProfile:
     """From a state (value, rate, its rate) to rest at a goal."""
     parameters = _parameters(state, limits)
     parameters.target_position = [goal / _unit(limits)]
     parameters.target_velocity = [0.0]
     parameters.target_acceleration = [0.0]
-    return Profile(parameters, _unit(limits))
+    return JerkProfile(parameters, _unit(limits))
 
 
-def brake(state: tuple[float, float, float], limits: Limits) -> Profile:
+def brake(state: tuple[float, float, float], limits: ProfileLimits) -> JerkProfile:
     """From a state (s, velocity, acceleration) to rest, wherever on the path that is."""
     parameters = _parameters(state, limits)
     parameters.control_interface = ControlInterface.Velocity
     parameters.target_velocity = [0.0]
     parameters.target_acceleration = [0.0]
-    return Profile(parameters, _unit(limits))
+    return JerkProfile(parameters, _unit(limits))

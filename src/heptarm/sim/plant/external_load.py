@@ -1,4 +1,4 @@
-"""What acts on the arm from outside: pushes, contacts, a viewer's mouse; and the wrench at the flange."""
+"""External load of the arm: pushes, contacts, a viewer's mouse; and the wrench at the flange."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from heptarm.values.arrays import Array
 _DAMPED = 1e-6 * np.eye(6)
 
 
-class Load:
+class ExternalLoad:
     """External load of a simulated arm.
 
     Args:
@@ -23,7 +23,7 @@ class Load:
     Attributes:
         torque: external load acting on the joints, shape (7,) [Nm].
         wrench: force and torque acting on the flange, base axes, shape (6,) [N, Nm].
-        is_misjudged: whether the controller's model of what hangs on the flange is wrong.
+        is_misjudged: whether the controller's load data differ from the true payload.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
@@ -44,7 +44,7 @@ class Load:
         self._push, self._until = wrench, until
 
     def apply(self, time: float) -> None:
-        """Before the dynamics of a tick: turn a push into joint torques."""
+        """Before the dynamics of a tick: convert a push to joint torques."""
         if self._push is None:
             return
         if time >= self._until or not self._push.any():
@@ -58,9 +58,9 @@ class Load:
         """After the dynamics of a tick: torques and wrench; zero without any load.
 
         Args:
-            inertial: M q̈ + h - τ, what the model cannot explain, shape (7,) [Nm].
+            inertial: M q̈ + h - τ, the residual of the controller's model, shape (7,) [Nm].
         """
-        # pulls at bodies and unknown loads are in no vector of MuJoCo's, but in what the model cannot explain
+        # forces on bodies and unknown payloads appear in no vector of MuJoCo, only in the residual
         explained = not self.is_misjudged and not self._pulled.any()
         self.torque = self._applied + self._constraint if explained else inertial
         if not self.torque.any():

@@ -1,4 +1,4 @@
-"""The virtual cabinet's IO image: its inputs and outputs by name, their values in memory that Java shares."""
+"""The virtual cabinet's IO image: inputs and outputs by name, their values in memory shared with Java."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import threading
 from heptarm.values.arrays import Array
 
 
-class Signals:
+class IoImage:
     """Inputs and outputs of the simulated cabinet.
 
-    On a robot the project says which there are; here each is made at its first use.
+    On a robot the project defines them; here each is created at its first use.
 
     Args:
-        values: of the signals by place, shape (n,).
+        values: of the signals by index, shape (n,).
     """
 
     def __init__(self, values: Array) -> None:
@@ -23,24 +23,24 @@ class Signals:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of all that are known, "Group.Name"."""
+        """Names of all signals, "Group.Name"."""
         return tuple(name for name, _ in self._places)
 
     def place(self, name: str, *, is_output: bool) -> int:
-        """Place of a signal; made if there is none.
+        """Index of a signal; created if there is none.
 
         Raises:
-            ValueError: there is no room for more.
+            ValueError: the image is full.
         """
         with self._lock:
             place = self._places.setdefault((name, is_output), len(self._places))
             if place >= len(self._values):
                 del self._places[name, is_output]
-                raise ValueError(f"the IO image has room for {len(self._values)} signals")
+                raise ValueError(f"the IO image is full: at most {len(self._values)} signals")
             return place
 
     def find(self, name: str) -> int:
-        """Place of a signal by its name, or the part behind the point where that is unique; case does not matter.
+        """Index of a signal by its name, or by the part after the point where that is unique; ignores case.
 
         Raises:
             ValueError: there is none, or more than one.
@@ -52,7 +52,9 @@ class Signals:
         ]
         exact = [place for (known, _), place in self._places.items() if known == name]
         if len(exact or found) != 1:
-            raise ValueError(f"no signal {name!r}, or several; there are {', '.join(self.names) or 'none'}")
+            raise ValueError(
+                f"signal {name!r} is unknown or ambiguous; signals are: {', '.join(self.names) or 'none'}"
+            )
         return (exact or found)[0]
 
     def get(self, name: str) -> float:
@@ -60,5 +62,5 @@ class Signals:
         return float(self._values[self.find(name)])
 
     def set(self, name: str, value: float) -> None:
-        """Give a signal a value; 0 and 1 of a boolean. Raises as `find` does."""
+        """Set the value of a signal; 0 or 1 of a boolean. Raises as `find` does."""
         self._values[self.find(name)] = value

@@ -1,9 +1,9 @@
-"""What hangs on the flange, and what the controller believes to hang there.
+"""The true payload on the flange, and the load data of the controller.
 
-Where both agree, nobody notices more than other torques. Where they do not, the controller works with a model that is
-wrong by the difference: it takes the weight that it does not know for an external force, as a robot does.
+Where both agree, only the torques change. Where they differ, the controller's model is wrong by the difference: it
+takes the unknown weight for an external force, as a robot does.
 
-What hangs there is what was declared, unless the world says otherwise.
+The true payload is the declared one, unless it was set separately.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ import numpy as np
 
 from heptarm.errors import HeptarmError
 from heptarm.values.arrays import Array
-from heptarm.values.links import Body, symmetric
+from heptarm.values.robot import Body, symmetric
 
 #: No load at all.
 NOTHING = Body(0.0, np.zeros(3))
 
 
-def hanging(text: str) -> Body:
-    """A load as a command line says it: mass [kg], perhaps centre of mass in the flange frame [m], with commas.
+def parse_payload(text: str) -> Body:
+    """A payload from "MASS" or "MASS,X,Y,Z": mass [kg] and centre of mass in the flange frame [m].
 
     Raises:
-        ValueError: it is none; the text says why.
+        ValueError: the text describes no payload.
     """
     try:
         mass, *com = (float(part) for part in text.split(","))
         return Body(mass, np.array(com or (0.0, 0.0, 0.0)))
     except (ValueError, HeptarmError) as error:
-        raise ValueError(f"payload {text!r}: {error}; MASS or MASS,X,Y,Z is wanted") from None
+        raise ValueError(f"payload must be MASS or MASS,X,Y,Z in kg and m, got {text!r}: {error}") from None
 
 
-class _Link:
+class _LastLink:
     """The last link of a model, to which loads are added."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
@@ -48,7 +48,7 @@ class _Link:
         self._inertia = axes @ np.diag(model.body_inertia[self._body]) @ axes.T
 
     def carry(self, model: mujoco.MjModel, load: Body) -> None:
-        """Give the link a load instead of the one it had."""
+        """Replace the load on the link."""
         com = self._at + self._turn @ load.com
         mass = self._mass + load.mass
         centre = (self._mass * self._com + load.mass * com) / mass
@@ -63,11 +63,11 @@ class _Link:
         model.body_ipos[self._body] = centre
         model.body_inertia[self._body] = moments
         model.body_iquat[self._body] = quat
-        mujoco.mj_setConst(model, mujoco.MjData(model))  # of scratch data: it sets their posture
+        mujoco.mj_setConst(model, mujoco.MjData(model))  # with scratch data: it changes their posture
 
 
-class Payload:
-    """Load of the simulated arm; to be used by the thread that ticks the plant.
+class PayloadModel:
+    """Payload of the simulated arm; used by the thread that ticks the plant.
 
     Args:
         model: MuJoCo's model of the world; its first seven joints are the arm's.
@@ -75,16 +75,16 @@ class Payload:
         mass: inertia matrix of the world, shape (nv, nv), which the plant keeps up to date [kg m²].
 
     Attributes:
-        mass: inertia matrix as the controller believes, shape (7, 7) [kg m²].
-        bias: Coriolis, centrifugal and gravity torques as it believes, shape (7,) [Nm].
-        differs: whether the controller is wrong.
+        mass: inertia matrix of the controller's model, shape (7, 7) [kg m²].
+        bias: Coriolis, centrifugal and gravity torques of that model, shape (7,) [Nm].
+        differs: whether the controller's load data differ from the true payload.
     """
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, mass: Array) -> None:
         self._model, self._data, self._world_mass = model, data, mass
-        self._link = _Link(model)
+        self._link = _LastLink(model)
         self._believed = copy(model)
-        # only the arm itself counts
+        # the controller's model has no contacts
         self._believed.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self._scratch: mujoco.MjData | None = None
         self._full = np.zeros_like(mass)
@@ -97,12 +97,12 @@ class Payload:
         self.mass, self.bias = self._world_mass[:7, :7], self._data.qfrc_bias[:7]
 
     def declare(self, load: Body) -> None:
-        """Tell the controller what hangs on the flange."""
+        """Set the load data of the controller."""
         self._declared = load
         self._settle()
 
-    def hang(self, load: Body | None) -> None:
-        """Hang something on the flange, whatever the controller believes; None: what was declared."""
+    def set_true(self, load: Body | None) -> None:
+        """Set the true payload independently of the load data; None: the declared one."""
         self._pinned = load
         self._settle()
 
@@ -121,7 +121,7 @@ class Payload:
         self.mass, self.bias = self._full[:7, :7], self._scratch.qfrc_bias[:7]
 
     def believe(self) -> None:
-        """Compute the controller's model for the present posture; needed in each tick in which it differs."""
+        """Update the controller's model for the present posture; needed in each tick in which it differs."""
         model, data = self._believed, self._scratch
         assert data is not None
         data.qpos[:] = self._data.qpos

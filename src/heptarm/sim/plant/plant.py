@@ -1,48 +1,74 @@
-"""The plant: a simulated LBR with its motion controller, one millisecond a tick.
-
-The interpolator gives the set-points, a control law the torques, and MuJoCo steps the dynamics. The plant needs
-neither JVM nor clock: whoever calls `tick` owns its time.
-"""
+"""The plant: a simulated LBR with its motion controller, advanced by one millisecond per tick."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import inf, nan
+from math import atan2, cos, inf, nan, sin, sqrt
 
 import mujoco
 import numpy as np
 
+from heptarm.model import inverse_kinematics
 from heptarm.model.kinematics import flange
+from heptarm.sim.control.controller import ActiveLaw
+from heptarm.sim.control.laws import MeasuredState, PositionLaw, Superposition
+from heptarm.sim.controller.interpolator import Interpolator
+from heptarm.sim.controller.safety import SafetyController, StopRequest
+from heptarm.sim.planning.command import TICK, Order
+from heptarm.sim.plant.external_load import ExternalLoad
+from heptarm.sim.plant.io_image import IoImage
+from heptarm.sim.plant.payload import PayloadModel
+from heptarm.sim.plant.shared_state import SharedState
+from heptarm.sim.plant.world import Box, compiled
+from heptarm.sim.seam import SLOTS, TICK_NS, HeaderWords, SafetyFlags, StateWords
 from heptarm.values.arrays import Array
-from heptarm.values.links import Body
-from heptarm.values.mode import Mode as ControlMode
-from heptarm.values.robot import RobotModel, robot
-from heptarm.virtual import ring
-from heptarm.virtual.control import Control
-from heptarm.virtual.fri.overlay import Superposition
-from heptarm.virtual.interpolator import Interpolator
-from heptarm.virtual.law import PositionLaw, Sensed
-from heptarm.virtual.load import Load
-from heptarm.virtual.order import Order
-from heptarm.virtual.payload import Payload
-from heptarm.virtual.posture import posture
-from heptarm.virtual.safety import Demand, Safety
-from heptarm.virtual.signals import Signals
-from heptarm.virtual.tick import TICK, TICK_NS
-from heptarm.virtual.world import Box, compiled
+from heptarm.values.mode.mode import Mode as ControlMode
+from heptarm.values.robot import Body, RobotModel, robot
 
-#: After a stop on the path the brakes close when no axis is faster than this [rad/s], or after so many ticks.
+#: Closer to the straight arm than this [rad] the elbow does not determine the arm angle well.
+_STRAIGHT = 1e-2
+_ON_AXIS = 1e-10
+
+
+def posture(robot: RobotModel, q: Sequence[float]) -> tuple[float, int]:
+    """E1 [rad] and Status of joint positions [rad]."""
+    q4 = q[3]
+    s2, c2, s4, c4 = sin(q[1]), cos(q[1]), sin(q4), cos(q4)
+    d_se, d_ew = robot.d_se, robot.d_ew
+    # shoulder to wrist: first in the frame of A2, then in the frame of A1
+    x, y, z = -d_ew * s4 * cos(q[2]), -d_ew * s4 * sin(q[2]), d_se + d_ew * c4
+    x, z = c2 * x + s2 * z, c2 * z - s2 * x
+    behind = x < -_ON_AXIS
+    status = behind | (q4 < 0) << 1 | (q[5] <= 0) << 2
+    if abs(s4) < _STRAIGHT:
+        return inverse_kinematics.arm_angle(robot, q, behind), status
+    # elbow of the reference arm (A3 = 0): in the plane of z and w, on the side given by the sign of A4
+    radius = sqrt(x * x + y * y)
+    if radius < _ON_AXIS:
+        return inverse_kinematics.arm_angle(robot, q, behind), status
+    side = -radius if behind else radius
+    a2 = atan2(side, z) - atan2(-d_ew * s4, d_se + d_ew * c4)
+    sa, ca = sin(a2), cos(a2)
+    ux, uy = (x / side) * sa, (y / side) * sa
+    # across = w . (reference x elbow) / |w|, along = components across w; the elbow is (s2, 0, c2)
+    length = sqrt(x * x + y * y + z * z)
+    across = (x * uy * c2 + y * (ca * s2 - ux * c2) - z * uy * s2) / length
+    with_w = (x * ux + y * uy + z * ca) * (x * s2 + z * c2) / (length * length)
+    return atan2(across, ux * s2 + ca * c2 - with_w), status
+
+
+#: After a stop on the path the brakes close when no axis is faster than this [rad/s], or after this many ticks.
 BRAKE_SPEED = 0.02
 BRAKE_TICKS = 400
 
-_DEMANDS = {
-    Demand.EMERGENCY_STOP: ring.EMERGENCY_STOP,
-    Demand.EXTERNAL_EMERGENCY_STOP: ring.EXTERNAL_STOP,
-    Demand.OPERATOR_SAFETY: ring.SAFEGUARD_OPEN,
-    Demand.PROTECTIVE_STOP: ring.PROTECTIVE_STOP,
-    Demand.DRIVE_ERROR: ring.DRIVE_ERROR,
+_REQUEST_FLAGS = {
+    StopRequest.EMERGENCY_STOP: SafetyFlags.EMERGENCY_STOP,
+    StopRequest.EXTERNAL_EMERGENCY_STOP: SafetyFlags.EXTERNAL_STOP,
+    StopRequest.OPERATOR_SAFETY: SafetyFlags.SAFEGUARD_OPEN,
+    StopRequest.PROTECTIVE_STOP: SafetyFlags.PROTECTIVE_STOP,
+    StopRequest.DRIVE_ERROR: SafetyFlags.DRIVE_ERROR,
 }
 
 HOME = (0.0, 0.0, 0.0, -np.pi / 2, 0.0, np.pi / 2, 0.0)
@@ -61,8 +87,8 @@ class Snapshot:
         tau_ext: external load acting on the joints [Nm].
         tau_cmd: commanded torques [Nm].
         wrench: external force and torque acting on the flange, base axes, shape (6,) [N, Nm].
-        order: id of the running order, 0 if none.
-        progress: of the running order, 0 to 1.
+        order: id of the running command, 0 if none.
+        progress: of the running command, 0 to 1.
     """
 
     time: float
@@ -77,13 +103,25 @@ class Snapshot:
     progress: float
 
 
+class _Inputs:
+    """What the controller reads from the shared state; see `ControllerInputs`."""
+
+    def __init__(self, ring: SharedState) -> None:
+        self._header, self.signals, self.target = ring.reals, ring.signals, ring.target
+
+    @property
+    def override(self) -> float:
+        """Factor on every programmed speed, 0 to 1."""
+        return float(self._header[HeaderWords.OVERRIDE])
+
+
 class Plant:
     """A simulated robot.
 
     Args:
         model: "iiwa7" or "iiwa14".
         q: joint positions at the start, shape (7,) [rad].
-        boxes: what stands around it.
+        boxes: fixed boxes around it.
     """
 
     def __init__(
@@ -94,32 +132,30 @@ class Plant:
         self.data = mujoco.MjData(self.model)
         self.data.qpos[:7] = q
         mujoco.mj_forward(self.model, self.data)
-        self.ring = ring.Ring()
+        self.ring = SharedState()
         self.tick_count = 0
         self.on_wake: Callable[[int], None] | None = None
         self._views()
-        self._load = Load(self.model, self.data)
-        self._payload = Payload(self.model, self.data, self._mass)
+        self._load = ExternalLoad(self.model, self.data)
+        self._payload = PayloadModel(self.model, self.data, self._mass)
         self._payloads: deque[tuple[Callable[[Body], None], Body]] = (
             deque()
-        )  # to be told or hung in the next tick
-        self._control = Control(self.robot, self.model, self.data)
-        self.signals = Signals(self.ring.signals)
-        self._sensed = Sensed(
+        )  # to take effect in the next tick
+        self._control = ActiveLaw(self.robot, self.model, self.data)
+        self.signals = IoImage(self.ring.signals)
+        self._sensed = MeasuredState(
             self._q, self._dq, self._mass[:7, :7], self._bias, self._passive, self._q, self._q, self._q
         )
-        self.safety = Safety()
-        self.on_safety: Callable[[int, int], None] | None = (
-            None  # called with flags and mode that have changed
-        )
+        self.safety = SafetyController()
+        self.on_safety: Callable[[int, int], None] | None = None  # called with changed flags and mode
         self._flags = 0
         self._brakes: PositionLaw | None = None  # closed
         self._braked = self._sensed
         self._halted = 0  # ticks for which a stop on the path has been in force
         self.interpolator = Interpolator(
-            self.robot, self.ring, self._sensed, self._load, self._control, self.safety
+            self.robot, _Inputs(self.ring), self._sensed, self._load, self._control, self.safety
         )
-        self.lookout = self.interpolator.lookout
+        self.condition_monitor = self.interpolator.condition_monitor
         self._write(0, 0.0, nan)
 
     def _views(self) -> None:
@@ -134,8 +170,6 @@ class Plant:
         self._tau = np.zeros(7)
         self._tau_cmd = np.zeros(7)
 
-    # ------------------------------------------------------------------------------ orders, from any thread
-
     @property
     def time_ns(self) -> int:
         """Plant time [ns]."""
@@ -143,23 +177,23 @@ class Plant:
 
     @property
     def override(self) -> float:
-        """Factor on every programmed speed, 0 to 1; Java writes it straight into the ring."""
-        return float(self.ring.reals[ring.OVERRIDE])
+        """Factor on every programmed speed, 0 to 1; Java writes it directly into the shared state."""
+        return float(self.ring.reals[HeaderWords.OVERRIDE])
 
     @override.setter
     def override(self, value: float) -> None:
-        self.ring.reals[ring.OVERRIDE] = value
+        self.ring.reals[HeaderWords.OVERRIDE] = value
 
     @property
     def idle(self) -> bool:
-        """No order is running or waiting."""
+        """Whether no command is running or waiting."""
         return self.interpolator.queue.idle
 
     def submit(self, order: Order) -> None:
-        """Plan an order from the end of what is queued and append it.
+        """Plan a command from the end of the queue and append it.
 
-        While the arm brakes, the place it will come to rest at is not known; then the order is planned when
-        its turn comes, and a planning error reaches its listener.
+        While the arm brakes, its final position is not known; then the command is planned when its turn comes, and
+        its listener receives a planning error.
 
         Raises:
             PlanError: it cannot be planned; nothing has changed.
@@ -167,33 +201,33 @@ class Plant:
         self.interpolator.queue.submit(order)
 
     def cancel(self, order_id: int | None = None) -> None:
-        """Cancel an order (None: all): the running one brakes on its path, waiting ones are dropped."""
+        """Cancel a command (None: all): the running one brakes on its path, waiting ones are dropped."""
         self.interpolator.queue.cancel(order_id, fast=False)
 
     def stop(self) -> None:
-        """Cancel everything."""
+        """Cancel all commands."""
         self.cancel(None)
 
     def stop_fast(self) -> None:
-        """Cancel everything; what runs leaves its path, since every axis brakes as hard as it may."""
+        """Cancel all commands; every axis brakes with its full deceleration, so the arm leaves the path."""
         self.interpolator.queue.cancel(None, fast=True)
 
     def pause(self) -> None:
-        """Come to rest on the path, keeping all orders."""
+        """Come to rest on the path, keeping all commands."""
         self.interpolator.is_paused = True
 
     def resume(self) -> None:
-        """Go on after a pause, or after a stop that nobody demands any more."""
+        """Continue after a pause, or after a stop that is not requested any more."""
         self.interpolator.is_paused = False
         self.safety.resume()
 
     def acknowledge(self) -> None:
-        """Acknowledge errors whose cause has gone."""
-        self.safety.withdraw(Demand.DRIVE_ERROR)
+        """Acknowledge errors whose cause is gone."""
+        self.safety.withdraw(StopRequest.DRIVE_ERROR)
 
     def trip(self, text: str) -> None:
-        """An error of the drives: what runs fails, every axis brakes by itself, and the drives stay off."""
-        self.safety.demand(Demand.DRIVE_ERROR)
+        """Drive error: the running command fails, every axis brakes by itself, and the drives stay off."""
+        self.safety.request_stop(StopRequest.DRIVE_ERROR)
         self.abort(0, text)
 
     def apply_wrench(
@@ -207,13 +241,13 @@ class Plant:
         wrench = np.concatenate([np.asarray(force, dtype=np.float64), np.asarray(torque, dtype=np.float64)])
         self._load.push(wrench, self.tick_count * TICK + duration)
 
-    def carries(self, load: Body) -> None:
-        """Tell the controller what hangs on the flange; it does hang there unless `hang` says otherwise."""
+    def set_load_data(self, load: Body) -> None:
+        """Declare the load data of the controller; also the true payload, unless `set_payload` sets another one."""
         self._payloads.append((self._payload.declare, load))
 
-    def hang(self, load: Body) -> None:
-        """Hang something on the flange without telling the controller; declarations change nothing there any more."""
-        self._payloads.append((self._payload.hang, load))
+    def set_payload(self, load: Body) -> None:
+        """Set the true payload on the flange; declared load data do not change it any more."""
+        self._payloads.append((self._payload.set_true, load))
 
     def _take_loads(self) -> None:
         payload, sensed = self._payload, self._sensed
@@ -223,25 +257,21 @@ class Plant:
         sensed.mass, sensed.bias, self._load.is_misjudged = payload.mass, payload.bias, payload.differs
 
     def change_mode(self, order_id: int, mode: ControlMode) -> None:
-        """Change the parameters of a running order's control mode; of another order or kind it does nothing."""
+        """Change the parameters of the running command's control mode; does nothing for another command or mode."""
         self.interpolator.change_mode(order_id, mode)
 
     def abort(self, order_id: int, text: str) -> None:
-        """End a running order (0: whichever runs) by an error; every axis brakes by itself."""
+        """End a running command (0: whichever runs) by an error; every axis brakes by itself."""
         self.interpolator.abort(order_id, text)
-
-    # ------------------------------------------------------------------------------ overlays, from the tick's thread
 
     @property
     def interpolated(self) -> Array:
-        """Set-point of the next tick without an overlay, shape (7,) [rad]: where a held arm was when the hold began."""
+        """Set-point of the next tick without an overlay, shape (7,) [rad]; of a hold: its start."""
         return self.interpolator.interpolated
 
     def overlay(self, action: Superposition | None) -> None:
-        """Lay an action on the running hold in the next tick; None after one: brake, and end the hold."""
+        """Overlay the running hold in the next tick; None after an overlay: brake, and end the hold."""
         self.interpolator.action = action
-
-    # ------------------------------------------------------------------------------ the tick
 
     def step(self, ticks: int = 1) -> None:
         """Run a number of ticks."""
@@ -249,7 +279,7 @@ class Plant:
             self.tick()
 
     def tick(self) -> None:
-        """One millisecond: set-point, control law, dynamics, state."""
+        """Advance by one millisecond: set-point, control law, dynamics, state."""
         m, d, interpolator = self.model, self.data, self.interpolator
         if self._payloads:
             self._take_loads()
@@ -270,7 +300,7 @@ class Plant:
         self._ctrl[:] = torque
         mujoco.mj_step2(m, d)
         self._tau_cmd = torque if self._brakes is None else np.zeros(7)
-        # the sensors sit behind the gear: rotor inertia and gear friction are not in them
+        # the torque sensors are on the link side of the gear: they do not measure rotor inertia and gear friction
         self._tau = torque - self._armature * self._acc + self._passive
         self._load.measure(sensed.mass @ self._acc + sensed.bias - self._passive - torque)
         self.tick_count += 1
@@ -283,7 +313,7 @@ class Plant:
         return self.interpolator.advance()
 
     def _brake_or_open(self) -> None:
-        """Close the brakes when a stop has brought the arm to rest; open them when execution may go on."""
+        """Close the brakes when a stop has brought the arm to rest; open them when execution may continue."""
         if not self.safety.latched:
             self._brakes, self._halted = None, 0
             return
@@ -293,43 +323,39 @@ class Plant:
         if self._halted > BRAKE_TICKS or float(np.abs(self._dq).max()) < BRAKE_SPEED:
             here = self._q.copy()
             self._braked = replace(self._sensed, before=here, now=here, after=here, is_overlaid=False)
-            self._brakes = PositionLaw.that_goes_on(self._tau_cmd, self._braked)
-
-    # ------------------------------------------------------------------------------ state
+            self._brakes = PositionLaw.continuing(self._tau_cmd, self._braked)
 
     def _write(self, order: int, progress: float, remaining: float) -> None:
         k, r = self.tick_count, self.ring
-        slot = k % ring.SLOTS
+        slot = k % SLOTS
         words, reals = r.ints[slot], r.floats[slot]
-        words[ring.SEQ] = 2 * k + 1
-        words[ring.TIME] = k * TICK_NS
+        words[StateWords.SEQ] = 2 * k + 1
+        words[StateWords.TIME] = k * TICK_NS
         q = self._q
-        reals[2:9] = q
-        reals[9:16] = self.interpolator.command.after
-        reals[16:23] = self._dq
-        reals[23:30] = self._tau
-        reals[30:37] = self._load.torque
-        reals[37:44] = self._tau_cmd
+        reals[StateWords.Q] = q
+        reals[StateWords.Q_CMD] = self.interpolator.command.after
+        reals[StateWords.DQ] = self._dq
+        reals[StateWords.TAU] = self._tau
+        reals[StateWords.TAU_EXT] = self._load.torque
+        reals[StateWords.TAU_CMD] = self._tau_cmd
         values = q.tolist()
         (x, y, z), p = flange(self.robot, values)
-        reals[44:47] = p
-        reals[47:51] = _quaternion(x, y, z)
-        reals[51:57] = self._load.wrench
+        reals[StateWords.POSE] = (*p, *_quaternion(x, y, z))
+        reals[StateWords.WRENCH] = self._load.wrench
         flags = self._safety_flags()
-        words[ring.FLAGS] = flags | ring.MOVING if order else flags
-        words[ring.MODE] = self.safety.mode
-        words[ring.ORDER] = order
-        reals[ring.PROGRESS] = progress
-        reals[ring.REMAINING] = remaining
-        reals[ring.E1], status = posture(self.robot, values)
-        turn = sum((v < 0) << i for i, v in enumerate(values))
-        words[ring.REDUNDANCY] = status | turn << 8
-        words[ring.SEQ] = 2 * k + 2
-        r.header[ring.NEWEST] = k
+        words[StateWords.FLAGS] = flags | SafetyFlags.MOVING if order else flags
+        words[StateWords.MODE] = self.safety.mode
+        words[StateWords.ORDER] = order
+        reals[StateWords.PROGRESS] = progress
+        reals[StateWords.REMAINING] = remaining
+        reals[StateWords.E1], words[StateWords.STATUS] = posture(self.robot, values)
+        words[StateWords.TURN] = sum((v < 0) << i for i, v in enumerate(values))
+        words[StateWords.SEQ] = 2 * k + 2
+        r.header[HeaderWords.NEWEST] = k
         wake = self.on_wake
-        if wake is not None and k * TICK_NS >= r.header[ring.WAKE]:
+        if wake is not None and k * TICK_NS >= r.header[HeaderWords.WAKE]:
             wake(k * TICK_NS)
-        flags |= int(self.safety.mode) << 32  # a mode by itself is news, too
+        flags |= int(self.safety.mode) << 32  # a change of the mode alone is reported, too
         if flags != self._flags:
             self._flags = flags
             if self.on_safety is not None:
@@ -337,26 +363,26 @@ class Plant:
 
     def _safety_flags(self) -> int:
         safety = self.safety
-        flags = ring.MASTERED
+        flags = SafetyFlags.MASTERED
         if self._brakes is None:
-            flags |= ring.BRAKES_OPEN
+            flags |= SafetyFlags.BRAKES_OPEN
         if self.interpolator.is_paused or safety.latched:
-            flags |= ring.PAUSED
+            flags |= SafetyFlags.PAUSED
         if safety.enabled:
-            flags |= ring.ENABLED
+            flags |= SafetyFlags.ENABLED
         if safety.guides:
-            flags |= ring.HAND_GUIDING
-        if not safety.halts:
-            return flags | ring.READY
-        flags |= ring.PROTECTIVE_STOP
-        for demand in safety.demands:
-            flags |= _DEMANDS[demand]
+            flags |= SafetyFlags.HAND_GUIDING
+        if not safety.stop_requested:
+            return flags | SafetyFlags.READY
+        flags |= SafetyFlags.PROTECTIVE_STOP
+        for request in safety.stop_requests:
+            flags |= _REQUEST_FLAGS[request]
         return flags
 
     @property
     def snapshot(self) -> Snapshot:
         """The newest state, copied."""
-        slot = self.ring.floats[self.tick_count % ring.SLOTS]
+        slot = self.ring.floats[self.tick_count % SLOTS]
         return Snapshot(
             self.tick_count * TICK,
             self._q.copy(),
@@ -367,12 +393,12 @@ class Plant:
             self._tau_cmd.copy(),
             self._load.wrench.copy(),
             self.interpolator.order,
-            float(slot[ring.PROGRESS]),
+            float(slot[StateWords.PROGRESS]),
         )
 
 
 def _quaternion(x: tuple[float, ...], y: tuple[float, ...], z: tuple[float, ...]) -> tuple[float, ...]:
-    """Quaternion x y z w of the columns of a rotation; the largest component leads."""
+    """Quaternion x y z w of the columns of a rotation, computed from its largest component."""
     xx, yy, zz = x[0], y[1], z[2]
     w = xx + yy + zz
     if w >= xx and w >= yy and w >= zz:

@@ -1,4 +1,4 @@
-"""What stands around the arm."""
+"""The simulated world: the arm's model among boxes."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from pathlib import Path
 
 import mujoco
 
-MODELS = Path(__file__).parent / "models"
+MODELS = Path(__file__).parents[1] / "models"
 _NUMBERS = 6
-#: Where the arm's shapes meet the world's, as the floor's do.
+#: Contact type of the world's shapes, as the floor's.
 _MEETS_ARM = 2
-#: How boxes yield, MuJoCo's time constant [s] and damping ratio: with the arm about as a tool's mounting does.
-GIVE = (0.05, 1.0)
+#: Compliance of boxes, MuJoCo's time constant [s] and damping ratio: about that of a tool's mounting.
+COMPLIANCE = (0.05, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Box:
-    """A box that stands still, its edges along the base's axes.
+    """A fixed box, its edges along the base's axes.
 
     Attributes:
         centre: in the base [m].
@@ -34,14 +34,16 @@ class Box:
         """A box from "X,Y,Z,LENGTH,WIDTH,HEIGHT": its centre and its edges [m].
 
         Raises:
-            ValueError: the text is no box.
+            ValueError: the text describes no box.
         """
         try:
             numbers = [float(part) for part in text.split(",")]
         except ValueError:
             numbers = []
         if len(numbers) != _NUMBERS or not all(map(isfinite, numbers)) or min(numbers[3:]) <= 0:
-            raise ValueError(f"{text!r} is no box; X,Y,Z,LENGTH,WIDTH,HEIGHT in metres is wanted")
+            raise ValueError(
+                f"box must be X,Y,Z,LENGTH,WIDTH,HEIGHT in metres with edges above 0, got {text!r}"
+            )
         x, y, z, length, width, height = numbers
         return Box((x, y, z), (length, width, height))
 
@@ -61,7 +63,7 @@ def compiled(model: str, boxes: Sequence[Box] = ()) -> mujoco.MjModel:
             contype=_MEETS_ARM,
             conaffinity=1,
             priority=1,
-            solref=GIVE,
+            solref=COMPLIANCE,
             rgba=[0.7, 0.6, 0.45, 1.0],
         )
     return spec.compile()

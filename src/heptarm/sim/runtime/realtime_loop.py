@@ -1,11 +1,12 @@
-"""Paces ticks in real time (or N times faster) and counts how well that went.
+"""The realtime loop: ticks in real time, or N times faster, and measures its own lateness.
 
-The loop sleeps to shortly before a tick is due and spins the rest; when it wakes late it catches up, since a
-tick costs a tenth of a millisecond; beyond 20 missed ticks it re-bases and counts that. Beside an FRI session it
-leaves `room` between two ticks, however late they are, and re-bases after one: no client could answer ticks that
-follow each other without a pause, and a machine that stood still kept its client from answering, too.
-Real-time priority and a short timer slack are asked for and, where refused, named in the report. Memory is not
-locked: that would make all that the JVM has only reserved real.
+The loop sleeps to shortly before a tick is due and spins for the rest. After a late wake-up it catches up, since a
+tick costs a tenth of a millisecond; after more than 20 missed ticks it re-bases its schedule and counts that. With an
+FRI session open it leaves `answer_gap` between two ticks, however late they are, and re-bases after one missed tick:
+no client could answer ticks that follow each other without a pause, and a machine that was suspended kept its client
+from answering as well.
+Real-time priority and a short timer slack are requested; a refusal is named in the statistics. Memory is not locked:
+that would commit all the memory that the JVM has only reserved.
 """
 
 from __future__ import annotations
@@ -21,23 +22,23 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from heptarm.virtual.ring import ANCHOR, NEWEST, RATE, Ring
-from heptarm.virtual.tick import TICK_NS
+from heptarm.sim.plant.shared_state import SharedState
+from heptarm.sim.seam import TICK_NS, HeaderWords
 
-#: Ticks that are caught up in one go; beyond them time is given up.
+#: Missed ticks that are caught up at once; after more the schedule is re-based.
 CATCH_UP = 20
-#: The same while somebody has to answer each tick.
+#: The same while an FRI client has to answer each tick.
 CATCH_UP_ANSWERED = 1
-#: What is then left between two ticks for the answer, as a share of a period.
-ROOM = 0.4
+#: Time between two ticks for the answer, as a fraction of a period.
+ANSWER_GAP = 0.4
 #: Wake this long before a tick is due and spin [ns]; small, since a spinning real-time thread starves the machine.
 SPIN_NS = 60_000
-#: At most this share of a period is spun.
-SPIN_SHARE = 0.1
-#: No real-time priority above this speed: a loop that never sleeps is thrown off the processor for 50 ms a second.
+#: At most this fraction of a period is spun.
+SPIN_FRACTION = 0.1
+#: No real-time priority above this speed: Linux throttles a loop that never sleeps for 50 ms in each second.
 REAL_TIME_SPEED = 5.0
-#: A loop that cannot keep up sleeps this long whenever it re-bases [s], so that others run.
-BREATH = 2e-4
+#: A loop that cannot keep up sleeps this long whenever it re-bases [s], so that other threads run.
+YIELD_TIME = 2e-4
 PRIORITY = 50
 
 _PR_SET_TIMERSLACK = 29
@@ -45,8 +46,8 @@ _HISTORY = 1 << 17
 
 
 @dataclass(slots=True)
-class Report:
-    """What the pacer saw, and what the system refused it."""
+class LoopStatistics:
+    """Counts and percentiles of the loop, and what the operating system refused."""
 
     ticks: int = 0
     rebased: int = 0
@@ -55,8 +56,8 @@ class Report:
     tick_us: dict[str, float] = field(default_factory=dict)
 
 
-def ask_for_real_time() -> list[str]:
-    """Ask for SCHED_FIFO and 1 ns timer slack; returns what was refused, in words."""
+def request_real_time() -> list[str]:
+    """Request SCHED_FIFO and 1 ns timer slack; returns one text for each refusal."""
     refused = []
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
@@ -71,10 +72,10 @@ def ask_for_real_time() -> list[str]:
 
 
 @contextlib.contextmanager
-def courteous() -> Iterator[None]:
-    """Threads begun within take no processor from whoever wakes them: a real cabinet is another machine."""
+def batch_scheduled() -> Iterator[None]:
+    """Threads started inside do not preempt the thread that wakes them: a real cabinet is another machine."""
     batch, other = (getattr(os, name, None) for name in ("SCHED_BATCH", "SCHED_OTHER"))
-    if batch is None or other is None:  # this system knows no such threads
+    if batch is None or other is None:  # this system has no batch scheduling
         yield
         return
     os.sched_setscheduler(0, batch, os.sched_param(0))
@@ -84,25 +85,25 @@ def courteous() -> Iterator[None]:
         os.sched_setscheduler(0, other, os.sched_param(0))
 
 
-class Pacer:
-    """Calls `tick` once per millisecond of plant time.
+class RealtimeLoop:
+    """Call `tick` once per millisecond of plant time.
 
     Args:
-        ring: whose anchor tells Java the wall time of plant time zero.
+        ring: shared state; its anchor word is the wall time of plant time zero, for Java.
         tick: one tick.
-        speed: plant seconds per second; 0: as fast as it goes.
+        speed: plant seconds per second; 0: as fast as possible.
 
     Attributes:
-        room: pause between two ticks, as a share of a period: `ROOM` while somebody has to answer each of them, else 0;
-            may be set at any time.
+        answer_gap: least time between two ticks, as a fraction of a period: `ANSWER_GAP` while an FRI client has to
+            answer each of them, else 0; may be set at any time.
     """
 
-    def __init__(self, ring: Ring, tick: Callable[[], None], *, speed: float = 1.0) -> None:
+    def __init__(self, ring: SharedState, tick: Callable[[], None], *, speed: float = 1.0) -> None:
         self._ring = ring
         self._tick = tick
         self._period = int(TICK_NS / speed) if speed > 0 else 0
         self._speed = speed
-        self.room = 0.0
+        self.answer_gap = 0.0
         self._stop = False
         self._cost = np.zeros(_HISTORY, dtype=np.int64)
         self._late = np.zeros(_HISTORY, dtype=np.int64)
@@ -115,42 +116,46 @@ class Pacer:
         self._stop = True
 
     def reset(self) -> None:
-        """Forget the statistics so far."""
+        """Reset the statistics."""
         self._count = self._rebased = 0
 
     def run(self) -> None:
         """Tick until stopped."""
         sys.setswitchinterval(2e-4)
         if 0.0 < self._speed <= REAL_TIME_SPEED:
-            self._refused = ask_for_real_time()
+            self._refused = request_real_time()
         else:
-            self._refused = [f"no real-time priority at this speed; it ends at {REAL_TIME_SPEED:g}"]
+            self._refused = [
+                f"real-time priority not requested: speed must be in (0, {REAL_TIME_SPEED:g}], got {self._speed:g}"
+            ]
         gc.collect()
         gc.freeze()
         gc.disable()
-        self._ring.reals[RATE] = self._speed
+        self._ring.reals[HeaderWords.RATE] = self._speed
         now_ns, period, header = time.monotonic_ns, self._period, self._ring.header
-        spin = min(SPIN_NS, int(SPIN_SHARE * period))
-        done = int(header[NEWEST])  # ticks of plant time that have passed before the loop
+        spin = min(SPIN_NS, int(SPIN_FRACTION * period))
+        done = int(header[HeaderWords.NEWEST])  # ticks of plant time that have passed before the loop
         due = now_ns() + period
-        header[ANCHOR] = due - (done + 1) * period
+        header[HeaderWords.ANCHOR] = due - (done + 1) * period
         end, is_second = now_ns(), False
         while not self._stop:
-            now, room = now_ns(), int(self.room * period)
+            now, gap = now_ns(), int(self.answer_gap * period)
             if period == 0:
                 due = now
-            elif now - due > (CATCH_UP_ANSWERED if room else CATCH_UP) * period:
+            elif now - due > (CATCH_UP_ANSWERED if gap else CATCH_UP) * period:
                 self._rebased += 1
-                time.sleep(BREATH)
+                time.sleep(YIELD_TIME)
                 due = now = now_ns()
-                header[ANCHOR] = due - (int(header[NEWEST]) + 1) * period
-            start = max(due, end + room)
+                header[HeaderWords.ANCHOR] = due - (int(header[HeaderWords.NEWEST]) + 1) * period
+            start = max(due, end + gap)
             if now < start:
                 if start - now > spin:
                     time.sleep((start - now - spin) * 1e-9)
                 while (now := now_ns()) < start:
                     pass
-                if now - start > room > 0 and not is_second:  # the machine stood still: leave room once more
+                if (
+                    now - start > gap > 0 and not is_second
+                ):  # the machine was suspended: leave the gap once more
                     end, is_second = now, True
                     continue
             begin, is_second = now_ns(), False
@@ -163,10 +168,10 @@ class Pacer:
             due += period
 
     @property
-    def report(self) -> Report:
+    def statistics(self) -> LoopStatistics:
         """Percentiles of the last 131,072 ticks, in microseconds."""
         size = min(self._count, _HISTORY)
-        return Report(
+        return LoopStatistics(
             self._count,
             self._rebased,
             list(self._refused),

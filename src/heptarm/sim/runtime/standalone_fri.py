@@ -1,8 +1,8 @@
-"""The controller side of FRI without a cabinet application: for any client, as `heptarm sim --fri VERSION` offers it.
+"""The controller side of FRI without a cabinet application, for any client: `heptarm sim --fri VERSION`.
 
-It does what the usual FRI application on a cabinet does: open a session, hold the position with an overlay on it as
-soon as the client answers well enough, and say what happens. Other than there nobody has to start it anew: after an
-error it waits a moment and offers the next overlay in the same session.
+It behaves like the usual FRI application on a cabinet: it opens a session, holds the position with an overlay as soon
+as the connection is good enough, and reports events. Unlike there, nobody has to restart it: after an error it waits
+a second and offers the next overlay in the same session.
 """
 
 from __future__ import annotations
@@ -12,28 +12,24 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from heptarm.errors import ModeConflict
-from heptarm.fri import messages as m
-from heptarm.fri.version import Version
-from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, Position
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.events import (
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.version import Version
+from heptarm.sim.fri.faults import FaultScenario
+from heptarm.sim.fri.overlay import HoldingTarget, MotionOverlay, control_mode
+from heptarm.sim.fri.server import PORT, Address, Server
+from heptarm.sim.fri.settings import (
     Event,
-    FrameProvided,
-    OutputWritten,
     OverlayEnded,
-    QualityChanged,
-    Refused,
-    StateChanged,
+    SessionConfiguration,
 )
-from heptarm.virtual.fri.faults import Scenario
-from heptarm.virtual.fri.overlay import HoldingTarget, MotionOverlay
-from heptarm.virtual.fri.server import PORT, Address, Server
-from heptarm.virtual.pacer import ROOM, Pacer
-from heptarm.virtual.ring import Ring
+from heptarm.sim.plant.shared_state import SharedState
+from heptarm.sim.runtime.realtime_loop import ANSWER_GAP, RealtimeLoop
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
+from heptarm.values.mode.mode import Mode, Position
 
-#: After an overlay has ended by an error, the next one begins so many ticks later at the earliest.
+#: Least time between an overlay that ended by an error and the next one [ticks].
 PAUSE = 1000
-#: Ticks after `close` in which the last message leaves.
+#: Ticks after `close` for the last message to be sent.
 FAREWELL = 2
 
 _COMMANDS = {
@@ -46,18 +42,18 @@ _COMMANDS = {
 
 
 class SimulatedArm(HoldingTarget, Protocol):
-    """An arm that can be ticked, and whose ring tells the time."""
+    """An arm that can be ticked, with a shared state that has the time."""
 
     @property
-    def ring(self) -> Ring:
-        """The shared ring, see heptarm.virtual.ring."""
+    def ring(self) -> SharedState:
+        """The shared state, see heptarm.sim.plant.shared_state."""
 
     def tick(self) -> None:
         """One millisecond."""
 
 
 def usual_mode(command: m.CommandMode) -> Mode:
-    """The control mode in which a client command mode is mostly used: the softest that holds nothing else."""
+    """The control mode in which a client command mode is mostly used: the most compliant one that fits."""
     if command is m.CommandMode.TORQUE:
         return JointImpedance(0.0)
     if command is m.CommandMode.WRENCH:
@@ -65,51 +61,42 @@ def usual_mode(command: m.CommandMode) -> Mode:
     return Position()
 
 
-def control_of(mode: Mode) -> m.ControlMode:
-    """What FRI calls a control mode."""
-    if isinstance(mode, Position):
-        return m.ControlMode.POSITION
-    return (
-        m.ControlMode.JOINT_IMPEDANCE
-        if isinstance(mode, JointImpedance)
-        else m.ControlMode.CARTESIAN_IMPEDANCE
-    )
-
-
 def command_mode(name: str) -> m.CommandMode:
     """The command mode of a name as in `arm.fri(name)`.
 
     Raises:
-        ModeConflict: there is none of that name; the text lists them.
+        ModeConflict: there is none of that name; the error lists them.
     """
     if name not in _COMMANDS:
         raise ModeConflict(
-            f"no FRI command mode {name!r}; there are {', '.join(_COMMANDS)}", parameter="command"
+            f"FRI command mode must be one of {', '.join(_COMMANDS)}; got {name!r}", parameter="command"
         )
     return _COMMANDS[name]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
-    """What the controller offers, and to whom.
+class StandaloneSettings:
+    """Settings of an FRI controller without a cabinet application.
 
     Attributes:
         configuration: of the session.
-        client: where the client listens.
-        port: own port; None: see `heptarm.virtual.fri.server.source_port`.
-        command: what the client may command; NO_COMMAND: it only monitors.
-        mode: control mode of the hold; None: the usual one of the command mode.
+        client: address at which the client listens.
+        port: own port; None: see `heptarm.sim.fri.server.source_port`.
+        command: client command mode; NO_COMMAND: the client only monitors.
+        mode: control mode while holding; None: see `usual_mode`.
         speed: simulated seconds per second.
-        scenario: faults on purpose.
+        scenario: faults to inject.
     """
 
-    configuration: Configuration = field(default_factory=lambda: Configuration(Version.V1_15, 5))
+    configuration: SessionConfiguration = field(
+        default_factory=lambda: SessionConfiguration(Version.V1_15, 5)
+    )
     client: Address = ("127.0.0.1", PORT)
     port: int | None = None
     command: m.CommandMode = m.CommandMode.POSITION
     mode: Mode | None = None
     speed: float = 1.0
-    scenario: Scenario | None = None
+    scenario: FaultScenario | None = None
 
 
 class Standalone:
@@ -117,28 +104,32 @@ class Standalone:
 
     Args:
         arm: the arm.
-        settings: what it offers.
-        listener: hears of events in the arm's thread; must not block.
+        settings: session, client and command mode.
+        listener: receives events in the arm's thread; must not block.
 
     Attributes:
         server: the session and its socket.
 
     Raises:
-        ConnectFailed: the port is taken, or the client's address is none.
+        ConnectFailed: the port is in use, or the client's address does not resolve.
         CommandRejected: the command mode does not go with version, period or control mode.
     """
 
     def __init__(
-        self, arm: SimulatedArm, settings: Settings, *, listener: Callable[[Event], None] | None = None
+        self,
+        arm: SimulatedArm,
+        settings: StandaloneSettings,
+        *,
+        listener: Callable[[Event], None] | None = None,
     ) -> None:
         self._arm = arm
         self._listener = listener
         self._mode = settings.mode or usual_mode(settings.command)
         self._overlay: MotionOverlay | None = None
         if settings.command is not m.CommandMode.NO_COMMAND:
-            self._overlay = MotionOverlay(settings.command, control_of(self._mode))
+            self._overlay = MotionOverlay(settings.command, control_mode(self._mode))
             self._overlay.check(settings.configuration)
-        self._patience = 0  # ticks until the next overlay may begin
+        self._pause = 0  # ticks until the next overlay may begin
         self._holding = False
         self.server = Server(
             settings.configuration,
@@ -147,13 +138,13 @@ class Standalone:
             port=settings.port,
             speed=settings.speed,
             scenario=settings.scenario,
-            listener=self._hear,
+            listener=self._on_event,
         )
-        self.pacer = Pacer(arm.ring, self.tick, speed=settings.speed)
-        self.pacer.room = ROOM
+        self.loop = RealtimeLoop(arm.ring, self.tick, speed=settings.speed)
+        self.loop.answer_gap = ANSWER_GAP
 
     def tick(self) -> None:
-        """One millisecond of session and arm."""
+        """Advance session and arm by one millisecond."""
         self.server.tick()
         self._offer()
         self._arm.tick()
@@ -162,7 +153,7 @@ class Standalone:
         """Open the session and tick in real time until `stop`; then close it and free the port."""
         self.server.open()
         try:
-            self.pacer.run()
+            self.loop.run()
         finally:
             self.server.close()
             for _ in range(FAREWELL):
@@ -171,43 +162,24 @@ class Standalone:
 
     def stop(self) -> None:
         """End `run`; may be called from a signal handler or another thread."""
-        self.pacer.stop()
+        self.loop.stop()
 
     def _offer(self) -> None:
-        """Hold with an overlay whenever the session is ready for one."""
+        """Start a hold with an overlay whenever the session is ready for one."""
         controller = self.server.controller
-        self._patience = max(0, self._patience - 1)
-        if self._overlay is None or self._patience or controller.state is not m.SessionState.MONITORING_READY:
+        self._pause = max(0, self._pause - 1)
+        if self._overlay is None or self._pause or controller.state is not m.SessionState.MONITORING_READY:
             return
         if self._arm.reading().safety is m.Safety.NORMAL_OPERATION:
             self._arm.hold(self._mode)
             self._holding = True
             self.server.start(self._overlay)
 
-    def _hear(self, event: Event) -> None:
+    def _on_event(self, event: Event) -> None:
         if isinstance(event, OverlayEnded):
-            self._patience = PAUSE
+            self._pause = PAUSE
             if self._holding:
                 self._holding = False
                 self._arm.release()
         if self._listener is not None:
             self._listener(event)
-
-
-def words(event: Event) -> str:
-    """An event in one line for a person; empty for what happens too often to be told."""
-    if isinstance(event, StateChanged):
-        return f"session {event.before.name} -> {event.state.name}"
-    if isinstance(event, QualityChanged):
-        return (
-            f"quality {event.before.name} -> {event.quality.name} "
-            f"(latency {1e3 * event.latency:.2f} ms, jitter {1e3 * event.jitter:.2f} ms)"
-        )
-    if isinstance(event, OverlayEnded):
-        return f"overlay ended: {event.text or event.cause}"
-    if isinstance(event, OutputWritten):
-        return f"output {event.value.name} = {event.value.value:g}"
-    if isinstance(event, FrameProvided):
-        frame = event.transformation
-        return f"frame {frame.name} = {', '.join(f'{value:g}' for value in frame.values)}"
-    return event.text if isinstance(event, Refused) else ""

@@ -1,6 +1,6 @@
-"""A live 3D view of a cabinet in the browser: a process of its own that observes over the real protocol.
+"""A live 3D view of a cabinet in the browser: a separate process that observes over the wire protocol.
 
-python -m heptarm.virtual.view --target sim://127.0.0.1:30001
+python -m heptarm.sim.runtime.view --target sim://127.0.0.1:30001
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import mujoco
 import numpy as np
 
 from heptarm.errors import require
+from heptarm.sim.plant.world import MODELS
 from heptarm.values.arrays import Array
-from heptarm.virtual.world import MODELS
 
 _RATE = 30.0
 _COLOURS = {"silver": (192, 194, 199), "orange": (255, 107, 10), "dark": (64, 64, 69)}
@@ -89,7 +89,7 @@ def _readout(state: Any, title: str) -> str:
 
 def main(argv: list[str] | None = None) -> int:
     """Show a cabinet until standard input is closed or the cabinet ends."""
-    parser = argparse.ArgumentParser(prog="python -m heptarm.virtual.view")
+    parser = argparse.ArgumentParser(prog="python -m heptarm.sim.runtime.view")
     parser.add_argument("--target", required=True)
     parser.add_argument("--host", default="127.0.0.1")
     parser.add_argument("--port", type=int, default=8080)
@@ -101,7 +101,7 @@ def main(argv: list[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with connect(options.target, control=False, name="view", state_rate=_RATE) as arm:
-        with contextlib.redirect_stdout(sys.stderr):  # standard output is for the line that says where we are
+        with contextlib.redirect_stdout(sys.stderr):  # standard output is for the line with the URL
             server = viser.ViserServer(host=options.host, port=options.port, verbose=False)
         scene = Scene(server, arm.robot.name)
         server.scene.set_up_direction("+z")

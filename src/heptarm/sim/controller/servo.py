@@ -1,0 +1,519 @@
+"""Set-points of a servo motion: the newest target wins, and every limit holds.
+
+`SmartFollower` and `DirectFollower` follow joint targets and poses, `StraightFollower` moves on straight lines as
+SmartServoLIN does; all of them plan online with `OnlineTrajectory`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan2, cos, sin, sqrt
+
+import numpy as np
+from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
+
+from heptarm.model.kinematics import forward
+from heptarm.sim.planning.command import Order
+from heptarm.sim.planning.path import TcpInverseKinematics
+from heptarm.sim.planning.targets import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT
+from heptarm.sim.seam import StraightLimits
+from heptarm.values.arrays import Array
+from heptarm.values.pose import Pose, multiply, rotation
+from heptarm.values.robot import RobotModel
+
+#: Position, velocity and acceleration.
+OtgState = tuple[Array, Array, Array]
+
+
+class OnlineTrajectory:
+    """Online trajectory generation of a servo motion.
+
+    Args:
+        axes: number of coordinates.
+        synchronization: of the coordinates on the way to a target.
+        halting: of the coordinates while they come to rest.
+
+    Attributes:
+        time: since the trajectory began [s].
+    """
+
+    def __init__(self, axes: int, *, synchronization: Synchronization, halting: Synchronization) -> None:
+        self._axes = axes
+        self._planner = Ruckig(axes)
+        self._input = InputParameter(axes)
+        self._synchronization, self._halting = synchronization, halting
+        self._plan: Trajectory | None = None
+        self.time = 0.0
+
+    def limit(self, acceleration: Array, jerk: Array, *, velocity: Array | None = None) -> None:
+        """Set the limits of each coordinate for the next trajectories; without a velocity that limit stays."""
+        if velocity is not None:
+            self._input.max_velocity = velocity.tolist()
+        self._input.max_acceleration, self._input.max_jerk = acceleration.tolist(), jerk.tolist()
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether there is a trajectory."""
+        return self._plan is not None
+
+    @property
+    def over(self) -> float:
+        """Time since the end of the trajectory, negative before it [s]; without one infinite."""
+        return float("inf") if self._plan is None else self.time - self._plan.duration
+
+    @property
+    def remaining(self) -> float:
+        """Time until the target is reached [s]; NaN without one."""
+        return float("nan") if self._plan is None else max(0.0, -self.over)
+
+    def at(self, time: float) -> OtgState:
+        """State of the trajectory at a time [s]."""
+        assert self._plan is not None
+        q, dq, ddq = self._plan.at_time(time)
+        return np.array(q), np.array(dq), np.array(ddq)
+
+    def aim(self, state: OtgState, target: Array, *, speed: Array, minimum: float) -> bool:
+        """Plan from a state to a target.
+
+        Args:
+            state: its start.
+            target: its end.
+            speed: velocity at the target.
+            minimum: least duration [s].
+
+        Returns:
+            False if that cannot be planned: the last trajectory continues.
+        """
+        parameters = self._input
+        parameters.control_interface, parameters.synchronization = (
+            ControlInterface.Position,
+            self._synchronization,
+        )
+        parameters.target_position, parameters.target_velocity = target.tolist(), speed.tolist()
+        parameters.minimum_duration = minimum
+        return self._start(state)
+
+    def halt(self, state: OtgState) -> bool:
+        """Plan from a state to rest, wherever that is; returns as `aim` does."""
+        parameters = self._input
+        parameters.control_interface, parameters.synchronization = ControlInterface.Velocity, self._halting
+        parameters.target_velocity = [0.0] * self._axes
+        parameters.minimum_duration = None
+        return self._start(state)
+
+    def _start(self, state: OtgState) -> bool:
+        parameters = self._input
+        parameters.current_position, parameters.current_velocity, parameters.current_acceleration = (
+            values.tolist() for values in state
+        )
+        plan = Trajectory(self._axes)
+        try:
+            result = self._planner.calculate(parameters, plan)
+        except RuckigError:
+            return False
+        if result not in (Result.Working, Result.Finished):
+            return False
+        self._plan, self.time = plan, 0.0
+        return True
+
+
+#: Time step for the angular acceleration, by differences of the angular velocity [s].
+_STEP = 1e-5
+#: Angles below it [rad] do not determine their axis.
+_TINY = 1e-9
+#: A velocity or acceleration perpendicular to the line that is smaller than this [m/s, rad/s, ...] is rounding.
+_ASIDE = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class StraightServoLimits:
+    """Limits of a straight servo motion; x y z, then about x y z, along the axes of a fixed frame.
+
+    Attributes:
+        velocity: shape (6,) [m/s, rad/s].
+        acceleration: shape (6,) [m/s², rad/s²].
+        jerk: shape (6,) [m/s³, rad/s³].
+        axes: that frame's axes as columns in the base, shape (3, 3).
+        minimum_time: least duration of a trajectory to a target [s].
+    """
+
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+    axes: Array
+    minimum_time: float
+
+    @staticmethod
+    def of(order: Order) -> StraightServoLimits:
+        """Limits of a command; defaults are those of a linear motion, and jerk scales with acceleration."""
+        default = np.repeat((CARTESIAN_DEFAULT, ORIENTATION_DEFAULT), 3, axis=0).T
+        given = order.straight or StraightLimits()
+        velocity = np.where(np.isnan(given.velocity), default[0], given.velocity)
+        acceleration = np.where(np.isnan(given.acceleration), default[1], given.acceleration)
+        axes = np.eye(3) if order.reference is None else rotation(order.reference)
+        return StraightServoLimits(
+            velocity, acceleration, acceleration * default[2] / default[1], axes, order.minimum_time
+        )
+
+    @property
+    def hardest(self) -> tuple[Array, ...]:
+        """Acceleration and jerk of braking: at least those of a linear motion."""
+        default = np.repeat((CARTESIAN_DEFAULT, ORIENTATION_DEFAULT), 3, axis=0).T
+        return np.maximum(self.acceleration, default[1]), np.maximum(self.jerk, default[2])
+
+
+class StraightFollower:
+    """Follows poses of the tool frame on straight lines.
+
+    Args:
+        robot: the robot.
+        order: the servo motion.
+        here: first set-point, at rest, shape (7,) [rad].
+
+    Attributes:
+        resting: time since the target was reached [s]; 0 while it is not.
+    """
+
+    def __init__(self, robot: RobotModel, order: Order, here: Array) -> None:
+        tcp = Pose.of(order.tcp[:3], order.tcp[3:])
+        origin = Pose.from_matrix(forward(robot, here)) @ tcp
+        limits = self._limits = StraightServoLimits.of(order)
+        self._inverse = TcpInverseKinematics(robot, here, tcp)
+        self._q = here.copy()
+        self._otg = OnlineTrajectory(6, synchronization=Synchronization.Phase, halting=Synchronization.Phase)
+        self._place = limits.axes.T @ origin.xyz  # position at rest, along the axes of the limits
+        self._centre = origin.quat  # orientation from which rotations are measured
+        self._stopping = False
+        self.resting = 0.0
+
+    @property
+    def remaining(self) -> float:
+        """Time until the target is reached [s]; NaN without a target."""
+        return self._otg.remaining
+
+    def aim(self, goal: Array, dq: Array | None = None) -> None:
+        """Set the target pose of the tool frame in the base: x y z [m], quaternion x y z w; shape (7,)."""
+        if self._stopping:
+            return
+        place, turn, speed, change = self._state()
+        centre = self._turned(turn)
+        inward = self._limits.axes.T
+        target = np.concatenate([inward @ goal[:3], inward @ _between(centre, goal[3:])])
+        distance = target - _unrotated(place)
+        free = (self._limits.velocity, self._limits.acceleration, self._limits.jerk)
+        (velocity, acceleration, jerk), speed, change = _along(distance, free, speed, change)
+        self._otg.limit(acceleration, jerk, velocity=velocity)
+        start = (_unrotated(place), speed, change)
+        if self._otg.aim(start, target, speed=np.zeros(6), minimum=self._limits.minimum_time):
+            self._centre, self.resting = centre, 0.0
+
+    def advance(self, dt: float) -> Array:
+        """The set-point after `dt` seconds of the motion's own time, shape (7,) [rad].
+
+        Raises:
+            Unreachable: the line leaves the workspace.
+        """
+        if not self._otg.has_begun:
+            self.resting += dt
+            return self._q
+        self._otg.time += dt
+        self.resting = max(0.0, self._otg.over)
+        place, turn, _, _ = self._state()
+        x, y, z = (self._limits.axes @ place).tolist()
+        i, j, k, w = self._turned(turn).tolist()
+        self._q = self._inverse.joints((x, y, z), (i, j, k, w), self._inverse.e1, self._q)
+        return self._q
+
+    def brake(self, *, scale: float, rate: float) -> None:
+        """Come to rest along the line; ends when `is_still`.
+
+        Args:
+            scale: speed as a fraction of full speed; the stop itself runs at full speed.
+            rate: change of that fraction [1/s].
+        """
+        if self._stopping:
+            return
+        self._stopping = True
+        if not self._otg.has_begun:
+            return
+        place, turn, speed, change = self._state()
+        speed, change = speed * scale, change * scale * scale + speed * rate
+        (acceleration, jerk), speed, change = _along(speed, self._limits.hardest, speed, change)
+        self._otg.limit(acceleration, jerk)
+        centre = self._turned(turn)
+        if self._otg.halt((_unrotated(place), speed, change)):
+            self._centre = centre
+
+    @property
+    def is_still(self) -> bool:
+        """Whether a braked motion has come to rest."""
+        return self._stopping and self._otg.over >= 0.0
+
+    def _turned(self, turn: Array) -> Array:
+        """Orientation at a rotation from the centre, quaternion."""
+        vector = self._limits.axes @ turn
+        angle = sqrt(float(vector @ vector))
+        if angle < _TINY:
+            return self._centre
+        return multiply((*(vector * (sin(angle / 2) / angle)).tolist(), cos(angle / 2)), self._centre)
+
+    def _state(self) -> tuple[Array, Array, Array, Array]:
+        """Position and rotation from the centre, shape (3,) each; velocity and acceleration, shape (6,)."""
+        if not self._otg.has_begun:
+            return self._place, np.zeros(3), np.zeros(6), np.zeros(6)
+        time = self._otg.time
+        x, v, a = self._otg.at(time)
+        low, high = max(0.0, time - _STEP), time + _STEP
+        change = (self._spin(high) - self._spin(low)) / (high - low)
+        return (
+            x[:3],
+            x[3:],
+            np.concatenate([v[:3], self._spin(time)]),
+            np.concatenate([a[:3], change]),
+        )
+
+    def _spin(self, time: float) -> Array:
+        """Angular velocity at a time of the plan, shape (3,) [rad/s]."""
+        x, v, _ = self._otg.at(time)
+        turn, speed = x[3:], v[3:]
+        angle = sqrt(float(turn @ turn))
+        if angle < 1e-6:
+            almost: Array = speed + 0.5 * np.cross(turn, speed)
+            return almost
+        # left Jacobian of the rotation group, e.g. Sola et al., "A micro Lie theory", 2018, (145)
+        once = np.cross(turn, speed)
+        twice = np.cross(turn, once)
+        spin: Array = speed + (1.0 - cos(angle)) / angle**2 * once + (angle - sin(angle)) / angle**3 * twice
+        return spin
+
+
+def _unrotated(place: Array) -> Array:
+    """Coordinates of a position without rotation from the centre, shape (6,)."""
+    return np.concatenate([place, np.zeros(3)])
+
+
+def _between(start: Array, end: Array) -> Array:
+    """Rotation vector from one orientation to another by the smaller angle, in the base, shape (3,) [rad]."""
+    x, y, z, w = multiply(end, start * (-1.0, -1.0, -1.0, 1.0)).tolist()
+    length = sqrt(x * x + y * y + z * z)
+    if length < _TINY:
+        return np.zeros(3)
+    angle = 2.0 * atan2(length, abs(w)) * (1.0 if w >= 0.0 else -1.0)
+    return np.array([x, y, z]) * (angle / length)
+
+
+def _along(
+    distance: Array, free: tuple[Array, ...], speed: Array, change: Array
+) -> tuple[tuple[Array, ...], Array, Array]:
+    """Limits for a displacement, then velocity and acceleration.
+
+    If these are parallel to it, the limits get the ratio of its coordinates, so that the motion is straight.
+    """
+    length = sqrt(float(distance @ distance))
+    if length < _TINY:
+        return free, speed, change
+    unit = distance / length
+    straight = (unit * (unit @ speed), unit * (unit @ change))
+    if np.abs(speed - straight[0]).max() > _ASIDE or np.abs(change - straight[1]).max() > _ASIDE:
+        return free, speed, change
+    ratio = np.maximum(np.abs(unit), _TINY)
+    bound = (np.where(ratio > _TINY, ratio * float((limit / ratio).min()), limit) for limit in free)
+    return tuple(bound), *straight
+
+
+#: Time constant of the final exponential approach of a direct follower [s].
+APPROACH = 0.01
+#: Largest velocity at a target relative to the axis' limit: Ruckig needs a margin to reach it.
+MARGIN = 0.999
+
+
+@dataclass(frozen=True, slots=True)
+class ServoLimits:
+    """Limits and times of a servo motion.
+
+    Attributes:
+        velocity: largest speed of each axis, shape (7,) [rad/s].
+        acceleration: shape (7,) [rad/s²].
+        jerk: shape (7,) [rad/s³].
+        minimum_time: least duration of a trajectory to a target [s].
+        speed_timeout: how long the velocity of a target is held after it was passed [s].
+    """
+
+    velocity: Array
+    acceleration: Array
+    jerk: Array
+    minimum_time: float
+    speed_timeout: float
+
+    @staticmethod
+    def of(
+        robot: RobotModel,
+        *,
+        velocity: tuple[float, ...],
+        acceleration: tuple[float, ...],
+        minimum_time: float = 0.02,
+        speed_timeout: float = 0.1,
+    ) -> ServoLimits:
+        """From fractions of a robot's limits, seven each; jerk scales with acceleration."""
+        return ServoLimits(
+            np.array(velocity) * robot.dq_max,
+            np.array(acceleration) * robot.ddq_max,
+            np.array(acceleration) * robot.dddq_max,
+            minimum_time,
+            speed_timeout,
+        )
+
+
+class SmartFollower:
+    """Follows targets with a velocity-, acceleration- and jerk-limited trajectory to each.
+
+    Args:
+        limits: limits and times.
+        here: first set-point, at rest, shape (7,) [rad].
+
+    Attributes:
+        resting: time since the target was reached [s]; 0 while it is not.
+    """
+
+    def __init__(self, limits: ServoLimits, here: Array) -> None:
+        self._limits = limits
+        self._otg = OnlineTrajectory(7, synchronization=Synchronization.Time, halting=Synchronization.No)
+        self._otg.limit(limits.acceleration, limits.jerk, velocity=limits.velocity)
+        self._still = here.copy()
+        self._passes = False
+        self._stopping = False
+        self.resting = 0.0
+
+    @property
+    def remaining(self) -> float:
+        """Time until the target is reached [s]; NaN without a target."""
+        return self._otg.remaining
+
+    def aim(self, q: Array, dq: Array | None = None) -> None:
+        """Set the target, shape (7,) [rad], and the velocity at it [rad/s]."""
+        if self._stopping:
+            return
+        pass_at = (
+            np.zeros(7)
+            if dq is None
+            else np.clip(dq, -MARGIN * self._limits.velocity, MARGIN * self._limits.velocity)
+        )
+        if self._otg.aim(self._state(), q, speed=pass_at, minimum=self._limits.minimum_time):
+            self._passes = bool(pass_at.any())
+            self.resting = 0.0
+
+    def advance(self, dt: float) -> Array:
+        """The set-point after `dt` seconds of the motion's own time, shape (7,) [rad]."""
+        if not self._otg.has_begun:
+            self.resting += dt
+            return self._still
+        self._otg.time += dt
+        over = self._otg.over
+        if over >= 0.0:
+            if self._passes and over > self._limits.speed_timeout:
+                self._halt(self._state())
+            elif not self._passes:
+                self.resting = over
+        return self._state()[0]
+
+    def brake(self, *, scale: float, rate: float, speed: Array | None = None) -> None:
+        """Come to rest as fast as the axes may, ignoring further targets; ends when `is_still`.
+
+        Args:
+            scale: speed as a fraction of full speed; the stop itself runs at full speed.
+            rate: change of that fraction [1/s].
+            speed: velocity instead of the planned one, shape (7,) [rad/s].
+        """
+        if self._stopping:
+            return
+        q, dq, ddq = self._state()
+        if speed is not None:
+            dq = speed
+        limit = self._limits.acceleration  # beyond it the axis would reverse at the end of braking
+        self._halt((q, dq * scale, np.clip(ddq * scale * scale + dq * rate, -limit, limit)))
+        self._stopping = True
+
+    @property
+    def is_still(self) -> bool:
+        """Whether a braked motion has come to rest."""
+        return self._stopping and self._otg.over >= 0.0
+
+    def _halt(self, state: OtgState) -> None:
+        self._passes = False
+        self._otg.halt(state)
+
+    def _state(self) -> OtgState:
+        if self._otg.has_begun:
+            return self._otg.at(self._otg.time)
+        return self._still, np.zeros(7), np.zeros(7)
+
+
+class DirectFollower:
+    """Follows targets directly, within velocity and acceleration limits only; interface of `SmartFollower`."""
+
+    def __init__(self, limits: ServoLimits, here: Array) -> None:
+        self._limits = limits
+        self._q = here.copy()
+        self._dq = np.zeros(7)
+        self._target = here.copy()
+        self._left = 0.0
+        self._brake: SmartFollower | None = None
+        self.resting = 0.0
+
+    @property
+    def remaining(self) -> float:
+        """Approximate time until the target is reached [s]."""
+        return self._left
+
+    def aim(self, q: Array, dq: Array | None = None) -> None:
+        """Set the target, shape (7,) [rad]; its velocity follows from the next targets."""
+        self._target = q.copy()
+        least = float((np.abs(q - self._q) / self._limits.velocity).max())
+        self._left = max(self._limits.minimum_time, least)
+        self.resting = 0.0
+
+    def advance(self, dt: float) -> Array:
+        """The set-point after `dt` seconds of the motion's own time, shape (7,) [rad]."""
+        if self._brake is not None:
+            return self._brake.advance(dt)
+        if dt <= 0.0:
+            return self._q
+        limits, distance = self._limits, self._target - self._q
+        velocity = distance / max(self._left, APPROACH)
+        ceiling = np.minimum(limits.velocity, np.sqrt(2.0 * limits.acceleration * np.abs(distance)))
+        velocity = np.clip(velocity, -ceiling, ceiling)
+        self._dq = self._dq + np.clip(
+            velocity - self._dq, -limits.acceleration * dt, limits.acceleration * dt
+        )
+        self._q = self._q + self._dq * dt
+        self._left = max(0.0, self._left - dt)
+        self.resting = self.resting + dt if self._left == 0.0 else 0.0
+        return self._q
+
+    def brake(self, *, scale: float, rate: float) -> None:
+        """Come to rest as fast as the axes may."""
+        if self._brake is None:
+            self._brake = SmartFollower(self._limits, self._q)
+            self._brake.brake(scale=1.0, rate=0.0, speed=self._dq * scale)
+
+    @property
+    def is_still(self) -> bool:
+        """Whether a braked motion has come to rest."""
+        return self._brake is not None and self._brake.is_still
+
+
+Follower = SmartFollower | DirectFollower | StraightFollower
+
+
+def follower(robot: RobotModel, order: Order, here: Array) -> Follower:
+    """The follower of a servo motion that begins at rest, at a set-point of shape (7,) [rad]."""
+    if order.kind == "straight":
+        return StraightFollower(robot, order, here)
+    limits = ServoLimits.of(
+        robot,
+        velocity=order.joint_velocity,
+        acceleration=order.joint_acceleration,
+        minimum_time=order.minimum_time,
+        speed_timeout=order.speed_timeout,
+    )
+    return (DirectFollower if order.kind == "direct" else SmartFollower)(limits, here)

@@ -1,0 +1,360 @@
+"""A foreign Sunrise application: compiles its sources against the doubles and finds its project file."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import zipfile
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from heptarm import _resources
+from heptarm.errors import CommandRejected, MissingExtra
+
+#: Workbench's file name of process data, frames and tools.
+PROJECT = "RoboticsAPI.data.xml"
+
+_CLASS = re.compile(r"\bclass\s+(\w+)(?:<[^{]*?>)?\s+extends\s+(?:\w+\.)*(\w+)")
+_ROOTS = ("RoboticsAPIApplication",)
+_BACKGROUND = ("RoboticsAPIBackgroundTask", "RoboticsAPICyclicBackgroundTask")
+#: Folders with Workbench's copies and KUKA's own jars.
+_LEFT_OUT = ("bin", "KUKAJavaLib")
+_PACKAGE = re.compile(r"^\s*package\s+([\w.]+)\s*;", re.MULTILINE)
+#: A comment, or a literal in which the signs of a comment mean nothing.
+_COMMENT = re.compile(r"""("(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*')|/\*.*?\*/|//[^\n]*""", re.DOTALL)
+_INTERNAL = re.compile(r"^[ \t]*import\s+(?:static\s+)?((?:com\.)?sun\.[\w.]+?)\.(\w+|\*)\s*;", re.MULTILINE)
+#: Packages of these names that a JDK of today still offers.
+_STILL_THERE = re.compile(
+    r"com\.sun\.(net\.httpserver|management|jdi|source|tools|security|nio\.sctp)\b|sun\.(misc|reflect)$"
+)
+#: javac reports the first 100 errors only, and none in method bodies after a wrong import.
+_EVERY_ERROR = ("-Xmaxerrs", "100000", "--should-stop=ifError=FLOW")
+_ERROR = re.compile(r"^(.+?\.java):(\d+): error: (.*)$")
+_DETAIL = re.compile(r"^\s+(symbol|location):\s+(.*)$")
+
+
+@dataclass(frozen=True, slots=True)
+class Application:
+    """A compiled application.
+
+    Attributes:
+        main: its class.
+        classes: folder with all classes.
+        project: the project's `RoboticsAPI.data.xml`; None: there is none.
+        background: classes of its background tasks.
+        jars: its own libraries.
+        left_out: why a background task or a class of the project file is missing beside a chosen application.
+    """
+
+    main: str
+    classes: Path
+    project: Path | None
+    background: tuple[str, ...] = ()
+    jars: tuple[Path, ...] = ()
+    left_out: tuple[str, ...] = ()
+
+
+def find(folder: Path) -> list[str]:
+    """Full names of the applications in a folder of Java sources."""
+    return _descendants(_sources(folder, "java"), _ROOTS)
+
+
+def background(folder: Path) -> list[str]:
+    """Full names of the background tasks in a folder of Java sources."""
+    return _descendants(_sources(folder, "java"), _BACKGROUND)
+
+
+def _sources(folder: Path, suffix: str) -> list[Path]:
+    """Files of a project without Workbench's copies and libraries."""
+    return [
+        file
+        for file in sorted(folder.rglob(f"*.{suffix}"))
+        if not set(_LEFT_OUT) & set(file.relative_to(folder).parts[:-1])
+    ]
+
+
+def _descendants(sources: list[Path], roots: tuple[str, ...]) -> list[str]:
+    """Concrete classes that extend one of the roots, directly or through other classes of the project."""
+    found: dict[str, tuple[str, str, bool]] = {}
+    for source in sources:
+        text = _without_comments(read_source(source))
+        package = _PACKAGE.search(text)
+        for match in _CLASS.finditer(text):
+            full = f"{package[1]}.{match[1]}" if package else match[1]
+            abstract = re.search(r"\babstract\s+(?:\w+\s+)*$", text[: match.start()]) is not None
+            found[full] = (match[1], match[2], abstract)
+    known, before = set(roots), -1
+    while len(known) != before:
+        before = len(known)
+        known |= {simple for simple, parent, _ in found.values() if parent in known}
+    return [full for full, (simple, _, abstract) in found.items() if simple in known and not abstract]
+
+
+def read_source(file: Path) -> str:
+    """Text of a Java source: UTF-8 with or without a byte order mark, otherwise windows-1252 as Workbench writes it."""
+    data = file.read_bytes()
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        # the few bytes that windows-1252 leaves open stand in comments, where they do no harm
+        return data.decode("windows-1252", errors="replace")
+
+
+def _without_comments(text: str) -> str:
+    return _COMMENT.sub(lambda match: match[1] or " ", text)
+
+
+def _modern(text: str) -> str:
+    """Blank the unused imports of packages inside old JREs; every line keeps its number."""
+    if not _INTERNAL.search(text):
+        return text
+    code = _INTERNAL.sub("", _without_comments(text))
+
+    def kept(match: re.Match[str]) -> str:
+        if match[2] == "*":
+            unused = not _STILL_THERE.match(match[1])
+        else:
+            unused = re.search(rf"\b{match[2]}\b", code) is None
+        return re.sub(r"[^\n]", "", match[0]) if unused else match[0]
+
+    return _INTERNAL.sub(kept, text)
+
+
+def _libraries(folder: Path) -> tuple[Path, ...]:
+    """The project's jars without those with KUKA's classes, which the doubles replace."""
+    found = []
+    for jar in _sources(folder, "jar"):
+        try:
+            with zipfile.ZipFile(jar) as file:
+                if not any(name.startswith("com/kuka/") for name in file.namelist()):
+                    found.append(jar)
+        except zipfile.BadZipFile:
+            continue  # not a jar in spite of its name
+    return tuple(found)
+
+
+def compile_application(folder: Path, out: Path, *, main: str = "") -> Application:
+    """Compile a folder of Java sources against the doubles.
+
+    Args:
+        folder: of the project, or of its sources.
+        out: an empty folder for the classes.
+        main: the application's class, with or without its package; "": the only one.
+
+    Raises:
+        CommandRejected: no sources, no such application, several of them, or errors of the compiler.
+        MissingExtra: there is no Java compiler.
+    """
+    sources = _sources(folder, "java")
+    if not sources:
+        raise CommandRejected(
+            f"{folder} contains no Java sources", parameter="app", hint="name the folder of a Sunrise project"
+        )
+    chosen = _chosen(find(folder), main, folder)
+    jars, tasks = _libraries(folder), background(folder)
+    data = next((file for file in _sources(folder, "xml") if file.name == PROJECT), None)
+    left_out: list[str] = []
+    with TemporaryDirectory(prefix="heptarm-sources-") as place:
+        copies = _Copies(Path(place), folder, sources)
+        if not main:
+            _compile(copies, list(copies.names.values()), out, jars, chosen=chosen)
+        else:
+            _compile(copies, [copies.of(chosen)], out, jars)
+            text = read_source(data) if data is not None else ""
+            named = {
+                name for name in copies.names if "." in name and re.search(rf"\b{re.escape(name)}\b", text)
+            }
+            for name in sorted({*tasks, *named} - _compiled(out)):
+                try:
+                    _compile(copies, [copies.of(name)], out, jars)
+                except CommandRejected as error:
+                    tasks = [task for task in tasks if task != name]
+                    left_out.append(f"{name} is left out: {error.text}")
+    return Application(chosen, out, data, tuple(tasks), jars, tuple(left_out))
+
+
+class _Copies:
+    """Sources as UTF-8 in folders that fit their packages, as javac's source path needs them."""
+
+    def __init__(self, place: Path, folder: Path, sources: list[Path]) -> None:
+        self.roots: list[Path] = []
+        self.names: dict[str, Path] = {}
+        self._origin: dict[str, str] = {}
+        for source in sources:
+            text = _modern(read_source(source))
+            package = _PACKAGE.search(_without_comments(text))
+            path = Path(*(package[1].split(".") if package else ()), source.name)
+            # two files of one name keep apart, so that javac reports the duplicate
+            root = next(
+                one for i in range(len(sources)) if not (one := place / str(i)).joinpath(path).exists()
+            )
+            copy = root / path
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_text(text, encoding="utf-8", newline="")
+            if root not in self.roots:
+                self.roots.append(root)
+            name = ".".join(path.with_suffix("").parts)
+            self.names[name if name not in self.names else f"{name} {root.name}"] = copy
+            self._origin[copy.as_posix()] = source.relative_to(folder).as_posix()
+
+    def of(self, name: str) -> Path:
+        """The file of a class; a second class of a file is found by its text."""
+        if name in self.names:
+            return self.names[name]
+        package, _, simple = name.rpartition(".")
+        declared = re.compile(rf"\bclass\s+{simple}\b")
+        return next(
+            copy
+            for full, copy in self.names.items()
+            if full.rpartition(".")[0] == package and declared.search(copy.read_text(encoding="utf-8"))
+        )
+
+    def original(self, text: str) -> str:
+        """A text of the compiler with the names of the original files."""
+        for copy in sorted(self._origin, key=len, reverse=True):
+            text = text.replace(copy, self._origin[copy])
+        return text
+
+
+def _compiled(out: Path) -> set[str]:
+    return {".".join(file.relative_to(out).with_suffix("").parts) for file in out.rglob("*.class")}
+
+
+def _compile(
+    copies: _Copies, files: list[Path], out: Path, jars: tuple[Path, ...], *, chosen: str = ""
+) -> None:
+    """Compile some sources and what they need of the others.
+
+    Raises:
+        CommandRejected: errors of the compiler, with a hint that fits them.
+    """
+    listing = copies.roots[0].parent / "sources.txt"
+    listing.write_text("".join(f'"{path.as_posix()}"\n' for path in files), encoding="utf-8")
+    path = os.pathsep.join(str(jar) for jar in (*_resources.jars(), *jars))
+    command = [
+        _compiler(),
+        "--release",
+        "17",
+        "-proc:none",
+        "-nowarn",
+        "-g",
+        "-encoding",
+        "UTF-8",
+        *_EVERY_ERROR,
+    ]
+    # a project's own source counts before a class of the same name in a jar
+    command += ["-cp", path, "-Xprefer:source", "-sourcepath", os.pathsep.join(map(str, copies.roots))]
+    # the hint reads javac's messages, so they have to be English
+    command += ["-J-Duser.language=en", "-d", str(out), f"@{listing}"]
+    done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+    if done.returncode:
+        text = copies.original(done.stderr.strip())
+        hints = _hints(text)
+        if chosen:
+            hints.append(f"--app-class {chosen} compiles only what that class needs")
+        raise CommandRejected(
+            f"the application does not compile:\n{text}\n", parameter="app", hint="\n".join(hints)
+        )
+
+
+def _hints(text: str) -> list[str]:
+    """Remedies for errors of the compiler: bad characters, libraries that are not there, members of Sunrise."""
+    members: dict[str, None] = {}
+    packages: dict[str, None] = {}
+    internal: dict[str, None] = {}
+    encoding = other = False
+    for message, symbol, location in _errors(text):
+        absent = re.match(r"package ([\w.]+) does not exist", message)
+        name = absent[1] if absent else ""
+        owner = _sunrise(location)
+        if name.startswith("com.kuka."):
+            members[f"package {name}"] = None
+        elif re.match(r"(com\.)?sun\.", name):
+            internal[name] = None
+        elif "." in name:
+            packages[name] = None
+        elif "illegal character" in message or "unmappable character" in message:
+            encoding = True
+        elif message == "cannot find symbol" and owner:
+            members[f"{symbol} of {owner}"] = None
+        elif (used := re.match(r"(?:method|constructor) (\w+) in \w+ (\w+)", message)) and _sunrise(used[2]):
+            members[f"{used[1]} of {_sunrise(used[2])} with these parameters"] = None
+        elif message != "cannot find symbol":
+            other = True
+    found = []
+    if members:
+        found.append(f"missing in the virtual cabinet's Sunrise, please report: {'; '.join(members)}")
+    if packages:
+        found.append(f"put the jar of {', '.join(packages)} into a folder of the project")
+    if internal:
+        found.append(f"Java 17 no longer offers {', '.join(internal)}: use a public class instead")
+    if encoding:
+        found.append("a character outside comments is neither UTF-8 nor windows-1252: save the file as UTF-8")
+    if other or not found:
+        found.append("correct the sources where javac reports an error")
+    return found
+
+
+def _errors(text: str) -> list[tuple[str, str, str]]:
+    """Message, symbol and location of each error."""
+    found: list[list[str]] = []
+    for line in text.splitlines():
+        if match := _ERROR.match(line):
+            found.append([match[3], "", ""])
+        elif found and (detail := _DETAIL.match(line)):
+            found[-1][1 if detail[1] == "symbol" else 2] = re.sub(r"\s+", " ", detail[2])
+    return [(message, symbol, location) for message, symbol, location in found]
+
+
+def _sunrise(location: str) -> str:
+    """The class or package of Sunrise in a location such as "variable robot of type LBR"; "": none."""
+    name = re.sub(r"<.*", "", location.rpartition(" ")[2])
+    if name.startswith("com.kuka."):
+        return name
+    return _sunrise_classes().get(name, "")
+
+
+@cache
+def _sunrise_classes() -> dict[str, str]:
+    """Full names of the doubles' classes by simple name."""
+    found = {}
+    for jar in _resources.jars():
+        with zipfile.ZipFile(jar) as file:
+            for entry in file.namelist():
+                if entry.startswith("com/kuka/") and entry.endswith(".class"):
+                    full = entry.removesuffix(".class").replace("/", ".").replace("$", ".")
+                    found[full.rpartition(".")[2]] = full
+    return found
+
+
+def _chosen(found: list[str], main: str, folder: Path) -> str:
+    fitting = [name for name in found if not main or name == main or name.rpartition(".")[2] == main]
+    if len(fitting) == 1:
+        return fitting[0]
+    names = ", ".join(found) or "none"
+    if main and not fitting:
+        raise CommandRejected(
+            f"{folder} has no application {main}", parameter="app-class", allowed=names, value=main
+        )
+    raise CommandRejected(
+        f"{folder} has {len(fitting) or 'no'} applications: {names}",
+        parameter="app-class",
+        allowed=names,
+        hint="choose one with --app-class" if fitting else "an application extends RoboticsAPIApplication",
+    )
+
+
+def _compiler() -> str:
+    home = os.environ.get("JAVA_HOME")
+    candidates = [str(Path(home) / "bin" / "javac")] if home else []
+    for candidate in (*candidates, "javac"):
+        if found := shutil.which(candidate):
+            return found
+    raise MissingExtra(
+        "compiling an application needs a Java compiler, but no javac was found",
+        hint="install a JDK 17 or newer, or set JAVA_HOME",
+    )

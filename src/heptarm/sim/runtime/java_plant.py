@@ -1,0 +1,368 @@
+"""The plant as Java sees it: motion orders, conditions, FRI sessions, and the project's templates.
+
+Java reads states from the shared memory without asking Python; only commands cross into Python, where they are planned
+in the calling thread. They come as the bytes that `heptarm.sim.seam` decodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from enum import IntEnum
+from functools import partial
+from math import isnan
+from typing import Any, TypeVar
+
+import jpype
+import jpype.nio
+import numpy as np
+
+from heptarm.errors import CommandRejected, HeptarmError, Unreachable
+from heptarm.model.inverse_kinematics import solve
+from heptarm.sim import seam
+from heptarm.sim.fri.io import SessionSignal
+from heptarm.sim.fri.sessions import Sessions
+from heptarm.sim.planning.command import ConditionWatch, Order, PlanError, Seven
+from heptarm.sim.plant.plant import Plant
+from heptarm.sim.runtime.project import Project
+from heptarm.values.frames import TOOL
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
+from heptarm.values.mode.mode import Mode
+from heptarm.values.mode.sine import SineImpedance
+from heptarm.values.motion.hand_guiding import HandGuide
+from heptarm.values.motion.orientation import Orientation
+from heptarm.values.pose import Pose
+from heptarm.values.robot import Body
+
+T = TypeVar("T")
+
+
+class JavaListener:
+    """A Java listener as the plant's; see `heptarm.sim.planning.command.PartListener`."""
+
+    __slots__ = ("_java",)
+
+    def __init__(self, java: Any) -> None:
+        self._java = java
+
+    def started(self) -> None:
+        """The motion begins."""
+        self._java.started()
+
+    def finished(self, cause: str, text: str) -> None:
+        """The motion has ended."""
+        self._java.finished(int(seam.EndCause[cause.upper()]), text)
+
+    def reached(self, part: int) -> None:
+        """A part of it begins."""
+        self._java.reached(part)
+
+
+# -------------------------------------------------------------------------------------------------------- translation
+
+
+def _keywords(value: Any) -> dict[str, Any]:
+    """Fields of a value of the seam by name: arrays as arrays, enumerations as words."""
+    found = {name: getattr(value, name) for name in value.__slots__}
+    return {
+        name: one.name.lower()
+        if isinstance(one, IntEnum)
+        else np.array(one)
+        if isinstance(one, tuple)
+        else one
+        for name, one in found.items()
+    }
+
+
+def mode_of(mode: seam.ImpedanceMode | None) -> tuple[Mode | None, Seven | None]:
+    """A control mode, and the quaternion of its axes if they are fixed to the base."""
+    if mode is None:
+        return None, None
+    if isinstance(mode, seam.JointImpedance):
+        return JointImpedance(**_keywords(mode)), None
+    if isinstance(mode, seam.SineImpedance):
+        base, axes = _cartesian(mode.base)
+        return SineImpedance(**{**_keywords(mode), "base": base}), axes
+    return _cartesian(mode)
+
+
+def _cartesian(mode: seam.CartesianImpedance) -> tuple[CartesianImpedance, Seven | None]:
+    given = _keywords(mode)
+    axes = given.pop("axes")
+    given["max_force_stops"] &= not np.isnan(mode.max_force).all()
+    return CartesianImpedance(**given, frame=TOOL if axes is None else "reference"), mode.axes
+
+
+def _filled(values: Sequence[float], default: float) -> tuple[float, ...]:
+    """Numbers with a default for NaN."""
+    return tuple(default if isnan(value) else value for value in values)
+
+
+def _watches(order: seam.MotionOrder, fired: Callable[[int, bool, int], None]) -> tuple[ConditionWatch, ...]:
+    """Triggers, then break conditions: a condition that is both is reported before it ends the motion."""
+    lists = [(-1, False, order.triggers)]
+    lists += [(part, False, one.triggers) for part, one in enumerate(order.parts)]
+    lists += [(-1, True, order.breaks)]
+    return tuple(
+        ConditionWatch(condition, partial(fired, part, breaks, index), breaks, part)
+        for part, breaks, conditions in lists
+        for index, condition in enumerate(conditions)
+    )
+
+
+def _word(value: IntEnum | None, default: IntEnum) -> str:
+    return (default if value is None else value).name.lower()
+
+
+def order_of(one: seam.MotionOrder, java: Any = None) -> Order:
+    """The order of a motion.
+
+    Args:
+        one: as Java describes it.
+        java: its listener; None for a part of another motion, which has the listener and conditions of the whole.
+    """
+    joints, path, blending, timing = (
+        one.joint_dynamics,
+        one.cartesian_dynamics,
+        one.blending,
+        one.servo_timing,
+    )
+    relative, distance, angle = _filled((blending.relative, blending.distance, blending.angle), 0.0)
+    listener = None if java is None else JavaListener(java)
+    mode, axes = mode_of(one.mode)
+    return Order(
+        one.id,
+        one.kind.name.lower(),
+        joints=one.joints,
+        pose=one.pose,
+        via=one.via,
+        orientation=Orientation(
+            _word(one.orientation_type, seam.OrientationType.VARIABLE),
+            _word(one.orientation_reference, seam.OrientationReference.BASE),
+        ),
+        redundancy=(one.redundancy.e1, one.redundancy.status, one.redundancy.turn),
+        tcp=one.tcp,
+        offset=one.offset,
+        reference=one.reference,
+        joint_velocity=_filled(joints.velocity, 1.0),
+        joint_acceleration=_filled(joints.acceleration, 1.0),
+        joint_jerk=_filled(joints.jerk, 1.0),
+        cart_velocity=path.velocity,
+        cart_acceleration=path.acceleration,
+        cart_jerk=path.jerk,
+        ori_velocity=path.orientation_velocity,
+        ori_acceleration=path.orientation_acceleration,
+        ori_jerk=path.orientation_jerk,
+        blending=(relative, distance, angle),
+        parts=tuple(order_of(part) for part in one.parts),
+        guide=None if one.hand_guiding is None else HandGuide(**_keywords(one.hand_guiding)),
+        duration=one.duration,
+        mode=mode,
+        axes=axes,
+        minimum_time=timing.minimum_time,
+        goal_timeout=timing.goal_timeout,
+        speed_timeout=timing.speed_timeout,
+        straight=one.straight_limits,
+        listener=listener,
+        watches=() if java is None else _watches(one, java.fired),
+        part_listener=listener,
+    )
+
+
+# --------------------------------------------------------------------------------------------------------------- Java
+
+
+def boxed(value: str | int | float | bool) -> Any:
+    """A value as the Java object that an application finds in its process data."""
+    kinds = {bool: "java.lang.Boolean", int: "java.lang.Integer", float: "java.lang.Double"}
+    kind = kinds.get(type(value))
+    return jpype.JString(value) if kind is None else jpype.JClass(kind).valueOf(value)
+
+
+def add_project(station: Any, project: Project) -> None:
+    """Give a station the templates and taught frames of a project."""
+    made = jpype.JClass("heptarm.doubles.runtime.ObjectTemplate")
+    for one in project.templates:
+        template = made(one.is_tool, one.mass, _doubles(one.centre), _doubles(one.inertia), one.moved)
+        template.setType(one.type)
+        for path, placed in one.frames:
+            template.addFrame(path, _doubles(placed))
+        station.addTemplate(one.name, template)
+    for path, placed in project.frames:
+        station.addFrame(path, _doubles(placed))
+    for path, redundancy in project.redundancies:
+        station.setRedundancy(path, *redundancy)
+
+
+def _doubles(values: Sequence[float]) -> Any:
+    return jpype.JArray(jpype.JDouble)(list(values))
+
+
+def _numbers(values: Any) -> list[float]:
+    """Numbers of a Java array."""
+    return [float(value) for value in values[:]]
+
+
+def _translated(java_error: str, call: Callable[[], T]) -> T:
+    """The result of a call; an error becomes one that Java can read, instead of a proxy without text."""
+    try:
+        return call()
+    except (HeptarmError, ValueError) as error:
+        raise jpype.JClass(java_error)(str(error)) from error
+
+
+@jpype.JImplements("heptarm.doubles.plant.Plant", deferred=True)
+class JavaPlant:
+    """The plant of the Java interface heptarm.doubles.plant.Plant.
+
+    Args:
+        plant: the plant.
+        sessions: its FRI sessions.
+    """
+
+    def __init__(self, plant: Plant, sessions: Sessions) -> None:
+        self._plant, self._sessions = plant, sessions
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def describe(self) -> Any:
+        """Name, limits and dimensions of the robot."""
+        robot = self._plant.robot
+        names = seam.RobotDescription.__slots__
+        return jpype.JArray(jpype.JByte)(
+            seam.RobotDescription(**{name: getattr(robot, name) for name in names}).encode()
+        )
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def submit(self, order: Any, listener: Any) -> str | None:
+        """Plan and queue a motion; the text of a refusal, or None."""
+        given = seam.MotionOrder.decode(bytes(order.encode()))
+        try:
+            made = order_of(given, listener)
+            overlay = given.fri_overlay
+            if overlay is not None:
+                overlaid = self._sessions.overlaid(
+                    overlay.session, overlay.command, made.id, made.mode, JavaListener(listener)
+                )
+                made = replace(made, listener=overlaid)
+            self._plant.submit(made)
+        except (PlanError, CommandRejected) as error:
+            return str(error)
+        return None
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def cancel(self, order_id: int) -> None:
+        """Cancel a motion."""
+        self._plant.cancel(int(order_id))
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def cancelAll(self) -> None:
+        """Cancel every motion."""
+        self._plant.cancel(None)
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def stopFast(self) -> None:
+        """Brake every axis with full deceleration."""
+        self._plant.stop_fast()
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def acknowledge(self) -> None:
+        """Acknowledge errors whose cause is gone."""
+        self._plant.acknowledge()
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def clipManualOverride(self, limit: float) -> None:
+        """Limit the manual override."""
+        self._plant.safety.manual = min(self._plant.safety.manual, float(limit))
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def pause(self) -> None:
+        """Pause execution."""
+        self._plant.pause()
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def resume(self) -> None:
+        """Resume execution."""
+        self._plant.resume()
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def changeMode(self, order_id: int, mode: Any) -> None:
+        """Change the parameters of a running motion's control mode."""
+        if mode is not None:
+            changed, _ = mode_of(seam.decode_impedance_mode(bytes(mode.encode())))
+            if changed is not None:
+                self._plant.change_mode(int(order_id), changed)
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def watch(self, condition: Any, at_once: bool, listener: Any) -> int:
+        """Monitor a condition; returns its number."""
+        decoded = seam.decode_condition(bytes(condition.encode()))
+        return self._plant.condition_monitor.observe(decoded, listener.changed, at_once=bool(at_once))
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def unwatch(self, number: int) -> None:
+        """Stop monitoring a condition."""
+        self._plant.condition_monitor.forget(int(number))
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def signal(self, name: Any, output: bool) -> int:
+        """Place of a signal in the IO image."""
+        place = partial(self._plant.signals.place, str(name), is_output=bool(output))
+        return _translated("java.lang.IllegalStateException", place)
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def inverse(self, pose: Any, e1: float, status: int, near: Any) -> Any:
+        """Inverse kinematics; None where there is no solution."""
+        place = _numbers(pose)
+        try:
+            found = solve(
+                self._plant.robot,
+                Pose.of(place[:3], place[3:]),
+                e1=float(e1),
+                status=int(status),
+                near=_numbers(near),
+            )
+        except Unreachable:
+            return None
+        return _doubles(found.tolist())
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def friOpen(self, settings: Any, channel: Any) -> int:
+        """Open an FRI session; returns its number."""
+        given = seam.FriSessionSettings.decode(bytes(settings.encode()))
+        return _translated(
+            "java.lang.IllegalStateException",
+            lambda: self._sessions.open(
+                (given.host, given.remote_port),
+                period_ms=given.send_period,
+                multiplier=given.receive_multiplier,
+                port=given.local_port or None,
+                transformations=given.transformations,
+                signals=tuple(SessionSignal.of(one) for one in given.signals),
+                channel=channel.changed,
+            ),
+        )
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def friClose(self, number: int) -> None:
+        """Close an FRI session."""
+        self._sessions.close(int(number))
+
+    @jpype.JOverride  # type: ignore[untyped-decorator]
+    def setAttachedLoad(self, load: Any) -> None:
+        """Set the load data of everything attached to the flange."""
+        given = seam.AttachedLoad.decode(bytes(load.encode()))
+        _translated(
+            "java.lang.IllegalArgumentException",
+            lambda: self._plant.set_load_data(
+                Body(given.mass, np.array(given.centre), inertia=np.array(given.inertia))
+            ),
+        )
+
+
+def open_station(plant: Plant, sessions: Sessions) -> Any:
+    """Give the plant and its FRI sessions to Java; returns heptarm.doubles.runtime.Station."""
+    memory = jpype.nio.convertToDirectBuffer(plant.ring.memory)
+    station = jpype.JClass("heptarm.doubles.runtime.Station").open(memory, JavaPlant(plant, sessions))
+    plant.on_wake = station.timers.tick
+    plant.on_safety = station.safetyChanged
+    return station
