@@ -1,0 +1,212 @@
+"""Replaying a taught trajectory, as a stream of targets or as one spline."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from heptarm.errors import CommandRejected, LimitError, MotionAborted, ShapeError, StaleState
+from heptarm.values.arrays import Array, Value, within
+from heptarm.values.condition.condition import Condition
+from heptarm.values.mode.mode import Mode
+from heptarm.values.motion.ptp import ptp
+from heptarm.values.motion.trajectory import Trajectory
+from heptarm.values.result import Cause, Result
+from heptarm.values.robot import RobotModel
+
+if TYPE_CHECKING:
+    from heptarm.arm.arm import Arm
+
+#: Default of the longest gap between two targets [s]: longer than that of `Arm.servo`, since each target is computed.
+WATCHDOG = 0.3
+#: Longest time that the arm may need to settle at the end of a trajectory after its last target [s].
+_SETTLE = 2.0
+#: The arm has settled when no joint deviates more than this [rad].
+_SETTLED = 5e-3
+#: The arm is at the start of the trajectory when no joint deviates more than this [rad].
+_AT_START = 1e-4
+#: Points of a trajectory with which a position is compared.
+_DENSE = 2001
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Replay(Value):
+    """Result of a replay.
+
+    Attributes:
+        result: how its motion ended.
+        deviation: largest distance of any axis from the taught path, whatever the time [rad].
+        lag: median delay of the arm [s], in the time of the trajectory; NaN for a spline, which has its own timing.
+    """
+
+    result: Result
+    deviation: float
+    lag: float = float("nan")
+
+
+def replay(
+    arm: Arm,
+    trajectory: Trajectory,
+    *,
+    by: Literal["servo", "spline"] = "servo",
+    pace: float = 1.0,
+    approach: float = 0.2,
+    rate: float = 100.0,
+    watchdog: float = WATCHDOG,
+    mode: Mode | None = None,
+    until: Condition | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> Replay:
+    """Move to the start of a trajectory and follow it.
+
+    Args:
+        arm: in control.
+        trajectory: the taught trajectory; best trimmed and thinned.
+        by: "servo": with the taught timing, as a stream of targets; "spline": as one smooth motion with the cabinet's
+            timing, which needs no stream and stops on its path.
+        pace: by servo: factor on the taught speed; by spline: fraction of each axis' maximum, (0, 1].
+        approach: speed of the motion to its start, a fraction of each axis' maximum in (0, 1].
+        rate: targets per second [Hz].
+        watchdog: by servo: longest gap between two targets; a longer one stops the arm [s].
+        mode: control mode; None: that of `using`, otherwise position.
+        until: break condition that ends it.
+        on_progress: called with the completed fraction, [0, 1], repeatedly once the start is reached.
+
+    Returns:
+        How it ended, and how closely the arm followed the taught path.
+
+    Raises:
+        CommandRejected: it was taught on another model; ModeConflict: a motion runs.
+        LimitError: a position beyond the joints' limits, or a speed above `arm.speed`.
+        MotionAborted: ended early.
+    """
+    _check(trajectory, arm.robot)
+    if by not in ("servo", "spline"):
+        raise ShapeError(f"by must be 'servo' or 'spline', got {by!r}", parameter="by", value=by)
+    if by == "spline":
+        within(pace, "pace", 0.0, 1.0, above=True)
+    elif within(pace, "pace", 0.0, 100.0, above=True):
+        _check_speed(trajectory, pace, arm.robot.dq_max * arm.speed)
+    if float(np.abs(arm.wait_for_rest().q - trajectory.q[0]).max()) > _AT_START:
+        arm.move(ptp(trajectory.q[0]), speed=approach)
+    run = _Run(arm, trajectory, pace, mode, until, on_progress)
+    return run.by_spline() if by == "spline" else run.by_servo(rate, watchdog)
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """A replay that starts at the first position of its trajectory; see `replay` for the attributes."""
+
+    arm: Arm
+    trajectory: Trajectory
+    pace: float
+    mode: Mode | None
+    until: Condition | None
+    on_progress: Callable[[float], None] | None
+
+    def by_spline(self) -> Replay:
+        """Follow it as one spline."""
+        handle = self.arm.start(
+            self.trajectory.spline(), mode=self.mode, speed=self.pace, until=self.until, when="reject"
+        )
+        seen: list[Array] = []
+        try:
+            for state in self.arm.states():
+                seen.append(state.q)
+                self._report(handle.progress)
+                if handle.done:
+                    break
+        finally:
+            handle.cancel()
+        deviation = max((_nearest(self.trajectory, q)[0] for q in seen), default=0.0)
+        return Replay(handle.wait(), deviation)
+
+    def by_servo(self, rate: float, watchdog: float) -> Replay:
+        """Follow it by a stream of targets."""
+        trajectory, per_second = self.trajectory, self.pace * self.arm.pace
+        seen: list[tuple[float, Array]] = []
+        due = 0
+        with self.arm.servo(
+            "joint",
+            rate=rate,
+            watchdog=watchdog,
+            speed=1.0,
+            acceleration=1.0,
+            mode=self.mode,
+            until=self.until,
+        ) as servo:
+            while servo.tick():
+                t = servo.t * per_second
+                servo.set(*trajectory.at(t + servo.period * per_second))
+                try:
+                    state = self.arm.state
+                except StaleState:
+                    continue  # the stream goes on without feedback
+                seen.append((t, state.q))
+                self._report(min(1.0, t / trajectory.duration))
+                if t < trajectory.duration:
+                    continue
+                # by the cabinet's clock, which the arm follows
+                due = due or state.stamp + round(_SETTLE * 1e9)
+                if float(np.abs(state.q - trajectory.q[-1]).max()) < _SETTLED or state.stamp > due:
+                    break
+        result = servo.result
+        if result is None:
+            raise MotionAborted("the servo motion has not ended")
+        ended = replace(result, cause=Cause.FINISHED) if result.cause is Cause.CANCELLED else result
+        nearest = [(t, *_nearest(trajectory, q)) for t, q in seen]
+        lags = [t - there for t, _, there in nearest if t < trajectory.duration]
+        deviation = max((distance for _, distance, _ in nearest), default=0.0)
+        return Replay(ended, deviation, float(np.median(lags)) if lags else float("nan"))
+
+    def _report(self, progress: float) -> None:
+        if self.on_progress is not None:
+            self.on_progress(progress)
+
+
+def _nearest(trajectory: Trajectory, q: Array) -> tuple[float, float]:
+    """Distance of a position from the taught path [rad], and the time of the nearest point on it [s]."""
+    times = np.linspace(0.0, trajectory.duration, _DENSE)
+    distances = np.abs(trajectory.positions(times) - q).max(axis=1)
+    nearest = int(distances.argmin())
+    return float(distances[nearest]), float(times[nearest])
+
+
+def _check_speed(trajectory: Trajectory, pace: float, allowed: Array) -> None:
+    """Refuse a pace at which an axis exceeds the allowed speeds, shape (7,) [rad/s]."""
+    fraction = trajectory.fastest * pace / allowed
+    if (fraction > 1.0).any():
+        axis = int(fraction.argmax())
+        most = pace / float(fraction[axis])
+        raise LimitError(
+            f"pace must be in (0, {most:.3g}], got {pace:g}: A{axis + 1} would turn at "
+            f"{np.degrees(trajectory.fastest[axis] * pace):.0f} deg/s, allowed are "
+            f"{np.degrees(allowed[axis]):.0f} deg/s",
+            code=2,
+            parameter="pace",
+            value=pace,
+            allowed=f"(0, {most:.3g}]",
+            hint=f"replay it at pace {most:.2g}, or by spline",
+        )
+
+
+def _check(trajectory: Trajectory, robot: RobotModel) -> None:
+    if not isinstance(trajectory, Trajectory):
+        raise ShapeError(
+            f"trajectory must be a Trajectory, got {trajectory!r}",
+            parameter="trajectory",
+            hint="Trajectory.load(...), or arm.teach()",
+        )
+    if trajectory.robot and trajectory.robot != robot.name:
+        raise CommandRejected(
+            f"trajectory must be taught on an {robot.name}, got one of an {trajectory.robot}",
+            parameter="trajectory",
+            value=trajectory.robot,
+            allowed=robot.name,
+            hint="teach it on this arm, or remove the robot: Trajectory.of(times, q)",
+        )
+    for index, extreme in enumerate((trajectory.q.min(axis=0), trajectory.q.max(axis=0))):
+        robot.check(extreme, f"trajectory, {('lowest', 'highest')[index]} q")
