@@ -14,10 +14,9 @@
 
 from heptarm.testing.measure import NotShown, Unfit
 from heptarm.testing.report import Outcome, Report, Verdict
-from heptarm.testing.runner import run
+from heptarm.testing.runner import find, run, scenarios
 from heptarm.testing.scenario import Risk, Scenario
 from heptarm.testing.stage import HOME, stage
-from heptarm.testing.suite import find, scenarios
 
 __all__ = [
     "HOME",

@@ -12,13 +12,13 @@ import numpy.typing as npt
 from heptarm.arm.arm import Arm
 from heptarm.errors import HeptarmError
 from heptarm.values.arrays import Array
-from heptarm.values.condition import Condition
-from heptarm.values.mode import Mode
-from heptarm.values.motion import Motion
+from heptarm.values.condition.condition import Condition
+from heptarm.values.mode.mode import Mode
+from heptarm.values.motion.motion import Motion
 from heptarm.values.result import Result
 from heptarm.values.state import State
 
-#: More numbers than this are told by their least and largest.
+#: More numbers than this are reported by their least and largest.
 _MANY = 16
 _SEEN: ContextVar[list[str] | None] = ContextVar("heptarm_measured", default=None)
 
@@ -109,8 +109,8 @@ def _text(value: npt.ArrayLike) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
-    """What the pushed states told while something ran, one after the other.
+class Recording:
+    """The states pushed during a motion, in their order.
 
     Attributes:
         result: how it ended.
@@ -138,12 +138,12 @@ class Course:
 
     @property
     def xyz(self) -> Array:
-        """Measured places of the moved frame, shape (n, 3) [m]."""
+        """Measured places of the motion frame, shape (n, 3) [m]."""
         return np.array([state.pose.xyz for state in self.states])
 
     @property
     def xyz_cmd(self) -> Array:
-        """Commanded places of the moved frame, shape (n, 3) [m]."""
+        """Commanded places of the motion frame, shape (n, 3) [m]."""
         return np.array([state.pose_cmd.xyz for state in self.states])
 
     @property
@@ -153,12 +153,12 @@ class Course:
 
     @property
     def speeds(self) -> Array:
-        """Commanded speeds of the moved frame between two states, shape (n - 1,) [m/s]."""
+        """Commanded speeds of the motion frame between two states, shape (n - 1,) [m/s]."""
         return np.asarray(np.linalg.norm(np.diff(self.xyz_cmd, axis=0), axis=1) / np.diff(self.t))
 
     @property
     def turns(self) -> Array:
-        """Commanded turning speeds of the moved frame between two states, shape (n - 1,) [rad/s]."""
+        """Commanded turning speeds of the motion frame between two states, shape (n - 1,) [rad/s]."""
         pairs = zip(self.states, self.states[1:])
         return np.array([b.pose_cmd.angle_to(a.pose_cmd) for a, b in pairs]) / np.diff(self.t)
 
@@ -170,7 +170,7 @@ def record(
     mode: Mode | None = None,
     until: Condition | None = None,
     speed: float | None = None,
-) -> Course:
+) -> Recording:
     """Carry out a motion, or several, and keep all states meanwhile. Raises as `Arm.move` does."""
     before = arm.state.stamp
     pushed = arm.states()  # from before the beginning: a slow machine would miss the first of them
@@ -185,7 +185,7 @@ def record(
         if state.stamp >= end if end is not None else state.stamp - before > handle.limit * 1e9:
             break
     pushed.close()
-    return Course(handle.wait(), tuple(states.values()))
+    return Recording(handle.wait(), tuple(states.values()))
 
 
 def fresh(arm: Arm, *, after: float = 0.03) -> State:

@@ -16,7 +16,7 @@ class Verdict(Enum):
 
     SHOWN = "shown"  # every measurement was as it should be
     FAILED = "failed"  # a measurement, or an error, said otherwise
-    LEFT_OUT = "left out"  # it was not tried; the text says why
+    LEFT_OUT = "left out"  # it was not tried; the text gives the reason
 
 
 @dataclass(frozen=True, slots=True)

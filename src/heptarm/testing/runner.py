@@ -1,20 +1,74 @@
-"""Runs scenarios one after the other, with the arm at its home and tidy before each of them."""
+"""Finds scenarios and runs them one after the other, with the arm at its home and tidy before each."""
 
 from __future__ import annotations
 
+import fnmatch
+import importlib
 import time
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from heptarm.arm.arm import Arm
-from heptarm.errors import HeptarmError, NotReady
+from heptarm.errors import CommandRejected, HeptarmError, NotReady
 from heptarm.testing.measure import NotShown, Unfit, collect
 from heptarm.testing.report import Outcome, Report, Verdict
-from heptarm.testing.scenario import Risk, Scenario
+from heptarm.testing.scenario import REGISTRY, Risk, Scenario
 from heptarm.testing.stage import HOME, REAL_SPEED, VIRTUAL_SPEED, has_operator
-from heptarm.testing.suite import find
-from heptarm.values.motion import ptp
+from heptarm.values.motion.ptp import ptp
+
+#: Modules of this package that define scenarios, in the order in which they run.
+GROUPS = (
+    "model",
+    "state",
+    "link",
+    "motions",
+    "paths",
+    "programs",
+    "modes",
+    "patterns",
+    "conditions",
+    "servo",
+    "tools",
+    "signals",
+    "contact",
+    "guiding",
+    "safety",
+    "applications",
+)
+
+
+def scenarios() -> tuple[Scenario, ...]:
+    """All of them, group by group."""
+    for group in GROUPS:
+        importlib.import_module(f"heptarm.testing.catalogue.{group}")
+    return tuple(sorted(REGISTRY.values(), key=lambda one: GROUPS.index(one.group)))
+
+
+def find(patterns: Sequence[str] = ()) -> tuple[Scenario, ...]:
+    """Scenarios by name, group, or pattern such as "motions.*"; without any: all.
+
+    Raises:
+        CommandRejected: a pattern that fits none.
+    """
+    every = scenarios()
+    if not patterns:
+        return every
+    for pattern in patterns:
+        if not any(_fits(one, pattern) for one in every):
+            raise CommandRejected(
+                f"no scenario {pattern!r}",
+                parameter="only",
+                value=pattern,
+                allowed=", ".join(dict.fromkeys(one.group for one in every)),
+                hint="name a group, a scenario, or a pattern such as motions.*",
+            )
+    return tuple(one for one in every if any(_fits(one, pattern) for pattern in patterns))
+
+
+def _fits(one: Scenario, pattern: str) -> bool:
+    return one.group == pattern or fnmatch.fnmatchcase(one.name, pattern)
+
 
 #: At home the joints are within this [rad].
 _AT_HOME = 1e-3
@@ -101,8 +155,8 @@ def _unwanted(scenario: Scenario, arm: Arm, ask: Callable[[str], bool] | None) -
     if ask is None:
         return "nobody was asked whether the robot may move"
     away = np.degrees(np.abs(arm.state.q - HOME).max())
-    way = f"go home, {away:.0f} deg away, then " if away > np.degrees(_AT_HOME) else ""
-    words = f"{way}move within {scenario.space:g} m of home at {arm.speed:.0%} of the full speed"
+    approach = f"go home, {away:.0f} deg away, then " if away > np.degrees(_AT_HOME) else ""
+    words = f"{approach}move within {scenario.space:g} m of home at {arm.speed:.0%} of the full speed"
     return (
         ""
         if ask(f"{scenario.name}: {scenario.title}. The {arm.robot.title} will {words}. Go on?")
@@ -144,7 +198,7 @@ def tidy(arm: Arm, *, home: bool) -> None:
     arm.wait_for_rest(timeout=_PATIENCE)
     state = arm.state
     if not state.safety.ready_to_move:
-        if not arm.is_virtual:  # why it stands still is for a person to find out
+        if not arm.is_virtual:  # a person has to find out why it does not move
             raise NotReady(
                 f"the robot is not ready: {', '.join(state.safety.stops) or 'it does not say why'}"
             )

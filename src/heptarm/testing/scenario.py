@@ -31,7 +31,7 @@ class Risk(Enum):
 
     STILL = "still"  # nothing moves
     FREE = "free"  # the arm moves in the air
-    CONTACT = "contact"  # the arm touches something, or yields to a force
+    CONTACT = "contact"  # the arm touches something, or is moved by a force
     FAULT = "fault"  # something goes wrong on purpose
 
 
@@ -42,7 +42,7 @@ class Scenario:
     Attributes:
         name: group and name, as in "motions.lin".
         title: one sentence.
-        show: shows it with an arm that rests at its home; raises NotShown where a measurement says otherwise, and
+        show: shows it with an arm that rests at its home; raises NotShown where a measurement shows otherwise, and
             Unfit where there is nothing to show it with.
         rows: of the feature table.
         line: of `LINES`.

@@ -38,7 +38,7 @@ public class Nod extends RoboticsAPIApplication {
         Frame end = robot.getCurrentCartesianPosition(robot.getFlange());
         getLogger().info("lifted by " + Math.round(end.getZ() - start.getZ()) + " mm");
         int times = getApplicationData().getProcessData("lab.times").getValue();
-        getLogger().info("told " + times + " times");
+        getLogger().info("reported " + times + " times");
     }
 }
 """
@@ -50,9 +50,9 @@ import javax.inject.Inject;
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import heptarm.app.CabinetArm;
-import heptarm.core.Arm;
-import heptarm.core.Move;
-import heptarm.core.Refusal;
+import heptarm.core.api.Arm;
+import heptarm.core.api.Move;
+import heptarm.core.CommandRejected;
 
 public class Own extends RoboticsAPIApplication {
     @Inject
@@ -65,10 +65,10 @@ public class Own extends RoboticsAPIApplication {
             arm.move(Move.ptp(0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0).speed(0.8));
             double before = arm.pose().xyz[2];
             String how = "" + arm.move(Move.linRel(0.0, 0.0, 0.05).along("base").velocity(0.2)).cause;
-            long way = Math.round(1000 * (arm.pose().xyz[2] - before));
-            getLogger().info(how + ", lifted by " + way + " mm");
+            long offset = Math.round(1000 * (arm.pose().xyz[2] - before));
+            getLogger().info(how + ", lifted by " + offset + " mm");
             arm.move(Move.ptp(0.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0));
-        } catch (Refusal e) {
+        } catch (CommandRejected e) {
             getLogger().info("refused " + e.parameter + ": " + e.getMessage());
         } finally {
             arm.close();
@@ -107,7 +107,7 @@ def foreign(arm: Arm) -> None:
     """Somebody else's Sunrise application is compiled and run as it is, with its own process data."""
     said = _sim("Nod", _FOREIGN)
     holds("lifted by 40 mm" in said, "it measured its line: 40 mm")
-    holds("told 2 times" in said, "it read its process data")
+    holds("reported 2 times" in said, "it read its process data")
 
 
 @scenario(line=12, risk=Risk.STILL, virtual=True)
@@ -115,4 +115,4 @@ def own(arm: Arm) -> None:
     """An application on heptarm's core, without any network: motions, their results, a refusal."""
     said = _sim("Own", _OWN)
     holds("FINISHED, lifted by 50 mm" in said, "its line was 50 mm long")
-    holds("A2 would be at" in said, "what cannot be done was refused by name")
+    holds("A2 must be in" in said, "what cannot be done was refused by name")

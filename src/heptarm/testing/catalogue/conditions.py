@@ -8,11 +8,13 @@ from heptarm.arm.arm import Arm
 from heptarm.testing.measure import above, below, fresh, holds, near, note, record
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
-from heptarm.values.condition import Condition
-from heptarm.values.motion import hold, lin_rel, ptp
+from heptarm.values.condition.condition import Condition
+from heptarm.values.condition.signals import Force, Path, force, io, path, torque
+from heptarm.values.motion.line import lin_rel
+from heptarm.values.motion.motion import hold
+from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose, deg
 from heptarm.values.result import Cause
-from heptarm.values.signals import Force, Path, force, io, path, torque
 
 
 @scenario(line=4, rows="H3 H5 B14", risk=Risk.CONTACT, operator=True, space=0.05, needs=("conditions",))
@@ -51,7 +53,7 @@ def torques(arm: Arm) -> None:
     arm.operator.push((0.0, 16.0, 0.0), duration=1.0)
     result = handle.wait(timeout=30.0)
     holds(result.stopped_by == (abs(torque[0]) > 6), f"the part that fired: {result.stopped_by}")
-    holds(result.fired_at is not None, "the state when it fired is told")
+    holds(result.fired_at is not None, "the state when it fired is reported")
     assert result.fired_at is not None
     above(abs(float(result.fired_at.tau_ext[0])), 6.0, "external torque of A1 then", unit="Nm")
     arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
@@ -72,7 +74,7 @@ def touch(arm: Arm) -> None:
     holds(result.item == 0 and result.fired_at is not None, "the line ended, the next motion did not begin")
     assert result.fired_at is not None
     place = result.fired_at.pose.xyz
-    below(float(np.abs(place[:2] - start.xyz[:2]).max()), 3e-3, "way from its line", unit="m")
+    below(float(np.abs(place[:2] - start.xyz[:2]).max()), 3e-3, "offset from its line", unit="m")
     above(float(result.fired_at.wrench.force[2]), 6.0, "force then", unit="N")
     above(float(arm.wait_for_rest().wrench.force[2]), 5.0, "and at rest", unit="N")
     note(f"the table is {start.xyz[2] - place[2]:.3f} m below home")
@@ -81,13 +83,13 @@ def touch(arm: Arm) -> None:
 
 @scenario(line=4, rows="H3", space=0.15, needs=("conditions", "lin_rel"))
 def combined(arm: Arm) -> None:
-    """And, or, not; a point on the path by way and by time; the part that held is named."""
+    """And, or, not; a point on the path by distance and by time; the part that held is named."""
     start = arm.wait_for_rest().pose
     half = path.after(0.04)
-    course = record(arm, lin_rel(y=0.1, frame="base", speed_mps=0.06), until=half | (force > 500))
-    holds(course.result.stopped_by == half, f"fired: {course.result.stopped_by}")
-    assert course.result.fired_at is not None
-    near(course.result.fired_at.pose.distance_to(start), 0.04, 6e-3, "way then", unit="m")
+    recording = record(arm, lin_rel(y=0.1, frame="base", speed_mps=0.06), until=half | (force > 500))
+    holds(recording.result.stopped_by == half, f"fired: {recording.result.stopped_by}")
+    assert recording.result.fired_at is not None
+    near(recording.result.fired_at.pose.distance_to(start), 0.04, 6e-3, "distance then", unit="m")
     calm = ~(force > 500) & half
     result = arm.move(lin_rel(y=-0.1, frame="base", speed_mps=0.06), until=calm)
     holds(result.cause is Cause.CONDITION and result.stopped_by == calm, f"fired: {result.stopped_by}")
@@ -95,7 +97,7 @@ def combined(arm: Arm) -> None:
     before = arm.wait_for_rest().pose
     result = arm.move(lin_rel(z=0.06, frame="base", speed_mps=0.06), until=late)
     assert result.fired_at is not None
-    near(result.fired_at.pose.distance_to(before), 0.04, 6e-3, "20 mm before the end: way", unit="m")
+    near(result.fired_at.pose.distance_to(before), 0.04, 6e-3, "20 mm before the end: distance", unit="m")
 
 
 @scenario(line=4, rows="J5 H13", operator=True, risk=Risk.CONTACT, space=0.02, needs=("conditions", "io"),

@@ -5,15 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.arm.arm import Arm
+from heptarm.testing.catalogue.modes import held, let_go
 from heptarm.testing.measure import Unfit, above, below, fresh, holds, near, watch
-from heptarm.testing.modes import held, let_go
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import DEEPEST, HOME
-from heptarm.values.mode import CartesianImpedance, JointImpedance
-from heptarm.values.motion import hold, lin, lin_rel, ptp
+from heptarm.values.condition.signals import Force, force, io
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
+from heptarm.values.motion.line import lin, lin_rel
+from heptarm.values.motion.motion import hold
+from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose, deg
 from heptarm.values.result import Cause
-from heptarm.values.signals import Force, force, io
 from heptarm.values.tool import Workpiece
 
 _LONG = 60.0
@@ -28,7 +30,7 @@ _LONG = 60.0
     needs=("conditions", "joint_impedance"),
 )
 def reaction(arm: Arm) -> None:
-    """A bump ends a motion at once, then the arm is soft; the result is the collision flag."""
+    """A bump ends a motion at once, then the arm is compliant; the result is the collision flag."""
     bump = force > 20
     handle = arm.start(lin_rel(y=0.15, frame="base", speed_mps=0.03), until=bump)
     arm.wait_until(lambda s: np.linalg.norm(s.dq) > 0.01, timeout=20.0)
@@ -38,27 +40,27 @@ def reaction(arm: Arm) -> None:
     arm.operator.push((0.0, -9.0, 0.0), duration=_LONG)
     arm.wait_until(lambda s: np.abs(s.tau_ext).max() < 8.0, timeout=20.0)
     rests = arm.wait_for_rest()
-    soft = held(arm, JointImpedance(300.0))
+    compliant = held(arm, JointImpedance(300.0))
     watch(arm, 0.5)
-    above(fresh(arm).pose.distance_to(rests.pose), 5e-3, "then it yields to a light push by", unit="m")
+    above(fresh(arm).pose.distance_to(rests.pose), 5e-3, "then a light push moves it by", unit="m")
     arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
-    let_go(arm, soft)
+    let_go(arm, compliant)
 
 
 @scenario(line=8, rows="H1 H8", risk=Risk.CONTACT, operator=True, space=0.2, needs=("cartesian_impedance",))
 def plane(arm: Arm) -> None:
-    """Soft in one plane only; led too far, the arm goes back by itself."""
+    """Compliant in one plane only; guided too far, the arm moves back by itself."""
     start = arm.wait_for_rest()
     mode = CartesianImpedance((200.0, 200.0, 5000.0, 300.0, 300.0, 300.0), damping=0.9, frame="base")
-    soft = held(arm, mode)
+    compliant = held(arm, mode)
     arm.operator.push((0.0, 14.0, -14.0), duration=_LONG)
     led = arm.wait_until(lambda s: s.pose.distance_to(start.pose) > 0.05, timeout=20.0)
-    way = led.pose.xyz - start.pose.xyz
-    above(abs(float(way[1])), 0.045, "led in the plane by", unit="m")
-    below(abs(float(way[2])), 0.006, "across it by", unit="m")
+    offset = led.pose.xyz - start.pose.xyz
+    above(abs(float(offset[1])), 0.045, "guided in the plane by", unit="m")
+    below(abs(float(offset[2])), 0.006, "across it by", unit="m")
     arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
     back = arm.start(ptp(HOME, speed=0.3), when="replace")
-    holds(soft.wait().cause is Cause.REPLACED and back.wait().arrived, "it went back")
+    holds(compliant.wait().cause is Cause.REPLACED and back.wait().arrived, "it went back")
     near(arm.wait_for_rest().q, HOME, 2e-3, "home", unit="rad")
 
 
@@ -94,13 +96,13 @@ def pick(arm: Arm) -> None:
         arm.operator.set_signal("UserButton", False)
         holds(arm.move(down, until=contact).stopped_by == contact, "put down on the table")
         arm.wait_for_rest()
-    holds(fresh(arm).control is not None and fresh(arm).control.workpiece == "", "the hand is empty")  # type: ignore[union-attr]
+    holds(fresh(arm).workpiece == "", "the hand is empty")
     arm.move([lin_rel(z=0.1, frame="base", speed_mps=0.4), ptp(HOME + deg(0, 0, 0, 0, 0, 0, 1))])
 
 
 @scenario(line=8, rows="H11", risk=Risk.CONTACT, operator=True, space=0.2, needs=("joint_impedance",))
 def led(arm: Arm) -> None:
-    """A soft arm is led by hand, and keeps the place where it was led: what is felt becomes the set-point."""
+    """A compliant arm is guided by hand and stays where it was guided: the measured pose becomes the set-point."""
     start = arm.wait_for_rest()
     with arm.servo(
         "joint", rate=50, speed=0.5, acceleration=1.0, mode=JointImpedance(200.0), watchdog=2.0

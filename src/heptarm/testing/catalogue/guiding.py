@@ -1,4 +1,4 @@
-"""Scenarios: people who lead the arm, tap it, teach it; contacts that are sought, and those that are not wanted."""
+"""Scenarios: guiding, tapping and teaching the arm; intended contacts and collisions."""
 
 from __future__ import annotations
 
@@ -8,24 +8,26 @@ import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.errors import CollisionDetected, NoContact
+from heptarm.testing.catalogue.modes import let_go
 from heptarm.testing.measure import Unfit, above, below, fresh, holds, near, note
-from heptarm.testing.modes import let_go
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import DEEPEST, HOME
 from heptarm.values.arrays import Array
-from heptarm.values.guiding import hand_guide
-from heptarm.values.motion import hold, lin_rel, ptp
+from heptarm.values.mode.compliance import compliance
+from heptarm.values.motion.hand_guiding import hand_guide
+from heptarm.values.motion.line import lin_rel
+from heptarm.values.motion.motion import hold
+from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import deg
-from heptarm.values.yielding import yielding
 
 _LONG = 120.0
 
 
-def _lead(arm: Arm, push: tuple[float, float, float], way: float) -> None:
+def _guide(arm: Arm, push: tuple[float, float, float], offset: float) -> None:
     """Push until a joint has turned so far [rad]."""
     before = arm.state.q
     arm.operator.push(push, duration=_LONG)
-    arm.wait_until(lambda s: np.abs(s.q - before).max() > way, timeout=60.0)
+    arm.wait_until(lambda s: np.abs(s.q - before).max() > offset, timeout=60.0)
     arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
     arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 1.0, timeout=20.0)
 
@@ -37,12 +39,12 @@ def by_hand(arm: Arm) -> None:
     handle.wait_started(20.0)
     arm.operator.guide()
     arm.wait_until(lambda s: s.safety.hand_guiding_switch, timeout=20.0)
-    _lead(arm, (0.0, 15.0, 15.0), 0.2)
+    _guide(arm, (0.0, 15.0, 15.0), 0.2)
     holds(not handle.done, "it goes on while the switch is held")
     arm.operator.let_go()
     holds(handle.wait(timeout=30.0).arrived, "it ends when the switch is let go")
     rests = arm.wait_for_rest()
-    above(float(np.abs(rests.q - HOME).max()), 0.05, "a joint was led by", unit="rad")
+    above(float(np.abs(rests.q - HOME).max()), 0.05, "a joint was guided by", unit="rad")
     near(fresh(arm, after=0.2).q, rests.q, 1e-3, "and it stays there", unit="rad")
 
 
@@ -50,9 +52,9 @@ def by_hand(arm: Arm) -> None:
 def precise(arm: Arm) -> None:
     """Led along one axis only, all other directions held, without any device."""
     start = arm.wait_for_rest().pose
-    handle = arm.start(hold(_LONG), mode=yielding("y", frame="base"))
+    handle = arm.start(hold(_LONG), mode=compliance("y", frame="base"))
     handle.wait_started(20.0)
-    _lead(arm, (10.0, 10.0, 10.0), 0.1)
+    _guide(arm, (10.0, 10.0, 10.0), 0.1)
     let_go(arm, handle)
     end = arm.wait_for_rest().pose
     above(float(end.xyz[1] - start.xyz[1]), 0.01, "led by", unit="m")
@@ -62,12 +64,12 @@ def precise(arm: Arm) -> None:
 
 @scenario(line=8, rows="H3 H4 H14", risk=Risk.CONTACT, space=0.3, needs=("conditions", "lin_rel"))
 def touched(arm: Arm) -> None:
-    """Touch and retreat; a second, slow touch says where the table is within a millimetre."""
-    way = DEEPEST - 0.05
+    """Touch and retreat; a second, slow touch measures the height of the table within a millimetre."""
+    offset = DEEPEST - 0.05
     try:
-        rough = arm.touch("-z", frame="base", distance=way, force=10.0, speed_mps=0.08, retreat=0.02)
+        rough = arm.touch("-z", frame="base", distance=offset, force=10.0, speed_mps=0.08, retreat=0.02)
     except NoContact as error:
-        raise Unfit(f"there is no table within {way:g} m below the flange") from error
+        raise Unfit(f"there is no table within {offset:g} m below the flange") from error
     above(float(rough.force[2]), 8.0, "force at the contact", unit="N")
     near(arm.wait_for_rest().pose.xyz[2] - rough.pose.xyz[2], 0.02, 2e-3, "retreated by", unit="m")
     fine = arm.touch_twice("-z", frame="base", distance=0.05, force=8.0, retreat=0.02)
@@ -79,7 +81,7 @@ def touched(arm: Arm) -> None:
 @scenario(line=8, rows="H12 H13", risk=Risk.CONTACT, operator=True, space=0.1, needs=("ptp",))
 def taps(arm: Arm) -> None:
     """A motion is interrupted by a tap and goes on after two more."""
-    from heptarm.values.signals import force
+    from heptarm.values.condition.signals import force
 
     target = ptp(HOME + deg(0, 0, 0, 0, 0, 0, 60), speed=0.2)
     handle = arm.start(target, until=force > 15)
@@ -130,20 +132,20 @@ def guard(arm: Arm) -> None:
     needs=("cartesian_impedance", "servo"),
 )
 def taught(arm: Arm) -> None:
-    """Led by hand, recorded with its times, and done again on the same way."""
+    """Guided by hand, recorded with its times, and replayed on the same path."""
 
     def person() -> None:
         arm.operator.guide()
         arm.wait_until(lambda s: s.motion is not None and s.motion.active, timeout=30.0)
-        _lead(arm, (0.0, 8.0, 8.0), 0.1)
+        _guide(arm, (0.0, 8.0, 8.0), 0.1)
         arm.operator.let_go()
 
     hand = Thread(target=person)
     hand.start()
     whole = arm.teach(hand_guide(joint_velocity=0.5), timeout=60.0)
     hand.join()
-    way: Array = np.ptp(whole.q, axis=0)
-    above(float(way.max()), 0.05, "taught: a joint was led by", unit="rad")
+    offset: Array = np.ptp(whole.q, axis=0)
+    above(float(offset.max()), 0.05, "taught: a joint was guided by", unit="rad")
     trajectory = whole.trimmed().thinned()
     above(float(len(trajectory)), 1.5, "positions kept, each with its time")
     replay = arm.replay(trajectory, by="spline", pace=0.5)

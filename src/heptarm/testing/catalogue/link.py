@@ -11,7 +11,7 @@ from heptarm.errors import ConnectionLost
 from heptarm.testing.measure import below, fresh, holds, near, note
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
-from heptarm.values.motion import ptp
+from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import deg
 
 _QUESTIONS = 100
@@ -39,7 +39,7 @@ def clock(arm: Arm) -> None:
 
 @scenario(line=10, rows="O6 O7 O8 O10", risk=Risk.FAULT, virtual=True, space=0.5, needs=("ptp",))
 def lost(arm: Arm) -> None:
-    """When the connection breaks amid a motion, the arm comes to rest and both sides say so; it is made anew."""
+    """When the connection breaks during a motion, the arm comes to rest, both sides report it, and it is made again."""
     handle = arm.start(ptp(HOME + deg(50, 0, 0, 0, 0, 0, 0), speed=0.1))
     arm.wait_until(lambda s: abs(s.q[0] - HOME[0]) > 0.02, timeout=20.0)
     arm._connection.link._transport.close()
@@ -52,6 +52,7 @@ def lost(arm: Arm) -> None:
     holds(recovery.done and arm.in_control, f"recovered: {recovery}")
     rests = arm.wait_for_rest()
     holds(
-        0.01 < rests.q[0] < np.radians(45), f"the arm stopped on its way, at {np.degrees(rests.q[0]):.1f} deg"
+        0.01 < rests.q[0] < np.radians(45),
+        f"the arm stopped on its path, at {np.degrees(rests.q[0]):.1f} deg",
     )
     near(fresh(arm).q, rests.q, 1e-3, "and rests there", unit="rad")

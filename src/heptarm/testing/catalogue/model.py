@@ -10,8 +10,8 @@ from heptarm.testing.measure import above, below, holds, near, note, record
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
 from heptarm.values.arrays import Array
-from heptarm.values.links import LINKS
-from heptarm.values.motion import lin_rel, ptp
+from heptarm.values.motion.line import lin_rel
+from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import ROBOTS
 
@@ -21,15 +21,15 @@ _GAP = 4
 
 @scenario(line=11, rows="K1 K13 K14 G8 G9", risk=Risk.STILL)
 def forward(arm: Arm) -> None:
-    """Forward kinematics gives the pose that the cabinet tells, as matrix, quaternion and angles."""
+    """Forward kinematics gives the pose that the cabinet reports, as matrix, quaternion and angles."""
     state = arm.wait_for_rest()
-    told = arm.pose("flange")
+    reported = arm.pose("flange")
     made = Pose.from_matrix(model.forward(arm.robot, state.q))
-    near(made.xyz, told.xyz, 2e-4, "place of the flange", unit="m")
-    near(made.angle_to(told), 0.0, 1e-3, "its orientation is off by", unit="rad")
-    again = Pose.xyz_abc(*told.xyz, *told.abc)
-    near(again.matrix, told.matrix, 1e-9, "the same from its angles")
-    near(np.linalg.det(told.rotation), 1.0, 1e-9, "determinant of its rotation")
+    near(made.xyz, reported.xyz, 2e-4, "place of the flange", unit="m")
+    near(made.angle_to(reported), 0.0, 1e-3, "its orientation is off by", unit="rad")
+    again = Pose.xyz_abc(*reported.xyz, *reported.abc)
+    near(again.matrix, reported.matrix, 1e-9, "the same from its angles")
+    near(np.linalg.det(reported.rotation), 1.0, 1e-9, "determinant of its rotation")
     for name, robot in ROBOTS.items():
         near(
             model.forward(robot, np.zeros(7))[2, 3],
@@ -38,7 +38,7 @@ def forward(arm: Arm) -> None:
             f"height of the stretched {name}",
             unit="m",
         )
-        holds(LINKS[name].mass.shape == (7,), f"inertial data of the {name} are there")
+        holds(robot.links.mass.shape == (7,), f"inertial data of the {name} are there")
 
 
 @scenario(line=11, rows="K4 K5", risk=Risk.STILL)
@@ -49,12 +49,12 @@ def inverse(arm: Arm) -> None:
     near(
         model.solve(arm.robot, pose, near=q.tolist()), q, 1e-9, "joints from the pose and a hint", unit="rad"
     )
-    told = arm.state.redundancy
+    reported = arm.state.redundancy
     near(
-        model.solve(arm.robot, pose, e1=told.e1, status=told.status),
+        model.solve(arm.robot, pose, e1=reported.e1, status=reported.status),
         q,
         2e-3,
-        "joints from the pose, E1 and Status as the cabinet tells them",
+        "joints from the pose, E1 and Status as the cabinet reports them",
         unit="rad",
     )
     bent = HOME + deg(10, 5, 15, 10, -10, 5, 20)
@@ -69,9 +69,9 @@ def inverse(arm: Arm) -> None:
 @scenario(line=11, rows="K2 K3 K6 G2", space=0.15, needs=("ptp",))
 def jacobian(arm: Arm) -> None:
     """The Jacobian turns measured joint speeds into the measured velocity of the flange and of a point on it."""
-    course = record(arm, ptp(HOME + deg(12, 4, -6, 5, 6, 8, 10), speed=0.25))
-    middle = len(course.states) // 2
-    a, b = course.states[middle - _GAP], course.states[middle + _GAP]
+    recording = record(arm, ptp(HOME + deg(12, 4, -6, 5, 6, 8, 10), speed=0.25))
+    middle = len(recording.states) // 2
+    a, b = recording.states[middle - _GAP], recording.states[middle + _GAP]
     seconds = (b.stamp - a.stamp) * 1e-9
     q, dq = (a.q_cmd + b.q_cmd) / 2, (b.q_cmd - a.q_cmd) / seconds
     matrix = model.jacobian(arm.robot, q)
@@ -103,11 +103,11 @@ def gravity(arm: Arm) -> None:
 @scenario(line=11, rows="K7 K8 K9 K11 K12", space=0.5, virtual=True, needs=("ptp",))
 def dynamics(arm: Arm) -> None:
     """Mass matrix, Coriolis and centrifugal torques explain what the joints measure in a fast motion, and back."""
-    course = record(arm, ptp(HOME + deg(50, -20, 10, 30, 20, -20, 40), speed=0.8))
-    middle = [k for k in range(_GAP, len(course.states) - _GAP) if 0.15 < k / len(course.states) < 0.85]
+    recording = record(arm, ptp(HOME + deg(50, -20, 10, 30, 20, -20, 40), speed=0.8))
+    middle = [k for k in range(_GAP, len(recording.states) - _GAP) if 0.15 < k / len(recording.states) < 0.85]
     worst, largest = 0.0, 0.0
     for k in middle:
-        a, here, b = course.states[k - _GAP], course.states[k], course.states[k + _GAP]
+        a, here, b = recording.states[k - _GAP], recording.states[k], recording.states[k + _GAP]
         half = (b.stamp - a.stamp) * 0.5e-9
         dq = (b.q_cmd - a.q_cmd) / (2 * half)
         ddq = (b.q_cmd - 2 * here.q_cmd + a.q_cmd) / half**2
@@ -139,5 +139,5 @@ def limits(arm: Arm) -> None:
         arm.move(lin_rel(z=3.0, frame="base"))
         holds(False, "a line out of the workspace is refused")
     except HeptarmError as error:
-        holds(error.code != 0, f"the cabinet's planner says why: {error.text}")
+        holds(error.code != 0, f"the cabinet's planner gives the reason: {error.text}")
     near(arm.wait_for_rest().q, before, 1e-4, "and the arm is where it was", unit="rad")

@@ -5,20 +5,25 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.handle import MotionHandle
+from heptarm.arm.motion.handle import MotionHandle
 from heptarm.errors import HeptarmError, MotionAborted, NotReady
 from heptarm.testing.measure import above, below, fresh, holds, near, note, record, watch
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
 from heptarm.values.arrays import Array
-from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, Position, SineImpedance
-from heptarm.values.motion import circ, ellipse, hold, lin, lin_rel, ptp
-from heptarm.values.pose import Pose, deg
-from heptarm.values.redundancy import Redundancy
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
+from heptarm.values.mode.mode import Mode, Position
+from heptarm.values.mode.sine import SineImpedance
+from heptarm.values.motion.circle import circ
+from heptarm.values.motion.line import lin, lin_rel
+from heptarm.values.motion.motion import hold
+from heptarm.values.motion.ptp import ptp
+from heptarm.values.motion.spline import ellipse
+from heptarm.values.pose import Pose, Redundancy, deg
 from heptarm.values.state import State
 
 #: Of a force over a stiffness.
-_SHARE = 0.02
+_TOLERANCE = 0.02
 _TURNING = (200.0, 200.0, 200.0)
 _LONG = 60.0
 
@@ -67,13 +72,13 @@ def stiff(arm: Arm) -> None:
         moved.append(float(np.linalg.norm(bent(arm))))
         arm.operator.push(push * 0, duration=0.0)
         let_go(arm, handle)
-    below(max(moved[0], moved[2]), 1e-3, "yields, position control, before and after", unit="m")
-    above(moved[1], 3e-3, "yields, under impedance", unit="m")
+    below(max(moved[0], moved[2]), 1e-3, "deflection, position control, before and after", unit="m")
+    above(moved[1], 3e-3, "deflection, under impedance", unit="m")
 
 
 @scenario(line=3, rows="D2 D3 H11", risk=Risk.CONTACT, operator=True, space=0.1, needs=("joint_impedance",))
 def joints(arm: Arm) -> None:
-    """Joint impedance: each joint yields by its torque over its stiffness, and comes back as it is damped."""
+    """Joint impedance: each joint deflects by its torque over its stiffness, and returns as it is damped."""
     stiffness = np.array([400.0, 600.0, 400.0, 600.0, 200.0, 200.0, 100.0])
     over = []
     for damping in (0.1, 1.0):
@@ -83,19 +88,25 @@ def joints(arm: Arm) -> None:
         watch(arm, 0.5)
         settled(arm)
         state = fresh(arm)
-        way, wanted = state.q - state.q_cmd, state.tau_ext / stiffness
-        above(float(np.abs(way).max()), 0.01, "largest way of a joint", unit="rad")
-        near(way, wanted, _SHARE * float(np.abs(wanted).max()) + 1e-3, "way of each joint", unit="rad")
+        offset, wanted = state.q - state.q_cmd, state.tau_ext / stiffness
+        above(float(np.abs(offset).max()), 0.01, "largest offset of a joint", unit="rad")
+        near(
+            offset,
+            wanted,
+            _TOLERANCE * float(np.abs(wanted).max()) + 1e-3,
+            "offset of each joint",
+            unit="rad",
+        )
         arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
         after = np.array([s.q[0] - s.q_cmd[0] for s in watch(arm, 1.0)])
-        over.append(float((-np.sign(way[0]) * after).max()))
+        over.append(float((-np.sign(offset[0]) * after).max()))
         let_go(arm, handle)
     above(over[0], 2.0 * max(over[1], 1e-4), "let go, A1 swings over by, hardly damped", unit="rad")
 
 
 @scenario(line=3, rows="D4 D5 D8 D20 H1", space=0.1, virtual=True, needs=("cartesian_impedance",))
 def cartesian(arm: Arm) -> None:
-    """Cartesian impedance: a force moves the flange by force over stiffness, far in a soft plane, hardly across it."""
+    """Cartesian impedance: the flange deflects by force over stiffness, far in a compliant plane, little across it."""
     stiffness = (400.0, 400.0, 4000.0, *_TURNING)
     force = (12.0, -10.0, -12.0)
     mode = CartesianImpedance(stiffness, damping=0.8, additional_force=(*force, 0, 0, 0), frame="base")
@@ -103,23 +114,23 @@ def cartesian(arm: Arm) -> None:
     watch(arm, 0.6)
     settled(arm)
     wanted = np.divide(force, stiffness[:3])
-    near(bent(arm), wanted, _SHARE * float(np.abs(wanted).max()) + 2e-4, "way", unit="m")
+    near(bent(arm), wanted, _TOLERANCE * float(np.abs(wanted).max()) + 2e-4, "offset", unit="m")
     let_go(arm, handle)
 
 
 @scenario(line=3, rows="D6 D7", space=0.1, virtual=True, needs=("cartesian_impedance", "ptp_pose"))
 def nullspace(arm: Arm) -> None:
-    """The null-space spring leads the elbow to its set-point while the flange stays."""
+    """The null-space spring pulls the elbow to its set-point while the flange stays."""
     start = arm.wait_for_rest()
     aside = Redundancy(start.redundancy.e1 + 0.3, start.redundancy.status)
     mode = CartesianImpedance(nullspace_stiffness=200.0, nullspace_damping=0.5)
-    course = record(arm, [ptp(start.pose, redundancy=aside, speed=0.3), hold(0.4)], mode=mode)
-    end = course.states[-1]
+    recording = record(arm, [ptp(start.pose, redundancy=aside, speed=0.3), hold(0.4)], mode=mode)
+    end = recording.states[-1]
     below(end.pose.distance_to(start.pose), 2e-3, "the flange is off by", unit="m")
     above(float(np.abs(end.q - start.q).max()), 0.15, "a joint has turned by", unit="rad")
     near(end.q, end.q_cmd, 0.02, "joints and their set-points", unit="rad")
-    told = [s.mode for s in course.states if isinstance(s.mode, CartesianImpedance)]
-    holds(told and told[-1].nullspace_damping == 0.5, "its damping is read back")
+    reported = [s.mode for s in recording.states if isinstance(s.mode, CartesianImpedance)]
+    holds(reported and reported[-1].nullspace_damping == 0.5, "its damping is read back")
 
 
 @scenario(
@@ -127,24 +138,24 @@ def nullspace(arm: Arm) -> None:
 )
 def bounds(arm: Arm) -> None:
     """The largest force caps what the control exerts, or ends the motion; so do largest speed and deviation."""
-    soft = (500.0, 500.0, 500.0, *_TURNING)
+    compliant = (500.0, 500.0, 500.0, *_TURNING)
     far = (1e3, 1e3, 1e3, 10.0, 10.0, 10.0)
-    ways = []
+    offsets = []
     for most in (1000.0, 10.0):
         limit = (most, *far[1:])
         handle = held(arm, CartesianImpedance((2000.0,) * 3 + _TURNING, max_force=limit, frame="base"))
         arm.operator.push((20.0, 0.0, 0.0), duration=0.5)
-        ways.append(max(float(np.linalg.norm(s.pose.xyz - s.pose_cmd.xyz)) for s in watch(arm, 0.6)))
+        offsets.append(max(float(np.linalg.norm(s.pose.xyz - s.pose_cmd.xyz)) for s in watch(arm, 0.6)))
         let_go(arm, handle)
         arm.move(ptp(HOME))
-    near(ways[0], 20.0 / 2000.0, 5e-3, "a push of 20 N against 2000 N/m", unit="m")
-    above(ways[1], 1.5 * ways[0], "if the control exerts no more than 10 N", unit="m")
+    near(offsets[0], 20.0 / 2000.0, 5e-3, "a push of 20 N against 2000 N/m", unit="m")
+    above(offsets[1], 1.5 * offsets[0], "if the control exerts no more than 10 N", unit="m")
     for words, limits in (
         ("force", {"max_force": (10.0, *far[1:]), "max_force_stops": True}),
         ("deviation", {"max_deviation": (0.01, 1, 1, 1, 1, 1)}),
         ("velocity", {"max_velocity": (0.01, 1, 1, 1, 1, 1)}),
     ):
-        base = CartesianImpedance(soft, frame="base", **limits)
+        base = CartesianImpedance(compliant, frame="base", **limits)
         try:
             arm.move(hold(5.0), mode=SineImpedance.force(x=30.0, base=base))
             holds(False, f"the largest {words} ends the motion")
@@ -156,7 +167,7 @@ def bounds(arm: Arm) -> None:
 
 @scenario(line=3, rows="D21 C15", space=0.2, needs=("cartesian_impedance", "spline", "circ"))
 def motions(arm: Arm) -> None:
-    """Lines, circles, ellipses and PTP under impedance: their set-points lead there, the arm close to them."""
+    """Lines, circles, ellipses and PTP under impedance: the set-points arrive, the arm close to them."""
     start = arm.wait_for_rest().pose
     centre = start.xyz + [0.0, 0.05, 0.0]
     end = Pose(start.xyz + [0.0, 0.1, 0.0], start.quat)
@@ -168,17 +179,17 @@ def motions(arm: Arm) -> None:
             ("ellipse", ellipse(end, 0.03, centre=centre, angle=np.pi, speed_mps=0.15), start.xyz),
             ("PTP", ptp(HOME + deg(5, 0, 0, 0, 0, 0, 0)), None),
         ):
-            course = record(arm, motion)
-            holds(course.result.arrived, f"{what} arrives")
-            off = np.linalg.norm(course.xyz - course.xyz_cmd, axis=1)
+            recording = record(arm, motion)
+            holds(recording.result.arrived, f"{what} arrives")
+            off = np.linalg.norm(recording.xyz - recording.xyz_cmd, axis=1)
             below(float(off.max()), 0.02, f"{what}, off its set-point by", unit="m")
             if target is not None:
-                near(course.xyz_cmd[-1], target, 2e-3, f"{what}, end of its set-point", unit="m")
+                near(recording.xyz_cmd[-1], target, 2e-3, f"{what}, end of its set-point", unit="m")
 
 
 @scenario(line=3, rows="D22 D23 E11", space=0.1, virtual=True, needs=("cartesian_impedance", "servo"))
 def online(arm: Arm) -> None:
-    """While the arm follows a stream, its stiffness is changed, and it yields accordingly."""
+    """While the arm follows a stream, its stiffness is changed, and its deflection with it."""
 
     def mode(stiffness: float) -> CartesianImpedance:
         force = (0.0, 12.0, 0.0, 0, 0, 0)
@@ -190,14 +201,14 @@ def online(arm: Arm) -> None:
         def follow(wanted: float, by: float) -> float:
             """Follow until the flange is where it should be, or 10 s have passed; where it is then."""
             first = arm.state.stamp
-            way = np.inf
-            while servo.tick() and abs(way - wanted) > by and arm.state.stamp < first + 10e9:
+            offset = np.inf
+            while servo.tick() and abs(offset - wanted) > by and arm.state.stamp < first + 10e9:
                 servo.set(start)
                 state = arm.state
-                way = float(state.pose.xyz[1] - state.pose_cmd.xyz[1])
-            return way
+                offset = float(state.pose.xyz[1] - state.pose_cmd.xyz[1])
+            return offset
 
-        soft = follow(12.0 / 600.0, 5e-4)
+        compliant = follow(12.0 / 600.0, 5e-4)
         servo.change(mode(3000.0))
         hard = follow(12.0 / 3000.0, 5e-4)
         try:
@@ -205,7 +216,7 @@ def online(arm: Arm) -> None:
             holds(False, "another kind of mode is refused")
         except HeptarmError as error:
             note(error.text)
-    near(soft, 12.0 / 600.0, 2e-3, "12 N over 600 N/m", unit="m")
+    near(compliant, 12.0 / 600.0, 2e-3, "12 N over 600 N/m", unit="m")
     near(hard, 12.0 / 3000.0, 1e-3, "12 N over 3000 N/m", unit="m")
 
 

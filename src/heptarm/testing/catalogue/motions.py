@@ -10,9 +10,10 @@ from heptarm.testing.measure import above, below, holds, near, note, record
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
 from heptarm.values.arrays import Array
-from heptarm.values.motion import hold, lin, lin_rel, ptp, ptp_home
-from heptarm.values.pose import Pose, deg
-from heptarm.values.redundancy import Redundancy
+from heptarm.values.motion.line import lin, lin_rel
+from heptarm.values.motion.motion import hold
+from heptarm.values.motion.ptp import ptp, ptp_home
+from heptarm.values.pose import Pose, Redundancy, deg
 
 #: How exactly a motion ends [m], [rad].
 _PLACE, _ANGLE = 5e-4, 2e-3
@@ -32,7 +33,7 @@ def ptp_joints(arm: Arm) -> None:
     """PTP to joint positions: the call returns when the arm is there."""
     target = HOME + deg(12, -4, 6, 8, -5, 6, 15)
     result = arm.move(ptp(target))
-    holds(result.arrived, f"it says so: {result.cause.value}")
+    holds(result.arrived, f"the result is: {result.cause.value}")
     assert result.state is not None
     near(result.state.q, target, 1e-3, "measured joints", unit="rad")
     near(arm.wait_for_rest().dq, np.zeros(7), 0.01, "and the arm rests", unit="rad/s")
@@ -51,7 +52,7 @@ def ptp_pose(arm: Arm) -> None:
     arm.move(ptp(target, redundancy=wanted))
     turned = arm.wait_for_rest()
     near(turned.pose.xyz, target.xyz, _PLACE, "place with another E1", unit="m")
-    near(turned.redundancy.e1, wanted.e1, _ANGLE, "E1 as the cabinet tells it", unit="rad")
+    near(turned.redundancy.e1, wanted.e1, _ANGLE, "E1 as the cabinet reports it", unit="rad")
     near(turned.redundancy.status, wanted.status, 0, "Status")
     above(float(np.abs(turned.q - there.q).max()), 0.1, "a joint has turned by", unit="rad")
 
@@ -61,17 +62,17 @@ def straight(arm: Arm) -> None:
     """LIN: the flange goes straight, at the wanted speed, turning along."""
     start = arm.wait_for_rest().pose
     target = start @ Pose.xyz_abc(0.03, 0.12, -0.02, *deg(25, 0, 0))
-    course = record(arm, lin(target, speed_mps=0.06))
+    recording = record(arm, lin(target, speed_mps=0.06))
     there = arm.wait_for_rest().pose
     near(there.xyz, target.xyz, _PLACE, "place", unit="m")
     near(there.angle_to(target), 0.0, _ANGLE, "orientation is off by", unit="rad")
-    below(_off_line(course.xyz, start.xyz, target.xyz), 5e-4, "way from the line", unit="m")
-    near(np.median(course.speeds), 0.06, 0.003, "speed on the way", unit="m/s")
-    middle = course.states[
+    below(_off_line(recording.xyz, start.xyz, target.xyz), 5e-4, "offset from the line", unit="m")
+    near(np.median(recording.speeds), 0.06, 0.003, "speed on the path", unit="m/s")
+    middle = recording.states[
         int(
             np.argmin(
                 np.abs(
-                    course.xyz @ (target.xyz - start.xyz)
+                    recording.xyz @ (target.xyz - start.xyz)
                     - (start.xyz + target.xyz) / 2 @ (target.xyz - start.xyz)
                 )
             )
@@ -81,7 +82,7 @@ def straight(arm: Arm) -> None:
         middle.pose.angle_to(start),
         start.angle_to(target) / 2,
         0.03,
-        "half way it has turned half",
+        "halfway it has turned half",
         unit="rad",
     )
 
@@ -92,13 +93,13 @@ def relative(arm: Arm) -> None:
     start = arm.wait_for_rest().pose
     arm.move(lin_rel(y=0.05, z=0.04, frame="base", speed_mps=0.2))
     there = arm.wait_for_rest().pose
-    near(there.xyz - start.xyz, (0, 0.05, 0.04), _PLACE, "way in the base", unit="m")
+    near(there.xyz - start.xyz, (0, 0.05, 0.04), _PLACE, "offset in the base", unit="m")
     arm.move(lin_rel(x=0.04, z=0.03, a=0.3, c=-0.1, speed_mps=0.2))
     near_pose(arm, there @ Pose.xyz_abc(0.04, 0, 0.03, 0.3, 0, -0.1), "in the tool's axes")
 
 
 def near_pose(arm: Arm, wanted: Pose, what: str) -> None:
-    """The arm rests, and its moved frame is at a pose."""
+    """The arm rests, and its motion frame is at a pose."""
     pose = arm.wait_for_rest().pose
     near(pose.xyz, wanted.xyz, _PLACE, f"place, {what}", unit="m")
     near(pose.angle_to(wanted), 0.0, _ANGLE, f"orientation, {what}, is off by", unit="rad")
@@ -116,8 +117,8 @@ def frames(arm: Arm) -> None:
     before = arm.pose(reference=name)
     arm.move(lin_rel(x=0.04, y=0.02, frame=name, speed_mps=0.2))
     arm.wait_for_rest()
-    way = arm.pose(reference=name).xyz - before.xyz
-    near(way, (0.04, 0.02, 0.0), _PLACE, f"way in the axes of {name}", unit="m")
+    offset = arm.pose(reference=name).xyz - before.xyz
+    near(offset, (0.04, 0.02, 0.0), _PLACE, f"offset in the axes of {name}", unit="m")
     arm.move(lin(arm.frames[name] @ before, speed_mps=0.2))
     near_pose(arm, start, f"back, by a target in {name}")
 
@@ -143,9 +144,9 @@ def project_home(arm: Arm) -> None:
 @scenario(line=1, rows="C21", space=0.02, needs=("hold",))
 def position_hold(arm: Arm) -> None:
     """A hold is a motion that lasts as long as it is wanted, and keeps the place."""
-    course = record(arm, hold(0.5))
-    near(course.result.duration, 0.5, 0.1, "duration", unit="s")
-    below(float(np.abs(course.q - course.q[0]).max()), 1e-3, "no joint moves by more than", unit="rad")
+    recording = record(arm, hold(0.5))
+    near(recording.result.duration, 0.5, 0.1, "duration", unit="s")
+    below(float(np.abs(recording.q - recording.q[0]).max()), 1e-3, "no joint moves by more than", unit="rad")
 
 
 @scenario(line=1, rows="C22", space=0.15, needs=("ptp",))
@@ -153,29 +154,29 @@ def one_axis(arm: Arm) -> None:
     """What shall stay is taken from the state: one axis moves, six do not."""
     target = arm.wait_for_rest().q_cmd.copy()
     target[4] += 0.3
-    course = record(arm, ptp(target))
-    near(course.states[-1].q[4], target[4], 2e-3, "A5", unit="rad")
-    others = np.delete(course.q - course.q[0], 4, axis=1)
+    recording = record(arm, ptp(target))
+    near(recording.states[-1].q[4], target[4], 2e-3, "A5", unit="rad")
+    others = np.delete(recording.q - recording.q[0], 4, axis=1)
     below(float(np.abs(others).max()), 1e-3, "the others move by at most", unit="rad")
 
 
 @scenario(line=1, rows="F1 F2 F3 F4", space=0.3, needs=("ptp",))
 def joint_speeds(arm: Arm) -> None:
     """Speed, acceleration and jerk as fractions of the axes' maxima, for all axes or one by one."""
-    robot, share = arm.robot, min(0.4, arm.speed)
+    robot, fraction = arm.robot, min(0.4, arm.speed)
     there = HOME + deg(16, 0, 0, 0, 0, 0, 25)
-    course = record(arm, ptp(there, speed=share))
-    tops = np.abs(course.rates).max(axis=0) / robot.dq_max
-    near(float(tops.max()), share, 0.03 * share, "fastest axis, fraction of its maximum")
-    slow = np.full(7, share)
-    slow[0] = share / 4
-    course = record(arm, ptp(HOME, speed=slow))
-    top = float(np.abs(course.rates[:, 0]).max() / robot.dq_max[0])
-    near(top, share / 4, 0.03 * share, "A1 alone slowed down")
+    recording = record(arm, ptp(there, speed=fraction))
+    tops = np.abs(recording.rates).max(axis=0) / robot.dq_max
+    near(float(tops.max()), fraction, 0.03 * fraction, "fastest axis, fraction of its maximum")
+    slow = np.full(7, fraction)
+    slow[0] = fraction / 4
+    recording = record(arm, ptp(HOME, speed=slow))
+    top = float(np.abs(recording.rates[:, 0]).max() / robot.dq_max[0])
+    near(top, fraction / 4, 0.03 * fraction, "A1 alone slowed down")
     there = HOME + deg(0, 0, 0, 0, 0, 0, 12)
     arm.move(ptp(HOME))
     times = [
-        arm.move(ptp(target, speed=share, acceleration=acceleration, jerk=jerk)).duration
+        arm.move(ptp(target, speed=fraction, acceleration=acceleration, jerk=jerk)).duration
         for target, acceleration, jerk in ((there, 1.0, 1.0), (HOME, 0.1, 1.0), (there, 1.0, 0.03))
     ]
     above(times[1], times[0] + 0.1, "with a tenth of the acceleration it takes", unit="s")
@@ -185,12 +186,14 @@ def joint_speeds(arm: Arm) -> None:
 @scenario(line=1, rows="F5 F6 F7 F8", space=0.3, needs=("lin_rel",))
 def path_speeds(arm: Arm) -> None:
     """Speed, acceleration and jerk along a path, and those of its rotation."""
-    course = record(arm, lin_rel(y=0.08, frame="base", speed_mps=0.07, acceleration_mps2=0.2, jerk_mps3=50.0))
-    near(float(course.speeds.max()), 0.07, 0.003, "top speed", unit="m/s")
-    pace = np.diff(course.speeds[::3]) / np.diff(course.t[:-1][::3])
-    near(float(np.abs(pace).max()), 0.2, 0.03, "largest acceleration", unit="m/s²")
+    recording = record(
+        arm, lin_rel(y=0.08, frame="base", speed_mps=0.07, acceleration_mps2=0.2, jerk_mps3=50.0)
+    )
+    near(float(recording.speeds.max()), 0.07, 0.003, "top speed", unit="m/s")
+    rates = np.diff(recording.speeds[::3]) / np.diff(recording.t[:-1][::3])
+    near(float(np.abs(rates).max()), 0.2, 0.03, "largest acceleration", unit="m/s²")
     gentle = record(arm, lin_rel(y=-0.08, frame="base", speed_mps=0.07, acceleration_mps2=0.2, jerk_mps3=0.5))
-    above(gentle.result.duration, course.result.duration + 0.2, "with a small jerk it takes", unit="s")
+    above(gentle.result.duration, recording.result.duration + 0.2, "with a small jerk it takes", unit="s")
     turning = record(arm, lin_rel(a=0.25, speed_radps=0.3, acceleration_radps2=1.0, jerk_radps3=50.0))
     near(float(turning.turns.max()), 0.3, 0.015, "top speed of the rotation", unit="rad/s")
     slow = arm.move(lin_rel(a=-0.25, speed_radps=0.3, acceleration_radps2=0.4, jerk_radps3=50.0)).duration
@@ -204,9 +207,9 @@ def path_speeds(arm: Arm) -> None:
 @scenario(line=1, rows="F12", space=0.2, needs=("ptp", "override"))
 def override(arm: Arm) -> None:
     """The application override slows down what runs, at once."""
-    share = min(0.3, arm.speed)
-    handle = arm.start(ptp(HOME + deg(0, 0, 0, 0, 0, 0, 60), speed=share))
-    full = share * arm.robot.dq_max[6]
+    fraction = min(0.3, arm.speed)
+    handle = arm.start(ptp(HOME + deg(0, 0, 0, 0, 0, 0, 60), speed=fraction))
+    full = fraction * arm.robot.dq_max[6]
     arm.wait_until(lambda s: abs(s.dq[6]) > 0.95 * full, timeout=20.0)
     arm.set_override(0.25)
     state = arm.wait_until(lambda s: 0.2 * full < abs(s.dq[6]) < 0.3 * full, timeout=20.0)
@@ -218,14 +221,14 @@ def override(arm: Arm) -> None:
 
 @scenario(line=1, rows="C23", risk=Risk.STILL)
 def reach(arm: Arm) -> None:
-    """Whether a pose can be reached, and by which arms, is told before anything moves."""
+    """Whether a pose can be reached, and by which arms, is known before anything moves."""
     from heptarm.errors import Unreachable
 
     pose = Pose.from_matrix(model.forward(arm.robot, HOME))
     spans = model.intervals(arm.robot, pose, model.redundancy(arm.robot, HOME.tolist()).status)
-    above(sum(high - low for low, high in spans), 0.5, "arm angles that lead there, all in all", unit="rad")
+    above(sum(high - low for low, high in spans), 0.5, "arm angles that reach the pose, in total", unit="rad")
     try:
         model.solve(arm.robot, Pose.of((2.0, 0.0, 0.5)))
-        holds(False, "a pose out of reach is told")
+        holds(False, "a pose out of reach is reported")
     except Unreachable as error:
         note(error.text)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.arm.arm import Arm
+from heptarm.testing.catalogue.motions import near_pose
 from heptarm.testing.measure import above, below, holds, near, note, record
-from heptarm.testing.motions import near_pose
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
 from heptarm.values.arrays import Array
-from heptarm.values.circ import normal_of
-from heptarm.values.motion import arc, circ, ellipse, lin, spl, spline, spline_joints
+from heptarm.values.motion.circle import arc, circ, normal_of
+from heptarm.values.motion.line import lin
+from heptarm.values.motion.spline import ellipse, spl, spline, spline_joints
 from heptarm.values.pose import Pose, deg
 
 #: How far a path may be from its geometry [m].
@@ -42,18 +43,22 @@ def circle(arm: Arm) -> None:
     centre = start.xyz + [0.0, 0.06, 0.0]
     via = Pose(centre + [-0.06, 0.0, 0.0], start.quat)
     end = Pose(centre + [0.0, 0.06, 0.0], start.quat) @ Pose.xyz_abc(0, 0, 0, *deg(0, 20, 0))
-    course = record(arm, circ(via, end, speed_mps=0.1))
-    radii = np.linalg.norm(course.xyz - centre, axis=1)
+    recording = record(arm, circ(via, end, speed_mps=0.1))
+    radii = np.linalg.norm(recording.xyz - centre, axis=1)
     near(radii, np.full(len(radii), 0.06), _TRUE, "radii", unit="m")
-    below(_misses(course.t, course.xyz, via.xyz), _TRUE, "it passes the point at", unit="m")
+    below(_misses(recording.t, recording.xyz, via.xyz), _TRUE, "it passes the point at", unit="m")
     near_pose(arm, end, "at the end")
-    half = course.states[int(np.argmin(np.linalg.norm(course.xyz - via.xyz, axis=1)))].pose
-    near(half.angle_to(start), np.radians(10), 0.03, "half way it has turned half", unit="rad")
+    half = recording.states[int(np.argmin(np.linalg.norm(recording.xyz - via.xyz, axis=1)))].pose
+    near(half.angle_to(start), np.radians(10), 0.03, "halfway it has turned half", unit="rad")
     back = arc(end, -2.0, centre=centre, reference="path", orientation="constant", speed_mps=0.2)
     arm.move(back)
     there = arm.wait_for_rest().pose
     near(
-        float(np.linalg.norm(there.xyz - centre)), 0.06, _TRUE, "radius at the end of the way back", unit="m"
+        float(np.linalg.norm(there.xyz - centre)),
+        0.06,
+        _TRUE,
+        "radius at the end of the motion back",
+        unit="m",
     )
     near(there.angle_to(end), 2.0, 5e-3, "with the tangent it has turned by", unit="rad")
 
@@ -70,10 +75,10 @@ def arcs(arm: Arm) -> None:
         radius = 0.04 * np.cross(normal, (0.0, 1.0, 0.0) if abs(normal[1]) < 0.9 else (1.0, 0.0, 0.0))
         centre = start.xyz + radius
         long = float(np.linalg.norm(radius))
-        course = record(arm, arc(start, 0.9, centre=centre, plane=plane, speed_mps=0.1))
-        lever = course.xyz - centre
+        recording = record(arm, arc(start, 0.9, centre=centre, plane=plane, speed_mps=0.1))
+        lever = recording.xyz - centre
         near(np.linalg.norm(lever, axis=1), np.full(len(lever), long), _TRUE, f"radii, {plane}", unit="m")
-        near(lever @ normal, np.zeros(len(lever)), _TRUE, f"way out of {plane}", unit="m")
+        near(lever @ normal, np.zeros(len(lever)), _TRUE, f"offset out of {plane}", unit="m")
         swept = np.arccos(np.clip((lever[0] @ lever[-1]) / long**2, -1, 1))
         near(swept, 0.9, 0.05, f"angle, {plane}", unit="rad")
         arm.move(lin(start, speed_mps=0.3))
@@ -91,12 +96,14 @@ def splines(arm: Arm) -> None:
     knots = [_moved(start, 0.03, 0.04, 0.02), _moved(start, 0.0, 0.09, 0.03), _moved(start, 0.0, 0.13, 0.03)]
     far, end = _moved(start, -0.04, 0.17, 0.03), _moved(start, -0.08, 0.13, 0.03)
     path = spline([knots[0], spl(knots[1]), lin(knots[2]), circ(far, end)], speed_mps=0.08)
-    course = record(arm, path)
+    recording = record(arm, path)
     for place, knot in enumerate((*knots, far, end)):
-        below(_misses(course.t, course.xyz, knot.xyz), _TRUE, f"it misses point {place} by", unit="m")
+        below(_misses(recording.t, recording.xyz, knot.xyz), _TRUE, f"it misses point {place} by", unit="m")
     near_pose(arm, end, "at the end")
-    moving = course.speeds[np.flatnonzero(course.speeds > 0.04)[0] : np.flatnonzero(course.speeds > 0.04)[-1]]
-    above(float(moving.min()), 0.3 * 0.08, "slowest on the way", unit="m/s")
+    moving = recording.speeds[
+        np.flatnonzero(recording.speeds > 0.04)[0] : np.flatnonzero(recording.speeds > 0.04)[-1]
+    ]
+    above(float(moving.min()), 0.3 * 0.08, "slowest on the path", unit="m/s")
 
 
 @scenario(line=1, rows="C18 B17", needs=("spline_joints",))
@@ -104,9 +111,11 @@ def joint_splines(arm: Arm) -> None:
     """A path given as a matrix of joint positions is passed row by row, without a halt."""
     rows = HOME + np.outer(np.sin(np.linspace(0, np.pi, 9))[1:], deg(12, 5, 8, 6, 0, 8, 25))
     rows = np.vstack([rows[:-1], HOME + deg(0, 0, 0, 0, 0, 0, 1)])
-    course = record(arm, spline_joints(list(rows), speed=0.4))
+    recording = record(arm, spline_joints(list(rows), speed=0.4))
     for place in (1, 4, 6):
-        below(_misses(course.t, course.q_cmd, rows[place]), 5e-3, f"it misses row {place} by", unit="rad")
+        below(
+            _misses(recording.t, recording.q_cmd, rows[place]), 5e-3, f"it misses row {place} by", unit="rad"
+        )
     near(arm.wait_for_rest().q, rows[-1], 1e-3, "last row", unit="rad")
 
 
@@ -120,15 +129,15 @@ def ellipses(arm: Arm) -> None:
         first = 0.04 * np.cross(normal, (0.0, 1.0, 0.0) if abs(normal[1]) < 0.9 else (1.0, 0.0, 0.0))
         centre, a, b = start.xyz + first, float(np.linalg.norm(first)), 0.025
         turn = 1.2 if plane != "xy" else 2 * np.pi
-        course = record(arm, ellipse(start, b, centre=centre, plane=plane, angle=turn, speed_mps=0.15))
-        lever = course.xyz - centre
+        recording = record(arm, ellipse(start, b, centre=centre, plane=plane, angle=turn, speed_mps=0.15))
+        lever = recording.xyz - centre
         along, across = -first / a, np.cross(normal, -first / a)
         ones = (lever @ along / a) ** 2 + (lever @ across / b) ** 2
         near(ones, np.ones(len(ones)), 0.04, f"equation of the ellipse, {plane}")
-        near(lever @ normal, np.zeros(len(lever)), _TRUE, f"way out of {plane}", unit="m")
+        near(lever @ normal, np.zeros(len(lever)), _TRUE, f"offset out of {plane}", unit="m")
         if plane == "xy":
-            below(_misses(course.t, course.xyz, start.xyz), _TRUE, "closed within", unit="m")
-            ramp = course.speeds[:3]
+            below(_misses(recording.t, recording.xyz, start.xyz), _TRUE, "closed within", unit="m")
+            ramp = recording.speeds[:3]
             below(float(ramp.min()), 0.075, "it begins slowly", unit="m/s")
         else:
             arm.move(lin(start, speed_mps=0.3))
@@ -139,9 +148,9 @@ def orientations(arm: Arm) -> None:
     """How the orientation is led: from start to end, constant, or by the joints."""
     start = arm.wait_for_rest().pose
     target = _moved(start, y=0.06) @ Pose.xyz_abc(0, 0, 0, *deg(15, 0, 0))
-    for way, turned in (("constant", 0.0), ("variable", np.radians(15)), ("joint", np.radians(15))):
-        arm.move(lin(target, orientation=way, speed_mps=0.2))
+    for control, turned in (("constant", 0.0), ("variable", np.radians(15)), ("joint", np.radians(15))):
+        arm.move(lin(target, orientation=control, speed_mps=0.2))
         pose = arm.wait_for_rest().pose
-        near(pose.xyz, target.xyz, _TRUE, f"place, {way}", unit="m")
-        near(pose.angle_to(start), turned, 3e-3, f"turned, {way}", unit="rad")
+        near(pose.xyz, target.xyz, _TRUE, f"place, {control}", unit="m")
+        near(pose.angle_to(start), turned, 3e-3, f"turned, {control}", unit="rad")
         arm.move(lin(start, speed_mps=0.3))

@@ -1,4 +1,4 @@
-"""Scenarios: several motions, one after the other, and what becomes of them."""
+"""Scenarios: several motions, one after the other, and their outcomes."""
 
 from __future__ import annotations
 
@@ -9,19 +9,21 @@ from dataclasses import replace as replaced
 import numpy as np
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.handle import MotionHandle
+from heptarm.arm.motion.handle import MotionHandle
 from heptarm.do import notify
 from heptarm.errors import HeptarmError, ModeConflict, MotionAborted
 from heptarm.model.kinematics import forward
 from heptarm.testing.measure import above, below, fresh, holds, near, note, record, watch
 from heptarm.testing.scenario import scenario
 from heptarm.testing.stage import HOME
-from heptarm.values.limits import Blending
-from heptarm.values.mode import JointImpedance
-from heptarm.values.motion import Motion, hold, lin, lin_rel, ptp
+from heptarm.values.condition.signals import path
+from heptarm.values.mode.impedance import JointImpedance
+from heptarm.values.motion.dynamics import Blending
+from heptarm.values.motion.line import lin, lin_rel
+from heptarm.values.motion.motion import Motion, hold
+from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose, deg
 from heptarm.values.result import Cause
-from heptarm.when import path
 
 
 def _turned(degrees: float) -> Motion:
@@ -31,7 +33,7 @@ def _turned(degrees: float) -> Motion:
 def _under_way(arm: Arm, handle: MotionHandle) -> None:
     """Wait until A7 has left home."""
     arm.wait_until(lambda s: abs(s.q[6] - HOME[6]) > 0.03 or handle.done, timeout=20.0)
-    holds(not handle.done, "it is under way")
+    holds(not handle.done, "it is running")
 
 
 @scenario(line=2, rows="B2 B3 B4 B5 B7 B8 G15", space=0.1, needs=("ptp",))
@@ -40,16 +42,18 @@ def queue(arm: Arm) -> None:
     pushed = arm.states()
     first, second = arm.start(_turned(20), speed=0.15), arm.start(_turned(0))
     holds(not first.done and not second.done, "both calls return before anything is done")
-    farthest, end, told = 0.0, None, False
+    farthest, end, reported = 0.0, None, False
     for state in pushed:
-        told = told or (state.motion is not None and (state.motion.id, state.motion.queued) == (first.id, 1))
+        reported = reported or (
+            state.motion is not None and (state.motion.id, state.motion.queued) == (first.id, 1)
+        )
         farthest = max(farthest, state.q[6])
         if end is None and first.done:
             end = arm.state.stamp  # a slow machine has not seen all of them yet
         if end is not None and state.stamp >= end:
             break
     pushed.close()
-    holds(told, "the cabinet says that one runs and one waits")
+    holds(reported, "the cabinet reports that one runs and one waits")
     near(farthest, np.radians(20), 0.02, "seen while it ran: A7 got to", unit="rad")
     ended: list[int] = []
     second.add_done_callback(lambda handle: ended.append(handle.id))
@@ -58,7 +62,7 @@ def queue(arm: Arm) -> None:
         return (await second).arrived
 
     holds(asyncio.run(wait()), "the second one, awaited, arrives")
-    holds(first.done and first.progress == 1.0, "both have told that they are done")
+    holds(first.done and first.progress == 1.0, "both have reported that they are done")
     arm.wait_until(lambda _: ended == [second.id], timeout=5.0)
     near(arm.wait_for_rest().q, HOME, 1e-3, "back home", unit="rad")
 
@@ -82,7 +86,7 @@ def replace(arm: Arm) -> None:
 
 @scenario(line=2, rows="B10 B14", space=0.1, needs=("ptp",))
 def cancel(arm: Arm) -> None:
-    """A motion is cancelled under way: it brakes, says so, and the arm stays where it stopped."""
+    """A motion is cancelled while it runs: it brakes, reports it, and the arm stays where it stopped."""
     handle = arm.start(_turned(80))
     _under_way(arm, handle)
     handle.cancel()
@@ -95,7 +99,7 @@ def cancel(arm: Arm) -> None:
 
 @scenario(line=2, rows="B10 B11 B15", space=0.1, needs=("ptp", "joint_impedance"))
 def stop(arm: Arm) -> None:
-    """A stop from another thread ends a blocking move with an error; the arm holds its place, stiff, then soft."""
+    """A stop from another thread ends a blocking move with an error; the arm holds its place, stiff, then compliant."""
 
     def stopping() -> None:
         arm.wait_until(lambda s: abs(s.q[6] - HOME[6]) > 0.03, timeout=20.0)
@@ -111,8 +115,8 @@ def stop(arm: Arm) -> None:
     other.join()
     rests = arm.wait_for_rest()
     near(fresh(arm, after=0.2).q, rests.q, 1e-3, "held, stiff", unit="rad")
-    soft = record(arm, hold(0.4), mode=JointImpedance(300.0))
-    near(soft.q[-1], rests.q, 0.02, "held, soft", unit="rad")
+    compliant = record(arm, hold(0.4), mode=JointImpedance(300.0))
+    near(compliant.q[-1], rests.q, 0.02, "held, compliant", unit="rad")
 
 
 @scenario(line=2, rows="F12", space=0.2, needs=("lin_rel", "pause"))
@@ -124,12 +128,12 @@ def pause(arm: Arm) -> None:
     arm.pause()
     arm.wait_until(lambda s: s.safety.paused and np.abs(s.dq).max() < 1e-3, timeout=20.0)
     paused = arm.state
-    holds(not handle.done and paused.pose.distance_to(start) < 0.11, "it rests on its way")
+    holds(not handle.done and paused.pose.distance_to(start) < 0.11, "it rests on its path")
     arm.resume()
     states = [state for state in watch(arm, 0.1)]
     holds(handle.wait().arrived, "it arrives")
     places = np.array([state.pose.xyz for state in states]) - start.xyz
-    below(float(np.abs(places[:, [0, 2]]).max()), 5e-4, "way from its path", unit="m")
+    below(float(np.abs(places[:, [0, 2]]).max()), 5e-4, "offset from its path", unit="m")
     near(arm.wait_for_rest().pose.xyz - start.xyz, (0, 0.12, 0), 5e-4, "end", unit="m")
 
 
@@ -168,16 +172,16 @@ def progress(arm: Arm) -> None:
         if end is not None and state.stamp >= end:
             break
     pushed.close()
-    told = np.array([one for one in seen if np.isfinite(one[2])])
-    above(len(told), 5, "states that tell the time to the destination")
+    reported = np.array([one for one in seen if np.isfinite(one[2])])
+    above(len(reported), 5, "states with the time to the destination")
     holds((np.diff([one[1] for one in seen]) >= 0).all(), "progress never goes back")
-    ends = told[:, 0] + told[:, 2]
+    ends = reported[:, 0] + reported[:, 2]
     below(float(np.ptp(ends[2:])), 0.05, "the end that they foretell moves by", unit="s")
 
 
 @scenario(line=2, rows="B7", space=0.2, needs=("lin_rel", "blending", "triggers"))
 def triggers(arm: Arm) -> None:
-    """Triggers of blended motions fire at their points of the path, the motions go on, and the handle hears of all."""
+    """Triggers of blended motions fire at their points of the path, motions continue, the handle gets all events."""
     start = arm.wait_for_rest().pose.xyz
     there = lin_rel(y=0.08, frame="base", speed_mps=0.05, blend_m=0.01).trigger(
         path.after(0.04), notify("half")
@@ -186,28 +190,28 @@ def triggers(arm: Arm) -> None:
     handle = arm.start([there, back])
     events = list(handle.events())
     holds(handle.wait().arrived, "the program arrives")
-    told = [(event.kind, event.item, event.label) for event in events]
+    reported = [(event.kind, event.item, event.label) for event in events]
     wanted = [("begun", 0, ""), ("trigger", 0, "half"), ("ended", 0, ""), ("begun", 1, "")]
-    holds(told[:4] == wanted and ("trigger", 1, "end") in told, f"events in their order: {told}")
+    holds(reported[:4] == wanted and ("trigger", 1, "end") in reported, f"events in their order: {reported}")
     half = next(event.state for event in events if event.label == "half")
     assert half is not None and half.joints is not None
     moved = Pose.from_matrix(forward(arm.robot, half.joints.q_cmd)).xyz - start
-    above(float(moved[1]), 0.039, "heard of behind the point, at", unit="m")
+    above(float(moved[1]), 0.039, "reported behind the point, at", unit="m")
 
 
 @scenario(line=2, rows="B12", space=0.1, needs=("ptp", "hold"))
 def wait(arm: Arm) -> None:
     """The cabinet waits between two motions of a program."""
-    course = record(arm, [_turned(10), hold(0.4), _turned(0)])
-    still = np.abs(course.rates).max(axis=1) < 1e-3
-    apart = course.q_cmd[1:, 6] > np.radians(9.9)
-    near(float(np.diff(course.t)[still & apart].sum()), 0.4, 0.15, "rest at the turning point", unit="s")
-    holds(course.result.arrived and course.result.item == 2, "all three were done")
+    recording = record(arm, [_turned(10), hold(0.4), _turned(0)])
+    still = np.abs(recording.rates).max(axis=1) < 1e-3
+    apart = recording.q_cmd[1:, 6] > np.radians(9.9)
+    near(float(np.diff(recording.t)[still & apart].sum()), 0.4, 0.15, "rest at the turning point", unit="s")
+    holds(recording.result.arrived and recording.result.item == 2, "all three were done")
 
 
 @scenario(line=2, rows="B15 G20", space=0.1, needs=("ptp", "lin_rel"))
 def error(arm: Arm) -> None:
-    """What fails tells why, what waits behind it is dropped, and the next motion knows nothing of it."""
+    """A failed motion gives its reason, queued motions are dropped, and the next motion is unaffected."""
     try:
         arm.move([_turned(3), lin_rel(x=3.0, frame="base")])
         holds(False, "a line that leaves the workspace fails")
@@ -219,12 +223,12 @@ def error(arm: Arm) -> None:
 
 @scenario(line=2, rows="F1", space=0.1, needs=("ptp",))
 def ceiling(arm: Arm) -> None:
-    """No motion is faster than the arm's ceiling, whatever it says itself."""
+    """No motion is faster than the arm's ceiling, whatever its own speed."""
     before, limit = arm.speed, 0.5 * min(arm.speed, 0.4)
     arm.speed = limit
     try:
-        course = record(arm, ptp(HOME + deg(0, 0, 0, 0, 0, 0, 30), speed=1.0))
+        recording = record(arm, ptp(HOME + deg(0, 0, 0, 0, 0, 0, 30), speed=1.0))
     finally:
         arm.speed = before
-    top = float(np.abs(course.rates[:, 6]).max() / arm.robot.dq_max[6])
+    top = float(np.abs(recording.rates[:, 6]).max() / arm.robot.dq_max[6])
     near(top, limit, 0.03 * limit, "fraction of A7's maximum")

@@ -1,16 +1,16 @@
-"""Scenarios: what goes wrong, what is told of it, and how it goes on."""
+"""Scenarios: faults, how they are reported, and how work continues after them."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.handle import MotionHandle
+from heptarm.arm.motion.handle import MotionHandle
 from heptarm.errors import HeptarmError, MotionAborted, NeedsOperator
 from heptarm.testing.measure import below, holds, near, note
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
-from heptarm.values.motion import ptp
+from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import deg
 from heptarm.values.result import Cause
 from heptarm.values.state import OperationMode
@@ -36,11 +36,11 @@ def _ends(handle: MotionHandle, what: str) -> MotionAborted:
 
 @scenario(line=10, rows="", risk=Risk.FAULT, operator=True, space=0.5)
 def stops(arm: Arm) -> None:
-    """Emergency stop, safeguard, safety stop: the arm brakes, says what is the matter and what a person has to do."""
+    """Emergency stop, safeguard, safety stop: the arm brakes and reports the cause and what a person has to do."""
     for name, step in (
         ("emergency_stop", "release the emergency stop"),
         ("operator_safety", "close the safeguard"),
-        ("protective_stop", "remove what the safety stop was for"),
+        ("protective_stop", "remove the cause of the safety stop"),
     ):
         handle = _under_way(arm)
         arm.operator.do(name)
@@ -64,7 +64,7 @@ def stops(arm: Arm) -> None:
 
 @scenario(line=10, rows="G17", risk=Risk.FAULT, operator=True, space=0.8)
 def modes(arm: Arm) -> None:
-    """T1 is slow and wants the enabling switch: let go, the arm pauses; held and recovered, the motion goes on."""
+    """T1 is slow and needs the enabling switch: let go, the arm pauses; held and recovered, the motion goes on."""
     arm.operator.choose("t1")
     arm.operator.hold()
     arm.wait_until(lambda s: s.safety.mode is OperationMode.T1 and s.safety.enabling_switch, timeout=20.0)
@@ -87,7 +87,7 @@ def modes(arm: Arm) -> None:
 @scenario(line=10, rows="G20 B15", risk=Risk.FAULT, operator=True, space=0.5)
 def errors(arm: Arm) -> None:
     """Errors of the drives, of a joint limit, of a singularity end a motion, each with its code."""
-    for words, says, code in (
+    for words, expected, code in (
         ("drive_error 3", "drive error in A3", 62),
         ("joint_limit 4", "limit A4", 50),
         ("singularity", "singularity", 53),
@@ -95,7 +95,7 @@ def errors(arm: Arm) -> None:
         handle = _under_way(arm)
         arm.operator.do(words)
         error = _ends(handle, words)
-        holds(says in error.text and error.code == code, f"code {error.code}")
+        holds(expected in error.text and error.code == code, f"code {error.code}")
         arm.wait_for_rest(timeout=20.0)
         holds(arm.recover(timeout=10.0).done, "recovered")
         holds(arm.move(ptp(HOME)).arrived, "the next motion arrives")

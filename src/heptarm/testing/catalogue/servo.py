@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.servo import JointServo, PoseServo
+from heptarm.arm.motion.servo import JointServo, PoseServo
 from heptarm.errors import HeptarmError, MotionAborted, Starved
 from heptarm.testing.measure import above, below, fresh, holds, near, note
 from heptarm.testing.scenario import Risk, scenario
@@ -84,7 +84,7 @@ def direct(arm: Arm) -> None:
 
 @scenario(line=5, rows="E3 E6", space=0.15, needs=("servo_pose",))
 def poses(arm: Arm) -> None:
-    """Pose targets, smart and direct; one that cannot be reached is refused and told of, the arm goes on."""
+    """Pose targets, smart and direct; one that cannot be reached is refused and reported, the arm continues."""
     for engine in ("smart", "direct"):
         with arm.servo(
             "pose",
@@ -97,8 +97,8 @@ def poses(arm: Arm) -> None:
             start = servo.start.pose
 
             def target(t: float, start: Pose = start, servo: PoseServo = servo) -> None:
-                share = (1.0 - np.cos(np.pi * min(t / 1.5, 1.0))) / 2
-                servo.set(Pose.of(start.xyz + share * np.array([0.0, 0.06, 0.03]), start.quat))
+                fraction = (1.0 - np.cos(np.pi * min(t / 1.5, 1.0))) / 2
+                servo.set(Pose.of(start.xyz + fraction * np.array([0.0, 0.06, 0.03]), start.quat))
 
             stream(arm, servo, 2.0, target)
             if engine == "smart":
@@ -106,7 +106,7 @@ def poses(arm: Arm) -> None:
                     servo.set(Pose.of([3.0, 0.0, 0.0], start.quat))
                     servo.tick()
                 target(2.0)
-        near(arm.wait_for_rest().pose.xyz - start.xyz, (0.0, 0.06, 0.03), 1e-3, f"way, {engine}", unit="m")
+        near(arm.wait_for_rest().pose.xyz - start.xyz, (0.0, 0.06, 0.03), 1e-3, f"offset, {engine}", unit="m")
         if engine == "smart":
             stats = servo.stats
             holds(stats.refused >= 1 and stats.text, f"refused: {stats.text}")
@@ -114,7 +114,7 @@ def poses(arm: Arm) -> None:
 
 @scenario(line=5, rows="E7 E8 B17", space=0.1, needs=("servo",))
 def velocities(arm: Arm) -> None:
-    """Targets with the velocity to pass them at, and a stream of velocities: A7 gets as far as it is told."""
+    """Targets with the velocity to pass them at, and a stream of velocities: A7 moves as far as commanded."""
     speed = 0.2
     with arm.servo("joint", rate=_RATE, speed=0.5, acceleration=1.0, watchdog=_PATIENT) as servo:
         start = servo.start.q
@@ -124,13 +124,13 @@ def velocities(arm: Arm) -> None:
 
         states = stream(arm, servo, 2.2, target)
     seen = [abs(s.dq[6]) for s in states if 0.6e9 < s.stamp - states[0].stamp < 1.3e9]
-    above(float(np.median(seen)), 0.5 * speed, "speed of A7 on the way", unit="rad/s")
-    near(arm.wait_for_rest().q[6] - start[6], 1.5 * speed, 0.03, "way of A7", unit="rad")
+    above(float(np.median(seen)), 0.5 * speed, "speed of A7", unit="rad/s")
+    near(arm.wait_for_rest().q[6] - start[6], 1.5 * speed, 0.03, "offset of A7", unit="rad")
 
 
 @scenario(line=5, rows="E9", space=0.15, needs=("servo_pose",))
 def twist(arm: Arm) -> None:
-    """A stream of Cartesian velocities, made of poses: the flange moves and turns as it is told."""
+    """A stream of Cartesian velocities, made of poses: the flange moves and turns as commanded."""
     speed, turn = 0.04, 0.1
     with arm.servo("pose", rate=_RATE, speed=0.5, acceleration=1.0, watchdog=_PATIENT) as servo:
         start = servo.start.pose
@@ -144,9 +144,9 @@ def twist(arm: Arm) -> None:
 
         states = stream(arm, servo, 2.2, target)
     top = max(s.pose.distance_to(states[0].pose) for s in states if s.stamp - states[0].stamp < 1.0e9)
-    near(top, 0.9 * speed, 0.35 * speed, "way in the first second", unit="m")
+    near(top, 0.9 * speed, 0.35 * speed, "distance in the first second", unit="m")
     end = arm.wait_for_rest().pose
-    near(end.xyz - start.xyz, (0.0, 1.5 * speed, 0.0), 5e-3, "way", unit="m")
+    near(end.xyz - start.xyz, (0.0, 1.5 * speed, 0.0), 5e-3, "offset", unit="m")
     near(end.angle_to(start), 1.5 * turn, 0.02, "turned", unit="rad")
 
 
@@ -154,11 +154,11 @@ def twist(arm: Arm) -> None:
 def jump(arm: Arm) -> None:
     """A target far away is approached within the limits of speed and acceleration, and not faster than it may be."""
     tops, times = [], []
-    for share, acceleration, shortest in ((0.1, 0.5, None), (0.1, 0.02, None), (0.3, 1.0, 1.0)):
+    for fraction, acceleration, shortest in ((0.1, 0.5, None), (0.1, 0.02, None), (0.3, 1.0, 1.0)):
         with arm.servo(
             "joint",
             rate=_RATE,
-            speed=share,
+            speed=fraction,
             acceleration=acceleration,
             watchdog=_PATIENT,
             min_trajectory_time=shortest,
@@ -183,7 +183,7 @@ def jump(arm: Arm) -> None:
 
 @scenario(line=5, rows="E14", space=0.1, risk=Risk.FAULT, virtual=True, needs=("servo",))
 def starved(arm: Arm) -> None:
-    """When no target comes in time, the arm comes to rest, and the block says why."""
+    """When no target comes in time, the arm comes to rest, and the block gives the reason."""
     try:
         with arm.servo("joint", rate=_RATE, watchdog=0.3) as servo:
             servo.tick()
@@ -199,7 +199,7 @@ def starved(arm: Arm) -> None:
 @scenario(line=5, rows="B14 F13", space=0.1, needs=("servo", "ptp"))
 def exclusive(arm: Arm) -> None:
     """While a stream is followed, another motion is refused; targets beyond limits are brought back."""
-    from heptarm.values.motion import ptp
+    from heptarm.values.motion.ptp import ptp
 
     with arm.servo("joint", rate=_RATE, watchdog=_PATIENT) as servo:
         servo.tick()
@@ -219,7 +219,7 @@ def exclusive(arm: Arm) -> None:
 
 @scenario(line=5, rows="E4 F11", space=0.2, needs=("servo_lin",))
 def lines(arm: Arm) -> None:
-    """SmartServoLIN: pose targets are approached on straight lines, no faster along an axis than it is told."""
+    """SmartServoLIN: pose targets are approached on straight lines, no faster along an axis than allowed."""
     limit = 0.06
     with arm.servo(
         "lin", rate=_RATE, speed_mps=limit / arm.speed, acceleration_mps2=1.0, watchdog=_PATIENT
@@ -232,12 +232,12 @@ def lines(arm: Arm) -> None:
             states[arm.state.stamp] = arm.state
     near(arm.wait_for_rest().pose.xyz, goal.xyz, 1e-3, "place", unit="m")
     seen = list(states.values())
-    way = np.array([s.pose.xyz for s in seen]) - start.xyz
+    offset = np.array([s.pose.xyz for s in seen]) - start.xyz
     along = (goal.xyz - start.xyz) / np.linalg.norm(goal.xyz - start.xyz)
     below(
-        float(np.linalg.norm(way - np.outer(way @ along, along), axis=1).max()),
+        float(np.linalg.norm(offset - np.outer(offset @ along, along), axis=1).max()),
         1e-3,
-        "way from the line",
+        "offset from the line",
         unit="m",
     )
     pairs = [(a, b) for a, b in zip(seen, seen[3:]) if b.stamp > a.stamp]

@@ -106,7 +106,7 @@ def keys(arm: Arm) -> None:
 @scenario(line=7, rows="J8", risk=Risk.STILL)
 def message(arm: Arm) -> None:
     """A text is shown in the smartPAD's log; one that is too long is refused."""
-    arm.pad.show("heptarm: a scenario says hello")
+    arm.pad.show("heptarm: hello from a scenario")
     try:
         arm.pad.show("x" * 513)
         holds(False, "too long a text is refused")

@@ -1,4 +1,4 @@
-"""Scenarios: what the robot tells of itself."""
+"""Scenarios: the state that the robot reports."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from heptarm.arm.arm import Arm
 from heptarm.testing.measure import below, fresh, holds, near, record, watch
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
-from heptarm.values.motion import hold, ptp
+from heptarm.values.motion.motion import hold
+from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import deg
 
 
@@ -21,25 +22,32 @@ def whole(arm: Arm) -> None:
     near(state.dq, np.zeros(7), 0.01, "joint speeds at rest", unit="rad/s")
     holds(state.tau.shape == state.tau_ext.shape == (7,), "torques of all joints, measured and external")
     near(state.tau_ext[3], 0.0, 5.0, "external torque of A4", unit="Nm")
-    near(state.pose.xyz, arm.pose().xyz, 1e-6, "place of the moved frame", unit="m")
+    near(state.pose.xyz, arm.pose().xyz, 1e-6, "place of the motion frame", unit="m")
     near(float(np.linalg.norm(state.pose.quat)), 1.0, 1e-9, "norm of its quaternion")
     below(float(np.linalg.norm(state.wrench.force)), 30.0, "nobody pushes: force", unit="N")
     holds(state.wrench.force_inaccuracy.shape == (3,), "the force comes with its inaccuracy")
     holds(state.safety.ready_to_move and state.safety.mastered, "ready to move, mastered")
     holds(state.safety.mode.value in ("t1", "t2", "aut"), f"operation mode {state.safety.mode.value}")
-    groups = (state.joints, state.torques, state.cartesian, state.external, state.motion, state.status)
+    groups = (
+        state.joints,
+        state.torques,
+        state.groups.pose,
+        state.groups.wrench,
+        state.motion,
+        state.groups.safety,
+    )
     holds(all(group is not None and group.stamp > 0 for group in groups), "each group has its own time stamp")
 
 
 @scenario(line=9, rows="G2", space=0.1, needs=("ptp",))
 def velocity(arm: Arm) -> None:
     """The filtered joint velocity is that of the measured positions, a little later."""
-    course = record(arm, ptp(HOME + deg(0, 0, 0, 0, 0, 0, 30), speed=0.3))
-    told = np.array([state.dq[6] for state in course.states])
+    recording = record(arm, ptp(HOME + deg(0, 0, 0, 0, 0, 0, 30), speed=0.3))
+    reported = np.array([state.dq[6] for state in recording.states])
     peak = 0.3 * arm.robot.dq_max[6] if arm.speed >= 0.3 else arm.speed * arm.robot.dq_max[6]
-    near(np.nanmax(told), peak, 0.05 * peak, "top speed of A7", unit="rad/s")
-    way = np.nansum(told[1:] * np.diff(course.t))
-    near(way, np.radians(30), 0.05 * np.radians(30), "its integral", unit="rad")
+    near(np.nanmax(reported), peak, 0.05 * peak, "top speed of A7", unit="rad/s")
+    offset = np.nansum(reported[1:] * np.diff(recording.t))
+    near(offset, np.radians(30), 0.05 * np.radians(30), "its integral", unit="rad")
 
 
 @scenario(line=9, rows="G10 G11 G18 H18", risk=Risk.CONTACT, operator=True, space=0.02)
@@ -76,13 +84,14 @@ def stream(arm: Arm) -> None:
 @scenario(line=9, rows="D26 G19", space=0.05, needs=("hold",))
 def mode(arm: Arm) -> None:
     """The control mode in force is read back with its parameters, and the limits of the robot are known."""
-    from heptarm.values.mode import JointImpedance, Position
+    from heptarm.values.mode.impedance import JointImpedance
+    from heptarm.values.mode.mode import Position
 
     holds(fresh(arm).mode == Position(), "position control while nothing runs")
-    soft = JointImpedance((800, 800, 800, 800, 300, 300, 300), damping=0.6)
-    handle = arm.start(hold(20.0), mode=soft)
-    state = arm.wait_until(lambda s: s.mode == soft, timeout=10.0)
-    holds(state.mode == soft, f"in force: {state.mode}")
+    compliant = JointImpedance((800, 800, 800, 800, 300, 300, 300), damping=0.6)
+    handle = arm.start(hold(20.0), mode=compliant)
+    state = arm.wait_until(lambda s: s.mode == compliant, timeout=10.0)
+    holds(state.mode == compliant, f"in force: {state.mode}")
     handle.cancel()
     handle.wait()
     robot = arm.robot

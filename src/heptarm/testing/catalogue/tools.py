@@ -1,4 +1,4 @@
-"""Scenarios: what hangs on the flange, and the frames that it brings."""
+"""Scenarios: tools and workpieces on the flange, and their frames."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from heptarm.arm.arm import Arm
 from heptarm.errors import CommandRejected
 from heptarm.testing.measure import Unfit, above, fresh, holds, near
 from heptarm.testing.scenario import Risk, scenario
-from heptarm.values.motion import hold, lin, lin_rel
+from heptarm.values.motion.line import lin, lin_rel
+from heptarm.values.motion.motion import hold
 from heptarm.values.pose import Pose, deg
 from heptarm.values.tool import Tool, Workpiece
 
@@ -65,12 +66,12 @@ def load(arm: Arm) -> None:
         arm.move(hold(0.4))
         state = fresh(arm)
         more = model.gravity(arm.robot, state.q, load=_GRIPPER.body) - model.gravity(arm.robot, state.q)
-        near(state.tau - before.tau, more, 0.15, "the tool's share of the torques", unit="Nm")
+        near(state.tau - before.tau, more, 0.15, "the tool's part of the torques", unit="Nm")
         near(state.tau_ext, np.zeros(7), 0.1, "external torques", unit="Nm")
         with arm.attached(_PART):
             arm.move(hold(0.4))
             held = fresh(arm)
-            above(abs(float(held.tau[1] - state.tau[1])), 2.0, "the workpiece's share in A2", unit="Nm")
+            above(abs(float(held.tau[1] - state.tau[1])), 2.0, "the workpiece's part in A2", unit="Nm")
             near(held.wrench.force, np.zeros(3), 0.3, "force", unit="N")
             peg = arm.pose("scenario-part/peg")
             near(peg.xyz, (arm.pose() @ Pose.at(0, 0, 0.08)).xyz, 2e-4, "its own frame", unit="m")
