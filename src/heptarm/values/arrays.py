@@ -1,4 +1,4 @@
-"""Checked, read-only arrays: the one way by which numbers of a user become numbers of heptarm."""
+"""Checked, read-only arrays: every number that a user gives passes through these checks."""
 
 from __future__ import annotations
 
@@ -52,28 +52,28 @@ def array(value: npt.ArrayLike, size: int, name: str, *, nan: bool = False) -> A
         value: anything that numpy makes a vector of.
         size: number of entries.
         name: of the parameter, for the error.
-        nan: NaN is legal ("keep the default").
+        nan: NaN is allowed ("keep the default").
 
     Raises:
         ShapeError: it is not a vector of that size.
-        LimitError: an entry is infinite, or NaN where that is not legal.
+        LimitError: an entry is infinite, or NaN where that is not allowed.
     """
     try:
         given = np.asarray(value)
         if given.dtype.kind not in "iuf":
-            raise ShapeError("no numbers")
+            raise ShapeError("not numeric")
         result = given.astype(np.float64) + 0.0  # + 0.0: -0.0 becomes 0.0, so that equal arrays hash alike
     except (TypeError, ValueError):
         raise ShapeError(
-            f"{name} is {value!r}; {size} numbers are wanted", parameter=name, value=value
+            f"{name} must be {size} numbers, got {value!r}", parameter=name, value=value
         ) from None
     if result.shape != (size,):
-        raise ShapeError(f"{name} has shape {result.shape}; ({size},) is wanted", parameter=name, value=value)
+        raise ShapeError(f"{name} must have shape ({size},), got {result.shape}", parameter=name, value=value)
     wrong = np.isinf(result) if nan else ~np.isfinite(result)
     if wrong.any():
         index = int(np.argmax(wrong))
         raise LimitError(
-            f"{name}[{index}] is {result[index]}; a finite number is wanted",
+            f"{name}[{index}] must be finite, got {result[index]}",
             code=1,
             parameter=f"{name}[{index}]",
             value=float(result[index]),
@@ -94,9 +94,10 @@ def within(
         return math.nan
     number = scalar(value, name)
     if not (low < number if above else low <= number) or not number <= high:
-        bounds = f"{'(' if above else '['}{low:g}, {high:g}]{' ' + unit if unit else ''}"
+        of_unit = f" {unit}" if unit else ""
+        bounds = f"{'(' if above else '['}{low:g}, {high:g}]{of_unit}"
         raise LimitError(
-            f"{name} is {number:g}; allowed is {bounds}",
+            f"{name} must be in {bounds}, got {number:g}{of_unit}",
             code=2 if math.isfinite(number) else 1,
             parameter=name,
             value=number,
@@ -113,16 +114,16 @@ def scalar(value: object, name: str) -> float:
     """
     if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
         return float(value) + 0.0
-    raise ShapeError(f"{name} is {value!r}; one number is wanted", parameter=name, value=value)
+    raise ShapeError(f"{name} must be a number, got {value!r}", parameter=name, value=value)
 
 
 def fractions(value: npt.ArrayLike | None, name: str, *, nan: bool = False) -> Array:
-    """Per-axis fractions in (0, 1], shape (7,), from one number, seven, or None (NaN: keep the default).
+    """Fractions of the joints' maxima in (0, 1], shape (7,), from one number, seven, or None (NaN: keep the default).
 
     Args:
-        value: one number for all axes, or seven.
+        value: one number for all joints, or seven.
         name: of the parameter, for the error.
-        nan: NaN entries are legal ("keep the default").
+        nan: NaN entries are allowed ("keep the default").
 
     Raises:
         ShapeError: neither one number nor seven.

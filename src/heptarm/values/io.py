@@ -1,4 +1,4 @@
-"""Signals of the cabinet: which there are, and what they are at one moment."""
+"""Signals of the cabinet: their description, and their values at one moment."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TypeAlias
 from heptarm.errors import CommandRejected
 from heptarm.values.arrays import Value
 
-#: What a signal is: boolean or number.
+#: Value of a signal: boolean or number.
 SignalValue: TypeAlias = bool | float
 
 
@@ -21,8 +21,8 @@ class Signal(Value):
         name: "Group.Name".
         is_output: whether the cabinet can write it.
         kind: "boolean", "integer", "unsigned" or "analog".
-        low: its least value.
-        high: its largest value.
+        low: its lowest value.
+        high: its highest value.
     """
 
     name: str
@@ -37,30 +37,39 @@ class Signal(Value):
 
 
 def find_name(name: str, names: Sequence[str]) -> int:
-    """Place of a name: written in full, or any unique part of it behind a point; case and underscores do not matter.
+    """Index of a name: the full name, or the unique part after a dot; case and underscores are ignored.
 
     Raises:
         CommandRejected: there is none of that name, or more than one.
     """
     if name in names:
         return names.index(name)
-    wanted = _plain(name)
+    plain = _plain(name)
     found = [
         place
         for place, known in enumerate(names)
-        if wanted in (_plain(known), _plain(known.rpartition(".")[2]))
+        if plain in (_plain(known), _plain(known.rpartition(".")[2]))
     ]
     if len(found) == 1:
         return found[0]
     listed = ", ".join(names[place] for place in found) if found else ", ".join(names)
     raise CommandRejected(
-        f"{name!r} means several signals" if found else f"no signal {name!r}",
+        f"the name {name!r} matches several signals" if found else f"no signal {name!r}",
         code=42,
         parameter="signal",
         value=name,
         allowed=listed,
         hint=f"this cabinet has {listed or 'none'}",
     )
+
+
+def find_signal(name: str, signals: Sequence[Signal]) -> Signal:
+    """A signal by its name, as `find_name` finds it.
+
+    Raises:
+        CommandRejected: there is none of that name, or more than one.
+    """
+    return signals[find_name(name, tuple(one.name for one in signals))]
 
 
 def _plain(name: str) -> str:
@@ -97,7 +106,7 @@ class SignalValues(Mapping[str, SignalValue]):
         return iter(self._values)
 
     def __len__(self) -> int:
-        """How many there are."""
+        """Number of signals."""
         return len(self._values)
 
     def __eq__(self, other: object) -> bool:
@@ -107,7 +116,7 @@ class SignalValues(Mapping[str, SignalValue]):
         return self.stamp == other.stamp and self._values == other._values
 
     def __hash__(self) -> int:
-        """Equal ones hash alike."""
+        """Hash of names, values and time."""
         return hash((self.stamp, tuple(self._values.items())))
 
     def __repr__(self) -> str:

@@ -1,16 +1,71 @@
-"""Pose of a frame: translation [m] and rotation (unit quaternion x y z w)."""
+"""Poses: translation and rotation; redundancy: which of the joint positions of one pose."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from math import isnan, nan
 from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import ShapeError
-from heptarm.values.arrays import Array, Value, array
+from heptarm.errors import CommandRejected, LimitError, ShapeError
+from heptarm.values.arrays import Array, Value, array, scalar, within
+
+#: Largest arm angle that is accepted [rad].
+_LARGEST = 1000.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Redundancy(Value):
+    """Arm angle E1, Status and Turn.
+
+    Attributes:
+        e1: arm angle [rad]: that of the elbow about the shoulder-wrist line, from the arm with A3 = 0 in the
+            same Status. NaN: not given.
+        status: bit 0, the wrist is behind A1's x axis; bit 1, A4 < 0; bit 2, A6 <= 0. -1: not given.
+        turn: bit i, A(i+1) < 0. -1: not given. An LBR does not need it: its joints turn less than once.
+
+    Raises:
+        LimitError: E1 is infinite, or Status or Turn has bits that do not exist.
+    """
+
+    e1: float = nan
+    status: int = -1
+    turn: int = -1
+
+    def __post_init__(self) -> None:
+        e1 = scalar(self.e1, "e1")
+        if not isnan(e1):
+            within(e1, "e1", -_LARGEST, _LARGEST, unit="rad")
+        for name, value, last in (("status", self.status, 7), ("turn", self.turn, 127)):
+            if not (isinstance(value, int) and -1 <= value <= last):
+                raise LimitError(
+                    f"{name} must be 0 to {last}, or -1 for not given, got {value!r}",
+                    code=2,
+                    parameter=name,
+                    value=value,
+                    allowed=f"[-1, {last}]",
+                )
+
+
+def near_of(near: npt.ArrayLike | None, redundancy: Redundancy | None) -> Array | None:
+    """Joint positions that choose the arm position, shape (7,) [rad], unless a redundancy does.
+
+    Raises:
+        CommandRejected: both are given.
+        ShapeError: a wrong shape or type.
+    """
+    if near is not None and redundancy is not None:
+        raise CommandRejected(
+            "near and redundancy both choose the arm position", parameter="near", hint="give one of them"
+        )
+    if redundancy is not None and not isinstance(redundancy, Redundancy):
+        raise ShapeError(
+            f"redundancy must be a Redundancy, got {redundancy!r}", parameter="redundancy", value=redundancy
+        )
+    return None if near is None else array(near, 7, "near")
 
 
 def deg(*angles: float) -> Array:
@@ -41,7 +96,7 @@ class Pose(Value):
         norm = float(np.linalg.norm(quat))
         if abs(norm - 1.0) > 1e-3:
             raise ShapeError(
-                f"quat {quat} has norm {norm:.6g}; 1 is wanted",
+                f"quat must have norm 1, got {norm:.6g} for {quat}",
                 code=4,
                 parameter="quat",
                 value=norm,
@@ -83,7 +138,7 @@ class Pose(Value):
         """
         m = np.asarray(matrix, dtype=np.float64)
         if m.shape not in ((4, 4), (3, 4)):
-            raise ShapeError(f"matrix has shape {m.shape}; (4, 4) is wanted")
+            raise ShapeError(f"matrix must have shape (4, 4), got {m.shape}")
         return cls.of(m[:3, 3], quaternion(m[:3, :3]))
 
     @property
@@ -152,6 +207,21 @@ class Pose(Value):
         return f"Pose(x={self.x:.4f} y={self.y:.4f} z={self.z:.4f} m, a={a:.2f} b={b:.2f} c={c:.2f} deg)"
 
 
+def check_pose(pose: Pose, parameter: str = "pose") -> None:
+    """Refuse what is no pose.
+
+    Raises:
+        ShapeError: it is something else.
+    """
+    if not isinstance(pose, Pose):
+        raise ShapeError(
+            f"{parameter} must be a Pose, got {pose!r}",
+            parameter=parameter,
+            value=pose,
+            hint="build one with Pose.xyz_abc(x, y, z, a, b, c)",
+        )
+
+
 def _turned(quat: list[float]) -> bool:
     """Whether the last entry that is not 0 is negative."""
     return next((v for v in reversed(quat) if v != 0.0), 1.0) < 0.0
@@ -184,14 +254,14 @@ def rotation(quat: Any) -> Array:
 
 
 def quaternion(r: Any) -> Array:
-    """Unit quaternion x y z w of a rotation matrix, w >= 0; the largest component leads (Shepperd 1978)."""
+    """Unit quaternion x y z w of a rotation matrix, w >= 0; from the largest component (Shepperd 1978)."""
     trace = r[0][0] + r[1][1] + r[2][2]
     squares = (r[0][0], r[1][1], r[2][2], trace)
-    lead = max(range(4), key=lambda i: squares[i])
-    if lead == 3:
+    largest = max(range(4), key=lambda i: squares[i])
+    if largest == 3:
         q = [r[2][1] - r[1][2], r[0][2] - r[2][0], r[1][0] - r[0][1], 1.0 + trace]
     else:
-        i, j, k = lead, (lead + 1) % 3, (lead + 2) % 3
+        i, j, k = largest, (largest + 1) % 3, (largest + 2) % 3
         q = [0.0] * 4
         q[i] = 1.0 + r[i][i] - r[j][j] - r[k][k]
         q[j] = r[j][i] + r[i][j]

@@ -1,4 +1,4 @@
-"""How a motion ended."""
+"""Outcomes: how a motion ended, its events, and how a recovery ended."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from enum import Enum
 from math import nan
 
 from heptarm.values.arrays import Value
-from heptarm.values.condition import Condition
+from heptarm.values.condition.condition import Condition
+from heptarm.values.condition.trigger import Notify, Trigger
 from heptarm.values.state import State
 
 
@@ -32,15 +33,15 @@ class Result(Value):
 
     Attributes:
         cause: why it ended.
-        state: the robot at its end; None if nothing is known of it.
-        residual: largest joint distance between measured and commanded position [rad]; NaN if it never moved.
+        state: the robot at its end; None if no state was received.
+        residual: largest joint distance between measured and commanded position [rad]; NaN if it did not move.
         duration: from its start to its end, on the cabinet's clock [s].
-        stopped_by: the part of the break condition that fired: of those combined by | the one that held; None if none
-            did.
+        stopped_by: the part of the break condition that fired: of parts combined by | the one that held; None if none
+            fired.
         fired_at: the robot when it fired, before it braked.
         item: index of the motion of the program that ran last.
         code: number in the protocol's table of codes; 0: none.
-        text: what the cabinet says.
+        text: explanation by the cabinet.
     """
 
     cause: Cause
@@ -57,3 +58,57 @@ class Result(Value):
     def arrived(self) -> bool:
         """Whether the motion reached its target."""
         return self.cause is Cause.FINISHED
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionEvent(Value):
+    """An event of a program.
+
+    Attributes:
+        kind: "begun" or "ended": a motion of the program; "segment": one of a spline has begun; "trigger": one has
+            fired and its action is done.
+        item: index of the motion in the program.
+        segment: index of the segment; -1 for other kinds.
+        trigger: the trigger; None for other kinds.
+        time: since the program's start, on the cabinet's clock [s]; NaN for other kinds than triggers.
+        state: the joints when the cabinet's application received that the trigger fired; None for other kinds, and if
+            the robot did not report them.
+        code: why an output was not written, a number in the protocol's table of codes; 0: it was written.
+        text: the same in words.
+    """
+
+    kind: str
+    item: int
+    segment: int = -1
+    trigger: Trigger | None = None
+    time: float = nan
+    state: State | None = None
+    code: int = 0
+    text: str = ""
+
+    @property
+    def label(self) -> str:
+        """Label of a trigger that notifies; otherwise empty."""
+        action = None if self.trigger is None else self.trigger.action
+        return action.label if isinstance(action, Notify) else ""
+
+
+@dataclass(frozen=True, slots=True)
+class Recovery:
+    """What the software did to recover, and what is left to the operator.
+
+    Attributes:
+        done: the robot is ready to move.
+        did: steps that were done, in order; empty: nothing had to be done, or nothing could be.
+        remaining: steps for the operator, in order; empty if done.
+    """
+
+    done: bool
+    did: tuple[str, ...] = ()
+    remaining: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        """One line of text."""
+        if self.done:
+            return f"ready: {', '.join(self.did) or 'nothing had to be done'}"
+        return f"not ready: {'; '.join(self.remaining)}"

@@ -1,21 +1,79 @@
-"""The robots: dimensions and limits of the LBR family.
-
-Kinematics, position, velocity and torque limits are the data sheets' as collected by lbr_description, Drake
-and iiwa_ros. KUKA publishes no acceleration and jerk limits; the values here are parameters of the virtual
-cabinet.
-"""
+"""The LBR robots: dimensions, limits, masses and inertias."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from heptarm.errors import CommandRejected, LimitError
-from heptarm.values.arrays import Array
+from heptarm.values.arrays import Array, Value, array, frozen, within
 from heptarm.values.pose import deg
 
-#: Acceleration and jerk of every axis in the virtual cabinet; MoveIt configurations have this acceleration.
+
+def _no_inertia() -> Array:
+    return frozen(np.zeros(6))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body(Value):
+    """A rigid body attached to the flange: a tool or a load.
+
+    Attributes:
+        mass: [kg], up to 50.
+        com: centre of mass in the flange frame, shape (3,) [m].
+        inertia: xx yy zz xy xz yz about the centre of mass, axes of the flange, shape (6,) [kg m²].
+
+    Raises:
+        ShapeError: wrong shapes.
+        LimitError: a mass outside its range, a number that is not finite, or an inertia that no body has.
+    """
+
+    mass: float
+    com: Array
+    inertia: Array = field(default_factory=_no_inertia)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mass", within(self.mass, "mass", 0.0, 50.0, unit="kg"))
+        object.__setattr__(self, "com", array(self.com, 3, "com"))
+        object.__setattr__(self, "inertia", array(self.inertia, 6, "inertia"))
+        least, middle, most = np.linalg.eigvalsh(symmetric(self.inertia)).tolist()
+        if least < -1e-12 or least + middle < most - 1e-12:
+            raise LimitError(
+                f"inertia must be a rigid body's, got principal moments {least:g}, {middle:g}, {most:g} kg m²",
+                code=2,
+                parameter="inertia",
+                value=self.inertia.tolist(),
+                allowed="none negative, none above the sum of the other two",
+                hint="check the order xx yy zz xy xz yz and that it is about the centre of mass",
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Links(Value):
+    """The seven moving links of a robot; link i moves with A(i+1).
+
+    Attributes:
+        origin: joint's origin in the frame of the link before, shape (7, 3) [m].
+        mass: shape (7,) [kg].
+        com: centre of mass in the link's frame, shape (7, 3) [m].
+        inertia: about the centre of mass in the link's axes, shape (7, 3, 3) [kg m²].
+        flange: of the last link, shape (3,) [m].
+    """
+
+    origin: Array
+    mass: Array
+    com: Array
+    inertia: Array
+    flange: Array
+
+
+def symmetric(entries: Array) -> Array:
+    """Symmetric matrices of xx yy zz xy xz yz: shape (..., 6) to (..., 3, 3)."""
+    return np.asarray(entries)[..., [[0, 3, 4], [3, 1, 5], [4, 5, 2]]]
+
+
+#: Acceleration and jerk of every joint in the virtual cabinet; MoveIt configurations have this acceleration.
 ACCELERATION = 10.0
 JERK = 100.0
 
@@ -27,6 +85,7 @@ class RobotModel:
     Attributes:
         name: short name, as in targets: "iiwa14".
         title: KUKA's name.
+        links: dimensions, masses and inertias of the links.
         d_bs: base to shoulder [m].
         d_se: shoulder to elbow [m].
         d_ew: elbow to wrist [m].
@@ -41,6 +100,7 @@ class RobotModel:
 
     name: str
     title: str
+    links: Links
     d_bs: float
     d_se: float
     d_ew: float
@@ -62,7 +122,7 @@ class RobotModel:
             if not self.q_min[index] <= q[index] <= self.q_max[index]:
                 low, high, value = np.degrees([self.q_min[index], self.q_max[index], q[index]])
                 raise LimitError(
-                    f"A{index + 1} is {value:.2f} deg; the {self.title} allows {low:.0f} to {high:.0f} deg",
+                    f"A{index + 1} must be in [{low:.0f}, {high:.0f}] deg on the {self.title}, got {value:.2f} deg",
                     code=50,
                     parameter=f"{name}[{index}]",
                     value=float(q[index]),
@@ -71,41 +131,146 @@ class RobotModel:
                 )
 
 
-def _frozen(values: Array) -> Array:
-    values.flags.writeable = False
-    return values
+# --------------------------------------------------------------------------------------- the robots, each an entry
+
+_FLANGE = (0.0, 0.0, 0.035)
+
+# joint origins
+_ORIGIN_7 = (
+    (0, 0, 0.1475),
+    (0, -0.0105, 0.1925),
+    (0, 0.0105, 0.2075),
+    (0, 0.0105, 0.1925),
+    (0, -0.0105, 0.2075),
+    (0, -0.0707, 0.1925),
+    (0, 0.0707, 0.091),
+)
+_ORIGIN_14 = (
+    (0, 0, 0.1475),
+    (0, -0.01, 0.2125),
+    (0, 0.01, 0.228),
+    (0, 0.0105, 0.192),
+    (0, -0.0105, 0.2075),
+    (0, -0.0707, 0.1925),
+    (0, 0.0707, 0.091),
+)
+
+# mass, centre of mass x y z, inertia xx yy zz xy xz yz; one row a link
+_IIWA7 = (
+    (3.394011, 0, -0.034819, 0.123299, 0.021383, 0.020403, 0.007563, 0, 0, 0.003797),
+    (4.031991, 0, 0.039793, 0.086944, 0.031697, 0.030080, 0.009666, 0, 0, 0.005889),
+    (3.394011, 0, 0.034819, 0.123299, 0.021383, 0.020403, 0.007563, 0, 0, -0.003797),
+    (4.031989, 0, -0.039793, 0.086944, 0.031695, 0.030079, 0.009665, 0, 0, -0.005889),
+    (1.529239, 0, -0.029824, 0.076267, 0.008485, 0.007136, 0.003848, 0, 0, 0.002806),
+    (2.403626, 0, 0.07102, 0.00495, 0.007067, 0.006804, 0.004629, 0, 0, 0.000311),
+    (0.259474, 3e-6, -2e-6, 0.013782, 0.000171, 0.000171, 0.000299, 0, 0, 0),
+)
+_IIWA14 = (
+    (5.289529, 0, -0.033795, 0.132404, 0.042462, 0.042838, 0.015870, 0, 0, 0.006341),
+    (5.688888, 0.000136, 0.047548, 0.076322, 0.055182, 0.053983, 0.016523, -3.3e-5, 5.6e-5, 0.010034),
+    (3.461245, 0, 0.034913, 0.123108, 0.021720, 0.020730, 0.007701, 0, 0, -0.003845),
+    (4.122995, 0, -0.039793, 0.086944, 0.032410, 0.030758, 0.009883, 0, 0, -0.006022),
+    (1.563756, 0, -0.029824, 0.076267, 0.008677, 0.007297, 0.003935, 0, 0, 0.002869),
+    (2.457878, 0, 0.07102, 0.00495, 0.007227, 0.006958, 0.004734, 0, 0, 0.000318),
+    (0.265331, 3e-6, -2e-6, 0.013782, 0.000175, 0.000175, 0.000306, 0, 0, 0),
+)
+_MED7 = (
+    (3.271499, 0, -0.034819, 0.123299, 0.020611, 0.019667, 0.007290, 0, 0, 0.003660),
+    (3.886413, 0, 0.039793, 0.086944, 0.030552, 0.028995, 0.009317, 0, 0, 0.005676),
+    (3.271499, 0, 0.034819, 0.123299, 0.020611, 0.019667, 0.007290, 0, 0, -0.003660),
+    (3.886411, 0, -0.039793, 0.086944, 0.030547, 0.028993, 0.009313, 0, 0, -0.005676),
+    (1.474048, 0, -0.029824, 0.076267, 0.008179, 0.006879, 0.003709, 0, 0, 0.002704),
+    (2.316911, -1e-6, 0.07102, 0.004953, 0.006813, 0.006559, 0.004462, 0, 0, 0.000300),
+    (0.250108, 3e-6, -2e-6, 0.013782, 0.000165, 0.000165, 0.000288, 0, 0, 0),
+)
+_MED14 = (
+    (5.591419, 0, -0.033795, 0.132404, 0.044885, 0.045283, 0.016776, 0, 0, 0.006703),
+    (6.013411, 0.000136, 0.047546, 0.076324, 0.058330, 0.057062, 0.017466, -3.5e-5, 5.9e-5, 0.010605),
+    (3.65879, 0, 0.034913, 0.123108, 0.022960, 0.021913, 0.008140, 0, 0, -0.004065),
+    (4.358267, 0, -0.039793, 0.086944, 0.034255, 0.032512, 0.010444, 0, 0, -0.006365),
+    (1.653015, 0, -0.029824, 0.076267, 0.009172, 0.007714, 0.004159, 0, 0, 0.003033),
+    (2.598211, -1e-6, 0.07102, 0.004953, 0.007640, 0.007355, 0.005004, 0, 0, 0.000336),
+    (0.280474, 3e-6, -2e-6, 0.013782, 0.000185, 0.000185, 0.000323, 0, 0, 0),
+)
 
 
 def _robot(
-    name: str, title: str, links: tuple[float, float, float, float], speed: Array, torque: tuple[float, ...]
+    name: str,
+    title: str,
+    *,
+    origins: tuple[tuple[float, ...], ...],
+    rows: tuple[tuple[float, ...], ...],
+    speed: tuple[float, ...],
+    torque: tuple[float, ...],
 ) -> RobotModel:
-    reach = _frozen(deg(170, 120, 170, 120, 170, 120, 175))
+    """A robot from its joint origins [m], its links, and the limits of its joints [deg/s], [Nm]."""
+    table, heights = np.array(rows), [origin[2] for origin in (*origins, _FLANGE)]
+    d_bs, d_se, d_ew, d_wf = (round(heights[k] + heights[k + 1], 6) for k in (0, 2, 4, 6))
+    reach = frozen(deg(170, 120, 170, 120, 170, 120, 175))
     return RobotModel(
         name,
         title,
-        *links,
-        q_min=_frozen(-reach),
+        Links(
+            frozen(origins),
+            frozen(table[:, 0].copy()),
+            frozen(table[:, 1:4].copy()),
+            frozen(symmetric(table[:, 4:])),
+            frozen(_FLANGE),
+        ),
+        d_bs,
+        d_se,
+        d_ew,
+        d_wf,
+        q_min=frozen(-reach),
         q_max=reach,
-        dq_max=_frozen(speed),
-        ddq_max=_frozen(np.full(7, ACCELERATION)),
-        dddq_max=_frozen(np.full(7, JERK)),
-        tau_max=_frozen(np.array(torque)),
+        dq_max=frozen(deg(*speed)),
+        ddq_max=frozen(np.full(7, ACCELERATION)),
+        dddq_max=frozen(np.full(7, JERK)),
+        tau_max=frozen(torque),
     )
 
 
-_SEVEN = ((0.34, 0.4, 0.4, 0.126), deg(98, 98, 100, 130, 140, 180, 180), (176.0, 176, 110, 110, 110, 40, 40))
-_FOURTEEN = (
-    (0.36, 0.42, 0.4, 0.126),
-    deg(85, 85, 100, 75, 130, 135, 135),
-    (320.0, 320, 176, 176, 110, 40, 40),
-)
+_SPEED_7, _TORQUE_7 = (98, 98, 100, 130, 140, 180, 180), (176, 176, 110, 110, 110, 40, 40)
+_SPEED_14, _TORQUE_14 = (85, 85, 100, 75, 130, 135, 135), (320, 320, 176, 176, 110, 40, 40)
 
-#: All robots by name. The Med variants share the arms of the iiwa ones.
+#: All robots by name. The Med variants have the limits of the iiwa ones. The Med 14's base is taken as the iiwa 14's,
+#: since its source differs by 0.5 mm.
 ROBOTS: dict[str, RobotModel] = {
-    "iiwa7": _robot("iiwa7", "LBR iiwa 7 R800", *_SEVEN),
-    "iiwa14": _robot("iiwa14", "LBR iiwa 14 R820", *_FOURTEEN),
-    "med7": _robot("med7", "LBR Med 7 R800", *_SEVEN),
-    "med14": _robot("med14", "LBR Med 14 R820", *_FOURTEEN),
+    one.name: one
+    for one in (
+        _robot(
+            "iiwa7",
+            "LBR iiwa 7 R800",
+            origins=_ORIGIN_7,
+            rows=_IIWA7,
+            speed=_SPEED_7,
+            torque=_TORQUE_7,
+        ),
+        _robot(
+            "iiwa14",
+            "LBR iiwa 14 R820",
+            origins=_ORIGIN_14,
+            rows=_IIWA14,
+            speed=_SPEED_14,
+            torque=_TORQUE_14,
+        ),
+        _robot(
+            "med7",
+            "LBR Med 7 R800",
+            origins=_ORIGIN_7,
+            rows=_MED7,
+            speed=_SPEED_7,
+            torque=_TORQUE_7,
+        ),
+        _robot(
+            "med14",
+            "LBR Med 14 R820",
+            origins=_ORIGIN_14,
+            rows=_MED14,
+            speed=_SPEED_14,
+            torque=_TORQUE_14,
+        ),
+    )
 }
 
 
@@ -115,9 +280,14 @@ def robot(name: str) -> RobotModel:
     Raises:
         CommandRejected: there is none; the text lists the names.
     """
-    try:
-        return ROBOTS[name]
-    except KeyError:
+    known = ROBOTS.get(name)
+    if known is None:
+        names = ", ".join(ROBOTS)
         raise CommandRejected(
-            f"no robot {name!r}; there are {', '.join(ROBOTS)}", parameter="model"
-        ) from None
+            f"robot must be one of {names}, got {name!r}",
+            parameter="model",
+            value=name,
+            allowed=names,
+            hint="for example robot('iiwa14')",
+        )
+    return known

@@ -1,26 +1,24 @@
-"""What is known of the robot at one moment: groups of measurements, each with its own time stamp.
+"""States of the robot: groups of measurements, each with its own time stamp.
 
-A cabinet samples groups at their own periods, since each of its getters takes time; so a state is a set of
-groups that are each consistent in themselves. A group that is not subscribed is missing, and asking for it
-says so.
+A cabinet samples each group at its own period, since reading takes time; so a state is a set of groups that are each
+consistent in themselves. Reading from a group that is not subscribed raises an error that names it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
 from math import nan
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from heptarm.errors import StaleState
 from heptarm.values.arrays import Array, Value, frozen
 from heptarm.values.io import SignalValues
-from heptarm.values.mode import Mode
-from heptarm.values.pose import Pose
-from heptarm.values.redundancy import Redundancy
+from heptarm.values.mode.mode import Mode
+from heptarm.values.pose import Pose, Redundancy
 
 _T = TypeVar("_T")
 
@@ -46,7 +44,7 @@ class Joints(Value):
         q: measured, shape (7,) [rad].
         q_cmd: commanded, shape (7,) [rad].
         dq: velocity, shape (7,) [rad/s]: the difference of measured positions behind a first-order low-pass of 10 ms,
-            since a cabinet tells none; NaN before the second sample.
+            since a cabinet does not measure it; NaN before the second sample.
     """
 
     stamp: int
@@ -67,7 +65,7 @@ class Torques(Value):
         stamp: cabinet time of the measurement [ns].
         tau: measured, shape (7,) [Nm].
         tau_ext: external load acting on the robot, shape (7,) [Nm].
-        tau_cmd: commanded, shape (7,) [Nm]; NaN where the cabinet does not tell.
+        tau_cmd: commanded, shape (7,) [Nm]; NaN where the cabinet does not report it.
     """
 
     stamp: int
@@ -82,7 +80,7 @@ class Torques(Value):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cartesian(Value):
-    """Pose of the moved frame in the base frame.
+    """Poses of the motion frame in the base frame.
 
     Attributes:
         stamp: cabinet time of the measurement [ns].
@@ -99,14 +97,14 @@ class Cartesian(Value):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wrench(Value):
-    """External force and torque acting on the robot at the moved frame, in base axes.
+    """External force and torque acting on the robot at the motion frame, in base axes.
 
     Attributes:
         stamp: cabinet time of the measurement [ns].
         force: shape (3,) [N].
         torque: shape (3,) [Nm].
-        force_inaccuracy: of the estimate, shape (3,) [N]; NaN where the cabinet does not tell.
-        torque_inaccuracy: of the estimate, shape (3,) [Nm]; NaN where the cabinet does not tell.
+        force_inaccuracy: of the estimate, shape (3,) [N]; NaN where the cabinet does not report it.
+        torque_inaccuracy: of the estimate, shape (3,) [Nm]; NaN where the cabinet does not report it.
     """
 
     stamp: int
@@ -123,7 +121,7 @@ class Wrench(Value):
         """The same load at another point in other axes.
 
         Args:
-            lever: from that point to the present one, base axes, shape (3,) [m].
+            lever: from that point to the current one, base axes, shape (3,) [m].
             axes: the other axes as columns in the base frame, shape (3, 3).
         """
         back, arm = np.abs(axes.T), np.abs(lever)
@@ -142,7 +140,7 @@ class Wrench(Value):
         return np.concatenate([self.force, self.torque])
 
     def valid(self, *, force: float = 10.0, torque: float = 10.0) -> bool:
-        """Whether no inaccuracy exceeds its tolerance; near a singularity the estimate is worthless.
+        """Whether no inaccuracy exceeds its tolerance; near a singularity the estimate is useless.
 
         Args:
             force: largest inaccuracy that is accepted [N].
@@ -152,16 +150,16 @@ class Wrench(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion(Value):
-    """What runs.
+class MotionStatus(Value):
+    """The running program.
 
     Attributes:
         stamp: cabinet time of the sample [ns].
         id: of the running program; 0: none.
-        item: index of its motion that runs.
-        queued: programs waiting.
-        progress: of the motion, [0, 1]; NaN where the cabinet does not tell.
-        remaining: time to the destination [s]; NaN where the cabinet does not tell.
+        item: index of its running motion.
+        queued: number of waiting programs.
+        progress: of the motion, [0, 1]; NaN where the cabinet does not report it.
+        remaining: time to the destination [s]; NaN where the cabinet does not report it.
         override: application override, [0, 1].
     """
 
@@ -188,7 +186,7 @@ class Safety(Value):
         mode: operation mode.
         ready_to_move: the robot would accept a motion.
         paused: execution is paused.
-        brakes_open: the brakes are open, as a simulator tells; never true on a cabinet, which does not tell of them.
+        brakes_open: the brakes are open; only a simulator reports it, on a cabinet it is never true.
         moving: a motion command is active.
         mastered: all axes are mastered.
         emergency_stop: a local or external emergency stop is active.
@@ -219,13 +217,13 @@ class Safety(Value):
 
     @property
     def stops(self) -> tuple[str, ...]:
-        """What keeps the arm from moving, in words; empty: nothing that is known."""
-        lacks = self.mode is not OperationMode.AUT and not self.enabling_switch
-        named = self.emergency_stop or self.operator_safety_open or lacks
+        """Reasons why the arm cannot move, as text; empty: none known."""
+        released = self.mode is not OperationMode.AUT and not self.enabling_switch
+        named = self.emergency_stop or self.operator_safety_open or released
         reasons = {
             "emergency stop": self.emergency_stop,
             "safeguard open": self.operator_safety_open,
-            "enabling switch not held": lacks,
+            "enabling switch not held": released,
             "safety stop": self.protective_stop and not named,
             "paused": self.paused,
             "recovery required": self.recovery_required,
@@ -235,14 +233,14 @@ class Safety(Value):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Control(Value):
-    """Control mode and tool in force.
+    """Active control mode and tool.
 
     Attributes:
         stamp: cabinet time of the sample [ns].
-        mode: control mode with its parameters, as the cabinet has it; position control while nothing runs.
+        mode: active control mode with its parameters; position control while nothing runs.
         tool: name of the attached tool; empty: none.
         workpiece: name of the attached workpiece; empty: none.
-        frame: what motions move unless they say another: a frame of the tool's, or "flange".
+        frame: the motion frame unless a motion names another: a frame of the tool, or "flange".
     """
 
     stamp: int
@@ -253,122 +251,157 @@ class Control(Value):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class State(Value):
-    """A snapshot. The short names reach into the groups and raise StaleState if the group is missing.
+class Groups(Value):
+    """The groups of a state by the names under which they are subscribed; None: not subscribed, or not received yet.
 
     Attributes:
-        joints: positions.
-        torques: torques.
-        cartesian: pose.
-        external: wrench.
-        motion: what runs.
-        status: safety and readiness.
-        control: control mode and tool.
-        signals: inputs and outputs of the cabinet.
-        sampled: when the newest group was sampled, on this side's clock [ns].
-        clock: this side's clock [ns], for the age.
+        joints: joint positions.
+        torques: joint torques.
+        pose: poses of the motion frame, and the arm's redundancy.
+        wrench: external force and torque.
+        motion: the running program.
+        safety: safety and readiness.
+        mode: control mode and tool.
+        io: inputs and outputs of the cabinet.
     """
 
     joints: Joints | None = None
     torques: Torques | None = None
-    cartesian: Cartesian | None = None
-    external: Wrench | None = None
-    motion: Motion | None = None
-    status: Safety | None = None
-    control: Control | None = None
-    signals: SignalValues | None = None
+    pose: Cartesian | None = None
+    wrench: Wrench | None = None
+    motion: MotionStatus | None = None
+    safety: Safety | None = None
+    mode: Control | None = None
+    io: SignalValues | None = None
+
+
+#: Names of all groups, as in `arm.subscribe(groups=...)`.
+GROUP_NAMES = tuple(one.name for one in fields(Groups))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class State(Value):
+    """A snapshot of the robot. The short names read from the groups and raise StaleState if the group is missing.
+
+    Attributes:
+        groups: the measurements, each group with its own time stamp.
+        sampled: time of the newest sample on this computer's clock [ns].
+        clock: this computer's clock [ns], for the age.
+    """
+
+    groups: Groups = Groups()
     sampled: int = 0
     clock: Callable[[], int] | None = field(default=None, repr=False, compare=False)
+
+    def with_groups(self, **groups: Any) -> State:
+        """The same state with other contents of some groups, by their names."""
+        return replace(self, groups=replace(self.groups, **groups))
+
+    @property
+    def joints(self) -> Joints | None:
+        """Joint positions; None: not subscribed."""
+        return self.groups.joints
+
+    @property
+    def torques(self) -> Torques | None:
+        """Joint torques; None: not subscribed."""
+        return self.groups.torques
+
+    @property
+    def motion(self) -> MotionStatus | None:
+        """The running program; None: not subscribed."""
+        return self.groups.motion
 
     @property
     def stamp(self) -> int:
         """Cabinet time of the newest group [ns]; 0 without any."""
-        groups = (
-            self.joints,
-            self.torques,
-            self.cartesian,
-            self.external,
-            self.motion,
-            self.status,
-            self.control,
-            self.signals,
-        )
+        groups = (getattr(self.groups, name) for name in GROUP_NAMES)
         return max((group.stamp for group in groups if group is not None), default=0)
 
     @property
     def age(self) -> float:
-        """How long ago the newest group was sampled, now [s]; NaN without a clock."""
+        """Time since the newest group was sampled [s]; NaN without a clock."""
         return nan if self.clock is None else (self.clock() - self.sampled) * 1e-9
 
     @property
     def q(self) -> Array:
         """Measured joint positions, shape (7,) [rad]."""
-        return _of(self.joints, "joints").q
+        return _of(self.groups.joints, "joints").q
 
     @property
     def q_cmd(self) -> Array:
         """Commanded joint positions, shape (7,) [rad]."""
-        return _of(self.joints, "joints").q_cmd
+        return _of(self.groups.joints, "joints").q_cmd
 
     @property
     def dq(self) -> Array:
         """Joint velocities, shape (7,) [rad/s]; see Joints."""
-        return _of(self.joints, "joints").dq
+        return _of(self.groups.joints, "joints").dq
 
     @property
     def tau(self) -> Array:
         """Measured joint torques, shape (7,) [Nm]."""
-        return _of(self.torques, "torques").tau
+        return _of(self.groups.torques, "torques").tau
 
     @property
     def tau_ext(self) -> Array:
         """External load acting on the robot, shape (7,) [Nm]."""
-        return _of(self.torques, "torques").tau_ext
+        return _of(self.groups.torques, "torques").tau_ext
 
     @property
     def tau_cmd(self) -> Array:
         """Commanded joint torques, shape (7,) [Nm]; see Torques."""
-        return _of(self.torques, "torques").tau_cmd
+        return _of(self.groups.torques, "torques").tau_cmd
 
     @property
     def pose(self) -> Pose:
-        """Measured pose of the moved frame in the base frame."""
-        return _of(self.cartesian, "pose").pose
+        """Measured pose of the motion frame in the base frame."""
+        return _of(self.groups.pose, "pose").pose
 
     @property
     def pose_cmd(self) -> Pose:
-        """Commanded pose of the moved frame in the base frame."""
-        return _of(self.cartesian, "pose").pose_cmd
+        """Commanded pose of the motion frame in the base frame."""
+        return _of(self.groups.pose, "pose").pose_cmd
 
     @property
     def redundancy(self) -> Redundancy:
         """E1, Status and Turn of the arm."""
-        return _of(self.cartesian, "pose").redundancy
+        return _of(self.groups.pose, "pose").redundancy
 
     @property
     def wrench(self) -> Wrench:
         """External force and torque."""
-        return _of(self.external, "wrench")
+        return _of(self.groups.wrench, "wrench")
 
     @property
     def mode(self) -> Mode:
-        """Control mode in force, with its parameters."""
-        return _of(self.control, "mode").mode
+        """Active control mode, with its parameters."""
+        return _of(self.groups.mode, "mode").mode
 
     @property
     def tool(self) -> str:
         """Name of the attached tool; empty: none."""
-        return _of(self.control, "mode").tool
+        return _of(self.groups.mode, "mode").tool
+
+    @property
+    def workpiece(self) -> str:
+        """Name of the attached workpiece; empty: none."""
+        return _of(self.groups.mode, "mode").workpiece
+
+    @property
+    def frame(self) -> str:
+        """Name of the motion frame: a frame of the tool, or "flange"."""
+        return _of(self.groups.mode, "mode").frame
 
     @property
     def io(self) -> SignalValues:
         """Values of the cabinet's signals."""
-        return _of(self.signals, "io")
+        return _of(self.groups.io, "io")
 
     @property
     def safety(self) -> Safety:
         """Safety and readiness."""
-        return _of(self.status, "safety")
+        return _of(self.groups.safety, "safety")
 
 
 def _of(group: _T | None, name: str) -> _T:

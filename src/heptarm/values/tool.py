@@ -1,4 +1,4 @@
-"""Tools and workpieces: what hangs on the flange, and the frames that it brings.
+"""Tools and workpieces: what is attached to the flange, and its frames.
 
 ::
 
@@ -7,7 +7,8 @@
     with arm.tool(gripper):
         arm.move(lin_rel(z=0.05))       # the gripper's tip moves
 
-A tool's frames, centre of mass and inertia are given in the flange frame, a workpiece's in the frame that it hangs on.
+A tool's frames, centre of mass and inertia are given in the flange frame, a workpiece's in the frame that it is
+attached to.
 """
 
 from __future__ import annotations
@@ -18,20 +19,14 @@ from dataclasses import dataclass
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arguments import TOOL, check_pose
 from heptarm.values.arrays import Array, Value, array, within
-from heptarm.values.links import Body
-from heptarm.values.pose import Pose
+from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL
+from heptarm.values.pose import Pose, check_pose
+from heptarm.values.robot import Body
 
 #: Heaviest tool [kg], and how far its centre of mass may be from the flange along each axis [m].
 HEAVIEST = 50.0
 FARTHEST = 2.0
-#: Frames that every robot has; no tool's frame bears their names.
-FLANGE = "flange"
-BASE = "base"
-#: Between a tool's or workpiece's name and that of its frame.
-SEPARATOR = "/"
-
 _MOST_FRAMES = 32
 _LONGEST_NAME = 64
 _LONGEST_FRAME = 128
@@ -98,35 +93,35 @@ class Tool(_Carried):
     """A tool on the flange.
 
     Args:
-        name: up to 64 octets, without a "/"; what the cabinet calls it.
+        name: up to 64 bytes, without a "/"; its name on the cabinet.
         mass: [kg], up to 50.
         com: centre of mass, shape (3,) [m], within 2 m of the flange along each axis.
         inertia: xx yy zz xy xz yz about the centre of mass, axes of the flange, shape (6,) [kg m²].
-        tcp: flange to tip; the frame "tcp", which motions move unless they say another.
-        frames: more frames, flange to frame, by name; without `tcp` the first is what motions move.
+        tcp: flange to tip; the frame "tcp", the motion frame unless a motion names another.
+        frames: more frames, flange to frame, by name; without `tcp` the first is the motion frame.
 
     Raises:
         ShapeError: wrong shapes, or an empty or too long name.
-        LimitError: a number outside its range, an inertia that no body has, or a name that means something else.
+        LimitError: a number outside its range, an inertia that no body has, or a reserved name.
         CommandRejected: two frames of one name.
     """
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class Workpiece(_Carried):
-    """What a tool holds; it hangs on the frame that the tool moves, without a tool on the flange.
+    """A workpiece, attached to the tool frame, without a tool to the flange.
 
     Args:
-        name: up to 64 octets, without a "/".
+        name: up to 64 bytes, without a "/".
         mass: [kg], up to 50.
-        com: centre of mass in the frame that it hangs on, shape (3,) [m], within 2 m of it along each axis.
+        com: centre of mass in the frame that it is attached to, shape (3,) [m], within 2 m of it along each axis.
         inertia: xx yy zz xy xz yz about the centre of mass, axes of that frame, shape (6,) [kg m²].
         tcp: that frame to a point of the workpiece; its frame "tcp".
         frames: more frames, by name.
 
     Raises:
         ShapeError: wrong shapes, or an empty or too long name.
-        LimitError: a number outside its range, an inertia that no body has, or a name that means something else.
+        LimitError: a number outside its range, an inertia that no body has, or a reserved name.
         CommandRejected: two frames of one name.
     """
 
@@ -136,7 +131,7 @@ class KnownTool(Value):
     """A tool or workpiece that the cabinet knows by name.
 
     Attributes:
-        name: to be given to `arm.tool`.
+        name: for `arm.tool`.
         mass: [kg].
         frames: its frames, flange to frame; the default one first.
     """
@@ -152,10 +147,10 @@ class KnownTool(Value):
 
 
 def unknown(name: str, parameter: str, known: tuple[str, ...]) -> CommandRejected:
-    """The error of a name that nothing bears."""
+    """The error of an unknown name."""
     listed = ", ".join(known) or "none"
     return CommandRejected(
-        f"{parameter} is {name!r}; there is no such name here, there are: {listed}",
+        f"{parameter} is {name!r}, which is unknown; there are: {listed}",
         code=42,
         parameter=parameter,
         value=name,
@@ -166,7 +161,7 @@ def unknown(name: str, parameter: str, known: tuple[str, ...]) -> CommandRejecte
 def _frames(tcp: Pose | None, more: Mapping[str, Pose]) -> tuple[tuple[str, Pose], ...]:
     if not isinstance(more, Mapping):
         raise ShapeError(
-            f"frames is {more!r}; poses by their names are wanted",
+            f"frames must be poses by name, got {more!r}",
             parameter="frames",
             value=more,
             hint='for example {"tip": Pose.at(0, 0, 0.1)}',
@@ -178,7 +173,7 @@ def _frames(tcp: Pose | None, more: Mapping[str, Pose]) -> tuple[tuple[str, Pose
     pairs = ((_TCP, tcp), *more.items()) if tcp is not None else tuple(more.items())
     if len(pairs) > _MOST_FRAMES:
         raise ShapeError(
-            f"{len(pairs)} frames; at most {_MOST_FRAMES} are allowed",
+            f"frames must be at most {_MOST_FRAMES}, got {len(pairs)}",
             code=3,
             parameter="frames",
             value=len(pairs),
@@ -187,7 +182,7 @@ def _frames(tcp: Pose | None, more: Mapping[str, Pose]) -> tuple[tuple[str, Pose
         at = f"frames[{index}]"
         if _checked(name, f"{at}.name", _LONGEST_FRAME) in (TOOL, FLANGE, BASE):
             raise LimitError(
-                f"{at}.name is {name!r}, which means something else",
+                f"{at}.name must not be the reserved name {name!r}",
                 code=2,
                 parameter=f"{at}.name",
                 value=name,
@@ -200,14 +195,14 @@ def _frames(tcp: Pose | None, more: Mapping[str, Pose]) -> tuple[tuple[str, Pose
 def _checked(name: str, parameter: str, longest: int) -> str:
     if not isinstance(name, str) or not 1 <= len(name.encode()) <= longest:
         raise ShapeError(
-            f"{parameter} is {name!r}; a name of 1 to {longest} octets is wanted",
+            f"{parameter} must be a name of 1 to {longest} bytes, got {name!r}",
             code=3,
             parameter=parameter,
             value=name,
         )
     if SEPARATOR in name:
         raise LimitError(
-            f'{parameter} is {name!r}; a name has no "{SEPARATOR}"',
+            f'{parameter} must not contain "{SEPARATOR}", got {name!r}',
             code=2,
             parameter=parameter,
             value=name,

@@ -1,4 +1,4 @@
-"""The collision guard: bands round the external torques that were there before anything was touched."""
+"""Collision guard: a band of allowed external torque for each joint, around the torques at rest."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from heptarm.errors import LimitError
 from heptarm.values.arrays import Array, Value, array, frozen, within
-from heptarm.values.condition import AnyOf, Condition
-from heptarm.values.force_condition import JOINT, JointTorqueOutside
+from heptarm.values.condition.condition import AnyOf, Condition
+from heptarm.values.condition.force import JOINT, JointTorqueOutside
 from heptarm.values.state import State
 
 
@@ -20,13 +20,13 @@ def _nothing() -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Collision(Value):
-    """What a guard has seen.
+    """A collision that a guard has detected.
 
     Attributes:
-        joint: whose torque left its band, 0 for A1.
-        torque: its external torque less the baseline [Nm].
-        allowed: how far it might have been from the baseline [Nm].
-        state: the robot at that moment; None if nothing is known of it.
+        joint: the joint whose torque left its band, 0 for A1.
+        torque: its external torque minus the baseline [Nm].
+        allowed: largest deviation from the baseline [Nm].
+        state: the robot at that moment; None if no state was received.
     """
 
     joint: int
@@ -40,12 +40,12 @@ class Collision(Value):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CollisionGuard(Value):
-    """Bands round the external torques at rest; made by `Arm.collision_guard`.
+    """Bands around the external torques at rest; made by `Arm.collision_guard`.
 
     Attributes:
         threshold: allowed deviation from the baseline, shape (7,) [Nm].
-        baseline: external torques at rest, shape (7,) [Nm]: what a load that is not quite known makes of them.
-        margin: what the speed of a joint adds to its threshold, shape (7,) [Nm s/rad].
+        baseline: external torques at rest, shape (7,) [Nm]; not zero where the load data are inexact.
+        margin: added to a joint's threshold per speed of the joint, shape (7,) [Nm s/rad].
     """
 
     threshold: Array
@@ -60,7 +60,7 @@ class CollisionGuard(Value):
 
         Raises:
             ShapeError: neither one number nor seven.
-            LimitError: a threshold that is not positive, a negative margin, or a band beyond what a joint can bear.
+            LimitError: a threshold that is not positive, a negative margin, or a band beyond the largest joint torque.
         """
         guard = CollisionGuard(
             _each(threshold, "threshold", above=True), array(baseline, 7, "baseline"), _each(margin, "margin")
@@ -69,7 +69,8 @@ class CollisionGuard(Value):
         if far.any():
             axis = int(far.argmax())
             raise LimitError(
-                f"the band of A{axis + 1} reaches beyond {JOINT:g} Nm",
+                f"threshold[{axis}] must be in (0, {JOINT - abs(guard.baseline[axis]):g}] Nm beside the baseline of "
+                f"A{axis + 1}, got {guard.threshold[axis]:g} Nm",
                 code=2,
                 parameter=f"threshold[{axis}]",
                 value=float(guard.threshold[axis]),
@@ -79,7 +80,7 @@ class CollisionGuard(Value):
 
     @property
     def is_moving(self) -> bool:
-        """Whether its bands depend on the speed; the cabinet's conditions do not, so it is watched by the client."""
+        """Whether its bands depend on the speed; conditions of the cabinet cannot, so the client evaluates them."""
         return bool(self.margin.any())
 
     @property
@@ -90,11 +91,11 @@ class CollisionGuard(Value):
 
     @property
     def condition(self) -> Condition:
-        """One of the joints' torques has left its band; for `until=`."""
+        """The torque of any joint has left its band; for `until=`."""
         return AnyOf(self.parts)
 
     def collision(self, state: State) -> Collision | None:
-        """The joint that is farthest beyond its band in a state; None: all are within.
+        """The joint farthest beyond its band in a state; None: all are within.
 
         Raises:
             StaleState: the state lacks torques or, with a margin, joints.
@@ -107,14 +108,14 @@ class CollisionGuard(Value):
         return found if abs(found.torque) > found.allowed else None
 
     def named(self, part: Condition, state: State | None) -> Collision:
-        """The collision that one of `parts` tells of."""
+        """The collision that one of `parts` stands for."""
         joint = self.parts.index(part)
         if state is None:
             return Collision(joint, float("nan"), float(self.threshold[joint]))
         return self.seen(joint, state)
 
     def seen(self, joint: int, state: State, *, allowed: float | None = None) -> Collision:
-        """What a state says of a joint."""
+        """The collision of a joint in a state."""
         torque = float(state.tau_ext[joint] - self.baseline[joint])
         return Collision(joint, torque, float(self.threshold[joint]) if allowed is None else allowed, state)
 

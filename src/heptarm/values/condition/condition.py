@@ -1,8 +1,4 @@
-"""Conditions that the cabinet evaluates while the arm moves: frozen values, composed with & | ^ ~.
-
-The makers of the leaves are in heptarm.when; those of forces are in heptarm.values.force_condition. `and`, `or`, `not`
-and chained comparisons would ask Python for a truth that only the cabinet knows; they raise.
-"""
+"""Conditions that the cabinet evaluates while the arm moves: frozen values, composed with & | ^ ~."""
 
 from __future__ import annotations
 
@@ -11,21 +7,48 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arguments import check_name
 from heptarm.values.arrays import Value, within
-from heptarm.values.band import band_text, check_band
+from heptarm.values.frames import check_name
+
+
+def check_band(low: float, high: float, limit: float, unit: str) -> None:
+    """Refuse a band that is empty, or exceeds the limit.
+
+    Raises:
+        LimitError: see above.
+    """
+    within(low, "low", -limit, limit, unit=unit)
+    within(high, "high", -limit, limit, unit=unit)
+    if not low < high:
+        raise LimitError(
+            f"low must be below high = {high:g} {unit}, got {low:g} {unit}",
+            code=2,
+            parameter="low",
+            value=low,
+            allowed=f"below {high:g} {unit}",
+        )
+
+
+def band_text(low: float, high: float, limit: float, unit: str) -> str:
+    """Describe the outside of a band; a bound at the limit is left out."""
+    if low <= -limit:
+        return f"> {high:g} {unit}"
+    if high >= limit:
+        return f"< {low:g} {unit}"
+    return f"outside [{low:g}, {high:g}] {unit}"
+
 
 #: Longest path [m] and delay [s].
 PATH, DELAY = 100.0, 1000.0
-#: Stands for "no bound" of a signal's band.
+#: Represents "no bound" in the band of a signal.
 UNBOUNDED = 1e300
 
-#: Nodes of one condition that the cabinet takes.
+#: Most nodes of a condition that the cabinet accepts.
 MOST_NODES = 64
 
 
 class Condition(Value):
-    """Something that holds or does not; combine with & (and), | (or), ^ (one of two), ~ (not)."""
+    """Base of conditions; combine them with & (and), | (or), ^ (exactly one of two), ~ (not)."""
 
     __slots__ = ()
 
@@ -43,16 +66,16 @@ class Condition(Value):
 
     def __bool__(self) -> NoReturn:
         raise ShapeError(
-            f"whether this holds is for the cabinet to say: {self}",
+            f"only the cabinet can evaluate the condition {self}",
             parameter="condition",
-            hint="combine conditions with & | ^ ~, in brackets, instead of and, or, not and a < b < c",
+            hint="combine conditions with & | ^ ~ and brackets, not with and, or, not or a < b < c",
         )
 
 
 def _condition(other: object) -> Condition:
     if not isinstance(other, Condition):
         raise ShapeError(
-            f"{other!r} is no condition",
+            f"condition must be a Condition, got {other!r}",
             parameter="condition",
             value=other,
             hint="put comparisons in brackets: (force > 10) | (torque[3] > 8)",
@@ -67,7 +90,7 @@ def _parts(condition: Condition, kind: type[AllOf] | type[AnyOf]) -> tuple[Condi
 
 
 def check_condition(condition: object, parameter: str = "until") -> Condition:
-    """Refuse what is no condition, or one with more nodes than the cabinet takes.
+    """Refuse what is no condition, or has more nodes than the cabinet accepts.
 
     Raises:
         ShapeError: it is none.
@@ -75,15 +98,15 @@ def check_condition(condition: object, parameter: str = "until") -> Condition:
     """
     if not isinstance(condition, Condition):
         raise ShapeError(
-            f"{parameter} is {condition!r}; a condition is wanted",
+            f"{parameter} must be a condition, got {condition!r}",
             parameter=parameter,
             value=condition,
-            hint="build one with heptarm.when, such as force > 10",
+            hint="build one with heptarm.when, for example force > 10",
         )
     size = sum(1 for _ in condition_nodes(condition))
     if size > MOST_NODES:
         raise LimitError(
-            f"{parameter} has {size} nodes; allowed is {MOST_NODES} at most",
+            f"{parameter} must have at most {MOST_NODES} nodes, got {size}",
             code=3,
             parameter=parameter,
             value=size,
@@ -94,12 +117,12 @@ def check_condition(condition: object, parameter: str = "until") -> Condition:
 
 
 def condition_nodes(condition: Condition) -> Iterator[tuple[Condition, Condition]]:
-    """The nodes in postfix order, as they go over the wire, each with the part that a person would name.
+    """The nodes in postfix order, as they are sent, each with the part of the user's condition that it belongs to.
 
-    `OneOf` is written out as what it means.
+    `OneOf` is expanded into & | ~.
     """
     if isinstance(condition, OneOf):
-        for node, _ in condition_nodes(condition.written_out):
+        for node, _ in condition_nodes(condition.expanded):
             yield node, condition
         return
     parts: tuple[Condition, ...] = ()
@@ -130,7 +153,7 @@ class SignalIs(Condition):
     def __post_init__(self) -> None:
         check_name(self.signal, "signal")
         if not isinstance(self.value, bool):
-            raise ShapeError(f"value is {self.value!r}; True or False is wanted", parameter="value")
+            raise ShapeError(f"value must be True or False, got {self.value!r}", parameter="value")
 
     def __gt__(self, other: float) -> SignalOutside:
         return SignalOutside(self.signal, -UNBOUNDED, other)
@@ -177,21 +200,29 @@ class PathReached(Condition):
 
     Attributes:
         distance: from the start, positive, or to the destination, negative [m].
-        delay: so long after that point, or before it if negative [s].
-        from_start: whether the distance counts from the start.
+        delay: time after that point, or before it if negative [s].
+        reference: "start" or "destination": where the distance counts from.
     """
 
     distance: float
     delay: float = 0.0
-    from_start: bool = True
+    reference: str = "start"
 
     def __post_init__(self) -> None:
-        low, high = (0.0, PATH) if self.from_start else (-PATH, 0.0)
+        if self.reference not in ("start", "destination"):
+            raise ShapeError(
+                f"reference must be 'start' or 'destination', got {self.reference!r}",
+                parameter="reference",
+                value=self.reference,
+            )
+        low, high = (0.0, PATH) if self.reference == "start" else (-PATH, 0.0)
         within(self.distance, "distance", low, high, unit="m")
         within(self.delay, "delay", -DELAY, DELAY, unit="s")
 
     def __str__(self) -> str:
-        where = f"{abs(self.distance):g} m {'after the start' if self.from_start else 'before the end'}"
+        where = (
+            f"{abs(self.distance):g} m {'after the start' if self.reference == 'start' else 'before the end'}"
+        )
         return where if self.delay == 0 else f"{where} and {self.delay:+g} s"
 
 
@@ -239,7 +270,7 @@ class OneOf(Condition):
     second: Condition
 
     @property
-    def written_out(self) -> Condition:
+    def expanded(self) -> Condition:
         """The same with & | ~ only, as the cabinet evaluates it."""
         return (self.first & ~self.second) | (~self.first & self.second)
 

@@ -1,4 +1,4 @@
-"""Conditions on the external forces and torques: when the arm touches something; see heptarm.values.condition."""
+"""Conditions on the external forces and torques."""
 
 from __future__ import annotations
 
@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from math import isnan, nan
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arguments import TOOL, check_name
 from heptarm.values.arrays import within
-from heptarm.values.band import band_text, check_band
-from heptarm.values.condition import Condition
+from heptarm.values.condition.condition import Condition, band_text, check_band
+from heptarm.values.frames import TOOL, check_name
 
-#: Largest force [N], torque [Nm] and joint torque [Nm] that can be asked for.
+#: Largest force [N], torque [Nm] and joint torque [Nm] of a threshold.
 FORCE, TORQUE, JOINT = 1000.0, 1000.0, 500.0
 
 _AXES = ("x", "y", "z")
@@ -19,7 +18,7 @@ _AXES = ("x", "y", "z")
 
 def _check_estimate(axis: str | None, frame: str, tolerance: float, unit: str) -> None:
     if axis is not None and axis not in _AXES:
-        raise ShapeError(f"axis is {axis!r}; allowed are 'x', 'y', 'z'", parameter="axis", value=axis)
+        raise ShapeError(f"axis must be 'x', 'y' or 'z', got {axis!r}", parameter="axis", value=axis)
     check_name(frame, "frame")
     if not (isinstance(tolerance, float) and isnan(tolerance)):
         within(tolerance, "tolerance", 0.0, FORCE, above=True, unit=unit)
@@ -123,7 +122,7 @@ class ForceOutside(Condition):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TorqueOutside(Condition):
-    """A component of the external torque at the moved frame is outside a band.
+    """A component of the external torque at the motion frame is outside a band.
 
     Attributes:
         axis: "x", "y" or "z" of the frame.
@@ -164,7 +163,7 @@ class JointTorqueOutside(Condition):
     def __post_init__(self) -> None:
         if not isinstance(self.joint, int) or isinstance(self.joint, bool) or not 0 <= self.joint <= 6:
             raise LimitError(
-                f"joint is {self.joint!r}; allowed is 0 (A1) to 6 (A7)",
+                f"joint must be 0 (A1) to 6 (A7), got {self.joint!r}",
                 code=2,
                 parameter="joint",
                 value=self.joint,

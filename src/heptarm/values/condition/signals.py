@@ -1,4 +1,4 @@
-"""What conditions are made of: signals that compare to conditions.
+"""The names that users compare to make conditions.
 
 ::
 
@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from math import nan
 
 from heptarm.errors import ShapeError
-from heptarm.values.arguments import TOOL
-from heptarm.values.condition import Condition, PathReached, SignalIs
-from heptarm.values.force_condition import (
+from heptarm.values.condition.condition import Condition, PathReached, SignalIs
+from heptarm.values.condition.force import (
     FORCE,
     JOINT,
     TORQUE,
@@ -27,6 +26,7 @@ from heptarm.values.force_condition import (
     ShearForceAbove,
     TorqueOutside,
 )
+from heptarm.values.frames import TOOL
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,12 +69,12 @@ class Component:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Force:
-    """The external force that the cabinet estimates at the moved frame [N]; `> threshold`: its magnitude.
+    """External force that the cabinet estimates at the motion frame [N]; `> threshold` compares its magnitude.
 
     Attributes:
-        frame: whose axes: "tool" (the moved frame's own), "flange" or "base".
+        frame: the frame whose axes count: "tool" (the motion frame), "flange" or "base".
         tolerance: largest inaccuracy of the estimate that is accepted [N]; NaN: any. A worse estimate, as near a
-            singularity, counts as exceeding the threshold.
+            singularity, counts as above the threshold.
     """
 
     frame: str = TOOL
@@ -95,21 +95,21 @@ class Force:
         return Component(lambda low, high: ForceOutside(axis, low, high, self.frame, self.tolerance), FORCE)
 
     def normal(self, axis: str) -> Magnitude:
-        """How strong it is along an axis, in either direction."""
+        """Its magnitude along an axis, in either direction."""
         return Magnitude(lambda threshold: NormalForceAbove(axis, threshold, self.frame, self.tolerance))
 
     def shear(self, axis: str) -> Magnitude:
-        """How strong it is across an axis."""
+        """Its magnitude across an axis."""
         return Magnitude(lambda threshold: ShearForceAbove(axis, threshold, self.frame, self.tolerance))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Torque:
-    """The external torque: `torque[3]` that of joint A4, `torque.about("z")` a component at the moved frame [Nm].
+    """The external torque: `torque[3]` that of joint A4, `torque.about("z")` a component at the motion frame [Nm].
 
     Attributes:
-        frame: whose axes `about` means; see `Force`.
-        tolerance: see `Force`, of `about` [Nm].
+        frame: the frame whose axes `about` refers to; see `Force`.
+        tolerance: see `Force`; for `about` [Nm].
     """
 
     frame: str = TOOL
@@ -128,13 +128,13 @@ class Torque:
         return Component(lambda low, high: TorqueOutside(axis, low, high, self.frame, self.tolerance), TORQUE)
 
 
-class Io:
+class IoSignals:
     """Signals of the cabinet by name: `io["MediaFlange.UserButton"]`, or `io.user_button` where that is unique."""
 
     __slots__ = ()
 
     def __getitem__(self, name: str) -> SignalIs:
-        """A signal; as it is, a condition that it is true."""
+        """A signal; by itself a condition that it is true."""
         return SignalIs(name)
 
     def __getattr__(self, name: str) -> SignalIs:
@@ -145,26 +145,31 @@ class Io:
 
 
 class Path:
-    """Points on the path of a motion. On one in joint space they count along the way of the moved frame."""
+    """Points on the path of a motion; in joint space the path of the motion frame counts."""
 
     __slots__ = ()
 
     def after(self, metres: float = 0.0, *, seconds: float = 0.0) -> Condition:
-        """So far after the start, and so long after (or, negative, before) that point."""
+        """A distance after the start, and a time after (or, negative, before) that point."""
         return PathReached(metres, seconds)
 
     def before_end(self, metres: float = 0.0, *, seconds: float = 0.0) -> Condition:
-        """So far before the destination, and so long before that point.
+        """A distance before the destination, and a time before that point.
 
         Raises:
             ShapeError: negative seconds: after the end there is no motion.
         """
         if seconds < 0:
-            raise ShapeError(f"seconds is {seconds:g}; it counts back from the end", parameter="seconds")
-        return PathReached(-metres if metres else 0.0, -seconds if seconds else 0.0, from_start=False)
+            raise ShapeError(
+                f"seconds must not be negative before the end, got {seconds:g} s",
+                parameter="seconds",
+                value=seconds,
+                hint="it counts back from the end",
+            )
+        return PathReached(-metres if metres else 0.0, -seconds if seconds else 0.0, "destination")
 
 
 force = Force()
 torque = Torque()
-io = Io()
+io = IoSignals()
 path = Path()

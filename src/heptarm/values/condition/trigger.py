@@ -1,4 +1,4 @@
-"""Triggers: what the cabinet does on the way, without stopping, when a condition of a motion comes true."""
+"""Triggers: actions of the cabinet during a motion, without stopping it, when a condition becomes true."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from dataclasses import dataclass, field, replace
 from typing import TypeAlias, TypeVar
 
 from heptarm.errors import ShapeError
-from heptarm.values.arguments import check_name
 from heptarm.values.arrays import Value, scalar
-from heptarm.values.condition import Condition, check_condition
+from heptarm.values.condition.condition import Condition, check_condition
+from heptarm.values.frames import check_name
 from heptarm.values.io import SignalValue
 
 _Motion = TypeVar("_Motion", bound="Triggered")
 
-#: Triggers of one motion that the cabinet takes.
+#: Most triggers of a motion that the cabinet accepts.
 MOST = 16
 _LONGEST_LABEL = 128
 
@@ -38,10 +38,10 @@ class SetOutput(Value):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Notify(Value):
-    """The cabinet tells of it.
+    """The cabinet sends an event.
 
     Attributes:
-        label: what the event is called, up to 128 octets.
+        label: name of the event, up to 128 bytes.
     """
 
     label: str = ""
@@ -49,7 +49,7 @@ class Notify(Value):
     def __post_init__(self) -> None:
         if not isinstance(self.label, str) or len(self.label.encode()) > _LONGEST_LABEL:
             raise ShapeError(
-                f"label is {self.label!r}; a text of at most {_LONGEST_LABEL} octets is wanted",
+                f"label must be a text of at most {_LONGEST_LABEL} bytes, got {self.label!r}",
                 code=3,
                 parameter="label",
                 value=self.label,
@@ -61,7 +61,7 @@ Action: TypeAlias = SetOutput | Notify
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trigger(Value):
-    """An action, and when it is done: when the condition holds for the first time while its motion runs.
+    """An action, done when the condition first holds while its motion runs.
 
     Attributes:
         condition: see heptarm.when.
@@ -78,10 +78,10 @@ class Trigger(Value):
         check_condition(self.condition, "condition")
         if not isinstance(self.action, SetOutput | Notify):
             raise ShapeError(
-                f"action is {self.action!r}; an action is wanted",
+                f"action must be an action of heptarm.do, got {self.action!r}",
                 parameter="action",
                 value=self.action,
-                hint="make one with heptarm.do, such as notify('half way') or set_output('LEDBlue', True)",
+                hint="make one with heptarm.do, for example notify('half way') or set_output('LEDBlue', True)",
             )
 
 
@@ -117,5 +117,5 @@ class Triggered(Value):
 
 
 def triggers_of(motion: object) -> tuple[Trigger, ...]:
-    """Triggers of a motion; hand guiding has none."""
+    """The triggers of a motion; hand guiding has none."""
     return motion.triggers if isinstance(motion, Triggered) else ()

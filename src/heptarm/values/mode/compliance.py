@@ -1,19 +1,19 @@
-"""The mode of precise guiding: soft along some directions, stiff along all others."""
+"""The mode for guiding along chosen directions: compliant along them, stiff along all others."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from heptarm.errors import ShapeError
-from heptarm.values.directions import DIRECTIONS, one
-from heptarm.values.impedance import STIFFEST, CartesianImpedance
-from heptarm.values.motion import TOOL
+from heptarm.values.frames import TOOL
+from heptarm.values.mode.directions import DIRECTIONS, one
+from heptarm.values.mode.impedance import STIFFEST, CartesianImpedance
 
 #: Stiffness of the directions that are held, along [N/m] and about an axis [Nm/rad].
 HOLDING = (4000.0, 300.0)
 
 
-def yielding(
+def compliance(
     free: str,
     *,
     frame: str = TOOL,
@@ -22,16 +22,16 @@ def yielding(
     damping: float = 1.0,
     nullspace_stiffness: float = 0.0,
 ) -> CartesianImpedance:
-    """Cartesian impedance that lets the arm be led along some directions and holds it in all others.
+    """Cartesian impedance that is compliant along some directions and holds the arm in all others.
 
     Args:
         free: the directions, such as "z" (a line), "xy" (a plane), "a" (about z), "xya" (the plane, and turning in it);
             "b" is about y, "c" about x.
-        frame: whose axes: "tool" (the moved frame's own at the start), "base", or a frame's name.
+        frame: the frame whose axes count: "tool" (the motion frame at the start), "base", or the name of a frame.
         stiffness: along the axes that are held [N/m], up to 5000.
         turning: about the axes that are held [Nm/rad], up to 300.
         damping: damping ratio, 0.1 to 1.
-        nullspace_stiffness: of the spring that keeps the elbow [Nm/rad]; without one it goes where it is led.
+        nullspace_stiffness: of the spring that holds the elbow [Nm/rad]; at 0 the elbow moves freely.
 
     Raises:
         ShapeError: no directions, unknown ones, or one twice.
@@ -44,7 +44,7 @@ def yielding(
         or not set(free) <= set(DIRECTIONS)
     ):
         raise ShapeError(
-            f"free is {free!r}; letters of 'xyzabc' are wanted, each once",
+            f"free must be letters of 'xyzabc', each at most once, got {free!r}",
             parameter="free",
             value=free,
             hint='for example "z", "xy", or "a" for turning about z',

@@ -1,6 +1,6 @@
 """Numbers for the six Cartesian directions: x y z, then about x, about y, about z; checked.
 
-Where a direction is given by its name, rotations bear KUKA's: "a" is about z, "b" about y, "c" about x.
+Where a direction is given by its name, rotations have KUKA's names: "a" is about z, "b" about y, "c" about x.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ PLANES = {"xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
 #: Units along and about an axis.
 FORCE = ("N", "Nm")
-WAY = ("m", "rad")
+LENGTH = ("m", "rad")
 SPEED = ("m/s", "rad/s")
 
 _T = TypeVar("_T")
 
 
 def one(value: float, name: str, low: float, high: float, unit: str = "", *, above: bool = False) -> float:
-    """A number in [low, high] (or (low, high] with `above`) that has no default to keep.
+    """A number in [low, high] (or (low, high] with `above`) without a default.
 
     Raises:
         LimitError: it is outside, or not given.
@@ -37,7 +37,7 @@ def one(value: float, name: str, low: float, high: float, unit: str = "", *, abo
     """
     number = within(value, name, low, high, above=above, unit=unit)
     if isnan(number):
-        raise LimitError(f"{name} is not given; a number is wanted", code=1, parameter=name, value=value)
+        raise LimitError(f"{name} must be a number, got {value!r}", code=1, parameter=name, value=value)
     return number
 
 
@@ -92,12 +92,12 @@ def flag(value: bool, name: str) -> bool:
         ShapeError: it is something else.
     """
     if not isinstance(value, (bool, np.bool_)):
-        raise ShapeError(f"{name} is {value!r}; True or False is wanted", parameter=name, value=value)
+        raise ShapeError(f"{name} must be True or False, got {value!r}", parameter=name, value=value)
     return bool(value)
 
 
 def choice(name: str, parameter: str, choices: dict[str, _T]) -> _T:
-    """What a name stands for.
+    """The choice of that name.
 
     Raises:
         ShapeError: it is none of the choices.
@@ -106,7 +106,7 @@ def choice(name: str, parameter: str, choices: dict[str, _T]) -> _T:
         return choices[name]
     allowed = ", ".join(choices)
     raise ShapeError(
-        f"{parameter} is {name!r}; allowed is one of {allowed}",
+        f"{parameter} must be one of {allowed}, got {name!r}",
         parameter=parameter,
         value=name,
         allowed=allowed,
@@ -122,5 +122,5 @@ def at(indices: Sequence[int], values: Sequence[float]) -> list[float]:
 
 
 def put(value: Value, name: str, content: object) -> None:
-    """Set a field of a frozen value that is being made."""
+    """Set a field of a frozen value during construction."""
     object.__setattr__(value, name, content)

@@ -1,4 +1,4 @@
-"""Impedance modes: the arm yields like a spring with a damper, joint by joint or at the moved frame.
+"""Impedance modes: the arm is compliant like a spring with a damper, in each joint or at the motion frame.
 
 Ranges and defaults are those of Sunrise's control modes. Cartesian directions are in the order x y z, then about x,
 about y, about z.
@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.values.arrays import Array, Value, array, within
-from heptarm.values.directions import FORCE, SPEED, WAY, each, flag, limit, one, put, six
-from heptarm.values.motion import TOOL
+from heptarm.values.frames import TOOL, check_name
+from heptarm.values.mode.directions import FORCE, LENGTH, SPEED, each, flag, limit, one, put, six
 
 #: Largest stiffness of a joint [Nm/rad].
 STIFFEST_JOINT = 5000.0
@@ -29,7 +29,6 @@ STRONGEST = 500.0
 UNLIMITED = 1e6
 
 NO_FORCE = (0.0,) * 6
-_LONGEST_NAME = 128
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
@@ -55,26 +54,26 @@ class JointImpedance(Value):
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class CartesianImpedance(Value):
-    """A spring and a damper between the moved frame and its set-point, and another that keeps the elbow.
+    """A spring and a damper between the motion frame and its set-point, and another for the elbow (null space).
 
     Args:
         stiffness: shape (6,); along the axes 0 to 5000 N/m, about them 0 to 300 Nm/rad.
         damping: damping ratio, one number for all directions or shape (6,), 0.1 to 1.
-        nullspace_stiffness: of the spring that keeps the elbow [Nm/rad], 0 to 5000.
+        nullspace_stiffness: of the spring that holds the elbow [Nm/rad], 0 to 5000.
         nullspace_damping: its damping ratio, 0.3 to 1.
-        additional_force: acts besides the springs, shape (6,) [N, Nm], -500 to 500.
+        additional_force: acts in addition to the springs, shape (6,) [N, Nm], -500 to 500.
         max_force: largest force that the control exerts, shape (6,) [N, Nm], 0 to 1e6; NaN or None: unlimited.
         max_force_stops: reaching it also stops the motion.
-        max_velocity: of the moved frame, shape (6,) [m/s, rad/s], up to 100; a higher one stops the motion; NaN or
+        max_velocity: of the motion frame, shape (6,) [m/s, rad/s], up to 100; a higher one stops the motion; NaN or
             None: unlimited.
         max_deviation: from the set-point, shape (6,) [m, rad], up to 100; a larger one stops the motion; NaN or None:
             unlimited.
-        frame: whose axes the directions are: "tool" (the moved frame's own), "base", or a frame's name.
+        frame: the frame whose axes the directions are: "tool" (the motion frame), "base", or the name of a frame.
 
     Raises:
         ShapeError: a wrong shape or type.
         LimitError: a value outside its range.
-        CommandRejected: reaching a force shall stop the motion, but none is given.
+        CommandRejected: max_force_stops without a max_force.
     """
 
     stiffness: Array
@@ -118,21 +117,21 @@ class CartesianImpedance(Value):
         put(self, "max_force", limit(max_force, "max_force", UNLIMITED, FORCE))
         put(self, "max_force_stops", flag(max_force_stops, "max_force_stops"))
         put(self, "max_velocity", limit(max_velocity, "max_velocity", 100.0, SPEED, above=True))
-        put(self, "max_deviation", limit(max_deviation, "max_deviation", 100.0, WAY, above=True))
-        put(self, "frame", _name(frame))
+        put(self, "max_deviation", limit(max_deviation, "max_deviation", 100.0, LENGTH, above=True))
+        put(self, "frame", check_name(frame, "frame"))
         if self.max_force_stops and np.isnan(self.max_force).all():
             raise CommandRejected(
-                "max_force_stops is given without a max_force",
+                "max_force_stops must not be set without a max_force",
                 code=2,
                 parameter="max_force_stops",
-                hint="give a max_force for the directions meant",
+                hint="give a max_force for at least one direction",
             )
 
 
 def _stiffness(value: npt.ArrayLike) -> Array:
     if np.ndim(value) == 0:
         raise ShapeError(
-            f"stiffness is {value!r}; 6 numbers are wanted",
+            f"stiffness must be 6 numbers, got {value!r}",
             parameter="stiffness",
             value=value,
             hint="three along the axes [N/m], three about them [Nm/rad]",
@@ -142,15 +141,3 @@ def _stiffness(value: npt.ArrayLike) -> Array:
         unit = "N/m" if index < 3 else "Nm/rad"
         within(entry, f"stiffness[{index}]", 0.0, STIFFEST[index // 3], unit=unit)
     return result
-
-
-def _name(value: str) -> str:
-    if not isinstance(value, str) or not 1 <= len(value.encode()) <= _LONGEST_NAME:
-        raise ShapeError(
-            f"frame is {value!r}; the name of a frame is wanted, up to {_LONGEST_NAME} octets",
-            code=3,
-            parameter="frame",
-            value=value,
-            hint='for example "tool" or "base"',
-        )
-    return value

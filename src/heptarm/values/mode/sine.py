@@ -1,6 +1,6 @@
-"""Cartesian impedance with a force laid over it: constant, swinging, a Lissajous figure, a spiral.
+"""Cartesian impedance with an overlaid force: constant, sinusoidal, a Lissajous figure, a spiral.
 
-Where a direction is given by its name, rotations bear KUKA's: "a" is about z, "b" about y, "c" about x.
+Where a direction is given by its name, rotations have KUKA's names: "a" is about z, "b" about y, "c" about x.
 """
 
 from __future__ import annotations
@@ -14,8 +14,20 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.values.arrays import Array, Value, within
-from heptarm.values.directions import DIRECTIONS, FORCE, PLANES, WAY, at, choice, flag, limit, one, put, six
-from heptarm.values.impedance import NO_FORCE, STRONGEST, UNLIMITED, CartesianImpedance
+from heptarm.values.mode.directions import (
+    DIRECTIONS,
+    FORCE,
+    LENGTH,
+    PLANES,
+    at,
+    choice,
+    flag,
+    limit,
+    one,
+    put,
+    six,
+)
+from heptarm.values.mode.impedance import NO_FORCE, STRONGEST, UNLIMITED, CartesianImpedance
 
 #: Highest frequency of an overlaid force [Hz].
 FASTEST = 15.0
@@ -28,25 +40,25 @@ _LONGEST_TIME = 1e6
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class SineImpedance(Value):
-    """Cartesian impedance with a force laid over it: bias + amplitude * sin(2 pi frequency t + phase).
+    """Cartesian impedance with an overlaid force: bias + amplitude * sin(2 pi frequency t + phase).
 
-    The class methods build the four patterns; `timed` bounds one in time. The force rises evenly for `rise_time`, lasts
-    for `hold_time` and falls evenly for `fall_time`; after `total_time` it is gone in any case.
+    The class methods build the four patterns; `timed` bounds one in time. The force rises linearly for `rise_time`,
+    lasts for `hold_time` and falls linearly for `fall_time`; after `total_time` it is zero in any case.
 
     Args:
-        base: the impedance under it; None: the default one.
+        base: the impedance without the overlaid force; None: the default one.
         amplitude: shape (6,) [N, Nm], 0 to 500.
         frequency: shape (6,) [Hz], 0 to 15.
         phase: at the beginning, shape (6,) [rad], 0 to 6.3.
         bias: constant part, shape (6,) [N, Nm], -500 to 500.
         force_limit: largest overlaid force, shape (6,) [N, Nm], 0 to 1e6; NaN or None: unlimited.
-        position_limit: deviation from the set-point that the overlaid force does not push beyond, shape (6,)
+        position_limit: largest deviation from the set-point that the overlaid force may cause, shape (6,)
             [m, rad], 0 to 100; NaN or None: unlimited.
-        total_time: [s], up to 1e6; NaN or None: as the other times say.
+        total_time: [s], up to 1e6; NaN or None: the sum of the other times.
         rise_time: [s], up to 1e6.
-        hold_time: [s], up to 1e6; NaN or None: what `total_time` leaves, without one until the motion ends.
+        hold_time: [s], up to 1e6; NaN or None: the rest of `total_time`, without one until the motion ends.
         fall_time: [s], up to 1e6.
-        stay_active: the motion does not end before the pattern has.
+        stay_active: the motion does not end before the pattern ends.
 
     Raises:
         ShapeError: a wrong shape or type.
@@ -89,7 +101,7 @@ class SineImpedance(Value):
         put(self, "phase", six(phase, "phase", 0.0, 6.3, ("rad", "rad")))
         put(self, "bias", six(bias, "bias", -STRONGEST, STRONGEST, FORCE))
         put(self, "force_limit", limit(force_limit, "force_limit", UNLIMITED, FORCE))
-        put(self, "position_limit", limit(position_limit, "position_limit", 100.0, WAY))
+        put(self, "position_limit", limit(position_limit, "position_limit", 100.0, LENGTH))
         put(self, "total_time", _time(total_time, "total_time"))
         put(self, "rise_time", one(rise_time, "rise_time", 0.0, _LONGEST_TIME, "s"))
         put(self, "hold_time", _time(hold_time, "hold_time"))
@@ -98,7 +110,7 @@ class SineImpedance(Value):
         ramps = self.rise_time + self.fall_time
         if ramps > self.total_time:
             raise CommandRejected(
-                f"rise_time and fall_time take {ramps:g} s; total_time is {self.total_time:g} s",
+                f"total_time must be at least rise_time + fall_time = {ramps:g} s, got {self.total_time:g} s",
                 code=2,
                 parameter="total_time",
                 value=self.total_time,
@@ -106,7 +118,7 @@ class SineImpedance(Value):
             )
         if self.stay_active and isnan(self.duration):
             raise CommandRejected(
-                "stay_active waits for a pattern without an end",
+                "stay_active must not be set for a pattern without an end",
                 code=2,
                 parameter="stay_active",
                 hint="give a total_time or a hold_time",
@@ -114,7 +126,7 @@ class SineImpedance(Value):
 
     @property
     def duration(self) -> float:
-        """When the overlaid force is gone [s]; NaN: it lasts as long as the motion."""
+        """Time when the overlaid force ends [s]; NaN: it lasts as long as the motion."""
         return float(np.fmin(self.total_time, self.rise_time + self.hold_time + self.fall_time))
 
     @classmethod
@@ -140,7 +152,7 @@ class SineImpedance(Value):
             b: torque about y [Nm].
             c: torque about x [Nm].
             stiffness: of the directions in which a force acts [N/m or Nm/rad]; None: the base's.
-            base: the impedance under it; None: the default one.
+            base: the impedance without the overlaid force; None: the default one.
 
         Raises:
             LimitError: a value outside its range.
@@ -160,16 +172,16 @@ class SineImpedance(Value):
         stiffness: float | None = None,
         base: CartesianImpedance | None = None,
     ) -> SineImpedance:
-        """Pattern of a force that swings in one direction.
+        """Pattern of a sinusoidal force in one direction.
 
         Args:
             direction: "x", "y", "z", or a torque: "a" (about z), "b" (about y), "c" (about x).
             frequency: [Hz], up to 15.
             amplitude: [N], of a torque [Nm], up to 500.
             phase: at the beginning [rad].
-            bias: what it swings about [N], of a torque [Nm].
+            bias: constant part [N], of a torque [Nm].
             stiffness: of that direction [N/m or Nm/rad]; None: the base's.
-            base: the impedance under it; None: the default one.
+            base: the impedance without the overlaid force; None: the default one.
 
         Raises:
             ShapeError: no such direction.
@@ -194,14 +206,14 @@ class SineImpedance(Value):
         stiffness: float | None = None,
         base: CartesianImpedance | None = None,
     ) -> SineImpedance:
-        """Pattern of a force that draws a Lissajous figure; the second axis swings 0.4 times as fast.
+        """Pattern of a force that follows a Lissajous figure; the second axis has 0.4 times the frequency.
 
         Args:
             plane: "xy", "xz" or "yz".
             frequency: along the plane's first axis [Hz], up to 15.
             amplitude: along both axes [N], up to 500.
             stiffness: along both axes [N/m]; None: the base's.
-            base: the impedance under it; None: the default one.
+            base: the impedance without the overlaid force; None: the default one.
 
         Raises:
             ShapeError: no such plane.
@@ -227,7 +239,7 @@ class SineImpedance(Value):
         stiffness: float | None = None,
         base: CartesianImpedance | None = None,
     ) -> SineImpedance:
-        """Pattern of a force that goes round in a spiral: outwards for half of its time, then back.
+        """Pattern of a force that follows a spiral: outwards for half of its time, then back.
 
         Args:
             plane: "xy", "xz" or "yz".
@@ -235,7 +247,7 @@ class SineImpedance(Value):
             amplitude: of the outermost turn [N], up to 500.
             total_time: [s], up to 1e6.
             stiffness: along both axes [N/m]; None: the base's.
-            base: the impedance under it; None: the default one.
+            base: the impedance without the overlaid force; None: the default one.
 
         Raises:
             ShapeError: no such plane.
@@ -288,7 +300,7 @@ def _base(value: CartesianImpedance | None) -> CartesianImpedance:
     if value is None:
         return CartesianImpedance()
     if not isinstance(value, CartesianImpedance):
-        raise ShapeError(f"base is {value!r}; a CartesianImpedance is wanted", parameter="base", value=value)
+        raise ShapeError(f"base must be a CartesianImpedance, got {value!r}", parameter="base", value=value)
     return value
 
 

@@ -1,4 +1,4 @@
-"""Hand guiding: a person leads the arm while holding the enabling switch of its hand guiding device."""
+"""Hand guiding: a person moves the arm while holding the enabling switch of its hand guiding device."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from heptarm.errors import LimitError, ShapeError
 from heptarm.values.arrays import Array, Value, array, frozen, within
 
-#: What can happen at a limit, and what to an axis that is beyond its limit at the start.
+#: What stops at a limit; what happens to a joint that is beyond its limit at the start.
 AT_LIMIT = ("axis", "all")
 OUTSIDE = ("free", "pull")
 _FASTEST = 10.0
@@ -23,13 +23,13 @@ def _open() -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandGuide(Value):
-    """A person leads the arm; made by `hand_guide`.
+    """A person moves the arm; made by `hand_guide`.
 
     Attributes:
-        q_min: lowest positions, shape (7,) [rad]; NaN: the axis' own limit.
+        q_min: lowest positions, shape (7,) [rad]; NaN: the joint's own limit.
         q_max: highest positions, likewise.
-        joint_velocity: no axis is led faster [rad/s]; NaN: the cabinet's limit.
-        cartesian_velocity: the moved frame is led no faster [m/s]; NaN: the cabinet's limit.
+        joint_velocity: highest speed of a joint [rad/s]; NaN: the cabinet's limit.
+        cartesian_velocity: highest speed of the motion frame [m/s]; NaN: the cabinet's limit.
         at_limit: "axis" or "all".
         outside: "free" or "pull".
     """
@@ -41,11 +41,6 @@ class HandGuide(Value):
     at_limit: str = "axis"
     outside: str = "free"
 
-    def under(self, ceiling: float) -> HandGuide:
-        """The same: the person leads as fast as its own limits let them."""
-        within(ceiling, "speed", 0.0, 1.0, above=True)
-        return self
-
 
 def hand_guide(
     *,
@@ -56,19 +51,19 @@ def hand_guide(
     at_limit: str = "axis",
     outside: str = "free",
 ) -> HandGuide:
-    """Let a person lead the arm by hand.
+    """Let a person move the arm by hand.
 
-    It begins standing. While the switch of the hand guiding device is held the arm gives way, without weight; when the
-    switch is let go the motion ends, at rest. It is not for the cabinet to say when that is: give a timeout.
+    The arm starts at rest. While the switch of the hand guiding device is held the arm is compliant and its weight is
+    compensated; when the switch is released the motion ends, at rest. The cabinet cannot know when: give a timeout.
 
     Args:
-        q_min: lowest positions that it can be led to, shape (7,) [rad]; NaN or None: the axis' own limits.
-        q_max: highest positions, likewise.
-        joint_velocity: no axis is led faster [rad/s], up to 10; None: the cabinet's limit.
-        cartesian_velocity: the moved frame is led no faster [m/s], up to 10; None: the cabinet's limit.
-        at_limit: "axis": an axis at its limit goes no further, all others are free; "all": every axis is held until
-            the switch is let go.
-        outside: an axis that is beyond its limit at the start can be led back freely but no further out ("free"), or
+        q_min: lowest joint positions, shape (7,) [rad]; NaN or None: the joint's own limit.
+        q_max: highest joint positions, likewise.
+        joint_velocity: highest speed of a joint [rad/s], up to 10; None: the cabinet's limit.
+        cartesian_velocity: highest speed of the motion frame [m/s], up to 10; None: the cabinet's limit.
+        at_limit: "axis": a joint at its limit stops there, all others stay free; "all": every joint is held until the
+            switch is released.
+        outside: a joint that is beyond its limit at the start can be moved back freely but no further out ("free"), or
             is pulled back while the arm is guided ("pull").
 
     Raises:
@@ -81,7 +76,7 @@ def hand_guide(
     if crossed.any():
         axis = int(crossed.argmax())
         raise LimitError(
-            f"q_min[{axis}] is {low[axis]:g} rad, q_max[{axis}] is {high[axis]:g} rad; the lower has to be below",
+            f"q_min[{axis}] must be below q_max[{axis}] = {high[axis]:g} rad, got {low[axis]:g} rad",
             code=2,
             parameter=f"q_min[{axis}]",
             value=float(low[axis]),
@@ -91,7 +86,7 @@ def hand_guide(
         if word not in words:
             allowed = ", ".join(map(repr, words))
             raise ShapeError(
-                f"{name} is {word!r}; allowed are {allowed}", parameter=name, value=word, allowed=allowed
+                f"{name} must be one of {allowed}, got {word!r}", parameter=name, value=word, allowed=allowed
             )
     return HandGuide(
         low,

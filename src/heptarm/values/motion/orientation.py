@@ -1,4 +1,4 @@
-"""How the orientation is led along a Cartesian path, in KUKA's terms."""
+"""Orientation control: how the orientation changes along a path."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ from dataclasses import dataclass
 from heptarm.errors import CommandRejected
 from heptarm.values.arrays import Value
 
-#: From the start's to the end's orientation; the start's all the way; chosen by a spline's other points; as the
-#: joints would turn it in a PTP.
+#: From the start's to the end's orientation; the start's throughout; interpolated from the neighbours in a spline; as
+#: the joints turn it in a PTP. In the order of the protocol.
 TYPES = ("variable", "constant", "ignore", "joint")
-#: What it is led relative to: the base, or the tangent of the path.
+#: The frame that the orientation is interpolated in: the base, or the tangent of the path.
 REFERENCES = ("base", "path")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Orientation(Value):
-    """How the orientation is led.
+    """How the orientation changes along a path.
 
     Attributes:
         type: "variable", "constant", "ignore" (segments of a spline only) or "joint".
         reference: "base" or "path".
 
     Raises:
-        CommandRejected: another word.
+        CommandRejected: another word, or "joint" with the reference "path".
     """
 
     type: str = "variable"
@@ -36,7 +36,7 @@ class Orientation(Value):
         ):
             if value not in allowed:
                 raise CommandRejected(
-                    f"{name} is {value!r}; allowed is {', '.join(allowed)}",
+                    f"{name} must be one of {', '.join(map(repr, allowed))}, got {value!r}",
                     code=2,
                     parameter=name,
                     value=value,
@@ -44,28 +44,31 @@ class Orientation(Value):
                 )
         if self.type == "joint" and self.reference == "path":
             raise CommandRejected(
-                'the orientation "joint" is led by the joints, not relative to the path',
+                'the orientation "joint" follows the joints and has no reference "path"',
                 parameter="reference",
-                hint='leave reference out, or take "variable" or "constant"',
+                value=self.reference,
+                allowed="base",
+                hint='leave reference out, or give orientation="variable" or "constant"',
             )
 
 
-#: The usual one.
+#: The default.
 VARIABLE = Orientation()
 
 
-def orientation_of(kind: str, reference: str, *, alone: bool = True) -> Orientation:
-    """An orientation; `alone`: of a motion by itself, which has no neighbours to be chosen by.
+def orientation_of(kind: str, reference: str, *, segment: bool = False) -> Orientation:
+    """An orientation control; only a segment of a spline may have the kind "ignore".
 
     Raises:
         CommandRejected: another word, or "ignore" outside a spline.
     """
     result = Orientation(kind, reference)
-    if alone and kind == "ignore":
+    if kind == "ignore" and not segment:
         raise CommandRejected(
-            'the orientation "ignore" belongs to points of a spline',
+            'orientation must not be "ignore" outside a spline',
             parameter="orientation",
             value=kind,
+            allowed=", ".join(one for one in TYPES if one != "ignore"),
             hint="use it in spl(...)",
         )
     return result

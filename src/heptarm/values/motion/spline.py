@@ -1,29 +1,42 @@
-"""Splines: several segments or points, gone through without a halt."""
+"""Splines: several segments or points, passed without a stop."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, pi, sin
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arguments import AXES, EXACT, FREE, TOOL, check_name, check_pose, joints_of, path_of
 from heptarm.values.arrays import Array, Value, array, within
-from heptarm.values.circ import Circ, normal_of
-from heptarm.values.limits import CartesianDynamics, JointDynamics
-from heptarm.values.lines import Lin
-from heptarm.values.orientation import VARIABLE, Orientation, orientation_of
-from heptarm.values.pose import Pose
-from heptarm.values.ptp import Ptp
-from heptarm.values.trigger import Triggered
+from heptarm.values.frames import TOOL, check_name
+from heptarm.values.motion.circle import Circ, normal_of
+from heptarm.values.motion.dynamics import (
+    DEFAULT,
+    EXACT,
+    DynamicMotion,
+    Dynamics,
+    JointSplineSettings,
+    SegmentSettings,
+    SplineSettings,
+    keywords,
+    settings,
+)
+from heptarm.values.motion.line import Lin
+from heptarm.values.motion.orientation import VARIABLE, Orientation, orientation_of
+from heptarm.values.motion.ptp import Ptp
+from heptarm.values.pose import Pose, check_pose
 
-#: As many segments as the protocol carries.
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+#: Most segments that the protocol carries.
 _MOST = 1000
-_LEAST_RADIUS = 1e-4
+#: Shortest half axis of an ellipse [m].
+_SMALLEST_RADIUS = 1e-4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,158 +44,110 @@ class Spl(Value):
     """Curved segment of a spline, shaped by its neighbours.
 
     Attributes:
-        pose: where it ends, in the base frame.
-        path: limits on this segment; what is open is the spline's.
-        orientation: how the orientation is led to it.
+        target: pose at its end, in the base frame.
+        orientation: how the orientation changes along the path.
+        dynamics: limits along this segment; those not given are the spline's.
     """
 
-    pose: Pose
-    path: CartesianDynamics = FREE
+    target: Pose
     orientation: Orientation = VARIABLE
+    dynamics: Dynamics = DEFAULT
 
     def __post_init__(self) -> None:
-        check_pose(self.pose)
+        check_pose(self.target)
 
 
 Segment: TypeAlias = Spl | Lin | Circ
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Spline(Triggered):
-    """Spline in space.
+class Spline(DynamicMotion):
+    """Cartesian spline; its dynamics are for segments without limits of their own.
 
     Attributes:
-        segments: curved, straight and round ones, 1 to 1000.
-        moving: the moved frame.
-        path: limits along it, where a segment says nothing.
-        joints: fractions of the axes' maxima, as well.
+        segments: curves, lines and arcs, 1 to 1000.
+        moving: the motion frame.
     """
 
     segments: tuple[Segment, ...]
     moving: str = TOOL
-    path: CartesianDynamics = FREE
-    joints: JointDynamics = AXES
 
     def __post_init__(self) -> None:
         check_name(self.moving, "moving")
 
-    def under(self, ceiling: float) -> Spline:
-        """The same motion, no axis faster than that fraction of its maximum."""
-        return replace(self, joints=self.joints.under(ceiling))
-
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointSpline(Triggered):
-    """Spline in joint space.
+class JointSpline(DynamicMotion):
+    """Spline in joint space; its dynamics are for points without limits of their own.
 
     Attributes:
-        points: joint positions to pass through and how fast to come there, 1 to 1000.
-        joints: fractions of the axes' maxima, where a point says nothing.
+        points: joint positions to pass through, 1 to 1000, each with the limits of the path to it.
     """
 
     points: tuple[Ptp, ...]
-    joints: JointDynamics = AXES
 
-    def under(self, ceiling: float) -> JointSpline:
-        """The same motion, no axis faster than that fraction of its maximum."""
+    def limited_to(self, speed: float) -> JointSpline:
+        """The same motion, no joint faster than a fraction of its maximum in (0, 1], at no point."""
         points = tuple(
-            replace(point, joints=_filled(point.joints, self.joints).under(ceiling)) for point in self.points
+            replace(point, dynamics=point.dynamics.filled_from(self.dynamics).limited_to(speed))
+            for point in self.points
         )
-        return replace(self, points=points, joints=self.joints.under(ceiling))
+        return replace(self, points=points, dynamics=self.dynamics.limited_to(speed))
 
 
-def _filled(own: JointDynamics, whole: JointDynamics) -> JointDynamics:
-    """What a point says, and where it says nothing what the spline says."""
-    names = ("velocity", "acceleration", "jerk")
-    values = ((getattr(own, name), getattr(whole, name)) for name in names)
-    return JointDynamics(*(np.where(np.isnan(mine), other, mine) for mine, other in values))
-
-
-def spl(
-    pose: Pose,
-    *,
-    orientation: str = "variable",
-    speed_mps: float | None = None,
-    acceleration_mps2: float | None = None,
-    jerk_mps3: float | None = None,
-    speed_radps: float | None = None,
-    acceleration_radps2: float | None = None,
-    jerk_radps3: float | None = None,
-) -> Spl:
+@keywords(SegmentSettings)
+def spl(pose: Pose, *, orientation: str = "variable", **limits: Unpack[SegmentSettings]) -> Spl:
     """Curved segment of a spline.
 
     Args:
-        pose: where it ends, in the base frame; the curve passes through it.
-        orientation: "variable": it has the pose's orientation there; "constant": it keeps the one before;
-            "ignore": the orientations before and after decide.
-        speed_mps: on this segment, see `lin`; the other limits as well.
-        acceleration_mps2: see `lin`.
-        jerk_mps3: see `lin`.
-        speed_radps: see `lin`.
-        acceleration_radps2: see `lin`.
-        jerk_radps3: see `lin`.
+        pose: its end in the base frame; the curve passes through it.
+        orientation: "variable": it has the pose's orientation there; "constant": it keeps the one before; "ignore": the
+            orientations before and after decide.
+        **limits: dynamics and speeds along and of the rotation on this segment, see `lin`.
 
     Raises:
         ShapeError: no pose.
         LimitError: a value outside its range.
-        CommandRejected: another word.
+        CommandRejected: an unknown word, or dynamics with limits of the joints.
     """
     return Spl(
         pose,
-        path_of(speed_mps, acceleration_mps2, jerk_mps3, speed_radps, acceleration_radps2, jerk_radps3),
-        orientation_of(orientation, "base", alone=False),
+        orientation_of(orientation, "base", segment=True),
+        **settings("spl", SegmentSettings, limits),
     )
 
 
+@keywords(SplineSettings)
 def spline(
-    segments: Sequence[Segment | Pose],
-    *,
-    moving: str = TOOL,
-    speed_mps: float | None = None,
-    acceleration_mps2: float | None = None,
-    jerk_mps3: float | None = None,
-    speed_radps: float | None = None,
-    acceleration_radps2: float | None = None,
-    jerk_radps3: float | None = None,
-    joint_speed: npt.ArrayLike | None = None,
-    joint_acceleration: npt.ArrayLike | None = None,
-    joint_jerk: npt.ArrayLike | None = None,
+    segments: Sequence[Segment | Pose], *, moving: str = TOOL, **limits: Unpack[SplineSettings]
 ) -> Spline:
-    """Smooth curve of the moved frame through poses, with straight and round segments where they are wanted.
+    """Smooth curve of the motion frame through poses, with lines and arcs where you give them.
 
-    The arm does not stop at the poses, unless two straight or round segments meet in a corner.
+    The arm does not stop at the poses, unless two lines or arcs meet in a corner.
 
     Args:
-        segments: poses, or spl(...), lin(...) and circ(...) for segments with limits of their own; the spline
-            begins where the arm is.
-        moving: the moved frame, see `lin`.
-        speed_mps: see `lin`; for segments that say nothing, as all other limits.
-        acceleration_mps2: see `lin`.
-        jerk_mps3: see `lin`.
-        speed_radps: see `lin`.
-        acceleration_radps2: see `lin`.
-        jerk_radps3: see `lin`.
-        joint_speed: see `lin`.
-        joint_acceleration: see `lin`.
-        joint_jerk: see `lin`.
+        segments: poses, or spl(...), lin(...) and circ(...) for segments with limits of their own; the spline starts
+            where the arm is.
+        moving: the motion frame, see `lin`.
+        **limits: dynamics and speeds, see `lin`; for segments without limits of their own.
 
     Raises:
         ShapeError: something that is no segment, none, or more than 1000.
         LimitError: a value outside its range.
-        CommandRejected: a segment has what a segment cannot have, as blending or joint limits of its own.
+        CommandRejected: a segment has something that a segment cannot have, such as blending or joint limits.
     """
     return Spline(
         tuple(_segment(one, index) for index, one in enumerate(_listed(segments, "segments"))),
         moving,
-        path_of(speed_mps, acceleration_mps2, jerk_mps3, speed_radps, acceleration_radps2, jerk_radps3),
-        joints_of(joint_speed, joint_acceleration, joint_jerk),
+        **settings("spline", SplineSettings, limits),
     )
 
 
 def _listed(values: Sequence[object], name: str) -> Sequence[object]:
     if isinstance(values, str) or not hasattr(values, "__len__") or not 1 <= len(values) <= _MOST:
+        got = f"{len(values)} entries" if hasattr(values, "__len__") else type(values).__name__
         raise ShapeError(
-            f"{name} is {type(values).__name__}; a list of 1 to {_MOST} is wanted",
+            f"{name} must be a list of 1 to {_MOST} entries, got {got}",
             code=3,
             parameter=name,
             hint="for example [pose1, pose2, circ(via, pose3)]",
@@ -198,8 +163,9 @@ def _segment(one: object, index: int) -> Segment:
         return one
     if not isinstance(one, Lin | Circ):
         raise ShapeError(
-            f"{name} is {one!r}, which is no segment of a spline",
+            f"{name} must be a segment of a spline, got {one!r}",
             parameter=name,
+            value=one,
             hint="give a pose, spl(...), lin(...) or circ(...)",
         )
     for what, given in (
@@ -207,7 +173,7 @@ def _segment(one: object, index: int) -> Segment:
         ("redundancy", one.redundancy is not None),
         ("moving", one.moving != TOOL),
         ("blending", one.blending != EXACT),
-        ("joint limits", one.joints != AXES),
+        ("joint limits", any(limit.startswith("joint_") for limit in one.dynamics.given())),
         ("triggers", bool(one.triggers)),
     ):
         if given:
@@ -219,25 +185,20 @@ def _segment(one: object, index: int) -> Segment:
     return one
 
 
+@keywords(JointSplineSettings)
 def spline_joints(
-    points: Sequence[npt.ArrayLike | Ptp],
-    *,
-    speed: npt.ArrayLike | None = None,
-    acceleration: npt.ArrayLike | None = None,
-    jerk: npt.ArrayLike | None = None,
+    points: Sequence[npt.ArrayLike | Ptp], **limits: Unpack[JointSplineSettings]
 ) -> JointSpline:
     """Smooth curve in joint space through joint positions.
 
     Args:
-        points: joint positions, shape (7,) [rad], or ptp(...) for a point with speeds of its own.
-        speed: fraction of each axis' maximum, (0, 1], one for all or shape (7,).
-        acceleration: likewise.
-        jerk: likewise.
+        points: joint positions, shape (7,) [rad], or ptp(...) for a point with limits of its own.
+        **limits: dynamics, speed, acceleration and jerk, see `ptp`.
 
     Raises:
         ShapeError: a wrong shape, no points, or more than 1000.
         LimitError: a value outside its range.
-        CommandRejected: a point with blending or triggers.
+        CommandRejected: a point with blending or triggers, or dynamics with limits along a path.
     """
     made = []
     for index, one in enumerate(_listed(points, "points")):
@@ -252,12 +213,13 @@ def spline_joints(
             raise CommandRejected(
                 f"points[{index}] has triggers of its own, which a point of a spline cannot have",
                 parameter=f"points[{index}]",
-                hint="give them to the spline; its path counts from its own start",
+                hint="give them to the spline, whose path starts at its first point",
             )
         made.append(point)
-    return JointSpline(tuple(made), joints_of(speed, acceleration, jerk))
+    return JointSpline(tuple(made), **settings("spline_joints", JointSplineSettings, limits))
 
 
+@keywords(SplineSettings)
 def ellipse(
     start: Pose,
     other: float,
@@ -267,30 +229,19 @@ def ellipse(
     angle: float = 2 * pi,
     points: int = 36,
     moving: str = TOOL,
-    speed_mps: float | None = None,
-    acceleration_mps2: float | None = None,
-    jerk_mps3: float | None = None,
-    joint_speed: npt.ArrayLike | None = None,
-    joint_acceleration: npt.ArrayLike | None = None,
-    joint_jerk: npt.ArrayLike | None = None,
+    **limits: Unpack[SplineSettings],
 ) -> Spline:
-    """An ellipse as a spline, the orientation constant.
+    """Ellipse as a spline with constant orientation.
 
     Args:
-        start: where the moved frame will be when it begins; its distance from the axis through the centre is
-            one half axis.
+        start: pose of the motion frame at its start; its distance from the axis through the centre is one half axis.
         other: the other half axis [m].
         centre: in the base frame, shape (3,) [m].
-        plane: "xy", "yz" or "xz" of the base (normals z, x, and y backwards), or a normal, shape (3,).
-        angle: how far to go [rad], positive by the right hand about the plane's normal, up to ten rounds.
-        points: of a full round, 12 to 360; more make it truer.
+        plane: "xy", "yz" or "xz" of the base (normals z, x, and -y), or a normal, shape (3,).
+        angle: how far to turn [rad], positive by the right-hand rule about the plane's normal, up to ten turns.
+        points: per turn, 12 to 360; more make it more accurate.
         moving: see `lin`.
-        speed_mps: see `lin`.
-        acceleration_mps2: see `lin`.
-        jerk_mps3: see `lin`.
-        joint_speed: see `lin`.
-        joint_acceleration: see `lin`.
-        joint_jerk: see `lin`.
+        **limits: dynamics and speeds, see `lin`.
 
     Raises:
         ShapeError: a wrong shape or type.
@@ -298,11 +249,15 @@ def ellipse(
         CommandRejected: no such plane, or the start lies on the axis.
     """
     check_pose(start, "start")
-    other = within(other, "other", _LEAST_RADIUS, 2.0, unit="m")
+    other = within(other, "other", _SMALLEST_RADIUS, 2.0, unit="m")
     angle = within(angle, "angle", -20 * pi, 20 * pi, unit="rad")
     if not isinstance(points, int) or not 12 <= points <= 360:
         raise LimitError(
-            f"points is {points!r}; allowed is 12 to 360", code=2, parameter="points", value=points, allowed="[12, 360]"
+            f"points must be in [12, 360], got {points!r}",
+            code=2,
+            parameter="points",
+            value=points,
+            allowed="[12, 360]",
         )
     middle, axis = array(centre, 3, "centre"), normal_of(plane)
     lever = start.xyz - middle
@@ -310,23 +265,18 @@ def ellipse(
     first = lever - height
     radius = float(np.linalg.norm(first))
     count = round(abs(angle) / (2 * pi) * points)
-    if radius < _LEAST_RADIUS or count < 1:
+    if radius < _SMALLEST_RADIUS or count < 1:
         raise CommandRejected(
-            f"an ellipse with a half axis of {radius:.6g} m, gone round by {angle:.6g} rad, has no length",
-            parameter="centre" if radius < _LEAST_RADIUS else "angle",
-            hint="move the centre away from the start, or give a greater angle",
+            f"an ellipse with a half axis of {radius:.6g} m, over {angle:.6g} rad, has no length",
+            parameter="centre" if radius < _SMALLEST_RADIUS else "angle",
+            hint="move the centre away from the start, or give a larger angle",
         )
     second = np.cross(axis, first) * (other / radius)
     turns = angle * np.arange(1, count + 1) / count
     return spline(
         [Pose(_on(middle + height, first, second, turn), start.quat) for turn in turns.tolist()],
         moving=moving,
-        speed_mps=speed_mps,
-        acceleration_mps2=acceleration_mps2,
-        jerk_mps3=jerk_mps3,
-        joint_speed=joint_speed,
-        joint_acceleration=joint_acceleration,
-        joint_jerk=joint_jerk,
+        **limits,
     )
 
 

@@ -1,4 +1,4 @@
-"""Taught trajectories: joint positions over time, to be thinned, kept in a file and replayed."""
+"""Taught trajectories: joint positions over time, to be simplified, saved and replayed."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.values.arrays import Array, Value, frozen, within
-from heptarm.values.motion import JointSpline, spline_joints
+from heptarm.values.motion.spline import JointSpline, spline_joints
 
-#: What a file says of itself, so that another .npz is not taken for one.
+#: Marks a file as a trajectory, so that another .npz is not mistaken for one.
 FORMAT = "heptarm trajectory 1"
-#: Points that the cabinet takes for one spline.
+#: Most points of a spline that the cabinet accepts.
 MOST_POINTS = 1000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trajectory(Value):
-    """Joint positions over time; between two of them they change evenly.
+    """Joint positions over time, linear between two points.
 
     Attributes:
         times: ascending, the first is 0, shape (n,) [s].
@@ -35,7 +35,7 @@ class Trajectory(Value):
 
     @staticmethod
     def of(times: npt.ArrayLike, q: npt.ArrayLike, *, robot: str = "") -> Trajectory:
-        """A trajectory from times and joint positions; time begins at the first of them.
+        """A trajectory from times and joint positions; its time starts at 0.
 
         Raises:
             ShapeError: fewer than two points, or shapes that do not fit.
@@ -44,17 +44,17 @@ class Trajectory(Value):
         t, points = np.array(times, dtype=np.float64), np.array(q, dtype=np.float64)
         if t.ndim != 1 or len(t) < 2 or points.shape != (len(t), 7):
             raise ShapeError(
-                f"times have shape {t.shape}, q has {points.shape}; (n,) and (n, 7) with n >= 2 are wanted",
+                f"times and q must have shapes (n,) and (n, 7) with n >= 2, got {t.shape} and {points.shape}",
                 parameter="q",
             )
         if not (np.isfinite(t).all() and np.isfinite(points).all()):
-            raise LimitError("a trajectory has finite numbers only", code=1, parameter="q")
+            raise LimitError("times and q must be finite", code=1, parameter="q")
         if not (np.diff(t) > 0).all():
-            raise LimitError("the times of a trajectory have to ascend", code=2, parameter="times")
+            raise LimitError("times must be strictly ascending", code=2, parameter="times")
         return Trajectory(frozen(t - t[0]), frozen(points), robot)
 
     def __len__(self) -> int:
-        """How many points it has."""
+        """Number of points."""
         return len(self.times)
 
     @property
@@ -72,7 +72,7 @@ class Trajectory(Value):
         return slopes
 
     def at(self, t: float) -> tuple[Array, Array]:
-        """Positions [rad] and velocities [rad/s] at a time [s], shape (7,) each; before and behind it, it rests."""
+        """Positions [rad] and velocities [rad/s] at a time [s], shape (7,) each; before and after, it is at rest."""
         piece = int(np.searchsorted(self.times, t, side="right")) - 1
         if piece < 0 or t >= self.duration:
             return self.q[0 if piece < 0 else -1], np.zeros(7)
@@ -84,10 +84,10 @@ class Trajectory(Value):
         return np.stack([np.interp(times, self.times, column) for column in self.q.T], axis=1)
 
     def trimmed(self, *, still: float = 1e-3) -> Trajectory:
-        """Without the rests at its ends.
+        """The trajectory without the rests at its ends.
 
         Args:
-            still: an axis that has not left its first (last) position by more than this has not moved [rad].
+            still: a joint closer than this to its first (last) position counts as at rest [rad].
 
         Raises:
             CommandRejected: nothing moves at all.
@@ -98,19 +98,19 @@ class Trajectory(Value):
             raise CommandRejected(
                 f"nothing moves by more than {still:g} rad",
                 parameter="still",
-                hint="teach again, or give a smaller one",
+                hint="teach again, or give a smaller value of still",
             )
         begin, end = max(int(away[0]) - 1, 0), min(int(before[-1]) + 1, len(self) - 1)
         return Trajectory.of(self.times[begin : end + 1], self.q[begin : end + 1], robot=self.robot)
 
     def thinned(self, *, tolerance: float = 2e-3) -> Trajectory:
-        """With as few of its points as needed.
+        """The trajectory with as few of its points as needed.
 
         The points are chosen as Douglas and Peucker do ("Algorithms for the reduction of the number of points required
         to represent a digitized line", 1973), with the distance at equal times.
 
         Args:
-            tolerance: no axis is farther off at any recorded time [rad].
+            tolerance: largest deviation of a joint at any recorded time [rad].
         """
         within(tolerance, "tolerance", 0.0, 1.0, above=True, unit="rad")
         return self._chosen(_needed(self.times, self.q, tolerance))
@@ -119,25 +119,25 @@ class Trajectory(Value):
         return Trajectory.of(self.times[indices], self.q[indices], robot=self.robot)
 
     def spline(self, *, tolerance: float = 5e-3, speed: float | None = None) -> JointSpline:
-        """A joint spline through its points, at the cabinet's own pace.
+        """A joint spline through its points, timed by the cabinet.
 
         Args:
-            tolerance: the points are chosen so that the straight way between them leaves no axis farther off [rad].
-            speed: fraction of each axis' maximum, (0, 1]; None: the cabinet's default.
+            tolerance: largest deviation of a joint from straight lines between the chosen points [rad].
+            speed: fraction of each joint's maximum, (0, 1]; None: the cabinet's default.
 
         Raises:
-            CommandRejected: nothing moves, or it takes more points than a spline may have.
+            CommandRejected: nothing moves, or the spline needs too many points.
         """
         within(tolerance, "tolerance", 0.0, 1.0, above=True, unit="rad")
         moved = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(self.q, axis=0)).max(axis=1))])
-        keep = np.concatenate([[True], np.diff(moved) > 1e-9])  # a rest is one place on the way
-        way, points = moved[keep], self.q[keep]
-        if len(way) < 2:
+        keep = np.concatenate([[True], np.diff(moved) > 1e-9])  # a rest is a single point of the path
+        path, points = moved[keep], self.q[keep]
+        if len(path) < 2:
             raise CommandRejected("nothing moves", parameter="trajectory", hint="teach again")
-        chosen = points[_needed(way, points, tolerance)]
+        chosen = points[_needed(path, points, tolerance)]
         if len(chosen) > MOST_POINTS + 1:
             raise CommandRejected(
-                f"a spline through it takes {len(chosen)} points; allowed are {MOST_POINTS}",
+                f"a spline must have at most {MOST_POINTS} points, this one needs {len(chosen)}",
                 parameter="tolerance",
                 value=tolerance,
                 hint="give a larger tolerance, or replay it by servo",
@@ -145,10 +145,10 @@ class Trajectory(Value):
         return spline_joints([*chosen[1:]], speed=speed)
 
     def save(self, path: str | Path) -> Path:
-        """Write it into a file, .npz; returns its path.
+        """Write a file, .npz; returns its path.
 
         Raises:
-            OSError: it cannot be written.
+            OSError: the file cannot be written.
         """
         file = Path(path).with_suffix(".npz")
         np.savez_compressed(file, format=FORMAT, times=self.times, q=self.q, robot=self.robot)
@@ -156,36 +156,37 @@ class Trajectory(Value):
 
     @staticmethod
     def load(path: str | Path) -> Trajectory:
-        """Read it from a file.
+        """Read a file that `save` has written.
 
         Raises:
-            OSError: there is none, or it cannot be read.
-            CommandRejected: it is no trajectory of heptarm.
+            OSError: the file does not exist or cannot be read.
+            CommandRejected: the file is no trajectory of heptarm.
         """
         try:
-            with np.load(Path(path), allow_pickle=False) as file:
+            # numpy leaves a broken archive open that it has opened itself
+            with Path(path).open("rb") as raw, np.load(raw, allow_pickle=False) as file:
                 if str(file["format"]) != FORMAT:
                     raise ValueError(f"its format is {file['format']}")
                 return Trajectory.of(file["times"], file["q"], robot=str(file["robot"]))
         except (KeyError, ValueError, zipfile.BadZipFile, EOFError) as error:
             raise CommandRejected(
-                f"{path} holds no trajectory: {error}",
+                f"{path} is no trajectory: {error}",
                 parameter="path",
                 value=str(path),
-                hint="heptarm teach writes one",
+                hint="`heptarm teach` writes one",
             ) from None
 
 
 def _needed(along: Array, points: Array, tolerance: float) -> list[int]:
-    """Indices of the points that are needed: between them straight lines are near enough, at equal places along."""
+    """Indices of the points to keep, by Douglas and Peucker: lines between them are within the tolerance."""
     kept = {0, len(along) - 1}
     stack = [(0, len(along) - 1)]
     while stack:
         first, last = stack.pop()
         if last - first < 2:
             continue
-        share = (along[first + 1 : last] - along[first]) / (along[last] - along[first])
-        straight = points[first] + share[:, None] * (points[last] - points[first])
+        fraction = (along[first + 1 : last] - along[first]) / (along[last] - along[first])
+        straight = points[first] + fraction[:, None] * (points[last] - points[first])
         off = np.abs(points[first + 1 : last] - straight).max(axis=1)
         worst = int(off.argmax())
         if off[worst] > tolerance:

@@ -1,0 +1,127 @@
+"""Point-to-point motions, in joint space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected
+from heptarm.values.arrays import Array, array
+from heptarm.values.frames import TOOL, check_name
+from heptarm.values.motion.dynamics import Blended, JointSettings, keywords, settings
+from heptarm.values.pose import Pose, Redundancy, check_pose, near_of
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ptp(Blended):
+    """Point-to-point motion to joint positions; all joints start and end together.
+
+    Attributes:
+        q: target, shape (7,) [rad].
+    """
+
+    q: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "q", array(self.q, 7, "q"))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PtpHome(Blended):
+    """Point-to-point motion to the home position of the cabinet's project."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PtpPose(Blended):
+    """Point-to-point motion to a pose of the motion frame.
+
+    Attributes:
+        target: pose in the base frame.
+        near: joint positions whose arm angle and Status the target keeps, shape (7,) [rad]; None: the current ones.
+        redundancy: arm angle, Status and Turn of the target; given instead of `near`.
+        moving: the motion frame.
+    """
+
+    target: Pose
+    near: Array | None = None
+    redundancy: Redundancy | None = None
+    moving: str = TOOL
+
+    def __post_init__(self) -> None:
+        check_pose(self.target)
+        object.__setattr__(self, "near", near_of(self.near, self.redundancy))
+        check_name(self.moving, "moving")
+
+
+@keywords(JointSettings)
+def ptp(
+    target: npt.ArrayLike | Pose,
+    *,
+    near: npt.ArrayLike | None = None,
+    redundancy: Redundancy | None = None,
+    moving: str = TOOL,
+    **limits: Unpack[JointSettings],
+) -> Ptp | PtpPose:
+    """Point-to-point motion in joint space.
+
+    Args:
+        target: joint positions, shape (7,) [rad], or a pose of the motion frame in the base frame.
+        near: for a pose: joint positions whose arm angle and Status it keeps, shape (7,) [rad].
+        redundancy: for a pose: arm angle E1, Status and Turn, instead of `near`.
+        moving: for a pose: the motion frame: "tool", "flange" or the name of a frame.
+        **limits: as follows.
+        dynamics: a `Dynamics` with joint limits, to share between motions; the keywords below replace its values.
+        speed: fraction of each joint's maximum, (0, 1], one number for all joints or shape (7,).
+        acceleration: likewise.
+        jerk: likewise.
+        blend_rel: fraction of the path at its end that may be blended into the next motion, [0, 1].
+        blend_m: the same as a distance of the motion frame [m], up to 2.
+        blend_rad: the same as a rotation of the motion frame [rad], up to 6.3.
+
+    Raises:
+        ShapeError: a wrong shape.
+        LimitError: a value outside its range.
+        CommandRejected: an argument that belongs to a pose is given with joint positions, both `near` and
+            `redundancy`, or dynamics with limits along a path.
+    """
+    chosen = settings("ptp", JointSettings, limits)
+    if isinstance(target, Pose):
+        return PtpPose(target, near_of(near, redundancy), redundancy, moving, **chosen)
+    given = {"near": near is not None, "redundancy": redundancy is not None, "moving": moving != TOOL}
+    if any(given.values()):
+        names = ", ".join(name for name, is_given in given.items() if is_given)
+        raise CommandRejected(
+            f"{names} given with joint positions, which leave no choice",
+            parameter=names.partition(",")[0],
+            hint="leave it out, or give a pose as the target",
+        )
+    return Ptp(array(target, 7, "q"), **chosen)
+
+
+@keywords(JointSettings)
+def ptp_home(**limits: Unpack[JointSettings]) -> PtpHome:
+    """Point-to-point motion to the home position of the cabinet's project.
+
+    Unless an application of the cabinet has set another one, that is the stretched arm: all joints at 0.
+
+    Args:
+        **limits: as follows.
+        dynamics: see `ptp`.
+        speed: fraction of each joint's maximum, (0, 1], one number for all joints or shape (7,).
+        acceleration: likewise.
+        jerk: likewise.
+        blend_rel: see `ptp`.
+        blend_m: see `ptp`.
+        blend_rad: see `ptp`.
+
+    Raises:
+        ShapeError: a wrong shape.
+        LimitError: a value outside its range.
+        CommandRejected: dynamics with limits along a path.
+    """
+    return PtpHome(**settings("ptp_home", JointSettings, limits))

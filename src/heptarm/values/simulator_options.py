@@ -1,0 +1,135 @@
+"""Options of the simulator, shared by `heptarm sim`, "sim://MODEL?OPTION=VALUE" and the cabinet's process."""
+
+from __future__ import annotations
+
+from dataclasses import Field, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+
+def _about(
+    text: str, *, metavar: str = "", in_target: bool = False, allowed: tuple[float, float] | None = None
+) -> dict[str, Any]:
+    """What an option has beside its default; an empty tuple as default: it may be given several times.
+
+    Args:
+        text: help.
+        metavar: form of the value.
+        in_target: also legal in a target "sim://MODEL?OPTION=VALUE".
+        allowed: range of the value in a target.
+    """
+    return {"help": text, "metavar": metavar, "in_target": in_target, "allowed": allowed}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatorOptions:
+    """Options of a virtual cabinet; a new one is declared here and used in `heptarm.sim.runtime.cabinet`."""
+
+    model: str = field(default="iiwa14", metadata=_about("iiwa7 or iiwa14"))
+    host: str = field(default="127.0.0.1", metadata=_about("address to listen on"))
+    port: int = field(default=30001, metadata=_about("TCP port; 0: any free port"))
+    speed: float = field(
+        default=1.0,
+        metadata=_about(
+            "simulated seconds per second; 0: as fast as possible", in_target=True, allowed=(0.01, 100.0)
+        ),
+    )
+    key: str = field(default="", metadata=_about("pre-shared key that clients must know"))
+    application: str = field(
+        default="", metadata=_about("class of another application; the process ends with it")
+    )
+    background: tuple[str, ...] = field(
+        default=(), metadata=_about("class of a background task of that application; may be repeated")
+    )
+    classpath: tuple[str, ...] = field(
+        default=(), metadata=_about("folder or jar with its classes; may be repeated")
+    )
+    answer: tuple[int, ...] = field(
+        default=(),
+        metadata=_about(
+            "button of the next dialog of the application, from 0; may be repeated", metavar="BUTTON"
+        ),
+    )
+    fri_version: str = field(
+        default="1.15", metadata=_about("version of the cabinet's FRI, such as 1.11 or 2.5")
+    )
+    project: Path | None = field(
+        default=None,
+        metadata=_about("RoboticsAPI.data.xml with process data, tool templates and frames", in_target=True),
+    )
+    box: tuple[str, ...] = field(
+        default=(),
+        metadata=_about(
+            "fixed box in the world [m]; may be repeated", metavar="X,Y,Z,LENGTH,WIDTH,HEIGHT", in_target=True
+        ),
+    )
+    payload: str = field(
+        default="",
+        metadata=_about(
+            "true payload on the flange, whatever load data the controller has [kg, m]",
+            metavar="MASS[,X,Y,Z]",
+            in_target=True,
+        ),
+    )
+    data: tuple[str, ...] = field(
+        default=(), metadata=_about("process data; may be repeated", metavar="NAME=VALUE")
+    )
+    fault: tuple[str, ...] = field(
+        default=(),
+        metadata=_about(
+            "fault at a simulated time, such as emergency_stop@5; may be repeated",
+            metavar="NAME@SECONDS",
+            in_target=True,
+        ),
+    )
+    stats: Path | None = field(
+        default=None,
+        metadata=_about("file for the statistics of the realtime loop, at the end and on SIGUSR1"),
+    )
+    parent_pipe: bool = field(
+        default=False,
+        metadata=_about("end when standard input is closed; its lines are actions of the simulated operator"),
+    )
+    verbose: bool = field(default=False, metadata=_about("log to standard error"))
+
+    def arguments(self) -> list[str]:
+        """Command line of the cabinet's process for all values that differ from their default."""
+        result: list[str] = []
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if value == one.default:
+                continue
+            if isinstance(value, bool):
+                result.append(flag(one.name))
+                continue
+            for part in value if isinstance(value, tuple) else (value,):
+                result += [flag(one.name), str(part)]
+        return result
+
+
+def flag(name: str) -> str:
+    """Command line flag of an option."""
+    return "--" + name.replace("_", "-")
+
+
+def check_target_option(name: str, value: str) -> None:
+    """Check an option of a target "sim://MODEL?OPTION=VALUE"; the cabinet's process checks the text of the others.
+
+    Raises:
+        ValueError: there is no such option, or its value is out of range.
+    """
+    known: dict[str, Field[Any]] = {
+        one.name: one for one in fields(SimulatorOptions) if one.metadata["in_target"]
+    }
+    if name not in known:
+        raise ValueError(f"option must be one of {', '.join(known)}; got {name!r}")
+    allowed = known[name].metadata["allowed"]
+    if allowed is None:
+        return
+    low, high = allowed
+    try:
+        good = low <= float(value) <= high
+    except ValueError:
+        good = False
+    if not good:
+        raise ValueError(f"{name} must be in [{low:g}, {high:g}], got {value}")
