@@ -1,1 +1,0 @@
-"""The virtual cabinet: a simulated robot under the real cabinet application."""
