@@ -1,11 +1,11 @@
-"""Estimate of the cabinet's clock from pings: sans IO, fed with triples of time stamps.
+"""Estimate of the cabinet's clock from pings, fed with triples of time stamps.
 
-A ping sent at `a` (our clock), seen by the cabinet at `m` (its clock) and answered at `b` (our clock) says that
-the cabinet's clock showed `m` at some moment of [a, b]: at the middle, give or take half the round trip. As time
-passes a sample says less, because clocks drift; so the sample with the smallest half round trip plus drift counts
-(the filter of NTP, RFC 5905, in its simplest form). A virtual cabinet's clock may run faster than ours: its rate
-is the one that the best old and the best new sample give, unless 1 explains them. It may also stall (a busy
-machine): a sample that no drift explains starts the estimate anew.
+A ping is sent at `a` (our clock), received by the cabinet at `m` (its clock) and answered at `b` (our clock): so the
+cabinet's clock read `m` at some time in [a, b], estimated as the middle with half the round trip as uncertainty.
+Because clocks drift, the uncertainty of a sample grows with its age; the sample with the smallest sum of both counts
+(the clock filter of NTP, RFC 5905, in its simplest form). The clock of a virtual cabinet may run faster than ours: its
+rate follows from the best older and the best newer sample, unless rate 1 explains both. It may also stall on a busy
+machine: a sample that no drift explains resets the estimate.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from __future__ import annotations
 from collections import deque
 from typing import NamedTuple
 
-#: How far two clocks of nominally equal rate may drift apart: 100 ppm, twice a poor quartz.
+#: Largest drift between two clocks of nominally equal rate: 100 ppm, twice that of a poor quartz.
 DRIFT = 1e-4
-#: Deviation from the estimate that is still no step [ns].
+#: Largest deviation from the estimate that does not count as a step [ns].
 TOLERANCE = 300_000
 
 
@@ -26,11 +26,11 @@ class _Sample(NamedTuple):
 
 
 class ClockOffset:
-    """The cabinet's clock as a function of ours.
+    """Cabinet's clock as a function of ours.
 
     Args:
-        window: number of samples that count.
-        span: samples older than this many seconds of our clock are forgotten.
+        window: number of samples kept.
+        span: largest age of a sample, our clock [s].
     """
 
     def __init__(self, *, window: int = 64, span: float = 30.0) -> None:
@@ -42,12 +42,12 @@ class ClockOffset:
         self._count = 0
 
     def feed(self, sent: int, received: int, returned: int) -> None:
-        """Take one ping.
+        """Add the time stamps of one ping.
 
         Args:
-            sent: our clock when the ping left [ns].
-            received: the cabinet's clock when it came [ns].
-            returned: our clock when the answer came [ns].
+            sent: our clock when the ping was sent [ns].
+            received: the cabinet's clock when it arrived [ns].
+            returned: our clock when the answer arrived [ns].
         """
         self._count += 1
         if returned < sent:
@@ -71,7 +71,7 @@ class ClockOffset:
         return abs(off) > round_trips + drift * since + TOLERANCE
 
     def _fit(self) -> float:
-        """The rate nearest to 1 that the best sample of the older and of the newer half allow."""
+        """Fit the rate nearest to 1 that the best samples of the older and the newer half allow."""
         samples = list(self._samples)
         if len(samples) < 2:
             return self._rate
@@ -84,7 +84,7 @@ class ClockOffset:
         rate, slack = (new.theirs - old.theirs) / base, (old.slack * max(self._rate, 1.0) + new.slack) / base
         if abs(rate - 1.0) <= slack + DRIFT:
             return 1.0
-        # outside what drift and round trips explain: the clock really runs at another rate
+        # drift and round trips do not explain it: the clock runs at another rate
         return max(rate, 0.0)
 
     @property
@@ -94,30 +94,30 @@ class ClockOffset:
 
     @property
     def rate(self) -> float:
-        """Cabinet seconds per second of ours."""
+        """Rate of the cabinet's clock relative to ours."""
         return self._rate
 
     @property
     def uncertainty(self) -> float:
-        """Half the round trip of the sample that counts [s]; infinite before the first."""
+        """Half the round trip of the best sample [s]; infinite before the first."""
         return self._anchor.slack * 1e-9
 
     def to_cabinet(self, ours: int) -> int:
-        """The cabinet's clock [ns] when ours shows `ours` [ns]."""
+        """Convert a time of our clock [ns] to the cabinet's [ns]."""
         if self._rate == 1.0:
             return ours + self._shift
         anchor = self._anchor
         return round(anchor.theirs + (ours - anchor.ours) * self._rate)
 
     def to_ours(self, theirs: int) -> int:
-        """Our clock [ns] when the cabinet's shows `theirs` [ns]; 0 before the first ping."""
+        """Convert a time of the cabinet's clock [ns] to ours [ns]; 0 before the first ping."""
         anchor = self._anchor
         if not self._samples:
             return 0
         return round(anchor.ours + (theirs - anchor.theirs) / (self._rate or 1.0))
 
     def age(self, stamp: int, ours: int) -> float:
-        """Seconds of cabinet time from `stamp` (cabinet clock, ns) to `ours` (our clock, ns); NaN: unknown."""
+        """Cabinet time from `stamp` (cabinet clock, ns) to `ours` (our clock, ns) [s]; NaN before the first ping."""
         if not self._samples:
             return float("nan")
         return (self.to_cabinet(ours) - stamp) * 1e-9

@@ -1,4 +1,4 @@
-"""What the generated codec stands on: decoding errors, violations, and the checks of ranges."""
+"""Functions and errors that the generated codec uses to read, write and check values."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ NOT_FINITE, OUT_OF_RANGE, BAD_LENGTH, NOT_NORMALISED = 1, 2, 3, 4
 
 
 class DecodeError(ValueError):
-    """Octets that are not a body of the message that they claim to be."""
+    """The bytes are not a legal body of their message."""
 
 
 class Violation(ValueError):
-    """A field outside what the schema allows.
+    """A field is outside the range of the schema.
 
     Attributes:
-        code: number in the table of codes.
+        code: error code.
         parameter: path of the field, such as items[2].motion.q[3].
-        value: as text.
-        allowed: as text.
+        value: the value, as text.
+        allowed: the range, as text.
     """
 
     def __init__(self, code: int, parameter: str, value: str, allowed: str) -> None:
@@ -38,95 +38,95 @@ class Violation(ValueError):
 
 
 def unpack(layout: Struct, data: bytes, pos: int) -> tuple[Any, ...]:
-    """Unpack, or say that the body is cut."""
+    """Unpack a layout at a position; refuse a body that is too short."""
     if pos + layout.size > len(data):
-        raise DecodeError(f"body is cut: {layout.size} octets wanted at {pos}, {len(data) - pos} left")
+        raise DecodeError(f"body is too short: {layout.size} bytes expected at {pos}, {len(data) - pos} left")
     return layout.unpack_from(data, pos)
 
 
 def read_bool(value: int) -> bool:
-    """A strict boolean."""
+    """Read a boolean: 0 or 1."""
     if value > 1:
-        raise DecodeError(f"a boolean is {value}; 0 and 1 are legal")
+        raise DecodeError(f"a boolean must be 0 or 1, got {value}")
     return value == 1
 
 
 def read_enum(kind: type[E], value: int) -> E:
-    """A known member of an enumeration."""
+    """Read a member of an enumeration."""
     try:
         return kind(value)
     except ValueError:
-        raise DecodeError(f"{kind.__name__} is {value}; legal are {[int(v) for v in kind]}") from None
+        raise DecodeError(f"{kind.__name__} must be one of {[int(v) for v in kind]}, got {value}") from None
 
 
 def read_flag(data: bytes, pos: int) -> tuple[bool, int]:
-    """A strict presence octet."""
+    """Read the byte that marks an optional value as present: 0 or 1."""
     if pos >= len(data):
-        raise DecodeError(f"body is cut at {pos}")
+        raise DecodeError(f"body is too short: 1 byte expected at {pos}, 0 left")
     return read_bool(data[pos]), pos + 1
 
 
 def read_count(data: bytes, pos: int) -> tuple[int, int]:
-    """Number of entries of a list."""
+    """Read the number of entries of a list."""
     return unpack(_U16, data, pos)[0], pos + 2
 
 
 def read_tag(data: bytes, pos: int) -> tuple[int, int]:
-    """Tag of a union."""
+    """Read the tag of a union."""
     if pos >= len(data):
-        raise DecodeError(f"body is cut at {pos}")
+        raise DecodeError(f"body is too short: 1 byte expected at {pos}, 0 left")
     return data[pos], pos + 1
 
 
 def read_bytes(data: bytes, pos: int) -> tuple[bytes, int]:
-    """Octets with their length before them."""
+    """Read bytes that follow their length."""
     size = unpack(_U32, data, pos)[0]
     pos += 4
     if pos + size > len(data):
-        raise DecodeError(f"body is cut: {size} octets wanted at {pos}, {len(data) - pos} left")
+        raise DecodeError(f"body is too short: {size} bytes expected at {pos}, {len(data) - pos} left")
     return bytes(data[pos : pos + size]), pos + size
 
 
 def read_str(data: bytes, pos: int) -> tuple[str, int]:
-    """UTF-8 text with its length before it."""
+    """Read UTF-8 text that follows its length."""
     size = unpack(_U16, data, pos)[0]
     pos += 2
     if pos + size > len(data):
-        raise DecodeError(f"body is cut: {size} octets wanted at {pos}, {len(data) - pos} left")
+        raise DecodeError(f"body is too short: {size} bytes expected at {pos}, {len(data) - pos} left")
     try:
         return bytes(data[pos : pos + size]).decode(), pos + size
     except UnicodeDecodeError:
-        raise DecodeError(f"a text at {pos} is not UTF-8") from None
+        raise DecodeError(f"the text at {pos} is not UTF-8") from None
 
 
 def put_str(value: str) -> bytes:
-    """UTF-8 text with its length before it; longer ones than a u16 can count are cut at a character."""
-    octets = value.encode()
-    if len(octets) > 65535:
-        octets = octets[:65535].decode(errors="ignore").encode()
-    return _U16.pack(len(octets)) + octets
+    """Write UTF-8 text after its length; cut it at a character if it exceeds 65535 bytes."""
+    encoded = value.encode()
+    if len(encoded) > 65535:
+        encoded = encoded[:65535].decode(errors="ignore").encode()
+    return _U16.pack(len(encoded)) + encoded
 
 
 def put_bytes(value: bytes) -> bytes:
-    """Octets with their length before them."""
+    """Write bytes after their length."""
     return _U32.pack(len(value)) + value
 
 
 def put_count(size: int) -> bytes:
-    """Number of entries of a list."""
+    """Write the number of entries of a list."""
     if size > 65535:
-        raise ValueError(f"a list has {size} entries; the protocol carries 65535")
+        raise ValueError(f"a list must have at most 65535 entries, got {size}")
     return _U16.pack(size)
 
 
 def end(data: bytes, pos: int, name: str) -> None:
-    """The body must end here."""
+    """Check that the body ends here."""
     if pos != len(data):
-        raise DecodeError(f"{name}: {len(data) - pos} octets behind its end")
+        raise DecodeError(f"{name}: {len(data) - pos} bytes behind its end")
 
 
 def check(value: float, path: str, low: float, high: float, low_open: bool, nan: bool) -> None:
-    """A number is finite and within its range.
+    """Check that a number is finite and within its range.
 
     Raises:
         Violation: it is not.
@@ -144,19 +144,19 @@ def check(value: float, path: str, low: float, high: float, low_open: bool, nan:
 def check_array(
     values: tuple[float, ...], path: str, low: float, high: float, low_open: bool, nan: bool
 ) -> None:
-    """Every number of an array is finite and within its range."""
+    """Check that every number of an array is finite and within its range."""
     for index, value in enumerate(values):
         check(value, f"{path}[{index}]", low, high, low_open, nan)
 
 
 def check_norm(values: tuple[float, ...], path: str) -> None:
-    """A quaternion has unit norm within 1e-6."""
+    """Check that a quaternion has unit norm within 1e-6."""
     norm = sum(value * value for value in values) ** 0.5
     if abs(norm - 1.0) > 1e-6:
         raise Violation(NOT_NORMALISED, path, f"of norm {norm:g}", "norm 1")
 
 
 def check_length(size: int, path: str, low: int, high: int) -> None:
-    """A text or a list has a legal length."""
+    """Check the length of a text or a list."""
     if not low <= size <= high:
         raise Violation(BAD_LENGTH, path, f"{size} long", f"{low} to {high} long")

@@ -1,4 +1,4 @@
-"""Frames: a header of fixed layout, then a body. Any split or merge of the octets is legal."""
+"""Frames: a header of fixed layout, then a body. The stream of bytes may be split or merged anywhere."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from heptarm.errors import LocalProtocolError, RemoteProtocolError
 from heptarm.wire.codes import Code
 from heptarm.wire.messages import HEADER, MAGIC, MAJOR, MAX_BODY, OneWay
 
-#: Octets that may wait unread before feeding more counts as a bug of the caller.
-MAX_WAITING = 2 * MAX_BODY
-#: Consumed octets are dropped from the front once there are this many.
+#: Largest number of unread bytes; feeding more is a bug of the caller.
+MAX_UNREAD = 2 * MAX_BODY
+#: Consumed bytes are deleted from the front once there are this many.
 _COMPACT_AT = 65536
 
 
 class Frame(NamedTuple):
-    """One frame.
+    """Header and body of one frame.
 
     Attributes:
         version: major version of its sender.
         type: message id.
-        seq: its number in its direction.
+        seq: counter of the frames in its direction.
         request: id of the request that it is or answers; 0 elsewhere.
         time: sender's clock [ns].
-        body: octets of the message.
+        body: bytes of the message.
     """
 
     version: int
@@ -38,25 +38,25 @@ class Frame(NamedTuple):
 
 
 def pack(type: int, body: bytes, *, seq: int, request: int = 0, time: int = 0) -> bytes:
-    """One frame as octets.
+    """Pack one frame.
 
     Raises:
-        LocalProtocolError: the body is longer than the protocol carries.
+        LocalProtocolError: the body is longer than the protocol allows.
     """
     if len(body) > MAX_BODY:
-        raise LocalProtocolError(f"a body of {len(body)} octets; the protocol carries {MAX_BODY}")
+        raise LocalProtocolError(f"a body must have at most {MAX_BODY} bytes, got {len(body)}")
     return HEADER.pack(MAGIC, MAJOR, 0, type, len(body), seq, request, time) + body
 
 
 def packer(kind: type[OneWay]) -> Callable[..., bytes]:
-    """Packs whole frames of a one-way message at once: called with seq, 0, time [ns] and the numbers of its body."""
+    """Make a function that packs frames of a oneway message from seq, 0, time [ns] and the numbers of its body."""
     body = kind.LAYOUT
     frame = Struct(HEADER.format + body.format.removeprefix(">"))
     return partial(frame.pack, MAGIC, MAJOR, 0, kind.TYPE, body.size)
 
 
 class FrameReader:
-    """Octets in, frames out. Memory is bounded whatever the other side sends."""
+    """Split a stream of bytes into frames, in bounded memory."""
 
     __slots__ = ("_buffer", "_start")
 
@@ -65,43 +65,43 @@ class FrameReader:
         self._start = 0
 
     def __len__(self) -> int:
-        """Octets that wait."""
+        """Number of unread bytes."""
         return len(self._buffer) - self._start
 
     def feed(self, data: bytes | bytearray | memoryview) -> None:
-        """Append what came from the other side.
+        """Append received bytes.
 
         Raises:
-            LocalProtocolError: the caller feeds without reading.
+            LocalProtocolError: too many bytes are unread.
         """
-        if len(self) + len(data) > MAX_WAITING:
-            raise LocalProtocolError(f"more than {MAX_WAITING} octets wait: read frames between feeds")
+        if len(self) + len(data) > MAX_UNREAD:
+            raise LocalProtocolError(f"more than {MAX_UNREAD} bytes are unread: read frames between feeds")
         self._buffer += data
 
     def read(self) -> Frame | None:
-        """The next whole frame, or None until more octets come.
+        """Read the next complete frame; None until more bytes arrive.
 
         Raises:
-            RemoteProtocolError: the octets are not a frame; the stream cannot be trusted any more.
+            RemoteProtocolError: the bytes are not a frame; the stream cannot be used any more.
         """
         buffer, start = self._buffer, self._start
         body = start + HEADER.size
         if len(buffer) < body:
-            # a wrong magic is refused at once: a peer of another protocol may never send a whole header
+            # refuse a wrong magic at once: a peer of another protocol may never send a complete header
             if len(buffer) >= start + 2 and int.from_bytes(buffer[start : start + 2], "big") != MAGIC:
-                raise _bad(f"a frame begins with {bytes(buffer[start : start + 2]).hex()}")
+                raise _bad(f"a frame must begin with {MAGIC:04x}, got {bytes(buffer[start : start + 2]).hex()}")
             return None
         magic, version, flags, type_, length, seq, request, time = HEADER.unpack_from(buffer, start)
         if magic != MAGIC:
-            raise _bad(f"a frame begins with {magic:#06x}")
+            raise _bad(f"a frame must begin with {MAGIC:04x}, got {magic:04x}")
         if flags != 0:
-            raise _bad(f"the flags of a frame are {flags:#04x}; 0 is legal")
+            raise _bad(f"the flags of a frame must be 0, got {flags:#04x}")
         if length > MAX_BODY:
-            raise _bad(f"a frame announces {length} octets; {MAX_BODY} are legal")
+            raise _bad(f"a frame announces {length} bytes; at most {MAX_BODY} are allowed")
         end = body + length
         if len(buffer) < end:
             return None
-        octets = bytes(buffer[body:end])
+        content = bytes(buffer[body:end])
         if end == len(buffer):
             buffer.clear()
             self._start = 0
@@ -110,7 +110,7 @@ class FrameReader:
             self._start = 0
         else:
             self._start = end
-        return Frame(version, type_, seq, request, time, octets)
+        return Frame(version, type_, seq, request, time, content)
 
 
 def _bad(text: str) -> RemoteProtocolError:

@@ -80,7 +80,7 @@ class OperationMode(enum.IntEnum):
 
 
 class OrientationType(enum.IntEnum):
-    """How the orientation is led along a Cartesian path."""
+    """How the orientation changes along a Cartesian path."""
 
     VARIABLE = 0
     CONSTANT = 1
@@ -89,7 +89,7 @@ class OrientationType(enum.IntEnum):
 
 
 class OrientationReference(enum.IntEnum):
-    """What the orientation is led relative to."""
+    """What the orientation is relative to."""
 
     BASE = 0
     PATH = 1
@@ -378,7 +378,7 @@ _Orientation_0 = Struct(">BB")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Orientation:
-    """How the orientation is led."""
+    """How the orientation changes along the path."""
 
     type: OrientationType = OrientationType.VARIABLE
     reference: OrientationReference = OrientationReference.BASE
@@ -433,7 +433,7 @@ class Ptp:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PtpHome:
-    """Point to point in joint space, to the home position that the cabinet's project has; all zeros unless it says otherwise."""
+    """Point to point in joint space, to the home position that the cabinet's project has; all zeros if it has none."""
 
     dynamics: JointDynamics = JointDynamics()
     blending: Blending = Blending()
@@ -457,7 +457,7 @@ class PtpHome:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PtpPose:
-    """Point to point in joint space, to a pose of the moved frame."""
+    """Point to point in joint space, to a pose of the motion frame."""
 
     target: Pose
     redundancy: Redundancy
@@ -489,7 +489,7 @@ class PtpPose:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lin:
-    """Straight line of the moved frame."""
+    """Straight line of the motion frame."""
 
     target: Pose
     redundancy: Redundancy
@@ -529,7 +529,7 @@ class Lin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinRel:
-    """Straight line relative to where the moved frame is when the motion starts."""
+    """Straight line relative to where the motion frame is when the motion starts."""
 
     offset: Pose
     reference: str = ""
@@ -846,7 +846,7 @@ _HandGuide_0 = Struct(">7d7dddBB")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HandGuide:
-    """Lets a person lead the arm by hand while the enabling switch of the hand guiding device is held; ends when it is let go."""
+    """Hand guiding while the enabling switch of the hand guiding device is held; ends when it is released."""
 
     q_min: tuple[float, ...] = (nan,) * 7
     q_max: tuple[float, ...] = (nan,) * 7
@@ -881,7 +881,7 @@ class HandGuide:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PositionMode:
-    """Stiff position control."""
+    """Position control."""
 
 
     def _write(self, out: list[bytes]) -> None:
@@ -926,7 +926,7 @@ _CartesianImpedance_0 = Struct(">6d6ddd6d6dB6d6d")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CartesianImpedance:
-    """Spring and damper at the moved frame; order x y z, then about x y z."""
+    """Spring and damper at the motion frame; order x y z, then about x y z."""
 
     stiffness: tuple[float, ...]
     damping: tuple[float, ...]
@@ -1911,7 +1911,7 @@ _PoseState_0 = Struct(">q3d4d3d4d")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PoseState:
-    """Pose of the moved frame in the base frame."""
+    """Pose of the motion frame in the base frame."""
 
     stamp: int
     xyz: tuple[float, ...]
@@ -1951,7 +1951,7 @@ _WrenchState_0 = Struct(">q3d3d3d3d")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WrenchState:
-    """External force and torque acting on the robot at the moved frame, in base axes."""
+    """External force and torque acting on the robot at the motion frame, in base axes."""
 
     stamp: int
     force: tuple[float, ...]
@@ -1985,7 +1985,7 @@ _MotionState_0 = Struct(">qIHHddd")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionState:
-    """What runs."""
+    """Running motion."""
 
     stamp: int
     motion: int
@@ -2287,7 +2287,7 @@ _Welcome_2 = Struct(">Hdd")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Welcome:
-    """The session stands. The mac, with a key set, proves the cabinet to the client: over the client's nonce, then the cabinet's."""
+    """The session is open. With a key set, the mac proves the cabinet to the client: over the client's nonce, then the cabinet's."""
 
     TYPE: ClassVar[int] = 4
     KIND: ClassVar[str] = "handshake"
@@ -2712,7 +2712,7 @@ _TakeControl_0 = Struct(">dB")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TakeControl:
-    """Asks to control. A controller that is silent for the watchdog time loses control and the arm stops."""
+    """Requests control. A controller that is silent for the watchdog time loses control and the arm stops."""
 
     TYPE: ClassVar[int] = 32
     KIND: ClassVar[str] = "request"
@@ -2758,7 +2758,7 @@ class TakeControl:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReleaseControl:
-    """Gives control back; what runs is stopped."""
+    """Releases control; running motions are stopped."""
 
     TYPE: ClassVar[int] = 33
     KIND: ClassVar[str] = "request"
@@ -2799,7 +2799,7 @@ _Subscribe_0 = Struct(">Hd")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Subscribe:
-    """Asks for the pushed state; a new one replaces the old; rate 0 ends it."""
+    """Subscribes to the pushed state; a new subscription replaces the old; rate 0 ends it."""
 
     TYPE: ClassVar[int] = 34
     KIND: ClassVar[str] = "request"
@@ -2846,7 +2846,7 @@ _Run_0 = Struct(">B")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """Runs a program: motions as one batch, blended on the cabinet where they say so."""
+    """Runs a program: motions as one batch, blended on the cabinet if they ask for it."""
 
     TYPE: ClassVar[int] = 35
     KIND: ClassVar[str] = "request"
@@ -2948,7 +2948,7 @@ _Stop_0 = Struct(">B")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stop:
-    """Stops whatever runs. Anybody may stop, at any time."""
+    """Stops all motions. Every client may stop, at any time."""
 
     TYPE: ClassVar[int] = 37
     KIND: ClassVar[str] = "request"
@@ -3032,7 +3032,7 @@ class Pause:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Resume:
-    """Goes on after a pause."""
+    """Continues after a pause."""
 
     TYPE: ClassVar[int] = 39
     KIND: ClassVar[str] = "request"
@@ -3106,48 +3106,6 @@ class SetOverride:
         """Read one body, all of it."""
         value, pos = cls._read(data, 0)
         codec.end(data, pos, "SetOverride")
-        return value
-
-    def validate(self) -> None:
-        """Raise Violation for a field outside its range."""
-        self._check("")
-
-
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SetMode:
-    """Control mode of items that bring none."""
-
-    TYPE: ClassVar[int] = 41
-    KIND: ClassVar[str] = "request"
-    SOURCE: ClassVar[str] = "client"
-    ROLE: ClassVar[str] = "controller"
-
-    mode: Mode
-
-    def _write(self, out: list[bytes]) -> None:
-        _write_Mode(self.mode, out)
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[SetMode, int]:
-        mode, pos = _read_Mode(data, pos)
-        return cls(mode=mode), pos
-
-    def _check(self, path: str) -> None:
-        self.mode._check(path + "mode.")
-
-    def encode(self) -> bytes:
-        """The body."""
-        out: list[bytes] = []
-        self._write(out)
-        return b"".join(out)
-
-    @classmethod
-    def decode(cls, data: bytes) -> SetMode:
-        """Read one body, all of it."""
-        value, pos = cls._read(data, 0)
-        codec.end(data, pos, "SetMode")
         return value
 
     def validate(self) -> None:
@@ -3288,7 +3246,7 @@ _AttachLoad_0 = Struct(">B")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttachLoad:
-    """Attaches a workpiece to the frame that the tool moves, or detaches it. Refused while anything runs or waits."""
+    """Attaches a workpiece to the motion frame of the tool, or detaches it. Refused while anything runs or waits."""
 
     TYPE: ClassVar[int] = 50
     KIND: ClassVar[str] = "request"
@@ -3627,7 +3585,7 @@ _ServoOpen_2 = Struct(">dddd")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoOpen:
-    """Starts a servo motion at the present position; Accepted carries its id."""
+    """Starts a servo motion at the current position; Accepted carries its id."""
 
     TYPE: ClassVar[int] = 64
     KIND: ClassVar[str] = "request"
@@ -3719,7 +3677,7 @@ _ServoJoints_0 = Struct(">Id7d")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoJoints:
-    """Newest target wins."""
+    """Joint target; the newest one counts."""
 
     TYPE: ClassVar[int] = 65
     KIND: ClassVar[str] = "oneway"
@@ -3824,7 +3782,7 @@ _ServoPose_0 = Struct(">Id3d4d")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoPose:
-    """Pose target of the moved frame."""
+    """Pose target of the motion frame."""
 
     TYPE: ClassVar[int] = 67
     KIND: ClassVar[str] = "oneway"
@@ -3972,7 +3930,7 @@ _ServoStatus_0 = Struct(">IIIIIddH")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ServoStatus:
-    """What the cabinet saw of the stream, once a second and at the end."""
+    """Statistics of the target stream, once a second and at the end."""
 
     TYPE: ClassVar[int] = 70
     KIND: ClassVar[str] = "event"
@@ -4317,7 +4275,7 @@ _TriggerFired_2 = Struct(">H")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TriggerFired:
-    """A trigger of an item has fired, and its action is done; an output that the cabinet did not write is told of by code and text."""
+    """A trigger of an item has fired, and its action is done; code and text are set if the cabinet did not write an output."""
 
     TYPE: ClassVar[int] = 98
     KIND: ClassVar[str] = "event"
@@ -4458,7 +4416,7 @@ _ControlChanged_0 = Struct(">I")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ControlChanged:
-    """Who controls has changed."""
+    """The controlling client has changed."""
 
     TYPE: ClassVar[int] = 100
     KIND: ClassVar[str] = "event"
@@ -4509,7 +4467,7 @@ _SafetyChanged_0 = Struct(">HB")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SafetyChanged:
-    """Safety or readiness has changed; in words."""
+    """Safety or readiness has changed."""
 
     TYPE: ClassVar[int] = 101
     KIND: ClassVar[str] = "event"
@@ -4606,7 +4564,7 @@ _Notice_0 = Struct(">BH")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Notice:
-    """Something a person should know."""
+    """Message for the user."""
 
     TYPE: ClassVar[int] = 103
     KIND: ClassVar[str] = "event"
@@ -4656,7 +4614,7 @@ _ConditionFired_0 = Struct(">IHH")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConditionFired:
-    """A break condition has fired, and where the robot was when the application heard of it; MotionFinished follows."""
+    """A break condition has fired, with the robot's state when the application received the event; MotionFinished follows."""
 
     TYPE: ClassVar[int] = 104
     KIND: ClassVar[str] = "event"
@@ -4720,7 +4678,7 @@ _SegmentReached_0 = Struct(">IHH")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SegmentReached:
-    """A segment of a spline has begun, as far as the robot tells; the one before it is done."""
+    """A segment of a spline has begun, as the robot reports it; the previous one is done."""
 
     TYPE: ClassVar[int] = 105
     KIND: ClassVar[str] = "event"
@@ -4888,7 +4846,7 @@ class State:
         self._check("")
 
 
-Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Accepted | Rejected | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | SetMode | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
+Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Accepted | Rejected | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
 OneWay: TypeAlias = ServoJoints | ServoJointsVelocity | ServoPose
 
 #: Message classes by id.
@@ -4912,7 +4870,6 @@ MESSAGES: dict[int, type[Message]] = {
     38: Pause,
     39: Resume,
     40: SetOverride,
-    41: SetMode,
     42: Recover,
     48: DefineTool,
     49: AttachTool,

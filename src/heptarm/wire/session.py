@@ -1,10 +1,10 @@
-"""The session machine of the wire protocol, for both sides: octets in, events out, messages to octets.
+"""State machine of a session of the wire protocol, for both sides: bytes in, events out, messages to bytes.
 
-It holds no socket, no clock and no thread::
+It has no socket, clock or thread::
 
     session = Session(Side.CLIENT)
     data = session.send(session.hello(name="me"))
-    session.receive_data(octets)
+    session.receive_data(received)
     for event in session.events():
         ...
 """
@@ -36,27 +36,27 @@ from heptarm.wire.messages import (
     State,
     Welcome,
 )
-from heptarm.wire.transitions import TRANSITIONS, SessionState, symbol
+from heptarm.wire.states import TRANSITIONS, SessionState, symbol
 
 _WRAP = 0xFFFFFFFF
 _SYMBOLS = {kind: symbol(kind) for kind in MESSAGES.values()}
 _PACKERS = {kind: packer(kind) for kind in ONE_WAY}
-#: Messages that a peer of another major version may send, so that both versions can be named.
+#: Messages that are the same in every major version, so that an error can name both versions.
 _FROZEN = (Hello.TYPE, Refusal.TYPE)
 
 
 class Side(enum.Enum):
-    """Which end of the connection this is."""
+    """End of the connection."""
 
     CLIENT = "client"
     CABINET = "cabinet"
 
 
 class Received(NamedTuple):
-    """A message came.
+    """Event: a message was received.
 
     Attributes:
-        message: what it says.
+        message: the message.
         request: id of the request that it is or answers; 0 elsewhere.
         time: sender's clock [ns].
     """
@@ -67,10 +67,10 @@ class Received(NamedTuple):
 
 
 class StateReceived(NamedTuple):
-    """A pushed state came; it is decoded when somebody wants it.
+    """Event: a pushed state was received; `decode` decodes it.
 
     Attributes:
-        body: octets of the State message.
+        body: bytes of the State message.
         time: sender's clock [ns].
     """
 
@@ -78,10 +78,10 @@ class StateReceived(NamedTuple):
     time: int
 
     def decode(self) -> State:
-        """The state.
+        """Decode the state.
 
         Raises:
-            RemoteProtocolError: the octets are no state.
+            RemoteProtocolError: the bytes are not a state.
         """
         try:
             return State.decode(self.body)
@@ -90,12 +90,12 @@ class StateReceived(NamedTuple):
 
 
 class Session:
-    """One session, seen from one side.
+    """One side of a session.
 
     Args:
-        side: which end this is.
+        side: end of the connection.
         key: pre-shared key; None for none.
-        nonce: random octets for the proof of the key; made here unless given.
+        nonce: random bytes for the proof of the key; None generates them.
     """
 
     def __init__(self, side: Side, *, key: bytes | None = None, nonce: bytes | None = None) -> None:
@@ -114,31 +114,31 @@ class Session:
 
     @property
     def side(self) -> Side:
-        """Which end this is."""
+        """End of the connection."""
         return self._side
 
     @property
     def state(self) -> SessionState:
-        """Where the session is."""
+        """State of the session."""
         return self._state
 
     # ------------------------------------------------------------------------------------- sending
 
     def next_request(self) -> int:
-        """A fresh request id."""
+        """Get an unused request id."""
         self._last_request = self._last_request % _WRAP + 1
         return self._last_request
 
     def send(self, message: Message, *, request: int = 0, time: int = 0) -> bytes:
-        """The octets that say a message.
+        """Pack a message to send.
 
         Args:
-            message: what to say.
+            message: the message.
             request: for a request its id (`next_request`), for an answer the id of its request.
             time: this side's clock [ns].
 
         Raises:
-            LocalProtocolError: it is illegal here; nothing has changed.
+            LocalProtocolError: the message is illegal in this state; nothing has changed.
         """
         kind = type(message)
         after = self._legal.get(_SYMBOLS[kind])
@@ -157,40 +157,40 @@ class Session:
         return data
 
     def send_numbers(self, kind: type[OneWay], numbers: Iterable[float], *, time: int) -> bytes:
-        """The octets that `send` makes of a one-way message, packed at once from the numbers of its fields.
+        """Pack a oneway message to send, directly from the numbers of its fields; same bytes as `send`.
 
-        It is for streams: a message that is sent once in some milliseconds finds cold caches, so that each step counts.
+        For streams: between two messages of a stream the caches get cold, so every step costs time.
 
         Args:
-            kind: what to say.
-            numbers: its fields, one after the other.
+            kind: class of the message.
+            numbers: its fields, in order.
             time: this side's clock [ns].
 
         Raises:
-            LocalProtocolError: it is illegal here; nothing has changed.
+            LocalProtocolError: the message is illegal in this state; nothing has changed.
         """
         data = self.pack_numbers(kind, numbers, time=time)
         self._sent = (self._sent + 1) & _WRAP
         return data
 
     def pack_numbers(self, kind: type[OneWay], numbers: Iterable[float], *, time: int) -> bytes:
-        """What `send_numbers` would return now; nothing is taken for sent. Raises what it raises."""
+        """Pack as `send_numbers` does, without counting the message as sent."""
         pack = self._packers.get(kind)
         if pack is None:
             raise self._illegal(kind)
         return pack(self._sent, 0, time, *numbers)
 
     def hello(self, *, name: str, version: str = "") -> Hello:
-        """The client's first message; of a longer name its first 64 octets."""
+        """Make the client's first message; cut its name at 64 bytes."""
         short = name.encode()[:64].decode(errors="ignore")
         return Hello(major=MAJOR, minor=MINOR, name=short, version=version[:32], nonce=self._nonce)
 
     def challenge(self) -> Challenge:
-        """The cabinet's demand for a proof of the key."""
+        """Make the cabinet's request for a proof of the key."""
         return Challenge(nonce=self._nonce)
 
     def proof(self) -> Proof:
-        """The client's answer to a Challenge.
+        """Make the client's answer to a Challenge.
 
         Raises:
             LocalProtocolError: this side has no key.
@@ -198,11 +198,11 @@ class Session:
         return Proof(mac=self._mac(self._other_nonce, self._nonce))
 
     def welcome_mac(self) -> bytes:
-        """The cabinet's proof of the key, for its Welcome; empty without a key."""
+        """Make the cabinet's proof of the key for its Welcome; empty without a key."""
         return self._mac(self._other_nonce, self._nonce) if self._key is not None else b""
 
     def is_proven(self, mac: bytes) -> bool:
-        """Whether the other side's mac proves that it knows the key; without a key everybody is."""
+        """Whether the mac of the other side proves that it knows the key; True without a key."""
         if self._key is None:
             return True
         return hmac.compare_digest(mac, self._mac(self._nonce, self._other_nonce))
@@ -210,15 +210,15 @@ class Session:
     # ----------------------------------------------------------------------------------- receiving
 
     def receive_data(self, data: bytes | bytearray | memoryview) -> None:
-        """Take octets from the other side; `events` says what they mean."""
+        """Add bytes from the other side; `events` decodes them."""
         if self._state is not SessionState.CLOSED:
             self._reader.feed(data)
 
     def events(self) -> Iterator[Received | StateReceived]:
-        """What the octets so far mean, each once.
+        """Decode the received bytes into events, each once.
 
         Raises:
-            RemoteProtocolError: the other side broke the protocol; the session is over.
+            RemoteProtocolError: the other side violated the protocol; the session is closed.
         """
         if self._failed is not None:
             raise self._failed
@@ -237,17 +237,17 @@ class Session:
     def _accept(self, frame: Frame) -> Received | StateReceived:
         if frame.version != MAJOR and frame.type not in _FROZEN:
             raise _broken(
-                Code.WRONG_VERSION, f"a frame of protocol version {frame.version}; this side has {MAJOR}"
+                Code.WRONG_VERSION, f"a frame has protocol version {frame.version}, this side has {MAJOR}"
             )
         if frame.seq != self._received:
-            raise _broken(Code.BAD_FRAME, f"frame {frame.seq} came where {self._received} was due")
+            raise _broken(Code.BAD_FRAME, f"expected frame {self._received}, got frame {frame.seq}")
         kind = MESSAGES.get(frame.type)
         if kind is None:
             raise _broken(Code.UNKNOWN_MESSAGE, f"message id {frame.type} is not known")
         after = self._legal.get(_SYMBOLS[kind])
         if after is None or self._source == kind.SOURCE:
             raise _broken(Code.UNEXPECTED_MESSAGE, f"a {kind.__name__} came in state {self._state.value!r}")
-        # the refusal of a message that was no request carries no id
+        # a Rejected for a message that is no request has no id
         is_numbered = kind.KIND in ("request", "answer") and (kind is not Rejected or frame.request != 0)
         if is_numbered != (frame.request != 0):
             raise _broken(Code.UNEXPECTED_MESSAGE, f"a {kind.__name__} with request id {frame.request}")
@@ -267,7 +267,7 @@ class Session:
         if isinstance(message, Hello | Challenge):
             self._other_nonce = message.nonce
         elif isinstance(message, Welcome) and not self.is_proven(message.mac):
-            raise _broken(Code.WRONG_KEY, "the cabinet does not prove that it knows the key")
+            raise _broken(Code.WRONG_KEY, "the cabinet failed to prove that it knows the key")
         self._after(kind, after, frame.request)
         return Received(message, frame.request, frame.time)
 
@@ -294,7 +294,7 @@ class Session:
 
     def _mac(self, first: bytes, second: bytes) -> bytes:
         if self._key is None:
-            raise LocalProtocolError("there is no key to prove")
+            raise LocalProtocolError("a proof needs a key, but this side has none")
         return hmac.digest(self._key, first + second, "sha256")
 
 
