@@ -2,7 +2,7 @@
 PY := .venv/bin/python
 STAMPS := build/stamps
 
-.PHONY: setup cabinet demo test test-ros2 test-ros1 conformance lint check bench docs wheel clean
+.PHONY: setup cabinet demo test test-ros2 test-ros1 conformance lint check bench figures docs wheel clean
 
 setup: $(STAMPS)/venv cabinet  ## virtual environment, package, compiled cabinet
 
@@ -17,6 +17,10 @@ $(STAMPS)/jdk: scripts/setup_jdk.py cabinet/toolchain.py $(STAMPS)/venv
 $(STAMPS)/browser: scripts/setup_browser.sh
 	scripts/setup_browser.sh
 	@mkdir -p $(STAMPS) && touch $@
+
+# Tests mostly wait for arms that move, and measure times: one processor is left for everything else.
+WORKERS ?= $(shell n=$$(nproc 2>/dev/null || echo 2); if [ $$n -gt 7 ]; then echo 6; elif [ $$n -gt 3 ]; then expr $$n - 1; else echo 2; fi)
+LONGEST := --durations=15 --durations-min=3
 
 ROS2_PACKAGES := $(shell find ros2/interfaces ros2/heptarm_msgs -type f)
 
@@ -45,16 +49,16 @@ check: $(STAMPS)/venv  ## the generated files agree with the schema
 	$(PY) schema/generate.py --check
 
 test: setup $(STAMPS)/browser lint check  ## everything; fast tests first
-	$(PY) -m pytest -n 2 --dist loadfile
+	$(PY) -m pytest -n $(WORKERS) --dist loadfile $(LONGEST)
 	@$(MAKE) --no-print-directory test-ros2
 	@$(MAKE) --no-print-directory test-ros1
 
 test-ros2: setup $(STAMPS)/ros2  ## the ROS 2 node with real rclpy, where there are wheels of it
-	@if [ -x build/ros2/bin/python ]; then build/ros2/bin/python -m pytest tests/ros2; \
+	@if [ -x build/ros2/bin/python ]; then build/ros2/bin/python -m pytest $(LONGEST) tests/ros2; \
 	else echo "no ROS 2 here: the tests of its node are skipped"; fi
 
 test-ros1: setup $(STAMPS)/ros1  ## the ROS 1 node with a real roscore, where there are packages of it
-	@if [ -x build/ros1/bin/python ]; then build/ros1/bin/python -m pytest tests/ros1; \
+	@if [ -x build/ros1/bin/python ]; then build/ros1/bin/python -m pytest $(LONGEST) tests/ros1; \
 	else echo "no ROS 1 here: the tests of its node are skipped"; fi
 
 conformance: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## every case of conformance against both nodes, with each way of execution
@@ -62,8 +66,11 @@ conformance: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## every case of conformance a
 	if [ -x build/$$ros/bin/python ]; then echo "$$ros, $$way:"; \
 	CONFORMANCE=all EXECUTION=$$way build/$$ros/bin/python -m pytest -q tests/$$ros/test_conformance.py || exit 1; fi; done; done
 
-bench: setup  ## figures as JSON lines; ONLY=name runs one, LIST=1 names them
-	@$(PY) -m bench $(if $(ONLY),--only $(ONLY)) $(if $(LIST),--list)
+bench: setup  ## figures as JSON lines; GROUP=fri or ONLY=name selects, LIST=1 lists them, STORE=1 stores the run
+	@$(PY) -m bench $(if $(GROUP),--group $(GROUP)) $(if $(ONLY),--only $(ONLY)) $(if $(LIST),--list) $(if $(STORE),--store)
+
+figures: $(STAMPS)/venv  ## docs/explanation/figures.md, from the newest stored run
+	$(PY) scripts/figures_page.py
 
 docs: $(STAMPS)/venv  ## the site, in docs/_build/html
 	.venv/bin/sphinx-build -W -q -b html docs docs/_build/html
@@ -73,4 +80,4 @@ wheel: setup  ## a wheel with the compiled jars, in dist/
 	$(PY) -m build --wheel
 
 clean:  ## everything that make made, but for the virtual environment
-	rm -rf build dist docs/_build src/heptarm/virtual/jars .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+	rm -rf build dist docs/_build src/heptarm/sim/jars .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
