@@ -1,17 +1,17 @@
-"""C10: what it costs to read a monitoring message and to write a command."""
+"""What it costs to read a monitoring message and to write a command."""
 
 from __future__ import annotations
 
+import struct
 import time
 from collections.abc import Callable, Iterator
 
-import numpy as np
-
-from bench.registry import Figure, benchmark
-from heptarm.fri import codec
-from heptarm.fri import messages as m
-from heptarm.fri.template import CommandTemplate, MonitoringReader
-from heptarm.fri.version import Version
+from bench.measure.blocks import by_turns, placements
+from bench.measure.figure import Figure, benchmark
+from heptarm.fri.protocol import codec
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.fast_codec import CommandTemplate, MonitoringReader
+from heptarm.fri.protocol.version import Version
 
 _JOINTS = (0.1, 0.4, -0.1, -1.2, 0.2, 0.9, 0.0)
 
@@ -35,25 +35,42 @@ def _monitoring() -> bytes:
     )
 
 
-@benchmark("fri_codec", "C10")
+@benchmark("fri_codec")
 def fri_codec() -> Iterator[Figure]:
-    """Median time to read a monitoring message and to write a joint command, pure Python."""
+    """Time to read a monitoring message and to write a joint command, pure Python, beside `struct` alone."""
     datagram, reader = _monitoring(), MonitoringReader(Version.V1_15)
     reader.read(datagram)
     template = CommandTemplate(Version.V1_15)
+    numbers, joints = struct.Struct("<35d"), struct.Struct("<2I7d")
+    buffer = bytearray(joints.size)
 
     def write() -> bytes:
         template.q[:] = _JOINTS
         return template.encode(70_000, 70_000)
 
-    yield Figure("fri_decode", "C10", _median(lambda: reader.read(datagram)), "us", limit=6.0)
-    yield Figure("fri_encode", "C10", _median(write), "us", limit=1.5)
+    def pack() -> bytes:
+        joints.pack_into(buffer, 0, 70_000, 70_000, *_JOINTS)
+        return bytes(buffer)
+
+    sides = {
+        "decode": (lambda: reader.read(datagram), lambda: numbers.unpack_from(datagram), 16.0),
+        "encode": (write, pack, 4.0),
+    }
+    for name, (call, floor, limit) in sides.items():
+        for found in by_turns(
+            lambda: _times(call),  # noqa: B023  called before the loop goes on
+            lambda: _times(floor),  # noqa: B023
+            lambda placement: None,
+            where=placements()[:1],
+        ):
+            yield found.figure(f"fri_{name}", 50, "us", limit=limit)
 
 
-def _median(call: Callable[[], object], times: int = 50_000) -> float:
+def _times(call: Callable[[], object], count: int = 20_000) -> list[float]:
+    """What each call takes [us]."""
     taken = []
-    for _ in range(times):
+    for _ in range(count):
         begin = time.perf_counter_ns()
         call()
-        taken.append(time.perf_counter_ns() - begin)
-    return float(np.median(taken)) / 1e3
+        taken.append((time.perf_counter_ns() - begin) / 1e3)
+    return taken

@@ -1,4 +1,4 @@
-"""C11: every fault of an FRI session, a hundred times each."""
+"""Every fault of an FRI session, a hundred times each."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import os
 import time
 from collections.abc import Callable, Iterator
 
-from bench.registry import Figure, benchmark
+from bench.measure.figure import Figure, benchmark
 from heptarm.errors import HeptarmError
-from tests.virtual_fri import kills, scenarios
+from tests.sim_fri import kills, scenarios
 
 #: Fewer are for a first look.
 TIMES = int(os.environ.get("BENCH_TIMES", "100"))
 
 
-@benchmark("fri_faults", "C11")
+@benchmark("fri_faults")
 def fri_faults() -> Iterator[Figure]:
     """Faults that ended as designed, with the cause in words and a session that worked after it; 100 of each."""
     runs: dict[str, Callable[[], int]] = {}
@@ -31,4 +31,4 @@ def fri_faults() -> Iterator[Figure]:
         except (AssertionError, HeptarmError) as error:
             detail["failure"] = str(error)[:500]
         detail["seconds"] = f"{time.monotonic() - begin:.0f}"
-        yield Figure(f"fri_fault_{name}", "C11", survived, "times", limit=TIMES, least=True, detail=detail)
+        yield Figure(f"fri_fault_{name}", survived, "count", limit=TIMES, at_least=True, detail=detail)

@@ -1,4 +1,4 @@
-"""C12: wild wishes through the whole stack: a step, no number at all, ten times an axis' speed."""
+"""Wild commands through the whole stack: a step, NaN, ten times the speed of each axis."""
 
 from __future__ import annotations
 
@@ -8,28 +8,28 @@ from dataclasses import dataclass
 import numpy as np
 
 import heptarm as ha
-from bench.fri_hold import BENT, Tape
-from bench.process import Cabinet
-from bench.registry import Figure, benchmark
-from heptarm.fri import Missing, Policy
+from bench.fri.hold import BENT, Tape
+from bench.measure.cabinet import Cabinet
+from bench.measure.figure import Figure, benchmark
+from heptarm.fri.guard.fallback import Missing, Policy
 
-#: What the report has to name after each wish.
-NAMED = ("velocity limited", "no finite number", "acceleration limited")
+#: What the report has to name after each command.
+NAMED = ("velocity limited", "not finite", "acceleration limited")
 
 
 @dataclass(frozen=True)
 class Wild:
-    """What the arm made of wild wishes.
+    """How the arm moved under wild commands.
 
     Attributes:
-        stood: the session lived to the end.
-        speed: fastest axis as a share of what it may.
+        survived: the session lasted to the end.
+        speed: fastest axis as a fraction of its limit.
         inside: every position was within the axes' ranges.
         reached: how far the arm was from the step's goal in the end [rad].
-        limited: what the guard named.
+        limited: what the guard reported.
     """
 
-    stood: bool
+    survived: bool
     speed: float
     inside: bool
     reached: float
@@ -37,7 +37,7 @@ class Wild:
 
 
 def wild(arm: ha.Arm, *, period_ms: int = 1) -> Wild:
-    """Ask for a step of half a radian, for no number, and for ten times the speed of every axis."""
+    """Command a step of half a radian, NaN, and ten times the speed of every axis."""
     arm.move(ha.ptp(BENT))
     robot = arm.robot
     with arm.fri("position", period_ms=period_ms, policy=Policy(Missing.HOLD), history=8192) as session:
@@ -54,34 +54,32 @@ def wild(arm: ha.Arm, *, period_ms: int = 1) -> Wild:
                 break
             session.command(q=start + 0.5 - 10.0 * robot.dq_max * ahead)
         session.command(q=start)
-        stood = tape.record(2.0)
+        survived = tape.record(2.0)
     arm.move(ha.ptp(BENT))
     speed = np.abs(np.diff(tape.q, axis=0)) / np.diff(tape.t)[:, None] / robot.dq_max
     inside = bool(((tape.q >= robot.q_min) & (tape.q <= robot.q_max)).all())
-    return Wild(stood, float(speed.max()), inside, reached, session.limited)
+    return Wild(survived, float(speed.max()), inside, reached, session.limited)
 
 
-@benchmark("fri_guard", "C12")
+@benchmark("fri_guard")
 def fri_guard() -> Iterator[Figure]:
     """A step of 0.5 rad, NaN, ten times the speed at 1 kHz: fastest axis, and what the report named."""
     with Cabinet() as cabinet, ha.connect(cabinet.target, watchdog=5.0) as arm:
         found = wild(arm)
-    # a share of the speed's limit; the drives overshoot a little
+    # of the limit; the drives overshoot a little
     yield Figure(
         "fri_guard_speed",
-        "C12",
         found.speed,
-        "of dq_max",
+        "fraction",
         limit=1.01,
-        detail={"stood": found.stood, "inside": found.inside, "reached_mrad": found.reached * 1e3},
+        detail={"survived": found.survived, "inside": found.inside, "reached_mrad": found.reached * 1e3},
     )
     named = sum(any(word in line for line in found.limited) for word in NAMED)
     yield Figure(
         "fri_guard_named",
-        "C12",
         named,
-        "kinds",
+        "count",
         limit=len(NAMED),
-        least=True,
+        at_least=True,
         detail={"report": found.limited},
     )

@@ -1,4 +1,4 @@
-"""Laws of the FRI benchmarks; the loop's process imports them."""
+"""Control laws of the FRI benchmarks; the process of the realtime loop imports them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.rt import Output, Params, State
+from heptarm.fri.loop.user_api import Output, Params, State
 
 Floats = npt.NDArray[np.float64]
 
@@ -20,13 +20,13 @@ _before: Floats = np.zeros(7)
 
 
 def fade(t: float, over: float) -> float:
-    """From 0 to 1 without a jerk within `over` seconds."""
+    """Rise smoothly from 0 to 1 within `over` seconds."""
     s = min(max(t / over, 0.0), 1.0)
     return s * s * s * (10.0 - 15.0 * s + 6.0 * s * s)
 
 
 def swing(t: float, amplitude: float, frequency: float) -> float:
-    """A sine that begins softly [rad]."""
+    """A sine whose amplitude rises smoothly [rad]."""
     return amplitude * fade(t, 2.0) * math.sin(2.0 * math.pi * frequency * t)
 
 
@@ -36,7 +36,7 @@ def sine(s: State, out: Output, p: Params) -> None:
 
 
 def balance(s: State, out: Output, p: Params) -> None:
-    """Joints float; torques alone lead them to `goal` and keep them there."""
+    """Move compliant joints to `goal` by torques alone and hold them there."""
     q = s.q
     speed = (q - _before) / s.period if s.t > 0.0 else np.zeros(7)
     _before[:] = q
@@ -45,5 +45,5 @@ def balance(s: State, out: Output, p: Params) -> None:
 
 
 def press(s: State, out: Output, p: Params) -> None:
-    """A force along the base's z, by and by."""
+    """A force along the z axis of the base that rises smoothly."""
     out.wrench[2] = -p.force * fade(s.t, 1.0)

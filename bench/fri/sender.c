@@ -1,7 +1,7 @@
 /* Sends monitoring messages at 1 kHz to a client and, half a period later, to an echo; measures both replies.
 
    Arguments: client's port, echo's port, processor, cycles, datagrams (a file: monitoring, waiting, active; each with
-   its length in four octets before it and counters of five octets), results (a file of doubles: client's and echo's
+   its length in four bytes before it and counters of five bytes), results (a file of doubles: client's and echo's
    latency [us] by turns, NaN where no reply came within the half period). */
 #define _GNU_SOURCE
 #include <arpa/inet.h>
