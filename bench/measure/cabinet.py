@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
-import math
 import os
 import signal
 import subprocess
@@ -16,15 +14,8 @@ from types import TracebackType
 from typing import Any
 
 
-def stolen() -> float:
-    """Time that the machine's host has kept its processors to itself since it was started [s]; NaN if not told."""
-    with contextlib.suppress(OSError):
-        return int(Path("/proc/stat").read_text().split(maxsplit=9)[8]) / os.sysconf("SC_CLK_TCK")
-    return math.nan
-
-
 class Cabinet:
-    """Starts `python -m heptarm.virtual.cabinet` on a free port."""
+    """Starts `python -m heptarm.sim.runtime.cabinet` on a free port."""
 
     def __init__(self, *options: str) -> None:
         self._folder = tempfile.TemporaryDirectory()
@@ -34,7 +25,7 @@ class Cabinet:
             [
                 sys.executable,
                 "-m",
-                "heptarm.virtual.cabinet",
+                "heptarm.sim.runtime.cabinet",
                 "--port",
                 "0",
                 "--stats",
@@ -58,7 +49,7 @@ class Cabinet:
         return f"sim://127.0.0.1:{self.port}"
 
     def pin(self, cpu: int) -> None:
-        """Let the plant's loop stay on one processor."""
+        """Keep the plant's loop on one processor; its other threads stay free."""
         os.sched_setaffinity(self.process.pid, {cpu})
 
     def memory(self) -> float:
@@ -79,6 +70,11 @@ class Cabinet:
         self.process.send_signal(number)
         return self.process.wait(timeout=10)
 
+    def _close_pipes(self) -> None:
+        for pipe in (self.process.stdin, self.process.stdout):
+            if pipe is not None:
+                pipe.close()
+
     def __enter__(self) -> Cabinet:
         return self
 
@@ -87,4 +83,8 @@ class Cabinet:
     ) -> None:
         if self.process.poll() is None:
             self.end()
+        self._close_pipes()
+        for pipe in (self.process.stdin, self.process.stdout):
+            if pipe is not None:
+                pipe.close()
         self._folder.cleanup()

@@ -1,4 +1,4 @@
-"""Compiles the C programs that are floors."""
+"""Compiles the C programs that measure floors."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from pathlib import Path
 
 
 def compiled(source: Path, folder: Path) -> Path:
-    """The program made of one source, in a folder.
+    """Compile one source to a program in a folder.
 
     Raises:
         RuntimeError: there is no C compiler.
     """
     compiler = shutil.which("gcc") or shutil.which("cc")
     if compiler is None:
-        raise RuntimeError(f"this benchmark compiles {source.name}: install gcc")
+        raise RuntimeError(f"no C compiler to compile {source.name} with; install gcc")
     program = folder / source.stem
     subprocess.run([compiler, "-O2", "-pthread", "-o", str(program), str(source), "-lm"], check=True)
     return program

@@ -1,5 +1,5 @@
-/* Tells when the machine stood still: a thread on each processor, above all others, wakes every half millisecond.
-   What it misses, nobody had. Ends with its standard input; then prints, for each time it woke late by more than
+/* Reports when the machine stalled: a thread on each processor, above all others, wakes every half millisecond.
+   Time that it misses, nobody had. Ends with its standard input; then prints, for each time it woke late by more than
    the argument [us]: when it was due [ns of the monotonic clock] and how late it was [ns]. */
 #define _GNU_SOURCE
 #include <pthread.h>

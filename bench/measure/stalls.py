@@ -1,4 +1,4 @@
-"""When the machine stood still, as a bare real-time thread on each processor felt it: the floor of all punctuality."""
+"""When the machine stalled, as a bare realtime thread on each processor saw it: the floor of all timing."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from types import TracebackType
 import numpy as np
 import numpy.typing as npt
 
-from bench.compiler import compiled
+from bench.measure.compiler import compiled
 
-#: What is shorter is not kept [s].
+#: Shorter stalls are not recorded [s].
 SHORTEST = 0.5e-3
 
 
 class Stalls:
-    """Watches in a `with` block; afterwards it knows.
+    """Watches for stalls in a `with` block.
 
     Attributes:
-        starts: when a processor should have gone on, shape (n,) [ns of the monotonic clock].
-        lengths: for how long it did not, shape (n,) [s].
+        starts: when a processor should have run on, shape (n,) [ns of the monotonic clock].
+        lengths: for how long it did not, shape (n,) [s]; both are complete after the block.
     """
 
     def __init__(self) -> None:
@@ -61,8 +61,8 @@ class Stalls:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        told, _ = self._process.communicate()
-        numbers = np.array([line.split() for line in told.splitlines()], dtype=np.int64).reshape(-1, 2)
+        output, _ = self._process.communicate()
+        numbers = np.array([line.split() for line in output.splitlines()], dtype=np.int64).reshape(-1, 2)
         numbers = numbers[np.argsort(numbers[:, 0])]
         self.starts, self.lengths = numbers[:, 0], numbers[:, 1] * 1e-9
         self._folder.cleanup()
