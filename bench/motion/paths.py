@@ -1,4 +1,4 @@
-"""B16: speed at blended corners, distance of splines from their points, stops on every kind of path."""
+"""Speed at blended corners, distance of splines from their points, stops on every kind of path."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bench.registry import Figure, benchmark
+from bench.measure.figure import Figure, benchmark
 from heptarm.model.kinematics import forward
+from heptarm.sim.planning.command import Order
+from heptarm.sim.plant.plant import Plant
 from heptarm.values.pose import Pose
-from heptarm.virtual.order import Order
-from heptarm.virtual.plant import Plant
 
 READY = (0.0, 0.5, 0.0, -1.3, 0.0, 0.9, 0.0)
 SPEED, ZONE = 0.25, 0.02
@@ -69,7 +69,7 @@ def _places(plant: Plant, joints: np.ndarray) -> np.ndarray:
     return np.array([forward(plant.robot, q)[:3, 3] for q in joints])
 
 
-@benchmark("blending", "B16")
+@benchmark("blending")
 def blending() -> Iterator[Figure]:
     """Slowest speed between the first and the last straight of a square with blended corners."""
     for zone in (ZONE, 2 * ZONE):
@@ -82,14 +82,14 @@ def blending() -> Iterator[Figure]:
         measured, _ = _track(plant)
         speed = np.linalg.norm(np.diff(_places(plant, measured), axis=0), axis=1) * 1e3
         fast = np.flatnonzero(speed > 0.9 * SPEED)
-        share = float(speed[fast[0] : fast[-1]].min()) / SPEED
+        fraction = float(speed[fast[0] : fast[-1]].min()) / SPEED
         yield Figure(
-            f"blended_speed_{zone * 1e3:.0f}_mm", "B16", 100 * share, "%", limit=30.0, least=True,
+            f"blended_speed_{zone * 1e3:.0f}_mm", 100 * fraction, "%", limit=30.0, at_least=True,
             detail={"speed_mps": SPEED, "corner_deg": 90},
         )  # fmt: skip
 
 
-@benchmark("spline_points", "B16")
+@benchmark("spline_points")
 def spline_points() -> Iterator[Figure]:
     """Largest distance of the measured path from a spline's points, and its slowest speed between them."""
     plant, start = _ready()
@@ -100,11 +100,11 @@ def spline_points() -> Iterator[Figure]:
     off = max(float(np.linalg.norm(places - np.array(part.pose[:3]), axis=1).min()) for part in order.parts)  # type: ignore[index]
     speed = np.linalg.norm(np.diff(places, axis=0), axis=1) * 1e3
     inside = speed[len(speed) // 10 : -len(speed) // 3]
-    yield Figure("spline_distance", "B16", off * 1e3, "mm", limit=0.5)
-    yield Figure("spline_slowest", "B16", 100 * float(inside.min()) / SPEED, "%")
+    yield Figure("spline_distance", off * 1e3, "mm", limit=0.5)
+    yield Figure("spline_slowest", 100 * float(inside.min()) / SPEED, "%")
 
 
-@benchmark("stops_on_paths", "B19")
+@benchmark("stops_on_paths")
 def stops_on_paths() -> Iterator[Figure]:
     """200 stops at random instants of six kinds of motion: rest, how soon, and how hard."""
     random = np.random.default_rng(19)
@@ -130,6 +130,6 @@ def stops_on_paths() -> Iterator[Figure]:
         acceleration = np.abs(np.diff(commanded, 2, axis=0)).max(initial=0.0) * 1e6
         hardest = max(hardest, float(acceleration) / float(plant.robot.ddq_max.max()))
     detail = {"kinds": kinds, "instants": INSTANTS, "limit_s": LONGEST}
-    yield Figure("stops_rested", "B19", 100 * rested / INSTANTS, "%", limit=100.0, least=True, detail=detail)
-    yield Figure("stops_longest", "B19", longest, "s")
-    yield Figure("stops_hardest", "B19", 100 * hardest, "% of the axes' acceleration")
+    yield Figure("stops_rested", 100 * rested / INSTANTS, "%", limit=100.0, at_least=True, detail=detail)
+    yield Figure("stops_longest", longest, "s")
+    yield Figure("stops_hardest", 100 * hardest, "% of the axes' acceleration")
