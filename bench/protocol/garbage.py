@@ -1,4 +1,4 @@
-"""A15: random and mutated frames on the port; the application lives."""
+"""Random and mutated frames on the port; the application survives them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import socket
 from collections.abc import Iterator
 
 import heptarm as ha
-from bench.process import Cabinet
-from bench.registry import Figure, benchmark
+from bench.measure.cabinet import Cabinet
+from bench.measure.figure import Figure, benchmark
 from heptarm.wire import messages
 
 FRAMES = int(os.environ.get("BENCH_FRAMES", "100000"))
@@ -56,10 +56,10 @@ def garbage(target: tuple[str, int], frames: int, seed: int = 3) -> int:
             if greeted:
                 peer.sendall(hello)
             try:
-                # what follows octets that are no frame, or a refused greeting, is thrown away and would prove nothing
+                # what follows bytes that are no frame, or a refused greeting, is discarded and would prove nothing
                 for _ in range(_PER_CONNECTION if greeted else 2):
-                    octets, is_frame = _one(chance, seeds)
-                    peer.sendall(octets)
+                    data, is_frame = _one(chance, seeds)
+                    peer.sendall(data)
                     sent += 1
                     if sent >= frames or not is_frame:
                         break
@@ -89,7 +89,7 @@ def _one(chance: random.Random, seeds: list[tuple[int, bytes]]) -> tuple[bytes, 
     return _frame(number, bytes(changed), chance.randrange(1, 2**32)), True
 
 
-@benchmark("garbage", "A15")
+@benchmark("garbage")
 def survive() -> Iterator[Figure]:
     """Random and mutated frames on the port; then a real client moves the arm."""
     with Cabinet() as cabinet:
@@ -98,4 +98,4 @@ def survive() -> Iterator[Figure]:
             arm.set_override(1.0)
             result = arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=0.5)
             alive = cabinet.process.poll() is None and result.cause is ha.Cause.FINISHED
-    yield Figure("garbage_survived", "A15", sent if alive else 0, "frames", limit=FRAMES, least=True)
+    yield Figure("garbage_survived", sent if alive else 0, "count", limit=FRAMES, at_least=True)

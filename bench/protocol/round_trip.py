@@ -1,0 +1,82 @@
+"""A request through the whole API beside a raw echo of as many bytes between the same two languages."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import heptarm as ha
+from bench.measure.blocks import Placement, by_turns, pin
+from bench.measure.cabinet import Cabinet
+from bench.measure.figure import Figure, benchmark
+from heptarm.wire import messages
+
+#: Requests of a block, back to back; and with a pause of so many seconds before each.
+REQUESTS, PAUSED, PAUSE = 4000, 200, 0.005
+#: Of the ratio; on one core nothing is waited for, and the work of the API itself weighs more.
+LIMITS = {"one_core": 2.5, "two_cores": 2.0}
+
+
+@benchmark("round_trip")
+def round_trip() -> Iterator[Figure]:
+    """Round trip of a request, Python API to application and back, beside a raw echo: back to back, with pauses."""
+    payload = b"\x5a" * (messages.HEADER.size + len(messages.SetOverride(value=1.0).encode()))
+    echo = subprocess.Popen(
+        ["java", "-Xmx32m", "-XX:+UseSerialGC", str(Path(__file__).parents[1] / "java" / "Echo.java")],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert echo.stdout is not None
+        port = int(echo.stdout.readline())
+        with (
+            Cabinet() as cabinet,
+            ha.connect(cabinet.target) as arm,
+            socket.create_connection(("127.0.0.1", port)) as raw,
+        ):
+            raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+            def place(placement: Placement) -> None:
+                pin(cabinet.process.pid, placement.far)
+                pin(echo.pid, placement.far)
+
+            def request() -> object:
+                return arm.set_override(1.0)
+
+            def bare() -> object:
+                return _echo(raw, payload)
+
+            for name, count, pause in (("", REQUESTS, 0.0), ("_paused", PAUSED, PAUSE)):
+                for found in by_turns(
+                    lambda: _times(request, count, pause),  # noqa: B023  called before the loop goes on
+                    lambda: _times(bare, count, pause),  # noqa: B023
+                    place,
+                ):
+                    limit = None if pause else LIMITS[found.placement.name]
+                    yield found.figure(f"round_trip{name}", 50, "us", limit=limit, scale=1e6)
+                    yield found.figure(f"round_trip{name}_p99", 99, "us", scale=1e6)
+    finally:
+        echo.kill()
+        echo.wait()
+
+
+def _times(call: Callable[[], object], count: int, pause: float) -> list[float]:
+    """How long each call takes [s]."""
+    times = []
+    for _ in range(count):
+        if pause:
+            time.sleep(pause)
+        begin = time.perf_counter_ns()
+        call()
+        times.append((time.perf_counter_ns() - begin) * 1e-9)
+    return times
+
+
+def _echo(raw: socket.socket, payload: bytes) -> None:
+    raw.sendall(payload)
+    missing = len(payload)
+    while missing:
+        missing -= len(raw.recv(missing))
