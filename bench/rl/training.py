@@ -1,4 +1,4 @@
-"""E8: policies trained on five seeds. E10: steps a second, of training and of simulation alone."""
+"""Policies trained on five seeds, and steps per second of training and of simulation alone."""
 
 from __future__ import annotations
 
@@ -10,17 +10,15 @@ from statistics import median
 
 import numpy as np
 
-from bench.registry import Figure, benchmark
-from heptarm.rl.batch import BatchReach
+from bench.measure.figure import Figure, benchmark
 from heptarm.rl.evaluate import evaluate
-from heptarm.rl.randomise import Randomisation
+from heptarm.rl.sim.batch import BatchReach
+from heptarm.rl.sim.randomisation import Randomisation
 from heptarm.rl.task import ReachTask
 
-#: How many seeds are trained; fewer, as HEPTARM_BENCH_SEEDS=1, for a first look.
-SEEDS = range(int(os.environ.get("HEPTARM_BENCH_SEEDS", "5")))
+#: How many seeds are trained; fewer, as BENCH_SEEDS=1, for a first look.
+SEEDS = range(int(os.environ.get("BENCH_SEEDS", "5")))
 TARGETS = 1000
-#: Prototypes' steps a second on two quiet cores: PPO on `mujoco.batch`, and that alone with self-collision.
-TRAINING, SIMULATION = 22_000.0, 50_700.0
 #: Late and compliant, on the plant: two decisions are 67 ms.
 HARD = Randomisation(latency=(2, 2), stiffness=(300.0, 300.0))
 ON_PLANT = 20
@@ -28,8 +26,8 @@ ON_PLANT = 20
 
 def _train(name: str, recipes: list, limit: float) -> Iterator[Figure]:
     """Figures of one kind of training over all seeds: the worst counts."""
-    from heptarm.rl.plant import PlantEngine
-    from heptarm.rl.train import train
+    from heptarm.rl.sim.plant_engine import PlantEngine
+    from heptarm.rl.train.train import train
 
     means, p95s, walls, hard, hits = [], [], [], [], []
     for recipe in recipes:
@@ -48,48 +46,49 @@ def _train(name: str, recipes: list, limit: float) -> Iterator[Figure]:
         "within_35_mm": [round(value, 4) for value in hits],
         "wall_s": [round(value, 1) for value in walls],
     }
-    yield Figure(f"{name}_error", "E8", max(means), "m", limit=limit, detail=detail)
-    yield Figure(f"{name}_wall", "E8", median(walls), "s")
+    yield Figure(f"{name}_error", max(means), "m", limit=limit, detail=detail)
+    yield Figure(f"{name}_wall", median(walls), "s")
     late = {"latency_ms": 67, "stiffness": 300, "mean_mm": [round(1e3 * value, 2) for value in hard]}
-    yield Figure(f"{name}_soft_late_error", "E8", max(hard), "m", detail=late)
+    yield Figure(f"{name}_compliant_late_error", max(hard), "m", detail=late)
 
 
-@benchmark("rl_exact", "E8")
+@benchmark("rl_exact")
 def rl_exact() -> Iterator[Figure]:
     """The paper's state, action and reward, 2.2 million steps, five seeds: mean final error on 1,000 targets."""
-    from heptarm.rl.train import Recipe
+    from heptarm.rl.train.recipe import Recipe
 
     yield from _train("reach_exact", [Recipe.exact(seed=seed) for seed in SEEDS], 0.010)
 
 
-@benchmark("rl_robust", "E8")
+@benchmark("rl_robust")
 def rl_robust() -> Iterator[Figure]:
     """The same with strong randomisation and an action cost: for late networks and compliant arms."""
-    from heptarm.rl.train import Recipe
+    from heptarm.rl.train.recipe import Recipe
 
     yield from _train("reach_robust", [Recipe(seed=seed) for seed in SEEDS[:2]], 0.010)
 
 
-@benchmark("rl_feature", "E8")
+@benchmark("rl_feature")
 def rl_feature() -> Iterator[Figure]:
     """With the kinematic feature, 1.3 million steps, strong randomisation, five seeds."""
-    from heptarm.rl.train import Recipe
+    from heptarm.rl.train.recipe import Recipe
 
     task = ReachTask(feature="kinematic")
     yield from _train("reach_feature", [Recipe(task, seed=seed) for seed in SEEDS], 0.004)
 
 
-@benchmark("rl_speed", "E10")
+@benchmark("rl_speed")
 def rl_speed() -> Iterator[Figure]:
-    """Environment steps a second: training, simulation alone on one thread and two, one decision."""
-    from heptarm.rl.train import Recipe, train
+    """Environment steps per second: training, simulation alone on one thread and two, one decision."""
+    from heptarm.rl.train.recipe import Recipe
+    from heptarm.rl.train.train import train
 
     recipe = Recipe(steps=250_000)
     trained = train(recipe)
     updates = np.diff([row.seconds for row in trained.history[2:]])  # the first warm up
     per_update = recipe.settings.envs * recipe.settings.horizon
     rate = per_update / float(np.median(updates))
-    yield Figure("train_steps", "E10", rate, "steps/s", reference=TRAINING, least=True)
+    yield Figure("train_steps", rate, "steps/s")
     for threads in (2, 1):
         arms = BatchReach(ReachTask(), envs=512, threads=threads)
         action = np.random.default_rng(0).uniform(-1, 1, (512, 7))
@@ -98,15 +97,11 @@ def rl_speed() -> Iterator[Figure]:
             begin = time.perf_counter()
             arms.step(action)
             times.append(time.perf_counter() - begin)
-        reference = SIMULATION if threads == 2 else None
         yield Figure(
-            "simulation_steps",
-            "E10",
+            f"simulation_steps_{'two_threads' if threads == 2 else 'one_thread'}",
             512 / float(np.median(times)),
             "steps/s",
-            reference=reference,
-            least=True,
-            detail={"threads": threads, "self_collision": True},
+            detail={"self_collision": True},
         )
     observation, best = np.zeros(17), inf
     for _ in range(5):
@@ -114,4 +109,4 @@ def rl_speed() -> Iterator[Figure]:
         for _ in range(2000):
             trained.policy(observation)
         best = min(best, (time.perf_counter() - begin) / 2000)
-    yield Figure("policy_decision", "E10", best * 1e6, "us")
+    yield Figure("policy_decision", best * 1e6, "us")
