@@ -1,6 +1,7 @@
-"""The part of the ROS 2 figures that runs where rclpy is; `bench.ros` starts it. Prints one JSON object.
+"""The part of the ROS 2 figures that needs rclpy; `bench.ros.nodes` starts it. Prints one JSON object.
 
-build/ros2/bin/python -m bench.ros2_peer trajectory_servo|trajectory_fri|states|bare TARGET
+build/ros2/bin/python -m bench.ros.ros2_peer trajectory_servo|trajectory_fri TARGET
+build/ros2/bin/python -m bench.ros.ros2_peer states TARGET CABINET-PROCESS
 """
 
 from __future__ import annotations
@@ -11,29 +12,19 @@ import sys
 import time
 from typing import Any, NoReturn
 
-import numpy as np
 import rclpy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
-from bench.ros_peer import RATE, WATCHED, follow, timing
+from bench.ros.peer import RATE, Watch, compare, follow
 from tests.ros2.peer import Client, NodeProcess, Ros, stamp, until
 
 
-class Watch:
-    """Everything that comes on a topic of joint states, with the time at which it came."""
-
-    def __init__(self, ros: Ros, topic: str) -> None:
-        self.came: list[float] = []
-        self.messages: list[Any] = []
-        ros.node.create_subscription(JointState, topic, self._take, 100)
-
-    def _take(self, message: Any) -> None:
-        self.came.append(time.time())
-        self.messages.append(message)
-
-    def stamps(self) -> Any:
-        return np.array([stamp(message) for message in list(self.messages)])
+def watched(ros: Ros, topic: str) -> Watch:
+    """Watch a topic of joint states."""
+    watch = Watch(stamp)
+    ros.node.create_subscription(JointState, topic, watch.take, 100)
+    return watch
 
 
 def trajectory(target: str, execution: str) -> dict[str, Any]:
@@ -42,45 +33,30 @@ def trajectory(target: str, execution: str) -> dict[str, Any]:
     node = NodeProcess(target, state_rate=RATE, execution=execution)
     client = Client(ros, None)
     client.ready()
-    found = follow(client, Watch(ros, "/joint_states"), execution)
+    found = follow(client, watched(ros, "/joint_states"), execution)
     node.finish()
     ros.close()
     return found
 
 
-def states(target: str) -> dict[str, Any]:
-    """How evenly joint states come."""
+def states(target: str, cabinet: int) -> dict[str, Any]:
+    """How evenly joint states come, and their latency beside that of a bare topic."""
     ros = Ros("bench")
     node = NodeProcess(target, state_rate=RATE)
     client = Client(ros, None)
     client.ready()
     ros.forget(0)
-    time.sleep(1.0)
-    watch = Watch(ros, "/joint_states")
-    until(lambda: len(watch.came) > 10, "states come")
-    del watch.came[:], watch.messages[:]
-    time.sleep(WATCHED)
-    found = timing(watch)
+    with subprocess.Popen([sys.executable, "-m", "bench.ros.ros2_peer", "publish"]) as process:
+        both = watched(ros, "/joint_states"), watched(ros, "/bare")
+        until(lambda: min(map(len, both)) > RATE, "messages come")
+        found = compare(*both, [node.process.pid, process.pid, cabinet])
+        process.terminate()
     node.finish()
     ros.close()
     return found
 
 
-def bare(target: str) -> dict[str, Any]:
-    """The same from a publisher without a robot, in a process of its own."""
-    ros = Ros("bench")
-    watch = Watch(ros, "/bare")
-    with subprocess.Popen([sys.executable, "-m", "bench.ros2_peer", "publish", ""]) as process:
-        until(lambda: len(watch.came) > 100, "messages come")
-        del watch.came[:], watch.messages[:]
-        time.sleep(WATCHED / 4)
-        found = timing(watch)
-        process.terminate()
-    ros.close()
-    return found
-
-
-def publish(target: str) -> NoReturn:
+def publish() -> NoReturn:
     """Publish joint states with nothing behind them, until a signal ends the process."""
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node("bare")
@@ -97,8 +73,10 @@ def publish(target: str) -> NoReturn:
 
 
 if __name__ == "__main__":
-    what, _, way = sys.argv[1].partition("_")
-    if what == "trajectory":
-        print(json.dumps(trajectory(sys.argv[2], way)))
+    what, _, execution = sys.argv[1].partition("_")
+    if what == "publish":
+        publish()
+    elif what == "trajectory":
+        print(json.dumps(trajectory(sys.argv[2], execution)))
     else:
-        print(json.dumps({"states": states, "bare": bare, "publish": publish}[what](sys.argv[2])))
+        print(json.dumps(states(sys.argv[2], int(sys.argv[3]))))

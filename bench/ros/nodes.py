@@ -1,0 +1,113 @@
+"""The nodes with real rclpy and a real roscore: how a trajectory is followed, how evenly joint states come."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from bench.measure.blocks import Comparison, placements
+from bench.measure.cabinet import Cabinet
+from bench.measure.figure import Figure, benchmark
+from bench.measure.noise import Noise
+
+ROOT = Path(__file__).parents[2]
+#: How near in time [ms] and in space [mrad] each execution is to pass a point.
+EXECUTIONS = {"servo": (20.0, 2.0), "fri": (5.0, 0.5)}
+
+
+def _peer(ros: str, what: str, *words: str) -> dict[str, Any]:
+    """What the peer in the environment of a ROS measured; it prints the node's log before."""
+    environment = os.environ | {
+        "ROS_DOMAIN_ID": str(os.getpid() % 101),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    }
+    done = subprocess.run(
+        [str(_python(ros)), "-m", f"bench.ros.{ros}_peer", what, *words],
+        cwd=ROOT,
+        env=environment,
+        stdout=subprocess.PIPE,
+        text=True,
+        check=True,
+        timeout=300,
+    )
+    return dict(json.loads(done.stdout.splitlines()[-1]))
+
+
+def _python(ros: str) -> Path:
+    return ROOT / "build" / ros / "bin" / "python"
+
+
+def _is_there(ros: str) -> bool:
+    there = _python(ros).exists()
+    if not there:
+        print(f"no {ros} here (make test-{ros} sets it up): its figures are left out", file=sys.stderr)
+    return there
+
+
+def _trajectory(ros: str) -> Iterator[Figure]:
+    if not _is_there(ros):
+        return
+    with Cabinet() as cabinet:
+        for execution, (moment, distance) in EXECUTIONS.items():
+            with Noise() as noise:
+                found = _peer(ros, f"trajectory_{execution}", cabinet.target)
+            detail = {name: round(value, 6) for name, value in found.items()}
+            name = f"{ros}_{execution}_point"
+            yield Figure(
+                f"{name}_moment",
+                found["moment"] * 1e3,
+                "ms",
+                limit=moment,
+                disturbed=noise.is_noisy,
+                detail=detail,
+            )
+            yield Figure(
+                f"{name}_distance", found["distance"] * 1e3, "mrad", limit=distance, disturbed=noise.is_noisy
+            )
+            yield Figure(f"{name}_at_its_time", found["at_its_time"] * 1e3, "mrad")
+
+
+def _states(ros: str) -> Iterator[Figure]:
+    if not _is_there(ros):
+        return
+    with Cabinet() as cabinet:
+        found = _peer(ros, "states", cabinet.target, str(cabinet.process.pid))
+    comparisons = {placement.name: Comparison(placement) for placement in placements()}
+    for block in found["blocks"]:
+        noise = Noise(others=block["others"], stolen=block["stolen"])
+        comparisons[block["placement"]].add(block["values"], block["floors"], noise)
+    noisy = any(noise.is_noisy for one in comparisons.values() for noise in one.noise)
+    yield Figure(f"{ros}_states_late", found["late"] * 100, "%", limit=0.5, disturbed=noisy)
+    yield Figure(f"{ros}_states_rate", found["rate"], "Hz")
+    for one in comparisons.values():
+        yield one.figure(f"{ros}_states", 50, "ms", limit=6.0, scale=1e3)
+        yield one.figure(f"{ros}_states_p99", 99, "ms", scale=1e3)
+
+
+@benchmark("ros2_trajectory")
+def ros2_trajectory() -> Iterator[Figure]:
+    """FollowJointTrajectory over ROS 2, 100 points in 10 s: distance from each point, and from its time."""
+    yield from _trajectory("ros2")
+
+
+@benchmark("ros1_trajectory")
+def ros1_trajectory() -> Iterator[Figure]:
+    """FollowJointTrajectory over ROS 1, 100 points in 10 s: distance from each point, and from its time."""
+    yield from _trajectory("ros1")
+
+
+@benchmark("ros2_states")
+def ros2_states() -> Iterator[Figure]:
+    """ROS 2: joint states at 200 Hz for 60 s: late ones, and their latency beside that of a bare topic."""
+    yield from _states("ros2")
+
+
+@benchmark("ros1_states")
+def ros1_states() -> Iterator[Figure]:
+    """ROS 1: joint states at 200 Hz for 60 s: late ones, and their latency beside that of a bare topic."""
+    yield from _states("ros1")

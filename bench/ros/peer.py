@@ -1,0 +1,160 @@
+"""What the peers of both ROS measure, free of ROS: how near its points a trajectory came, how evenly states come."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.measure.blocks import BLOCKS, pin, placed, placements
+from bench.measure.noise import Noise
+from heptarm.ros.trajectory.goal import GoalOutcome, TrajectoryGoal, TrajectoryPoint
+from tests.conformance.client import Client
+
+Floats = npt.NDArray[np.float64]
+
+#: A trajectory of so many seconds and points.
+SECONDS, POINTS = 10.0, 100
+#: How near each execution is to pass a point [rad]; how long its motion may take to start [s].
+NEAR, OPENING = {"servo": 2e-3, "fri": 5e-4}, 4.0
+#: States per second, and for how long.
+RATE, WATCHED = 200.0, 60.0
+#: Amplitude of every joint [rad], and how many periods a trajectory has.
+SWING = np.array([0.5, 0.3, 0.5, 0.4, 0.6, 0.4, 0.8])
+TURNS = np.array([1.0, 2.0, 1.5, 1.0, 2.0, 1.5, 2.5])
+
+
+class Watch:
+    """Everything that comes on a topic of joint states.
+
+    Args:
+        stamp: time stamp of a message [s].
+    """
+
+    def __init__(self, stamp: Callable[[Any], float]) -> None:
+        self._stamp = stamp
+        self._taken: list[tuple[float, Any]] = []
+
+    def take(self, message: Any) -> None:
+        """Record a message; any thread."""
+        self._taken.append((time.time(), message))
+
+    def restart(self) -> None:
+        """Forget what came."""
+        self._taken = []
+
+    def __len__(self) -> int:
+        return len(self._taken)
+
+    @property
+    def times(self) -> tuple[Floats, Floats]:
+        """When messages came, and their stamps [s]."""
+        taken = list(self._taken)
+        return np.array([came for came, _ in taken]), np.array([self._stamp(one) for _, one in taken])
+
+    @property
+    def track(self) -> tuple[Floats, Floats]:
+        """Stamps [s] and positions [rad], shapes (n,) and (n, 7)."""
+        taken = list(self._taken)
+        return np.array([self._stamp(one) for _, one in taken]), np.array([one.position for _, one in taken])
+
+
+def wave(fraction: Floats) -> tuple[Floats, Floats, Floats]:
+    """Offset, velocity and acceleration at fractions of the duration, shape (n, 7): at rest at both ends."""
+    s = fraction[:, None]
+    # the window begins and ends with zero velocity and acceleration
+    w = 64 * (s * (1 - s)) ** 3
+    dw = 192 * (s * (1 - s)) ** 2 * (1 - 2 * s)
+    ddw = 384 * s * (1 - s) * (1 - 2 * s) ** 2 - 384 * (s * (1 - s)) ** 2
+    k = 2 * np.pi * TURNS
+    p, dp, ddp = SWING * np.sin(k * s), SWING * k * np.cos(k * s), -SWING * k * k * np.sin(k * s)
+    q = w * p
+    dq = (dw * p + w * dp) / SECONDS
+    ddq = (ddw * p + 2 * dw * dp + w * ddp) / SECONDS**2
+    return q, dq, ddq
+
+
+def follow(client: Client, watch: Watch, execution: str) -> dict[str, Any]:
+    """Send the trajectory, wait for its end, and measure how near the arm came.
+
+    Args:
+        client: of the action.
+        watch: on the node's joint states.
+        execution: of the node.
+    """
+    fraction = np.arange(1, POINTS + 1) / POINTS
+    q, dq, ddq = wave(fraction)
+    here = client.place().q
+    start = client.now() + OPENING
+    points = tuple(
+        TrajectoryPoint(float(s * SECONDS), tuple((here + a).tolist()), tuple(b.tolist()), tuple(c.tolist()))
+        for s, a, b, c in zip(fraction, q, dq, ddq)
+    )
+    sent = client.send(TrajectoryGoal(client.joints, points, start))
+    ended = client.result(sent)
+    assert ended.outcome is GoalOutcome.SUCCEEDED, ended
+    time.sleep(0.1)  # the last states are on their way
+    stamps, places = watch.track
+    times = stamps - start
+    fine = np.arange(-0.02, 0.02005, 0.0001)
+    distances, moments = [], []
+    for point in points:
+        at = np.stack([np.interp(point.time + fine, times, places[:, j]) for j in range(7)], axis=1)
+        off = np.abs(at - np.array(point.q)).max(axis=1)
+        near = off <= NEAR[execution]
+        moments.append(float(np.abs(fine[near]).min()) if near.any() else float("inf"))
+        distances.append(float(off.min()))
+    plain = np.stack([np.interp([p.time for p in points], times, places[:, j]) for j in range(7)], axis=1)
+    error = np.abs(plain - np.array([p.q for p in points])).max(axis=1)
+    gaps = np.diff(times[(times > 0.0) & (times < SECONDS)])
+    return {
+        "distance": max(distances),
+        "moment": max(moments),
+        "missed": int(np.isinf(moments).sum()),
+        "at_its_time": float(error.max()),
+        "at_its_time_rms": float(np.sqrt((error**2).mean())),
+        "states": len(times),
+        "longest_gap": float(gaps.max()),
+    }
+
+
+def compare(states: Watch, bare: Watch, processes: Sequence[int]) -> dict[str, Any]:
+    """How evenly joint states come, and their latency beside that of a bare topic in the same windows of time.
+
+    Args:
+        states: on the node's joint states.
+        bare: on a publisher without a robot, of the same rate and type.
+        processes: what serves both: node, publisher, cabinet.
+    """
+    where = placements()
+    seconds = WATCHED / BLOCKS / len(where)
+    gaps: list[Floats] = []
+    blocks = []
+    with placed():
+        for _ in range(BLOCKS):
+            for placement in where:
+                pin(os.getpid(), placement.near)
+                for process in processes:
+                    pin(process, placement.far)
+                time.sleep(0.2)  # what was on its way while threads changed places
+                states.restart()
+                bare.restart()
+                with Noise(measured=tuple(processes)) as noise:
+                    time.sleep(seconds)
+                came, stamps = states.times
+                gaps.append(np.diff(came))
+                values = came - stamps
+                floors = np.subtract(*bare.times)
+                block = {"placement": placement.name, "values": values.tolist(), "floors": floors.tolist()}
+                blocks.append(block | {"others": noise.others, "stolen": noise.stolen})
+    every = np.concatenate(gaps)
+    return {
+        "rate": float(1.0 / every.mean()),
+        "late": float((every > 2.0 / RATE).mean()),
+        "gap_p999": float(np.percentile(every, 99.9)),
+        "blocks": blocks,
+    }
