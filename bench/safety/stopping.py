@@ -1,4 +1,4 @@
-"""B19: stops at random instants of every kind of motion, on the plant with its dynamics."""
+"""Stops at random instants of every kind of motion, on the plant with its dynamics."""
 
 from __future__ import annotations
 
@@ -6,49 +6,49 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bench.registry import Figure, benchmark
+from bench.measure.figure import Figure, benchmark
 from heptarm.model.kinematics import forward
-from heptarm.values.guiding import hand_guide
+from heptarm.sim.controller.safety import StopRequest
+from heptarm.sim.planning.command import TICK, Order
+from heptarm.sim.planning.targets import CARTESIAN_DEFAULT
+from heptarm.sim.plant.plant import Plant
+from heptarm.sim.seam import StraightLimits
+from heptarm.values.motion.hand_guiding import hand_guide
 from heptarm.values.pose import Pose
-from heptarm.virtual.order import Order
-from heptarm.virtual.planner import CARTESIAN_DEFAULT
-from heptarm.virtual.plant import Plant
-from heptarm.virtual.safety import Demand
-from heptarm.virtual.tick import TICK
-from tests.virtual.driving import READY
-from tests.virtual.ideal import KINDS, braking, stopping_time
+from tests.sim.driving import READY
+from tests.sim.ideal import KINDS, braking, stopping_time
 
 INSTANTS = 200
-#: Every stop gets this much beyond its deceleration limit's time for the joints to settle behind their set-points [s].
+#: Time that every stop has beyond that of its deceleration limit, in which the joints settle at their setpoints [s].
 SETTLING = 0.1
-#: How far a servo motion is sent from its start [rad]; farther, the arm runs into the floor or itself at times.
+#: Distance of a servo target from its start [rad]; from farther away the arm may hit the floor or itself.
 REACH = 0.4
-#: Kinds of motion in which the arm is led; how fast on lines [m/s, rad/s, ...], how far [m], and by what force [N].
-LED = ("straight", "guiding")
-QUICK = (0.5,) * 3 + (1.0,) * 3 + (2.0,) * 3 + (4.0,) * 3
-WAY = 0.06
+#: Kinds of motion that follow a target or a hand; limits on lines, distance [m], force of the hand [N].
+GUIDED = ("straight", "guiding")
+QUICK = StraightLimits(velocity=(0.5,) * 3 + (1.0,) * 3, acceleration=(2.0,) * 3 + (4.0,) * 3)
+DISTANCE = 0.06
 PUSH = 60.0
-#: At rest [rad/s].
+#: An axis below this speed is at rest [rad/s].
 REST = 0.01
 
 
-@benchmark("stopping", "B19")
+@benchmark("stopping")
 def stopping() -> Iterator[Figure]:
-    """200 stops of each kind at random instants of each kind of motion: the share that rest in time, and the times."""
+    """200 stops of each kind at random instants of each kind of motion: how many rest in time, and the times."""
     for how in ("path", "fast", "emergency"):
-        for kind in (*KINDS, *LED):
+        for kind in (*KINDS, *GUIDED):
             random = np.random.default_rng(19)
             times, in_time = [], 0
             for _ in range(INSTANTS):
-                time, allowed = (_stop_led if kind in LED else _stop)(kind, how, random)
+                time, allowed = (_stop_guided if kind in GUIDED else _stop)(kind, how, random)
                 times.append(time)
                 in_time += time <= allowed
             detail = {
                 "median_ms": round(float(np.median(times)) * 1e3, 1),
                 "max_ms": round(max(times) * 1e3, 1),
             }
-            share = 100.0 * in_time / INSTANTS
-            yield Figure(f"stop_{how}_{kind}", "B19", share, "%", limit=100.0, least=True, detail=detail)
+            fraction = in_time / INSTANTS
+            yield Figure(f"stop_{how}_{kind}", fraction, "fraction", limit=1.0, at_least=True, detail=detail)
 
 
 def _stop(kind: str, how: str, random: np.random.Generator) -> tuple[float, float]:
@@ -63,8 +63,8 @@ def _stop(kind: str, how: str, random: np.random.Generator) -> tuple[float, floa
     return _rest(plant, how), allowed
 
 
-def _stop_led(kind: str, how: str, random: np.random.Generator) -> tuple[float, float]:
-    """The same of an arm that is led on lines, or by a hand that keeps on pushing."""
+def _stop_guided(kind: str, how: str, random: np.random.Generator) -> tuple[float, float]:
+    """The same while the arm follows a Cartesian target, or a hand that keeps pushing."""
     plant = Plant("iiwa14", q=READY)
     if kind == "guiding":
         plant.submit(Order(1, "guide", guide=hand_guide()))
@@ -79,7 +79,7 @@ def _stop_led(kind: str, how: str, random: np.random.Generator) -> tuple[float, 
     plant.submit(Order(1, "straight", straight=QUICK))
     plant.tick()
     here = _tip(plant)
-    plant.ring.post(1, Pose.of(here.xyz + random.uniform(-WAY, WAY, 3), here.quat).array)
+    plant.ring.post(1, Pose.of(here.xyz + random.uniform(-DISTANCE, DISTANCE, 3), here.quat).array)
     plant.step(int(random.integers(3, 700)))
     if how != "path":
         allowed = stopping_time(plant, how)
@@ -100,7 +100,7 @@ def _tip(plant: Plant) -> Pose:
 def _rest(plant: Plant, how: str) -> float:
     """Stop the arm; how long it takes to rest [s]."""
     if how == "emergency":
-        plant.safety.demand(Demand.EMERGENCY_STOP)
+        plant.safety.request_stop(StopRequest.EMERGENCY_STOP)
     else:
         (plant.stop_fast if how == "fast" else plant.stop)()
     ticks = last = 0
