@@ -1,4 +1,4 @@
-"""A13: start, memory, and what is left behind."""
+"""Start-up, memory, and processes left behind."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from pathlib import Path
 import numpy as np
 
 import heptarm as ha
-from bench.process import Cabinet
-from bench.registry import Figure, benchmark
+from bench.measure.cabinet import Cabinet
+from bench.measure.figure import Figure, benchmark
+from bench.measure.noise import Noise
 
 _OWNER = """
 import sys, time, heptarm as ha
@@ -24,23 +25,23 @@ time.sleep(60)
 """
 
 
-@benchmark("start_up", "A13")
+@benchmark("start_up")
 def start_up() -> Iterator[Figure]:
-    """Time from the command to a virtual cabinet that accepts clients, the worst of 5; and its memory."""
-    times, memory = [], []
+    """Time from the command until a virtual cabinet accepts clients, the worst of 5; and its memory."""
+    times, memory, noisy = [], [], False
     for _ in range(5):
-        with Cabinet() as cabinet:
+        with Noise() as noise, Cabinet() as cabinet:
             times.append(cabinet.ready_after)
             with ha.connect(cabinet.target, state_rate=1000) as arm:
                 arm.move([ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), ha.lin_rel(z=-0.1, frame="base")])
             memory.append(cabinet.memory())
-    yield Figure(
-        "ready", "A13", max(times), "s", limit=4.0, detail={"median": round(float(np.median(times)), 2)}
-    )
-    yield Figure("memory", "A13", max(memory), "MB", limit=350)
+        noisy = noisy or noise.is_noisy
+    median = round(float(np.median(times)), 2)
+    yield Figure("start_up", max(times), "s", limit=4.0, disturbed=noisy, detail={"median": median})
+    yield Figure("memory", max(memory), "MB", limit=350)
 
 
-@benchmark("leftovers", "A13")
+@benchmark("leftovers")
 def leftovers() -> Iterator[Figure]:
     """Processes left after a virtual cabinet was ended, killed, or lost its owner by SIGKILL; 3 of each."""
     left = 0
@@ -57,7 +58,7 @@ def leftovers() -> Iterator[Figure]:
         owner.kill()
         owner.wait()
         left += sum(not _gone(pid) for pid in cabinets) + (not cabinets)
-    yield Figure("leftovers", "A13", left, "processes", limit=0)
+    yield Figure("leftovers", left, "count", limit=0)
 
 
 def _children_of(pid: int) -> list[int]:
