@@ -1,0 +1,127 @@
+"""A thousand states per second while the arm moves, beside the bare path of a state: shared memory and TCP."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+import heptarm as ha
+from bench.measure.blocks import BLOCKS, Placement, by_turns, pin
+from bench.measure.cabinet import Cabinet
+from bench.measure.compiler import compiled
+from bench.measure.figure import Figure, benchmark
+from heptarm.model.kinematics import forward
+from heptarm.values.pose import Pose
+from heptarm.values.robot import ROBOTS
+
+#: Of states over all blocks of a placement, and of their floor; fewer are for a first look.
+SECONDS = float(os.environ.get("BENCH_SECONDS", "60")) / 2
+#: Bytes of a state's frame, header included.
+FRAME = 690
+
+
+class States:
+    """Takes blocks of states and keeps what has to hold for every one of them."""
+
+    def __init__(self, arm: ha.Arm, seconds: float) -> None:
+        self._arm, self._seconds = arm, seconds
+        self._robot = ROBOTS["iiwa14"]
+        self.count = self.distinct = self.expected = self.disordered = self.dropped = 0
+        self.checked = self.torn = 0
+
+    def block(self) -> list[float]:
+        """Ages of the states of one block [s]."""
+        stamps: list[int] = []
+        ages: list[float] = []
+        kept: list[tuple[np.ndarray, Pose]] = []
+        stream = self._arm.states(duration=self._seconds, size=20_000)
+        for state in stream:
+            ages.append(state.age)
+            stamps.append(state.stamp)
+            if len(stamps) % 10 == 0:
+                kept.append((state.q, state.pose))
+        times = np.array(stamps)
+        self.count += len(times)
+        self.distinct += len(np.unique(times))
+        self.expected += round((times[-1] - times[0]) / 1e6) + 1
+        self.disordered += int((np.diff(times) <= 0).sum())
+        self.dropped += stream.lost
+        self.checked += len(kept)
+        self.torn += sum(
+            float(np.abs(forward(self._robot, q)[:3, 3] - pose.xyz).max()) > 1e-9 for q, pose in kept
+        )
+        return ages
+
+
+@benchmark("state_push")
+def state_push() -> Iterator[Figure]:
+    """States at 1 kHz while the arm moves: delivery, order, consistency, and their age beside the bare path's."""
+    seconds = SECONDS / BLOCKS
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        Cabinet() as cabinet,
+        ha.connect(cabinet.target, state_rate=1000) as arm,
+    ):
+        program = compiled(Path(__file__).with_name("path.c"), Path(folder))
+        arm.speed = 0.3
+        there, back = (
+            ha.ptp(ha.deg(30, 40, 10, -70, 20, 60, 30)),
+            ha.ptp(ha.deg(-30, 20, -10, -100, -20, 50, -30)),
+        )
+        arm.start([there, back] * int(8 * SECONDS + 20))  # longer than the run; closing stops it
+        states, current = States(arm, seconds), [frozenset({0})]
+
+        def place(placement: Placement) -> None:
+            pin(cabinet.process.pid, placement.far)
+            current[0] = placement.far
+
+        found = by_turns(states.block, lambda: bare(program, round(seconds * 1000), current[0]), place)
+        stats = cabinet.stats()
+    noisy = any(one.is_noisy for comparison in found for one in comparison.noise)
+    delivered = states.distinct / states.expected
+    detail = {"states": states.count, "expected": states.expected, "dropped_by_client": states.dropped}
+    yield Figure(
+        "push_delivered", delivered, "fraction", limit=0.999, at_least=True, disturbed=noisy, detail=detail
+    )
+    yield Figure("push_out_of_order", states.disordered, "count", limit=0)
+    yield Figure("push_torn", states.torn, "count", limit=0, detail={"checked": states.checked})
+    for comparison in found:
+        yield comparison.figure("push_age", 50, "us", limit=6.0, scale=1e6)
+        yield comparison.figure("push_age_p99", 99, "us", scale=1e6)
+    lateness = {"lateness_us": stats["lateness_us"], "rebased": stats["rebased"], "refused": stats["refused"]}
+    yield Figure("push_tick", stats["tick_us"]["p50"], "us", detail={**stats["tick_us"], **lateness})
+
+
+def bare(program: Path, frames: int, processors: frozenset[int]) -> list[float]:
+    """Ages of stamps that went through shared memory and TCP, read in a loop that does nothing else [s]."""
+    ages = []
+    with subprocess.Popen(
+        [str(program), str(frames), str(FRAME)], stdout=subprocess.PIPE, text=True
+    ) as sender:
+        assert sender.stdout is not None
+        port = int(sender.stdout.readline())
+        pin(sender.pid, processors)
+        with socket.create_connection(("127.0.0.1", port)) as raw:
+            buffer = bytearray(FRAME)
+            view = memoryview(buffer)
+            while _filled(raw, view):
+                ages.append((time.monotonic_ns() - int.from_bytes(buffer[:8], "little")) * 1e-9)
+    return ages
+
+
+def _filled(raw: socket.socket, view: memoryview) -> bool:
+    """Read a whole frame; False at the end."""
+    filled = 0
+    while filled < len(view):
+        count = raw.recv_into(view[filled:])
+        if count == 0:
+            return False
+        filled += count
+    return True
