@@ -6,7 +6,7 @@ import sys
 
 import heptarm as ha
 
-command = [sys.executable, "-m", "heptarm.virtual.cabinet", "--port", "0", "--parent-pipe"]
+command = [sys.executable, "-m", "heptarm.sim.runtime.cabinet", "--port", "0", "--parent-pipe"]
 cabinet = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 target = f"sim://127.0.0.1:{json.loads(cabinet.stdout.readline())['port']}"
 

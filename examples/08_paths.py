@@ -39,9 +39,9 @@ with ha.connect(os.environ.get("HEPTARM_TARGET", "sim://iiwa14")) as arm:
     shapes = {name: drawn(arm, motion) for name, motion in paths.items()}
 
 for name, places in shapes.items():
-    way = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+    length = np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
     closed = np.linalg.norm(places[-1] - start.xyz) * 1e3
-    print(f"{name}: {way:.3f} m, closed within {closed:.3f} mm, {len(places)} states")
+    print(f"{name}: {length:.3f} m, closed within {closed:.3f} mm, {len(places)} states")
 
 if "--plot" in sys.argv:
     import matplotlib.pyplot as plt

@@ -1,4 +1,4 @@
-"""Lead the arm by hand, keep the way, and let the arm do it again. On a simulator this program plays the person."""
+"""Guide the arm by hand, save the trajectory and replay it. On a simulator this program pushes the arm."""
 
 import os
 from pathlib import Path
@@ -28,9 +28,9 @@ with ha.connect(os.environ.get("HEPTARM_TARGET_TO_GUIDE", "sim://iiwa14"), watch
         Thread(target=person, args=(arm,)).start()
     whole = arm.teach(ha.hand_guide(joint_velocity=0.5), timeout=50.0)
 
-    way = whole.trimmed().thinned()
-    print(f"{whole.duration:.1f} s were recorded, {len(way)} of {len(whole)} points tell the way")
+    taught = whole.trimmed().thinned()
+    print(f"{whole.duration:.1f} s were recorded, {len(taught)} of {len(whole)} points are kept")
     with TemporaryDirectory() as folder:
-        file = way.save(Path(folder) / "way.npz")
+        file = taught.save(Path(folder) / "taught.npz")
         replay = arm.replay(ha.Trajectory.load(file), by="spline", pace=0.3)
     print(f"{replay.result.cause.value}, {np.degrees(replay.deviation):.2f} deg off at most")

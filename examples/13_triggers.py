@@ -4,7 +4,7 @@ import os
 
 import heptarm as ha
 from heptarm.do import notify, set_output
-from heptarm.when import path
+from heptarm.values.condition.signals import path
 
 LAMP = "LEDBlue"
 

@@ -1,9 +1,9 @@
-"""Stop at a collision: which joint felt it, how much, and a soft reaction."""
+"""Stop at a collision: which joint felt it, how much, and a compliant reaction."""
 
 import os
 
 import heptarm as ha
-from heptarm.modes import JointImpedance
+from heptarm.values.mode.impedance import JointImpedance
 
 TABLE = "sim://iiwa14?box=0.6,0,0.15,0.4,0.6,0.3"  # stands where the arm is going to
 

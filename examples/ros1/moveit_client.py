@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What MoveIt does with a plan, without MoveIt: checks the start, sends, watches the time, cancels, looks again.
 
-A planner's place is taken by a straight way in joint space. Everything else is what MoveIt's execution manager and its
+A straight line in joint space stands in for a planner. Everything else is what MoveIt's execution manager and its
 simple controller manager do with a controller of the type FollowJointTrajectory.
 """
 
@@ -74,22 +74,22 @@ class Execution:
 def plan(start: JointState, seconds: float, **target: float) -> JointTrajectory:
     """From where the arm is, in 20 pieces, at rest at both ends, with all that a planner gives."""
     goal = [target.get(name, value) for name, value in zip(start.name, start.position)]
-    way = JointTrajectory(joint_names=list(start.name))
+    trajectory = JointTrajectory(joint_names=list(start.name))
     for number in range(21):
         x = number / 20
-        share = x**3 * (10 - 15 * x + 6 * x**2)
+        fraction = x**3 * (10 - 15 * x + 6 * x**2)
         speed = 30 * x**2 * (1 - x) ** 2 / seconds
         change = 60 * x * (1 - x) * (1 - 2 * x) / seconds**2
-        ways = [b - a for a, b in zip(start.position, goal)]
-        way.points.append(
+        offsets = [b - a for a, b in zip(start.position, goal)]
+        trajectory.points.append(
             JointTrajectoryPoint(
-                positions=[a + share * d for a, d in zip(start.position, ways)],
-                velocities=[speed * d for d in ways],
-                accelerations=[change * d for d in ways],
+                positions=[a + fraction * d for a, d in zip(start.position, offsets)],
+                velocities=[speed * d for d in offsets],
+                accelerations=[change * d for d in offsets],
                 time_from_start=rospy.Duration.from_sec(x * seconds),
             )
         )
-    return way
+    return trajectory
 
 
 rospy.init_node("moveit_client")

@@ -26,7 +26,9 @@ if not moved.success:
 felt = do(
     TouchAction,
     "heptarm/touch",
-    TouchGoal(direction="-z", frame="base", distance=0.2, force=10.0, twice=True, retreat=True, retreat_m=0.05),
+    TouchGoal(
+        direction="-z", frame="base", distance=0.2, force=10.0, twice=True, retreat=True, retreat_m=0.05
+    ),
 )
 if felt.contact:
     print(f"the table is {felt.pose.pose.position.z:.4f} m high, felt with {felt.force.z:.1f} N")

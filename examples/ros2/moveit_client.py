@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """What MoveIt does with a plan, without MoveIt: checks the start, sends, watches the time, cancels, looks again.
 
-A planner's place is taken by a straight way in joint space. Everything else is what MoveIt's execution manager and its
+A straight line in joint space stands in for a planner. Everything else is what MoveIt's execution manager and its
 simple controller manager do with a controller of the type FollowJointTrajectory.
 """
 
@@ -10,9 +10,11 @@ import sys
 import rclpy
 from action_msgs.msg import GoalStatus
 from control_msgs.action import FollowJointTrajectory
+from rcl_interfaces.srv import GetParameters
 from rclpy.action import ActionClient
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.task import Future
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -39,6 +41,14 @@ class Execution(Node):
         self.client = ActionClient(self, FollowJointTrajectory, controller)
         while not self.client.server_is_ready():
             rclpy.spin_once(self, timeout_sec=0.1)
+        # until the node has discovered this one, its answers are lost: ask for nothing, and again after a second
+        probe, answer = (
+            self.create_client(GetParameters, f"{controller.rpartition('/')[0]}/get_parameters"),
+            Future(),
+        )
+        while not answer.done():
+            answer = probe.call_async(GetParameters.Request())
+            rclpy.spin_until_future_complete(self, answer, timeout_sec=1.0)
 
     def on_state(self, message: JointState) -> None:
         self.state = message
@@ -85,22 +95,22 @@ class Execution(Node):
 def plan(start: JointState, seconds: float, **target: float) -> JointTrajectory:
     """From where the arm is, in 20 pieces, at rest at both ends, with all that a planner gives."""
     goal = [target.get(name, value) for name, value in zip(start.name, start.position)]
-    way = JointTrajectory(joint_names=list(start.name))
-    ways = [b - a for a, b in zip(start.position, goal)]
+    trajectory = JointTrajectory(joint_names=list(start.name))
+    offsets = [b - a for a, b in zip(start.position, goal)]
     for number in range(21):
         x = number / 20
-        share = x**3 * (10 - 15 * x + 6 * x**2)
+        fraction = x**3 * (10 - 15 * x + 6 * x**2)
         speed = 30 * x**2 * (1 - x) ** 2 / seconds
         change = 60 * x * (1 - x) * (1 - 2 * x) / seconds**2
-        way.points.append(
+        trajectory.points.append(
             JointTrajectoryPoint(
-                positions=[a + share * d for a, d in zip(start.position, ways)],
-                velocities=[speed * d for d in ways],
-                accelerations=[change * d for d in ways],
+                positions=[a + fraction * d for a, d in zip(start.position, offsets)],
+                velocities=[speed * d for d in offsets],
+                accelerations=[change * d for d in offsets],
                 time_from_start=Duration(seconds=x * seconds).to_msg(),
             )
         )
-    return way
+    return trajectory
 
 
 rclpy.init()

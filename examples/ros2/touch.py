@@ -5,7 +5,9 @@ import math
 
 import rclpy
 from heptarm_msgs.action import MoveJoints, Touch
+from rcl_interfaces.srv import GetParameters
 from rclpy.action import ActionClient
+from rclpy.task import Future
 
 HOME = [math.radians(angle) for angle in (0, 30, 0, -90, 0, 60, 0)]
 
@@ -13,14 +15,23 @@ rclpy.init()
 node = rclpy.create_node("touch")
 
 
+def discover(name: str) -> None:
+    """Until a node has discovered this one, its answers are lost: ask for nothing, and again after a second."""
+    client, answer = node.create_client(GetParameters, f"{name}/get_parameters"), Future()
+    while not answer.done():
+        answer = client.call_async(GetParameters.Request())
+        rclpy.spin_until_future_complete(node, answer, timeout_sec=1.0)
+
+
 def do(kind, name: str, **goal):
     """A goal's result."""
     client = ActionClient(node, kind, name)
     client.wait_for_server()
+    discover("heptarm")
     sent = client.send_goal_async(kind.Goal(**goal))
     rclpy.spin_until_future_complete(node, sent)
     if not sent.result().accepted:
-        raise SystemExit(f"{name} is rejected: the node's log says why")
+        raise SystemExit(f"{name} is rejected: see the node's log")
     ended = sent.result().get_result_async()
     rclpy.spin_until_future_complete(node, ended)
     return ended.result().result

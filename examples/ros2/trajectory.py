@@ -5,8 +5,10 @@ import math
 
 import rclpy
 from control_msgs.action import FollowJointTrajectory
+from rcl_interfaces.srv import GetParameters
 from rclpy.action import ActionClient
 from rclpy.duration import Duration
+from rclpy.task import Future
 from rclpy.wait_for_message import wait_for_message
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
@@ -15,6 +17,12 @@ rclpy.init()
 node = rclpy.create_node("trajectory")
 client = ActionClient(node, FollowJointTrajectory, "/heptarm/follow_joint_trajectory")
 client.wait_for_server()
+
+# until the node has discovered this one, its answers are lost: ask for nothing, and again after a second
+probe, answer = node.create_client(GetParameters, "/heptarm/get_parameters"), Future()
+while not answer.done():
+    answer = probe.call_async(GetParameters.Request())
+    rclpy.spin_until_future_complete(node, answer, timeout_sec=1.0)
 found, here = wait_for_message(JointState, node, "/joint_states", time_to_wait=10.0)
 assert found
 
@@ -55,6 +63,6 @@ result = ended.result().result
 print(f"{result.error_string}; code {result.error_code}, worst error {worst[0]:.4f} rad")
 
 goal.trajectory.joint_names = ["elbow", *here.name[1:]]
-print("accepted" if send(goal).accepted else "rejected: the node's log says why")
+print("accepted" if send(goal).accepted else "rejected: see the node's log")
 node.destroy_node()
 rclpy.shutdown()

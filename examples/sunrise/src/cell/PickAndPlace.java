@@ -30,7 +30,7 @@ import com.kuka.roboticsAPI.motionModel.controlModeModel.CartesianImpedanceContr
 import com.kuka.roboticsAPI.persistenceModel.processDataModel.IProcessData;
 import com.kuka.task.ITaskLogger;
 
-/** Moves parts from one side of a table to the other, and sets them down softly. */
+/** Moves parts from one side of a table to the other, and sets them down gently. */
 public class PickAndPlace extends RoboticsAPIApplication {
     private static final double ABOVE = 80.0; // [mm]
     private static final double TOUCH = 15.0; // [N]
@@ -50,12 +50,12 @@ public class PickAndPlace extends RoboticsAPIApplication {
     @Named("cell.speed")
     private IProcessData speed;
 
-    private final CartesianImpedanceControlMode soft = new CartesianImpedanceControlMode();
+    private final CartesianImpedanceControlMode compliant = new CartesianImpedanceControlMode();
     private ICounter counter;
 
     @Override
     public void initialize() {
-        soft.parametrize(CartDOF.Z).setStiffness(500);
+        compliant.parametrize(CartDOF.Z).setStiffness(500);
         gripper.attachTo(lbr.getFlange());
         lbr.setHomePosition(new JointPosition(0, 0.4, 0, -1.4, 0, 1.3, 0));
         counter = getTaskFunction(ICounter.class);
@@ -101,7 +101,7 @@ public class PickAndPlace extends RoboticsAPIApplication {
         ObjectFrame to = data.getFrame("/Table/Place");
         gripper.move(batch(lin(above(to)).setCartVelocity(2 * speed()), lin(to).setCartVelocity(speed())).setBlendingCart(20));
         ForceCondition touched = ForceCondition.createSpatialForceCondition(gripper.getDefaultMotionFrame(), TOUCH);
-        IMotionContainer down = gripper.move(linRel(0, 0, 5).setCartVelocity(20).setMode(soft).breakWhen(touched));
+        IMotionContainer down = gripper.move(linRel(0, 0, 5).setCartVelocity(20).setMode(compliant).breakWhen(touched));
         logger.fine(down.hasFired(touched) ? "touched the table" : "nothing was touched");
         gripper.release(io);
         gripper.move(linRel(0, 0, -ABOVE).setCartVelocity(speed()));
