@@ -1,1 +1,1 @@
-"""The heptarm node of ROS 1: it converts messages for `heptarm.bridge`, which does the work."""
+"""The heptarm node of ROS 1: it converts messages for `heptarm.ros`, which does the work."""

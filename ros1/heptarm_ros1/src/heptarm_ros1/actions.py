@@ -1,4 +1,4 @@
-"""Actions but for trajectories, with feedback and a way to cancel them; `heptarm.bridge.actions` has their table."""
+"""Action servers for the table of `heptarm.ros.interface.actions`."""
 
 from __future__ import annotations
 
@@ -10,40 +10,40 @@ import rospy
 from actionlib import ActionServer
 from actionlib_msgs.msg import GoalStatus
 
-from heptarm.bridge.action import Action, Work, fill
-from heptarm.bridge.actions import ACTIONS, Actions
-from heptarm.bridge.driver import Driver
-from heptarm.bridge.goal import Outcome
-from heptarm.bridge.messages import class_of
 from heptarm.errors import HeptarmError, NotReady
+from heptarm.ros.interface.action import ActionDispatcher, GoalWork, RosAction, fill
+from heptarm.ros.interface.actions import ACTIONS
+from heptarm.ros.interface.context import NodeContext
+from heptarm.ros.interface.messages import class_of
+from heptarm.ros.trajectory.goal import GoalOutcome
 from heptarm_ros1 import convert
 
 
 class ActionServers:
-    """Gives goals to the driver, and their feedback and ends back to their clients."""
+    """Passes goals to their handlers, and feedback and results to their clients."""
 
     def __init__(self) -> None:
-        self._actions: Actions | None = None
+        self._dispatcher: ActionDispatcher | None = None
         self._servers = [self._server(row) for row in ACTIONS]
         for server in self._servers:
             server.start()
 
-    def serve(self, driver: Driver | None) -> None:
-        """Give goals to this driver from now on; None: reject them."""
-        self._actions = None if driver is None else Actions(driver, convert.ROS)
+    def serve(self, context: NodeContext | None) -> None:
+        """Use this context from now on; None: reject goals."""
+        self._dispatcher = None if context is None else ActionDispatcher(context)
 
-    def _server(self, row: Action) -> ActionServer:
+    def _server(self, row: RosAction) -> ActionServer:
         action = class_of(f"{row.type}Action", "msg")
-        return ActionServer(convert.name(row.name), action, self._taker(row), auto_start=False)
+        return ActionServer(convert.name(row.name), action, self._on_goal(row), auto_start=False)
 
-    def _taker(self, row: Action) -> Callable[[Any], None]:
+    def _on_goal(self, row: RosAction) -> Callable[[Any], None]:
         result = class_of(f"{row.type}Result", "msg")
 
-        def take(handle: Any) -> None:
+        def callback(handle: Any) -> None:
             try:
-                if self._actions is None:
-                    raise NotReady("the node is not configured")
-                work = self._actions.begin(row, handle.get_goal())
+                if self._dispatcher is None:
+                    raise NotReady("the node is not configured", hint="call ~configure")
+                work = self._dispatcher.begin(row, handle.get_goal())
             except HeptarmError as error:
                 rospy.logwarn(f"{row.name} rejected: {error}")
                 handle.set_rejected(result(success=False, message=str(error)), str(error))
@@ -54,7 +54,7 @@ class ActionServers:
                 target=_carry_out, args=(work, client, handle, result), name="heptarm-goal"
             ).start()
 
-        return take
+        return callback
 
 
 class _Client:
@@ -63,29 +63,29 @@ class _Client:
     def __init__(self, handle: Any, feedback: Any) -> None:
         self._handle, self._feedback = handle, feedback
 
-    def tell(self, fields: Mapping[str, Any]) -> None:
-        """Feedback, of the fields that its type has."""
+    def publish_feedback(self, fields: Mapping[str, Any]) -> None:
+        """Publish feedback, of the fields that its type has."""
         feedback = self._feedback()
         fill(feedback, fields)
         try:
             self._handle.publish_feedback(feedback)
-        except rospy.ROSException as error:  # ROS has gone
-            rospy.logdebug(f"telling of a goal: {error}")
+        except rospy.ROSException as error:  # ROS has shut down
+            rospy.logdebug(f"publishing feedback: {error}")
 
-    def has_cancelled(self) -> bool:
-        """Whether it does not want the goal any more."""
+    def is_cancel_requested(self) -> bool:
+        """Whether the client has requested to cancel the goal."""
         return bool(self._handle.get_goal_status().status == GoalStatus.PREEMPTING)
 
 
-def _carry_out(work: Work, client: _Client, handle: Any, result: Any) -> None:
-    ended = work(client)
-    answer = ended.fill(result())
+def _carry_out(work: GoalWork, client: _Client, handle: Any, kind: Any) -> None:
+    result = work(client)
+    message = result.fill(kind())
     try:
-        if ended.outcome is Outcome.SUCCEEDED:
-            handle.set_succeeded(answer, ended.text)
-        elif ended.outcome is Outcome.ABORTED:
-            handle.set_aborted(answer, ended.text)
+        if result.outcome is GoalOutcome.SUCCEEDED:
+            handle.set_succeeded(message, result.text)
+        elif result.outcome is GoalOutcome.ABORTED:
+            handle.set_aborted(message, result.text)
         else:
-            handle.set_canceled(answer, ended.text)
-    except rospy.ROSException as error:  # ROS has gone
-        rospy.logdebug(f"telling of a goal: {error}")
+            handle.set_canceled(message, result.text)
+    except rospy.ROSException as error:  # ROS has shut down
+        rospy.logdebug(f"publishing a result: {error}")

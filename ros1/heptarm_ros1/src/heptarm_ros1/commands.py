@@ -1,56 +1,53 @@
-"""What the node is told: command and servo topics, services."""
+"""Subscribers and services for the tables of `heptarm.ros.interface`."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import rospy
 
-from heptarm.bridge.messages import class_of
-from heptarm.bridge.service import Service, fill
-from heptarm.bridge.services import SERVICES, Services
-from heptarm.bridge.topics import Topic, Topics, topics_of
 from heptarm.errors import HeptarmError
+from heptarm.ros.interface.context import NodeContext
+from heptarm.ros.interface.messages import class_of
+from heptarm.ros.interface.service import Service, ServiceDispatcher
+from heptarm.ros.interface.services import SERVICES
+from heptarm.ros.interface.topics import Topic, TopicDispatcher, topics_of
 from heptarm_ros1 import convert
-
-if TYPE_CHECKING:
-    from heptarm.bridge.driver import Driver
 
 
 class Commands:
-    """Takes commands and services to the driver."""
+    """Passes messages and requests to their handlers."""
 
-    def __init__(self, driver: Driver) -> None:
-        names = driver.configuration.values["names"]
-        topics, services = Topics(driver, convert.ROS), Services(driver, convert.ROS)
+    def __init__(self, context: NodeContext) -> None:
+        names = context.driver.configuration.values["names"]
+        topics, requests = TopicDispatcher(context), ServiceDispatcher(context)
         self._subscribers = [_subscriber(topics, row) for row in topics_of(names)]
-        self._services = [_service(services, row) for row in SERVICES]
+        self._services = [_service(requests, row) for row in SERVICES]
 
     def destroy(self) -> None:
-        """End them."""
+        """Destroy subscribers and services."""
         for one in self._subscribers:
             one.unregister()
         for service in self._services:
             service.shutdown("the node was cleaned up")
 
 
-def _subscriber(topics: Topics, row: Topic) -> rospy.Subscriber:
-    """One that tells the log why a message was refused."""
+def _subscriber(topics: TopicDispatcher, row: Topic) -> rospy.Subscriber:
     name = convert.name(row.name)
 
     def callback(message: Any) -> None:
         try:
-            topics.take(row, message)
+            topics.handle(row, message)
         except HeptarmError as error:
             rospy.logwarn_throttle(1.0, f"{name}: {error}")
 
     return rospy.Subscriber(name, class_of(row.type, "msg"), callback, queue_size=1, tcp_nodelay=True)
 
 
-def _service(services: Services, row: Service) -> rospy.Service:
+def _service(requests: ServiceDispatcher, row: Service) -> rospy.Service:
     kind = class_of(row.type, "srv")
 
     def callback(request: Any) -> Any:
-        return fill(kind._response_class(), services.answer(row, request))
+        return requests.answer(row, request).fill(kind._response_class())
 
     return rospy.Service(convert.name(row.name), kind, callback)

@@ -1,4 +1,4 @@
-"""What of ROS 1 the bridge makes messages of, and names as ROS 1 writes them."""
+"""Types and time of ROS 1 for `heptarm.ros`, and names in its notation."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from geometry_msgs.msg import Wrench
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
-from heptarm.bridge.messages import Ros
+from heptarm.ros.interface.messages import RosAdapter
 
-#: Types and time of ROS.
-ROS = Ros(
+#: Types and time of ROS 1.
+ROS = RosAdapter(
     joint_state=JointState,
     point=JointTrajectoryPoint,
     feedback=FollowJointTrajectoryFeedback,
@@ -29,6 +29,6 @@ ROS = Ros(
 )
 
 
-def name(ours: str) -> str:
-    """A name as in ROS 2; ROS 1 writes the node's own without the slash."""
-    return f"~{ours[2:]}" if ours.startswith("~/") else ours
+def name(native: str) -> str:
+    """Convert a name from the notation of ROS 2: ROS 1 writes private names without the slash."""
+    return f"~{native[2:]}" if native.startswith("~/") else native

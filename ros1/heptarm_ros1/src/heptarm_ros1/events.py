@@ -1,82 +1,68 @@
-"""What the node publishes beside the arm's state: signals, keys, programs, collisions, the FRI session, transforms."""
+"""Publishers besides the robot state: signals, keys, motion events, collisions, the FRI session."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import rospy
-from geometry_msgs.msg import TransformStamped
 from heptarm_msgs.msg import Collision, FriStatus, KeyEvent, MotionEvent, Signals
-from tf2_msgs.msg import TFMessage
 
-from heptarm.bridge.events import collision_message, event_message
-from heptarm.bridge.frames import Frames
-from heptarm.values import collision, event
+from heptarm.ros.interface.events import collision_message, event_message
+from heptarm.ros.node.parameters import NodeConfiguration
+from heptarm.values import result
+from heptarm.values.condition import collision
 from heptarm.values.state import State
 from heptarm_ros1.convert import ROS
 from heptarm_ros1.publishers import publisher
 
-if TYPE_CHECKING:
-    from heptarm_ros1.node import HeptarmNode
 
+class EventPublisher:
+    """Publishes signals and keys when they change, events as they occur, and the FRI session periodically."""
 
-class Events:
-    """Publishes signals and keys as they change, transforms if wanted, and the FRI session when asked."""
-
-    def __init__(self, node: HeptarmNode) -> None:
-        self._node = node
+    def __init__(self, configuration: NodeConfiguration) -> None:
+        self._joints = configuration.joints
         self._signals = publisher(Signals, "~signals", latch=True)
         self._keys = publisher(KeyEvent, "~keys")
         self._fri = publisher(FriStatus, "~fri/status", latch=True)
         self._motions = publisher(MotionEvent, "~events")
         self._collisions = publisher(Collision, "~collisions")
-        wanted = node.configuration.values["publish_tf"]
-        self._tf = publisher(TFMessage, "/tf") if wanted else None
-        self._frames: Frames | None = None
-        self._last: dict[str, float] = {}
-        self._told: Mapping[str, Any] = {"text": ""}
+        self._last_signals: dict[str, float] = {}
+        self._last_fri: Mapping[str, Any] = {"text": ""}
 
     def state(self, state: State) -> None:
-        """Publish transforms, and the signals of a state if one has changed."""
-        driver = self._node.driver
-        if self._tf is not None and driver is not None:
-            if self._frames is None:
-                types = (TFMessage, TransformStamped)
-                self._frames = Frames(ROS, self._node.configuration, driver.arm.robot, types)
-            self._tf.publish(self._frames.of(state))
-        if state.signals is None:
+        """Publish the signals of a state if one has changed."""
+        if state.groups.io is None:
             return
-        values = {name: float(value) for name, value in state.signals.items()}
-        if values != self._last:
-            self._last = values
-            _send(self._signals, Signals(names=list(values), values=list(values.values())))
+        values = {name: float(value) for name, value in state.groups.io.items()}
+        if values != self._last_signals:
+            self._last_signals = values
+            _publish(self._signals, Signals(names=list(values), values=list(values.values())))
 
     def key(self, slot: int, down: bool) -> None:
         """Publish that a key was pressed or released."""
-        _send(self._keys, KeyEvent(slot=slot, down=down))
+        _publish(self._keys, KeyEvent(slot=slot, down=down))
 
-    def motion(self, number: int, news: event.MotionEvent) -> None:
-        """Publish what has become of a program."""
-        self._motions.publish(event_message(ROS, number, news))
+    def motion(self, number: int, event: result.MotionEvent) -> None:
+        """Publish an event of a program."""
+        self._motions.publish(event_message(ROS, number, event))
 
     def collision(self, found: collision.Collision) -> None:
-        """Publish what the collision guard has met."""
-        self._collisions.publish(collision_message(ROS, found, self._node.configuration.joints))
+        """Publish a collision."""
+        self._collisions.publish(collision_message(ROS, found, self._joints))
 
     def fri(self, status: Mapping[str, Any]) -> None:
-        """Publish how the FRI session is, if there is one or it has just ended."""
-        if status != self._told:
-            self._told = status
-            _send(self._fri, FriStatus(**status))
+        """Publish the status of the FRI session if it has changed."""
+        if status != self._last_fri:
+            self._last_fri = status
+            _publish(self._fri, FriStatus(**status))
 
     def destroy(self) -> None:
-        """End them."""
-        for one in (self._signals, self._keys, self._motions, self._collisions, self._fri, self._tf):
-            if one is not None:
-                one.unregister()
+        """Destroy the publishers."""
+        for one in (self._signals, self._keys, self._motions, self._collisions, self._fri):
+            one.unregister()
 
 
-def _send(topic: rospy.Publisher, message: Any) -> None:
+def _publish(topic: rospy.Publisher, message: Any) -> None:
     message.header.stamp = rospy.Time.now()
     topic.publish(message)

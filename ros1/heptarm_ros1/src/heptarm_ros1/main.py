@@ -1,4 +1,4 @@
-"""Runs the node until it is told to end; the arm is at rest then."""
+"""Runs the node until shutdown is requested; it leaves the arm at rest."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ import rospy
 from heptarm_ros1.node import HeptarmNode
 
 
-class ToRos(logging.Handler):
-    """Takes what heptarm says to ROS' log."""
+class RosLogHandler(logging.Handler):
+    """Forwards heptarm's log to the ROS log."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        """One message."""
-        say = rospy.loginfo
+        """Forward one record."""
+        log = rospy.loginfo
         if record.levelno >= logging.ERROR:
-            say = rospy.logerr
+            log = rospy.logerr
         elif record.levelno >= logging.WARNING:
-            say = rospy.logwarn
-        say("%s", self.format(record))
+            log = rospy.logwarn
+        log("%s", self.format(record))
 
 
 def main() -> int:
-    """Run the node; returns the process' exit code."""
+    """Run the node; returns the exit code of the process."""
     rospy.init_node("heptarm")
     log = logging.getLogger("heptarm")
-    log.addHandler(ToRos(logging.WARNING))
+    log.addHandler(RosLogHandler(logging.WARNING))
     log.propagate = False
     node = HeptarmNode()
     rospy.on_shutdown(node.close)

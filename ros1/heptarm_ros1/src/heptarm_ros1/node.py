@@ -1,6 +1,6 @@
-"""The node: life cycle, parameters, and what ties the driver to ROS.
+"""The node: life cycle, parameters, and the connection of the driver to ROS.
 
-ROS 1 knows no life cycle, so the node has services by the names of ROS 2's transitions.
+ROS 1 has no life cycle, so the node has services with the names of the transitions of ROS 2.
 """
 
 from __future__ import annotations
@@ -13,43 +13,45 @@ from typing import Any
 import rospy
 from std_srvs.srv import Trigger, TriggerResponse
 
-from heptarm.bridge import parameters
-from heptarm.bridge.driver import Driver
-from heptarm.bridge.goal import End
-from heptarm.bridge.parameters import Configuration
-from heptarm.bridge.runner import Feedback
 from heptarm.errors import HeptarmError, NotReady
-from heptarm.values.collision import Collision
-from heptarm.values.event import MotionEvent
+from heptarm.ros.interface.context import NodeContext
+from heptarm.ros.node.driver import Driver
+from heptarm.ros.node.parameters import PARAMETERS, NodeConfiguration
+from heptarm.ros.trajectory.goal import GoalResult
+from heptarm.ros.trajectory.runner import GoalFeedback
+from heptarm.values.condition.collision import Collision
+from heptarm.values.result import MotionEvent
 from heptarm.values.state import State
-from heptarm_ros1 import peers, settings
+from heptarm_ros1 import parameters
 from heptarm_ros1.actions import ActionServers
 from heptarm_ros1.commands import Commands
-from heptarm_ros1.events import Events
-from heptarm_ros1.peers import Peers
-from heptarm_ros1.publishers import Publishers
+from heptarm_ros1.convert import ROS
+from heptarm_ros1.events import EventPublisher
+from heptarm_ros1.presets import PresetPublisher
+from heptarm_ros1.publishers import StatePublisher, TransformPublisher
 from heptarm_ros1.trajectory import TrajectoryAction
 
-#: Pause between attempts of the autostart [s].
+#: Pause between two attempts of the autostart [s].
 _RETRY = 2.0
 
 
 class HeptarmNode:
-    """An LBR iiwa. Configuring connects, activating takes goals and commands; states come from configuring on."""
+    """An LBR iiwa. ~configure connects and publishes states, ~activate accepts goals and commands."""
 
     def __init__(self) -> None:
         self.driver: Driver | None = None
-        self.configuration = Configuration.of({})
+        self.configuration = NodeConfiguration.of({})
         self._given: dict[str, Any] = {}
-        self._outputs: Publishers | None = None
-        self._inputs: Commands | None = None
-        self._peers: Peers | None = None
-        self._events: Events | None = None
+        self._states: StatePublisher | None = None
+        self._presets: PresetPublisher | None = None
+        self._transforms: TransformPublisher | None = None
+        self._events: EventPublisher | None = None
+        self._commands: Commands | None = None
         self._lock = threading.RLock()
         self._ending = threading.Event()
         self._wake = threading.Event()
-        # actionlib cannot end a server, so they live as long as the node, and reject while it is not configured
-        self._goals = TrajectoryAction(self, ("~follow_joint_trajectory", *peers.actions()))
+        # actionlib cannot destroy a server, so they live as long as the node, and reject while it is not configured
+        self._trajectories = TrajectoryAction(("~follow_joint_trajectory", *parameters.preset().actions()))
         self._actions = ActionServers()
         steps: tuple[tuple[type, str, Callable[[], str]], ...] = (
             (Trigger, "~configure", self.configure),
@@ -58,8 +60,8 @@ class HeptarmNode:
             (Trigger, "~cleanup", self.cleanup),
             (Trigger, "~reload", self.reload),
         )
-        self._services = [rospy.Service(name, kind, _answered(step)) for kind, name, step in steps]
-        self._threads = [threading.Thread(target=self._report, name="heptarm-report")]
+        self._services = [rospy.Service(name, kind, _service(step)) for kind, name, step in steps]
+        self._threads = [threading.Thread(target=self._run_reports, name="heptarm-report")]
         if rospy.get_param("~autostart", True):
             self._threads.append(threading.Thread(target=self._start, name="heptarm-start"))
         for thread in self._threads:
@@ -68,7 +70,7 @@ class HeptarmNode:
     # ------------------------------------------------------------------------------- life cycle
 
     def _start(self) -> None:
-        """Configure and activate, again and again until it works; later the life cycle is the user's."""
+        """Configure and activate, with retries until it works; after that the user controls the life cycle."""
         while not self._ending.is_set():
             try:
                 if self.driver is None:
@@ -83,32 +85,39 @@ class HeptarmNode:
         """Connect.
 
         Raises:
-            HeptarmError: nobody answers, or a parameter is wrong.
+            HeptarmError: the cabinet does not answer, or a parameter is not allowed.
         """
         with self._lock:
             if self.driver is not None or self._ending.is_set():
-                return "it is configured"
-            self._given, strange = settings.read()
-            if strange:
-                rospy.logwarn(f"unknown parameters: {', '.join(strange)}")
-            self.configuration = Configuration.of(self._given)
-            self._outputs = Publishers(self.configuration)
-            self._peers, self._events = Peers(self), Events(self)
+                return "configured already"
+            self._given, unknown = parameters.read()
+            if unknown:
+                rospy.logwarn(f"unknown parameters: {', '.join(unknown)}")
+            self.configuration = NodeConfiguration.of(self._given)
+            self._states, self._presets = (
+                StatePublisher(self.configuration),
+                PresetPublisher(self.configuration),
+            )
+            self._events = EventPublisher(self.configuration)
             try:
                 self.driver = Driver(self.configuration, self)
             except HeptarmError:
                 self._destroy()
                 raise
-            self._inputs = Commands(self.driver)
-            self._actions.serve(self.driver)
             arm = self.driver.arm
+            if self.configuration.values["publish_tf"]:
+                self._transforms = TransformPublisher(self.configuration, arm.robot)
+            context = NodeContext(self.driver, ROS)
+            self._commands = Commands(context)
+            self._actions.serve(context)
+            self._trajectories.serve(self.driver)
             text = f"heptarm {_version()}, {arm.robot.title}, cabinet {arm.cabinet!r} with software {arm.software}"
             rospy.loginfo(text)
             self._wake.set()
             return text
 
     def activate(self) -> str:
-        """Take goals and commands.
+        """Accept goals and commands.
 
         Raises:
             HeptarmError: the node is not configured.
@@ -116,10 +125,10 @@ class HeptarmNode:
         with self._lock:
             self._configured().activate()
         self._wake.set()
-        return "goals and commands are taken"
+        return "active"
 
     def deactivate(self) -> str:
-        """Take no more goals; what runs comes to rest.
+        """Accept nothing more, and bring the arm to rest.
 
         Raises:
             HeptarmError: the node is not configured.
@@ -127,7 +136,7 @@ class HeptarmNode:
         with self._lock:
             self._configured().deactivate()
         self._wake.set()
-        return "no goals and commands are taken"
+        return "inactive"
 
     def cleanup(self) -> str:
         """Disconnect."""
@@ -136,28 +145,31 @@ class HeptarmNode:
         return "disconnected"
 
     def reload(self) -> str:
-        """Take parameters that have changed; ROS 1 tells nobody of them, so the node looks now and then, too.
+        """Apply changed parameters; ROS 1 does not report changes, so the node also calls this periodically.
 
         Raises:
-            HeptarmError: one is not legal, or cannot change now; the old ones count.
+            HeptarmError: one is not allowed, or cannot change now; the old ones stay in effect.
         """
         with self._lock:
             self._configured()
-            given, strange = settings.read()
+            given, unknown = parameters.read()
             before = self._given
             if given == before:
                 return "nothing has changed"
             changed = sorted(name for name in {*given, *before} if given.get(name) != before.get(name))
-            configuration = Configuration.of(given)
-            fixed = {one.name for one in parameters.PARAMETERS if one.fixed}
+            configuration = NodeConfiguration.of(given)
+            fixed = {one.name for one in PARAMETERS if one.fixed}
             held = [name for name in changed if name in fixed]
             if held:
-                raise NotReady(f"{', '.join(held)} cannot change now", hint="clean the node up first")
+                raise NotReady(
+                    f"{', '.join(held)} cannot change while the node is configured",
+                    hint="call ~cleanup first",
+                )
             self._given, self.configuration = given, configuration
             self._configured().configure(configuration)
         text = f"new parameters: {', '.join(changed)}"
-        if strange:
-            text += f"; unknown ones: {', '.join(strange)}"
+        if unknown:
+            text += f"; unknown ones: {', '.join(unknown)}"
         rospy.loginfo(text)
         return text
 
@@ -171,7 +183,7 @@ class HeptarmNode:
                 driver.close()
         for thread in self._threads:
             thread.join()
-        self._goals.close()
+        self._trajectories.close()
 
     def _configured(self) -> Driver:
         if self.driver is None:
@@ -181,93 +193,96 @@ class HeptarmNode:
     def _destroy(self) -> None:
         driver, self.driver = self.driver, None
         self._actions.serve(None)
+        self._trajectories.serve(None)
         if driver is not None:
             driver.close()
-        for one in (self._inputs, self._outputs, self._peers, self._events):
+        for one in (self._commands, *self._publishers, self._events):
             if one is not None:
                 one.destroy()
-        self._inputs = self._outputs = self._peers = self._events = None
+        self._commands = self._states = self._presets = self._transforms = self._events = None
+
+    @property
+    def _publishers(self) -> tuple[StatePublisher | PresetPublisher | TransformPublisher | None, ...]:
+        return self._states, self._presets, self._transforms
 
     # -------------------------------------------------------------------------- from the driver
 
     def on_state(self, state: State) -> None:
-        """A state came."""
-        for outputs in (self._outputs, self._peers, self._events):
-            if outputs is not None and not rospy.is_shutdown():
-                outputs.state(state)
+        """Publish a state."""
+        for publisher in (*self._publishers, self._events):
+            if publisher is not None and not rospy.is_shutdown():
+                publisher.state(state)
 
-    def on_feedback(self, feedback: Feedback) -> None:
-        """A goal went on."""
-        self._goals.on_feedback(feedback)
+    def on_feedback(self, feedback: GoalFeedback) -> None:
+        """Publish feedback of a goal."""
+        self._trajectories.on_feedback(feedback)
 
-    def on_end(self, end: End) -> None:
-        """A goal ended."""
-        self._goals.on_end(end)
+    def on_result(self, result: GoalResult) -> None:
+        """Report the result of a goal."""
+        self._trajectories.on_result(result)
 
-    def on_link(self, trouble: str) -> None:
-        """The connection came or went."""
-        if trouble:
-            rospy.logerr(f"the connection is lost: {trouble}")
+    def on_link(self, error: str) -> None:
+        """Log that the arm was connected or the connection was lost."""
+        if error:
+            rospy.logerr(f"connection lost: {error}")
         else:
             rospy.loginfo("connected")
         self._wake.set()
 
     def on_key(self, slot: int, down: bool) -> None:
-        """A user key of the smartPAD was pressed or released."""
+        """Publish that a user key of the smartPAD was pressed or released."""
         if self._events is not None and not rospy.is_shutdown():
             self._events.key(slot, down)
 
     def on_event(self, number: int, event: MotionEvent) -> None:
-        """Something has become of a program."""
+        """Publish an event of a program."""
         if self._events is not None and not rospy.is_shutdown():
             self._events.motion(number, event)
 
     def on_collision(self, found: Collision) -> None:
-        """The collision guard has met something."""
+        """Publish a collision."""
         if self._events is not None and not rospy.is_shutdown():
             self._events.collision(found)
 
-    # -------------------------------------------------------------------------- now and then
+    # ---------------------------------------------------------------------------------- reporting
 
-    def _report(self) -> None:
-        """Diagnostics, the status if it has changed, and parameters that have changed."""
-        told = ""
+    def _run_reports(self) -> None:
+        """Periodically apply changed parameters and publish diagnostics, until the node closes."""
+        last_error = ""
         while not self._ending.is_set():
             self._wake.wait(1.0 / self.configuration.values["diagnostics_rate"])
             self._wake.clear()
             try:
-                trouble = ""
-                try:
-                    if self.driver is not None:
-                        self.reload()
-                except HeptarmError as error:
-                    trouble = str(error)
-                if trouble and trouble != told:
-                    rospy.logerr(f"the old parameters count: {trouble}")
-                told = trouble
-                self._tell()
-            except (rospy.ROSException, OSError) as error:  # no master
+                found = self._reload_error()
+                if found and found != last_error:
+                    rospy.logerr(f"parameters not applied: {found}")
+                last_error = found
+                self._report()
+            except (rospy.ROSException, OSError) as error:  # the master does not answer
                 if not self._ending.is_set():
                     rospy.logwarn_throttle(10.0, f"reporting: {error}")
 
-    def _tell(self) -> None:
-        driver, outputs = self.driver, self._outputs
-        if driver is None or outputs is None or self._ending.is_set():
+    def _reload_error(self) -> str:
+        try:
+            if self.driver is not None:
+                self.reload()
+        except HeptarmError as error:
+            return str(error)
+        return ""
+
+    def _report(self) -> None:
+        """Publish diagnostics, and the status and the FRI session if they have changed."""
+        driver, states, events = self.driver, self._states, self._events
+        if driver is None or states is None or self._ending.is_set():
             return
-        report = driver.report()
-        state = None
-        if not driver.trouble:
-            try:
-                state = driver.arm.state
-            except HeptarmError:
-                state = None
-        outputs.status(report, state, connected=not driver.trouble, active=driver.active)
-        outputs.diagnostics(report, driver.arm.cabinet)
-        if self._events is not None:
-            self._events.fri(driver.fri.status())
+        diagnosis = driver.diagnosis()
+        states.status(diagnosis, driver.state, connected=not driver.link_error, active=driver.active)
+        states.diagnostics(diagnosis, driver.arm.cabinet)
+        if events is not None:
+            events.fri(driver.fri.status())
 
 
-def _answered(step: Callable[[], str]) -> Callable[[Any], TriggerResponse]:
+def _service(step: Callable[[], str]) -> Callable[[Any], TriggerResponse]:
     def callback(_: Any) -> TriggerResponse:
         try:
             return TriggerResponse(success=True, message=step())
@@ -281,4 +296,4 @@ def _version() -> str:
     try:
         return importlib.metadata.version("heptarm")
     except importlib.metadata.PackageNotFoundError:
-        return "(from its sources)"
+        return "(not installed)"

@@ -1,30 +1,32 @@
-"""What the node publishes."""
+"""Publishers of the robot state, the status, diagnostics and transforms."""
 
 from __future__ import annotations
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped, WrenchStamped
+from geometry_msgs.msg import PoseStamped, TransformStamped, WrenchStamped
 from heptarm_msgs.msg import RobotState, Status
 from sensor_msgs.msg import JointState
+from tf2_msgs.msg import TFMessage
 
-from heptarm.bridge.outputs import Outputs
-from heptarm.bridge.parameters import Configuration
-from heptarm.bridge.report import Report
+from heptarm.ros.interface.state_messages import StateMessages, TransformMessages
+from heptarm.ros.node.diagnostics import Diagnosis
+from heptarm.ros.node.parameters import NodeConfiguration
+from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
 from heptarm_ros1.convert import ROS
 
 
 def publisher(kind: type, name: str, *, latch: bool = False) -> rospy.Publisher:
-    """A publisher that never waits for its subscribers."""
+    """Make a publisher that never waits for its subscribers."""
     return rospy.Publisher(name, kind, queue_size=1 if latch else 10, latch=latch, tcp_nodelay=True)
 
 
-class Publishers:
-    """Publishes states as they come, status when it changes, diagnostics when asked."""
+class StatePublisher:
+    """Publishes every state, the status when it changes, and diagnostics periodically."""
 
-    def __init__(self, configuration: Configuration) -> None:
-        self._outputs = Outputs(
+    def __init__(self, configuration: NodeConfiguration) -> None:
+        self._messages = StateMessages(
             ROS, configuration, stamped=(PoseStamped, WrenchStamped), state=RobotState, status=Status
         )
         self._states = {
@@ -40,23 +42,39 @@ class Publishers:
     def state(self, state: State) -> None:
         """Publish a state."""
         full = self._states["state"].get_num_connections() > 0
-        for name, message in self._outputs.states(state, full=full):
+        for name, message in self._messages.states(state, full=full):
             self._states[name].publish(message)
 
-    def status(self, report: Report, state: State | None, *, connected: bool, active: bool) -> None:
+    def status(self, diagnosis: Diagnosis, state: State | None, *, connected: bool, active: bool) -> None:
         """Publish the status if it has changed."""
-        message = self._outputs.status(report, state, connected=connected, active=active)
+        message = self._messages.status(diagnosis, state, connected=connected, active=active)
         if message is not None:
             self._status.publish(message)
 
-    def diagnostics(self, report: Report, hardware: str) -> None:
+    def diagnostics(self, diagnosis: Diagnosis, hardware: str) -> None:
         """Publish diagnostics."""
         name = rospy.get_name()
         self._diagnostics.publish(
-            self._outputs.diagnostics(DiagnosticArray, report, name=name, hardware=hardware)
+            self._messages.diagnostics(DiagnosticArray, diagnosis, name=name, hardware=hardware)
         )
 
     def destroy(self) -> None:
-        """End them."""
+        """Destroy the publishers."""
         for one in (*self._states.values(), self._status, self._diagnostics):
             one.unregister()
+
+
+class TransformPublisher:
+    """Publishes flange and tool on /tf."""
+
+    def __init__(self, configuration: NodeConfiguration, robot: RobotModel) -> None:
+        self._messages = TransformMessages(ROS, configuration, robot, (TFMessage, TransformStamped))
+        self._tf = publisher(TFMessage, "/tf")
+
+    def state(self, state: State) -> None:
+        """Publish the transforms of a state."""
+        self._tf.publish(self._messages.of(state))
+
+    def destroy(self) -> None:
+        """Destroy the publisher."""
+        self._tf.unregister()

@@ -1,4 +1,4 @@
-"""A node that lets a reach policy drive the arm over the heptarm node's servo topic.
+"""A node in which a reach policy moves the arm through the servo topic of the heptarm node.
 
 rosrun heptarm_ros1 reach
 rostopic pub -1 /reach/target geometry_msgs/PointStamped "{point: {x: 0.55, y: 0.1, z: 0.4}}"
@@ -19,7 +19,7 @@ from heptarm.rl.policy import Policy, shipped
 
 
 class Reach:
-    """Follows ~target until ~hold comes; the arm brakes when either node falls silent."""
+    """Reaches for ~target until ~hold; the arm brakes when either node falls silent."""
 
     def __init__(self) -> None:
         driver = rospy.get_param("~driver", "heptarm")
@@ -36,7 +36,7 @@ class Reach:
         rospy.Subscriber("~hold", Empty, self._on_hold, queue_size=1)
 
     def run(self) -> None:
-        """Decide at the task's rate until ROS ends."""
+        """Command at the rate of the task until ROS shuts down."""
         rate = rospy.Rate(self._follower.task.rate)
         while not rospy.is_shutdown():
             self._decide()
@@ -52,7 +52,7 @@ class Reach:
     def _on_target(self, message: PointStamped) -> None:
         point, frame = message.point, message.header.frame_id
         if frame not in ("", self._base):
-            rospy.logwarn(f"the target is in {frame!r}; {self._base!r} is wanted")
+            rospy.logwarn(f"frame of the target must be {self._base!r}, got {frame!r}")
             return
         try:
             with self._lock:
@@ -73,7 +73,7 @@ class Reach:
 
 
 def main() -> int:
-    """Run the node; returns the process' exit code."""
+    """Run the node; returns the exit code of the process."""
     rospy.init_node("reach")
     Reach().run()
     return 0

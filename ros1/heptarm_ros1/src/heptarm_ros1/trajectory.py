@@ -5,39 +5,37 @@ from __future__ import annotations
 import queue
 import threading
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import rospy
 from actionlib import ActionServer
 from control_msgs.msg import FollowJointTrajectoryAction, FollowJointTrajectoryResult
 
-from heptarm.bridge import messages
-from heptarm.bridge.goal import Code, End, GoalRefused, Outcome
-from heptarm.bridge.runner import Feedback
+from heptarm.ros.interface import messages
+from heptarm.ros.node.driver import Driver
+from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, GoalRefused, GoalResult
+from heptarm.ros.trajectory.runner import GoalFeedback
 from heptarm_ros1.convert import ROS
-
-if TYPE_CHECKING:
-    from heptarm_ros1.node import HeptarmNode
 
 
 class TrajectoryAction:
-    """Gives goals to the driver, and their feedback and ends back to their clients.
+    """Passes goals to the driver, and feedback and results to their clients.
 
-    A full action server, not the simple one: that can reject no goal with a code, and takes one goal after the other.
+    A full action server: the simple one cannot reject a goal with a code, and executes queued goals one by one.
 
     Args:
-        node: whose driver runs the goals.
         names: of the action; a server each.
     """
 
-    def __init__(self, node: HeptarmNode, names: Sequence[str]) -> None:
-        self._node = node
+    def __init__(self, names: Sequence[str]) -> None:
+        self._driver: Driver | None = None
+        self._joints: Sequence[str] = ()
         self._lock = threading.Lock()
         self._handles: dict[int, Any] = {}
-        # The driver's threads must not wait for the server's lock, so they leave their news here.
-        self._news: queue.SimpleQueue[Feedback | End | None] = queue.SimpleQueue()
-        self._teller = threading.Thread(target=self._tell, name="heptarm-goals")
-        self._teller.start()
+        # the driver's threads must not wait for the lock of the server, so a thread of our own publishes
+        self._outbox: queue.SimpleQueue[GoalFeedback | GoalResult | None] = queue.SimpleQueue()
+        self._publisher = threading.Thread(target=self._publish, name="heptarm-goals")
+        self._publisher.start()
         self._servers = [
             ActionServer(name, FollowJointTrajectoryAction, self._on_goal, self._on_cancel, auto_start=False)
             for name in names
@@ -45,16 +43,22 @@ class TrajectoryAction:
         for server in self._servers:
             server.start()
 
+    def serve(self, driver: Driver | None) -> None:
+        """Pass goals to this driver from now on; None: reject them."""
+        if driver is not None:
+            self._joints = driver.configuration.joints
+        self._driver = driver
+
     def close(self) -> None:
-        """Tell the last news."""
-        self._news.put(None)
-        self._teller.join()
+        """Publish what is left."""
+        self._outbox.put(None)
+        self._publisher.join()
 
     def _on_goal(self, handle: Any) -> None:
-        driver = self._node.driver
+        driver = self._driver
         try:
             if driver is None:
-                raise GoalRefused("the node is not configured")
+                raise GoalRefused("the node is not configured", hint="call ~configure")
             goal = messages.action_goal(ROS, handle.get_goal(), now=driver.now)
             with self._lock:
                 self._handles[driver.accept(goal)] = handle
@@ -66,53 +70,54 @@ class TrajectoryAction:
     def _on_cancel(self, handle: Any) -> None:
         with self._lock:
             number = next((number for number, one in self._handles.items() if one == handle), 0)
-        if number and self._node.driver is not None:
-            self._node.driver.cancel(number)
+        driver = self._driver
+        if number and driver is not None:
+            driver.cancel(number)
 
     # -------------------------------------------------------------------------- from the driver
 
-    def on_feedback(self, value: Feedback) -> None:
-        """A goal went on."""
-        self._news.put(value)
+    def on_feedback(self, value: GoalFeedback) -> None:
+        """Queue feedback."""
+        self._outbox.put(value)
 
-    def on_end(self, end: End) -> None:
-        """A goal ended."""
-        self._news.put(end)
+    def on_result(self, result: GoalResult) -> None:
+        """Queue a result."""
+        self._outbox.put(result)
 
-    def _tell(self) -> None:
-        while (news := self._news.get()) is not None:
+    def _publish(self) -> None:
+        while (one := self._outbox.get()) is not None:
             try:
-                if isinstance(news, End):
-                    self._end(news)
+                if isinstance(one, GoalResult):
+                    self._end(one)
                 else:
-                    self._feedback(news)
-            except rospy.ROSException as error:  # ROS has gone
-                rospy.logdebug(f"telling of a goal: {error}")
+                    self._feedback(one)
+            except rospy.ROSException as error:  # ROS has shut down
+                rospy.logdebug(f"publishing about a goal: {error}")
 
-    def _feedback(self, value: Feedback) -> None:
+    def _feedback(self, value: GoalFeedback) -> None:
         with self._lock:
             handle = self._handles.get(value.number)
         if handle is not None:
-            handle.publish_feedback(messages.feedback(ROS, value, self._node.configuration.joints))
+            handle.publish_feedback(messages.feedback(ROS, value, self._joints))
 
-    def _end(self, end: End) -> None:
+    def _end(self, result: GoalResult) -> None:
         with self._lock:
-            handle = self._handles.pop(end.number, None)
-        text = f"goal {end.number} {end.outcome.value}: {end.text}"
-        if end.code is Code.SUCCESSFUL:
+            handle = self._handles.pop(result.number, None)
+        text = f"goal {result.number} {result.outcome.value}: {result.text}"
+        if result.code is ErrorCode.SUCCESSFUL:
             rospy.loginfo(text)
         else:
             rospy.logwarn(text)
-        if handle is None:  # it came by a topic
+        if handle is None:  # the trajectory came by topic
             return
-        result = _result(end.code, end.text)
-        if end.outcome is Outcome.SUCCEEDED:
-            handle.set_succeeded(result, end.text)
-        elif end.outcome is Outcome.ABORTED:
-            handle.set_aborted(result, end.text)
-        else:  # in ROS 1 a goal that ran and was cancelled is a preempted one, too
-            handle.set_canceled(result, end.text)
+        message = _result(result.code, result.text)
+        if result.outcome is GoalOutcome.SUCCEEDED:
+            handle.set_succeeded(message, result.text)
+        elif result.outcome is GoalOutcome.ABORTED:
+            handle.set_aborted(message, result.text)
+        else:  # actionlib reports a goal that was cancelled while active as preempted
+            handle.set_canceled(message, result.text)
 
 
-def _result(code: Code, text: str) -> FollowJointTrajectoryResult:
+def _result(code: ErrorCode, text: str) -> FollowJointTrajectoryResult:
     return FollowJointTrajectoryResult(error_code=int(code), error_string=text)
