@@ -1,1 +1,1 @@
-"""The heptarm node of ROS 2: it converts messages for `heptarm.bridge`, which does the work."""
+"""The heptarm node of ROS 2: it converts messages for `heptarm.ros`, which does the work."""

@@ -1,41 +1,39 @@
-"""Actions but for trajectories, with feedback and a way to cancel them; `heptarm.bridge.actions` has their table."""
+"""Action servers for the table of `heptarm.ros.interface.actions`."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rclpy.action import ActionServer, CancelResponse
+from rclpy.node import Node
 
-from heptarm.bridge.action import Action, fill
-from heptarm.bridge.actions import ACTIONS, Actions
-from heptarm.bridge.goal import Outcome
-from heptarm.bridge.messages import class_of
 from heptarm.errors import HeptarmError
-
-if TYPE_CHECKING:
-    from heptarm.bridge.driver import Driver
-    from heptarm_ros2.node import HeptarmNode
+from heptarm.ros.interface.action import ActionDispatcher, RosAction, fill
+from heptarm.ros.interface.actions import ACTIONS
+from heptarm.ros.interface.context import NodeContext
+from heptarm.ros.interface.messages import class_of
+from heptarm.ros.trajectory.goal import GoalOutcome
 
 
 class ActionServers:
-    """Gives goals to the driver, and their feedback and ends back to their clients.
+    """Passes goals to their handlers, and feedback and results to their clients.
 
-    A goal that makes no sense is accepted and aborted at once: a rejection could not say why. A goal under way takes a
-    thread of the executor: what waits in a coroutine would keep all of them busy asking for it.
+    An invalid goal is accepted and aborted immediately: a rejection cannot carry the reason. Each active goal takes a
+    thread of the executor; a coroutine that waits would be polled by all of them.
     """
 
-    def __init__(self, node: HeptarmNode, driver: Driver, group: Any) -> None:
+    def __init__(self, node: Node, context: NodeContext, group: Any) -> None:
         self._node = node
-        self._actions = Actions(driver, node.ros)
+        self._dispatcher = ActionDispatcher(context)
         self._servers = [self._server(row, group) for row in ACTIONS]
 
     def destroy(self) -> None:
-        """End them."""
+        """Destroy the servers."""
         for server in self._servers:
             server.destroy()
 
-    def _server(self, row: Action, group: Any) -> ActionServer:
+    def _server(self, row: RosAction, group: Any) -> ActionServer:
         kind = class_of(row.type, "action")
 
         def execute(handle: Any) -> Any:
@@ -50,21 +48,21 @@ class ActionServers:
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
 
-    def _execute(self, row: Action, kind: Any, handle: Any) -> Any:
+    def _execute(self, row: RosAction, kind: Any, handle: Any) -> Any:
         try:
-            work = self._actions.begin(row, handle.request)
+            work = self._dispatcher.begin(row, handle.request)
         except HeptarmError as error:
             self._node.get_logger().warning(f"{row.name} refused: {error}")
             handle.abort()
             return kind.Result(success=False, message=str(error))
-        ended = work(_Client(handle, kind))
-        if ended.outcome is Outcome.SUCCEEDED:
+        result = work(_Client(handle, kind))
+        if result.outcome is GoalOutcome.SUCCEEDED:
             handle.succeed()
         elif handle.is_cancel_requested:
             handle.canceled()
         else:
             handle.abort()
-        return ended.fill(kind.Result())
+        return result.fill(kind.Result())
 
 
 class _Client:
@@ -73,13 +71,13 @@ class _Client:
     def __init__(self, handle: Any, kind: Any) -> None:
         self._handle, self._kind = handle, kind
 
-    def tell(self, fields: Mapping[str, Any]) -> None:
-        """Feedback, of the fields that its type has."""
+    def publish_feedback(self, fields: Mapping[str, Any]) -> None:
+        """Publish feedback, of the fields that its type has."""
         if self._handle.is_active:
             feedback = self._kind.Feedback()
             fill(feedback, fields)
             self._handle.publish_feedback(feedback)
 
-    def has_cancelled(self) -> bool:
-        """Whether it does not want the goal any more."""
+    def is_cancel_requested(self) -> bool:
+        """Whether the client has requested to cancel the goal."""
         return bool(self._handle.is_cancel_requested)

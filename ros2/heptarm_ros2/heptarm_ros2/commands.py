@@ -1,71 +1,67 @@
-"""What the node is told: command and servo topics, services."""
+"""Subscriptions and services for the tables of `heptarm.ros.interface`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.node import Node
 
-from heptarm.bridge.messages import class_of
-from heptarm.bridge.service import Service, fill
-from heptarm.bridge.services import SERVICES, Services
-from heptarm.bridge.topics import Topic, Topics, topics_of
 from heptarm.errors import HeptarmError
-
-if TYPE_CHECKING:
-    from heptarm.bridge.driver import Driver
-    from heptarm_ros2.node import HeptarmNode
+from heptarm.ros.interface.context import NodeContext
+from heptarm.ros.interface.messages import class_of
+from heptarm.ros.interface.service import Service, ServiceDispatcher
+from heptarm.ros.interface.services import SERVICES
+from heptarm.ros.interface.topics import Topic, TopicDispatcher, topics_of
 
 
 class Commands:
-    """Takes commands and services to the driver. A stop never waits behind another command."""
+    """Passes messages and requests to their handlers. A stop never waits for another command."""
 
-    def __init__(self, node: HeptarmNode, driver: Driver) -> None:
+    def __init__(self, node: Node, context: NodeContext) -> None:
         self._node = node
-        self._topics, self._offered = Topics(driver, node.ros), Services(driver, node.ros)
+        self._topics, self._requests = TopicDispatcher(context), ServiceDispatcher(context)
         at_once = ReentrantCallbackGroup()
-        told, asked = MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()
+        one_topic, one_service = MutuallyExclusiveCallbackGroup(), MutuallyExclusiveCallbackGroup()
         self._subscriptions = [
             node.create_subscription(
                 class_of(row.type, "msg"),
                 row.name,
-                self._taker(row),
+                self._on_message(row),
                 1,
-                callback_group=at_once if row.at_once else told,
+                callback_group=at_once if row.at_once else one_topic,
             )
-            for row in topics_of(node.value("names"))
+            for row in topics_of(context.driver.configuration.values["names"])
         ]
         self._services = [
             node.create_service(
                 class_of(row.type, "srv"),
                 row.name,
-                self._server(row),
-                callback_group=at_once if row.at_once else asked,
+                self._on_request(row),
+                callback_group=at_once if row.at_once else one_service,
             )
             for row in SERVICES
         ]
 
     def destroy(self) -> None:
-        """End them."""
+        """Destroy subscriptions and services."""
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
         for service in self._services:
             self._node.destroy_service(service)
 
-    def _taker(self, row: Topic) -> Callable[[Any], None]:
-        """A callback that tells the log why a message was refused."""
-
+    def _on_message(self, row: Topic) -> Callable[[Any], None]:
         def callback(message: Any) -> None:
             try:
-                self._topics.take(row, message)
+                self._topics.handle(row, message)
             except HeptarmError as error:
                 self._node.get_logger().warning(f"{row.name}: {error}", throttle_duration_sec=1.0)
 
         return callback
 
-    def _server(self, row: Service) -> Callable[[Any, Any], Any]:
+    def _on_request(self, row: Service) -> Callable[[Any, Any], Any]:
         def callback(request: Any, response: Any) -> Any:
-            return fill(response, self._offered.answer(row, request))
+            return self._requests.answer(row, request).fill(response)
 
         return callback

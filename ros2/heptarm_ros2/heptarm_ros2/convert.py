@@ -1,4 +1,4 @@
-"""What of ROS 2 the bridge makes messages of."""
+"""Types and time of ROS 2 for `heptarm.ros`."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectoryPoint
 
-from heptarm.bridge.messages import Ros
+from heptarm.ros.interface.messages import RosAdapter
 
 
-def ros(node: Node) -> Ros:
-    """Types and time of a node's ROS."""
-    return Ros(
+def ros(node: Node) -> RosAdapter:
+    """Make the adapter of a node."""
+    return RosAdapter(
         joint_state=JointState,
         point=JointTrajectoryPoint,
         feedback=FollowJointTrajectory.Feedback,

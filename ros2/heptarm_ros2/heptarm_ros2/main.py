@@ -1,19 +1,19 @@
-"""Runs the node until it is told to end; the arm is at rest then."""
+"""Runs the node until shutdown is requested; it leaves the arm at rest."""
 
 from __future__ import annotations
 
 import sys
 
-from heptarm.bridge.actions import MOST
+from heptarm.ros.interface.action import MAX_GOALS
 from heptarm_ros2.node import HeptarmNode
 from heptarm_ros2.process import run
 
-#: As many goals as the bridge takes, and beside them a cancellation, a stop and a diagnosis may come at once.
-_THREADS = MOST + 8
+#: One for each active goal, and some for a cancellation, a stop and diagnostics at the same time.
+_THREADS = MAX_GOALS + 8
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the node; returns the process' exit code."""
+    """Run the node; returns the exit code of the process."""
     return run(HeptarmNode, arguments, threads=_THREADS, close=HeptarmNode.close)
 
 

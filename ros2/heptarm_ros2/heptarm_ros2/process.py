@@ -1,4 +1,4 @@
-"""A process with one node, which ends in order when it is told to."""
+"""A process with one node and an orderly shutdown."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ One = TypeVar("One", bound=Node)
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
-def _told_to_end(*_: Any) -> None:
+def _on_signal(*_: Any) -> None:
     for number in _SIGNALS:
-        signal.signal(number, signal.SIG_IGN)  # it ends already
+        signal.signal(number, signal.SIG_IGN)  # shutdown has begun
     raise KeyboardInterrupt
 
 
@@ -32,15 +32,15 @@ def run(
     threads: int = 1,
     close: Callable[[One], None] = lambda _: None,
 ) -> int:
-    """Run a node until a signal comes or a callback fails; returns the process' exit code.
+    """Run a node until a signal comes or a callback fails; returns the exit code of the process.
 
-    ROS' own handlers of signals would end ROS at once, while the executor uses it and before the node is through.
+    The signal handlers of ROS would shut it down immediately, while the executor and the node still use it.
 
     Args:
         make: makes the node.
-        arguments: of the process; None: its own.
-        threads: how many callbacks may run at once.
-        close: ends the node's work while ROS still tells of it; called twice, the second time without callbacks.
+        arguments: of the command line; None: those of the process.
+        threads: of the executor.
+        close: ends the work of the node while ROS still publishes; called twice, the second time without callbacks.
     """
     rclpy.init(
         args=sys.argv if arguments is None else arguments, signal_handler_options=SignalHandlerOptions.NO
@@ -62,7 +62,7 @@ def run(
     spinner = threading.Thread(target=spin, name="heptarm-ros")
     try:
         for number in _SIGNALS:
-            signal.signal(number, _told_to_end)
+            signal.signal(number, _on_signal)
         node = make()
         executor.add_node(node)
         spinner.start()

@@ -1,4 +1,4 @@
-"""A node that lets a reach policy drive the arm over the heptarm node's servo topic.
+"""A node in which a reach policy moves the arm through the servo topic of the heptarm node.
 
 ros2 run heptarm_ros2 reach
 ros2 topic pub --once /reach/target geometry_msgs/msg/PointStamped "{point: {x: 0.55, y: 0.1, z: 0.4}}"
@@ -21,7 +21,7 @@ from heptarm_ros2.process import run
 
 
 class Reach(Node):
-    """Follows ~/target until ~/hold comes; the arm brakes when either node falls silent."""
+    """Reaches for ~/target until ~/hold; the arm brakes when either node falls silent."""
 
     def __init__(self, name: str = "reach", **options: Any) -> None:
         super().__init__(name, **options)
@@ -49,7 +49,7 @@ class Reach(Node):
     def _on_target(self, message: PointStamped) -> None:
         point, frame = message.point, message.header.frame_id
         if frame not in ("", self._base):
-            self.get_logger().warning(f"the target is in {frame!r}; {self._base!r} is wanted")
+            self.get_logger().warning(f"frame of the target must be {self._base!r}, got {frame!r}")
             return
         try:
             self._follower.on_target((point.x, point.y, point.z))
@@ -64,7 +64,7 @@ class Reach(Node):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the node; returns the process' exit code."""
+    """Run the node; returns the exit code of the process."""
     return run(Reach, arguments)
 
 

@@ -5,31 +5,40 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from control_msgs.action import FollowJointTrajectory
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.node import Node
 from rclpy.task import Future
 
-from heptarm.bridge import messages
-from heptarm.bridge.goal import Code, End, GoalRefused, Outcome
-from heptarm.bridge.runner import Feedback
+from heptarm.ros.interface import messages
+from heptarm.ros.interface.messages import RosAdapter
+from heptarm.ros.node.driver import Driver
+from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, GoalRefused, GoalResult
+from heptarm.ros.trajectory.runner import GoalFeedback
 
-if TYPE_CHECKING:
-    from heptarm_ros2.node import HeptarmNode
-
-#: How long the server may take to note a cancellation that has been carried out [s].
-_NOTED = 5.0
+#: How long the server may take to mark a cancelled goal as canceling [s], and how often that is checked [s].
+_CANCELING_TIMEOUT, _CANCELING_PERIOD = 5.0, 0.002
 
 
 class TrajectoryAction:
-    """Gives goals to the driver, and their feedback and ends back to their clients."""
+    """Passes goals to the driver, and feedback and results to their clients.
 
-    def __init__(self, node: HeptarmNode, names: Sequence[str], group: Any) -> None:
-        self._node = node
-        self._lock = threading.Lock()
-        self._numbers: dict[int, int] = {}  # of a goal message on its way to its handle
-        self._ends: dict[int, Future[End]] = {}
+    Args:
+        node: offers the action.
+        ros: types and time.
+        driver: executes the goals.
+        names: of the action; a server each.
+        group: callback group.
+    """
+
+    def __init__(self, node: Node, ros: RosAdapter, driver: Driver, names: Sequence[str], group: Any) -> None:
+        self._node, self._ros, self._driver, self._group = node, ros, driver, group
+        self._accepting = threading.Lock()  # held while the driver accepts a goal, which may end immediately
+        self._lock = threading.Lock()  # for the tables below
+        self._numbers: dict[int, int] = {}  # by the goal message, until the server gives its handle
+        self._results: dict[int, Future[GoalResult]] = {}
         self._handles: dict[int, Any] = {}
         self._servers = [
             ActionServer(
@@ -46,20 +55,18 @@ class TrajectoryAction:
         ]
 
     def destroy(self) -> None:
-        """End it."""
+        """Destroy the servers."""
         for server in self._servers:
             server.destroy()
 
     def _on_goal(self, message: FollowJointTrajectory.Goal) -> GoalResponse:
-        driver = self._node.driver
         try:
-            if driver is None:
-                raise GoalRefused("the node is not configured")
-            goal = messages.action_goal(self._node.ros, message, now=driver.now)
-            with self._lock:
-                number = driver.accept(goal)
-                self._numbers[id(message)] = number
-                self._ends[number] = Future(executor=self._node.executor)
+            goal = messages.action_goal(self._ros, message, now=self._driver.now)
+            with self._accepting:
+                number = self._driver.accept(goal)
+                with self._lock:
+                    self._numbers[id(message)] = number
+                    self._results[number] = Future(executor=self._node.executor)
         except GoalRefused as error:
             self._node.get_logger().warning(f"goal rejected ({error.reason.name}): {error}")
             return GoalResponse.REJECT
@@ -73,49 +80,66 @@ class TrajectoryAction:
 
     def _on_cancel(self, handle: Any) -> CancelResponse:
         number = self._number(handle)
-        if number and self._node.driver is not None:
-            self._node.driver.cancel(number)
+        if number:
+            self._driver.cancel(number)
         return CancelResponse.ACCEPT
 
     def _number(self, handle: Any) -> int:
         with self._lock:
-            known = (number for number, one in self._handles.items() if one is handle)
-            # a client that knows of its goal may ask for something before the server has given its handle
-            return next(known, self._numbers.get(id(handle.request), 0))
+            found = (number for number, one in self._handles.items() if one is handle)
+            # a client may already cancel its goal before the server has given the handle
+            return next(found, self._numbers.get(id(handle.request), 0))
 
     async def _execute(self, handle: Any) -> FollowJointTrajectory.Result:
         number = self._number(handle)
-        end: End = await self._ends[number]
         with self._lock:
-            del self._ends[number], self._handles[number]
-        if end.outcome is Outcome.SUCCEEDED:
+            future = self._results[number]
+        result: GoalResult = await future
+        with self._lock:
+            del self._results[number], self._handles[number]
+        if result.outcome is GoalOutcome.SUCCEEDED:
             handle.succeed()
-        elif end.outcome is Outcome.CANCELED:
-            patience = time.monotonic() + _NOTED
-            while not handle.is_cancel_requested and time.monotonic() < patience:
-                time.sleep(0.001)
+        elif result.outcome is GoalOutcome.CANCELED:
+            await self._canceling(handle)
             handle.canceled()
         else:
             handle.abort()
-        return FollowJointTrajectory.Result(error_code=int(end.code), error_string=end.text)
+        return FollowJointTrajectory.Result(error_code=int(result.code), error_string=result.text)
+
+    async def _canceling(self, handle: Any) -> None:
+        """Wait until the server has marked a goal as canceling, which it does after the cancel callback."""
+        marked: Future[None] = Future(executor=self._node.executor)
+        deadline = time.monotonic() + _CANCELING_TIMEOUT
+
+        def check() -> None:
+            if (handle.is_cancel_requested or time.monotonic() > deadline) and not marked.done():
+                marked.set_result(None)
+
+        check()
+        if marked.done():
+            return
+        timer = self._node.create_timer(_CANCELING_PERIOD, check, callback_group=self._group)
+        await marked
+        self._node.destroy_timer(timer)
 
     # -------------------------------------------------------------------------- from the driver
 
-    def on_feedback(self, value: Feedback) -> None:
-        """A goal went on."""
-        handle = self._handles.get(value.number)
-        if handle is not None and handle.is_active:
-            joints = self._node.configuration.joints
-            handle.publish_feedback(messages.feedback(self._node.ros, value, joints))
-
-    def on_end(self, end: End) -> None:
-        """A goal ended."""
-        log = self._node.get_logger()
-        if end.code is Code.SUCCESSFUL:
-            log.info(f"goal {end.number} {end.outcome.value}: {end.text}")
-        else:
-            log.warning(f"goal {end.number} {end.outcome.value} ({end.code.name}): {end.text}")
+    def on_feedback(self, value: GoalFeedback) -> None:
+        """Publish feedback."""
         with self._lock:
-            future = self._ends.get(end.number)
+            handle = self._handles.get(value.number)
+        if handle is not None and handle.is_active:
+            joints = self._driver.configuration.joints
+            handle.publish_feedback(messages.feedback(self._ros, value, joints))
+
+    def on_result(self, result: GoalResult) -> None:
+        """Log a result and pass it to its client."""
+        log = self._node.get_logger()
+        if result.code is ErrorCode.SUCCESSFUL:
+            log.info(f"goal {result.number} {result.outcome.value}: {result.text}")
+        else:
+            log.warning(f"goal {result.number} {result.outcome.value} ({result.code.name}): {result.text}")
+        with self._accepting, self._lock:
+            future = self._results.get(result.number)
         if future is not None:
-            future.set_result(end)
+            future.set_result(result)
