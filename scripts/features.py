@@ -13,7 +13,8 @@ try:
 except ModuleNotFoundError:  # Python 3.10
     import tomli as tomllib  # type: ignore[import-not-found,no-redef]
 
-from heptarm.testing import Scenario, scenarios
+from heptarm.testing import Scenario
+from heptarm.testing.runner import scenarios
 from heptarm.testing.scenario import LINES
 
 ROOT = Path(__file__).resolve().parents[1]

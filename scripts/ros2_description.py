@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from heptarm.values.arrays import Array
-from heptarm.values.links import LINKS
 from heptarm.values.robot import ROBOTS, RobotModel
 
 ROOT = Path(__file__).parents[1]
@@ -27,7 +26,7 @@ def _list(values: Array) -> str:
 
 def model(robot: RobotModel) -> str:
     """Kinematics, limits and inertias of a robot as YAML; angles in rad, lengths in m."""
-    links = LINKS[robot.name]
+    links = robot.links
     lines = [
         f"# {robot.title}; written by scripts/ros2_description.py",
         f"title: {robot.title}",

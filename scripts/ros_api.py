@@ -1,7 +1,7 @@
-"""What the public members of heptarm's Python API are in ROS, or why they are not there; for scripts/ros_table.py.
+"""ROS counterparts of the public members of heptarm's Python API, or why there are none; for scripts/ros_table.py.
 
-A word that begins with "~/" is a name of the nodes, "joint_states" and "/diagnostics" as well; anything with a space in
-it is for people. Every public member needs an entry; tests/bridge/test_ros_table.py looks after that.
+A text without a space is a name of the interface; any other text is prose. Every public member needs an entry;
+tests/ros/test_ros_table.py checks that.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ MODES = (
     "~/mode/sine_impedance",
     "~/mode/force_pattern",
 )
-OPERATOR = ("~/operate", "in words")
-CLIENT = "for the client to do: what it needs is in"
-WORDS = "stays in the node: "
+OPERATOR = ("~/operate", "as a command line")
+CLIENT = "a task of the client, with the data of"
+WORDS = "not offered: "
 
 #: By the class, or what leads to it.
 API: dict[str, dict[str, tuple[str, ...]]] = {
@@ -28,6 +28,10 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "attach_tool": ("~/attach_tool",),
         "attach_workpiece": ("~/attach_workpiece",),
         "attached": ("~/attach_workpiece", "~/detach_workpiece"),
+        "groups": (WORDS + "the nodes subscribe to what their topics need",),
+        "history": (WORDS + "a rosbag keeps the states",),
+        "state_rate": ("parameter `state_rate`",),
+        "breaking_on": ("~/collision_guard", "fields `until` of goals"),
         "cabinet": ("~/info", "/diagnostics"),
         "capabilities": ("~/capabilities",),
         "close": (LIFE,),
@@ -50,7 +54,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "pad": ("see below",),
         "pause": ("~/pause",),
         "pose": ("~/get_pose", "~/pose", "~/state"),
-        "reconnect": ("happens by itself", "~/recover"),
+        "reconnect": ("happens automatically", "~/recover"),
         "recover": ("~/recover",),
         "release_control": ("~/release_control", LIFE),
         "replay": ("~/replay",),
@@ -113,17 +117,17 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "arm.fri(...)": {
         "active": ("~/fri/status",),
-        "client": (WORDS + "its process and its shared memory",),
+        "client": (WORDS + "internal process and shared memory",),
         "close": ("~/fri/close",),
         "command": ("~/fri/joint", "~/fri/wrench", "~/fri/pose"),
         "events": ("~/fri/status",),
-        "history": (WORDS + "a thousand messages a second",),
+        "history": (WORDS + "up to a thousand messages a second",),
         "inputs": ("~/fri/status",),
         "kind": ("~/fri/status",),
         "limited": ("~/fri/status",),
-        "next": (WORDS + "a thousand messages a second",),
+        "next": (WORDS + "up to a thousand messages a second",),
         "output": ("~/fri/set_outputs",),
-        "outputs": (WORDS + "they are set by name", "~/fri/set_outputs"),
+        "outputs": (WORDS + "outputs are set by name", "~/fri/set_outputs"),
         "params": (WORDS + "a law is Python code",),
         "quality": ("~/fri/status",),
         "refused": ("the node's log",),
@@ -138,28 +142,31 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "arm.servo(...)": {
         "active": ("~/state",),
-        "change": (WORDS + "a servo topic keeps the control mode that it began with",),
+        "change": (WORDS + "a servo topic keeps its initial control mode",),
         "close": ("the end of the messages", "~/stop"),
         "result": ("~/state",),
         "set": SERVOS,
         "start": ("joint_states", "~/pose"),
-        "stats": (WORDS + "the nodes are measured by the benchmarks",),
+        "stats": (WORDS + "benchmarks measure the nodes",),
         "t": (CLIENT, "its own clock"),
         "tick": (CLIENT, "its own clock"),
         "what": ("the name of the topic",),
     },
     "arm.start(...)": {
-        "accepted": (WORDS + "for heptarm itself",),
+        "send": (WORDS + "internal",),
+        "on_lost": (WORDS + "internal",),
+        "on_fork": (WORDS + "internal",),
+        "on_accepted": (WORDS + "internal",),
         "add_done_callback": ("the action's result",),
         "add_event_callback": ("the action's feedback", "~/events"),
         "cancel": ("cancelling the action's goal",),
         "done": ("the action's status",),
+        "error": ("the action's result",),
         "events": ("the action's feedback", "~/events"),
         "id": ("~/state",),
         "item": ("feedback and result of", "~/run_program", "~/events"),
-        "limit": (WORDS + "an action's client has its own patience",),
-        "lose": (WORDS + "for heptarm itself",),
-        "on_event": (WORDS + "for heptarm itself",),
+        "limit": (WORDS + "the client of an action has its own timeouts",),
+        "on_event": (WORDS + "internal",),
         "progress": ("the action's feedback",),
         "remaining": ("the action's feedback",),
         "result": ("the action's result",),
@@ -169,11 +176,11 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "wait_started": ("the action's feedback",),
     },
     "heptarm": {
-        "arc": ("as CIRC or SPLINE, of points that the client reckons", "~/run_program"),
+        "arc": ("as CIRC or SPLINE, with points computed by the client", "~/run_program"),
         "circ": ("~/move_pose", "~/run_program"),
         "connect": (LIFE, "parameters `target`, `key`, `watchdog`, `state_rate`"),
-        "deg": ("ROS has radians",),
-        "ellipse": ("as SPLINE, of points that the client reckons", "~/run_program"),
+        "deg": ("ROS uses radians",),
+        "ellipse": ("as SPLINE, with points computed by the client", "~/run_program"),
         "hand_guide": ("~/guide", "~/teach", "~/run_program"),
         "hold": ("~/run_program",),
         "lin": ("~/move_pose", "~/command/lin", "~/run_program"),
@@ -189,7 +196,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "CartesianImpedance": ("~/mode/cartesian_impedance",),
         "JointImpedance": ("~/mode/joint_impedance",),
         "Position": ("~/mode/position",),
-        "yielding": ("~/guide", "~/teach", "~/mode/cartesian_impedance"),
+        "compliance": ("~/guide", "~/teach", "~/mode/cartesian_impedance"),
         "SineImpedance": ("~/mode/sine_impedance", "~/mode/force_pattern"),
     },
     "heptarm.when": {

@@ -1,8 +1,8 @@
-"""Writes docs/reference/ros.md: what the nodes of both ROS have, read from their sources, and what it is in Python.
+"""Writes docs/reference/ros.md: the interface of both nodes, read from their sources, and its counterparts in Python.
 
     .venv/bin/python scripts/ros_table.py [--check]
 
-Nothing of ROS is imported: a declaration is a message type beside a name, in a call or in a table.
+It imports nothing of ROS: a declaration is a message type next to a name, in a call or in a table.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ sys.path[:0] = [str(ROOT / "src"), str(ROOT)]
 import heptarm  # noqa: E402
 from heptarm import modes, when  # noqa: E402
 from heptarm.arm.arm import Arm  # noqa: E402
-from heptarm.arm.fri import Fri  # noqa: E402
-from heptarm.arm.handle import MotionHandle  # noqa: E402
-from heptarm.arm.io import Io  # noqa: E402
-from heptarm.arm.operator import Operator  # noqa: E402
-from heptarm.arm.pad import Pad  # noqa: E402
-from heptarm.arm.servo import JointServo, PoseServo  # noqa: E402
-from heptarm.bridge.actions import ACTIONS  # noqa: E402
-from heptarm.bridge.names import PRESETS  # noqa: E402
-from heptarm.bridge.parameters import PARAMETERS, Parameter, of_joints  # noqa: E402
-from heptarm.bridge.services import SERVICES  # noqa: E402
-from heptarm.bridge.topics import TOPICS  # noqa: E402
+from heptarm.arm.devices.io import Io  # noqa: E402
+from heptarm.arm.devices.operator import Operator  # noqa: E402
+from heptarm.arm.devices.smartpad import Pad  # noqa: E402
+from heptarm.arm.fri.session import Fri  # noqa: E402
+from heptarm.arm.motion.handle import MotionHandle  # noqa: E402
+from heptarm.arm.motion.servo import JointServo, PoseServo  # noqa: E402
+from heptarm.ros.interface.actions import ACTIONS  # noqa: E402
+from heptarm.ros.interface.names import PRESETS  # noqa: E402
+from heptarm.ros.interface.services import SERVICES  # noqa: E402
+from heptarm.ros.interface.topics import TOPICS  # noqa: E402
+from heptarm.ros.node.parameters import PARAMETERS, Parameter, joint_parameters  # noqa: E402
 from scripts.ros_api import API, LIFE  # noqa: E402
 
 PAGE = ROOT / "docs" / "reference" / "ros.md"
@@ -40,10 +40,10 @@ SOURCES = {
     "ROS 2": ROOT / "ros2" / "heptarm_ros2" / "heptarm_ros2",
     "ROS 1": ROOT / "ros1" / "heptarm_ros1" / "src" / "heptarm_ros1",
 }
-#: Modules of other nodes, and other drivers' names, which have a table of their own.
-OTHERS = ("reach.py", "peers.py")
+#: Modules of other nodes, and of other drivers' names, which have their own table.
+OTHERS = ("reach.py", "presets.py")
 KINDS = ("publishes", "subscribes", "service", "action")
-#: The life cycle of ROS 2 is rclpy's; in ROS 1 it is a handful of services.
+#: The life cycle of ROS 2 is that of rclpy; in ROS 1 it consists of services.
 STEPS = {
     "~configure": "change_state",
     "~activate": "change_state",
@@ -51,7 +51,7 @@ STEPS = {
     "~cleanup": "change_state",
     "~reload": "set_parameters",
 }
-#: Where the members of a part of the API are looked up.
+#: Classes and modules of each part of the API.
 PARTS: dict[str, tuple[object, ...]] = {
     "arm": (Arm,),
     "arm.io": (Io,),
@@ -82,7 +82,7 @@ class Declared:
 
 
 def declared(folder: Path) -> dict[tuple[str, str], Declared]:
-    """Everything that the sources in a folder declare, by kind and name."""
+    """Collect everything that the sources in a folder declare, by kind and name."""
     found = {}
     for path in sorted(folder.glob("*.py")):
         if path.name not in OTHERS:
@@ -92,16 +92,16 @@ def declared(folder: Path) -> dict[tuple[str, str], Declared]:
 
 
 def _of(tree: ast.Module) -> Iterator[Declared]:
-    types = {}  # of ROS: how they are called here, where they come from
+    types = {}  # of ROS: local name to kind and full name
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module:
-            if node.module == "heptarm.bridge.services":
+            if node.module == "heptarm.ros.interface.services":
                 for row in SERVICES:
                     yield Declared(row.name, "service", row.type)
-            if node.module == "heptarm.bridge.topics":
+            if node.module == "heptarm.ros.interface.topics":
                 for topic in TOPICS:
                     yield Declared(topic.name, "subscribes", topic.type)
-            if node.module == "heptarm.bridge.actions":
+            if node.module == "heptarm.ros.interface.actions":
                 for action in ACTIONS:
                     yield Declared(action.name, "action", action.type)
             package, _, kind = node.module.partition(".")
@@ -150,17 +150,17 @@ def _name(text: str) -> str:
 
 
 def ros1(name: str) -> str:
-    """A name of ROS 2 as ROS 1 writes it."""
+    """Convert a name of ROS 2 to the notation of ROS 1."""
     return f"~{name[2:]}" if name.startswith("~/") else name
 
 
 def members(part: str) -> list[str]:
-    """Public members of a part of the API; of a module those that one calls or compares."""
+    """List the public members of a part of the API; of a module its functions and values."""
     found: set[str] = set()
     for owner in PARTS[part]:
         if inspect.ismodule(owner):
             every = {name: getattr(owner, name) for name in owner.__all__}
-            plain = part != "heptarm"  # there, classes are values and errors
+            plain = part != "heptarm"  # its classes are values and errors
             found |= {name for name, one in every.items() if not name.startswith("_") and _counts(one, plain)}
         else:
             found |= {name for name, _ in inspect.getmembers(owner) if not name.startswith("_")}
@@ -168,13 +168,13 @@ def members(part: str) -> list[str]:
 
 
 def _counts(one: object, plain: bool) -> bool:
-    if plain:  # a union of types, and the base of conditions, are no things of their own
+    if plain:  # neither a union of types nor the base of conditions counts
         return not isinstance(one, types.UnionType) and one is not when.Condition
     return inspect.isfunction(one)
 
 
 def in_ros(entry: tuple[str, ...], ros: str) -> str:
-    """What a member is in one of both, in words."""
+    """Describe the counterpart of a member in one ROS."""
     return ", ".join(_words(one, ros) for one in entry)
 
 
@@ -187,7 +187,7 @@ def _words(one: str, ros: str) -> str:
 
 
 def names_of(entry: tuple[str, ...]) -> list[str]:
-    """The names of the nodes in an entry."""
+    """List the names of the interface in an entry."""
     return [one for one in entry if " " not in one]
 
 
@@ -204,16 +204,15 @@ def _default(one: Parameter) -> str:
 
 
 def page() -> str:
-    """The page's text."""
+    """Make the text of the page."""
     tables = {ros: declared(folder) for ros, folder in SOURCES.items()}
     lines = [
         "# ROS: topics, services, actions, parameters",
         "",
-        "Made by `scripts/ros_table.py` from the sources of both nodes. `~/` stands for the node's own name,",
-        "`/heptarm` unless it is given another; ROS 1 writes `~pose` where ROS 2 writes `~/pose`, and slashes for the",
-        "dots of parameters.",
+        "`scripts/ros_table.py` generates this page from the sources of both nodes. `~/` stands for the node's name,",
+        "by default `/heptarm`; ROS 1 writes `~pose` for `~/pose`, and slashes instead of dots in names of parameters.",
         "",
-        "## What the nodes have",
+        "## Topics, services and actions",
         "",
         "| name | what | type | ROS 2 | ROS 1 |",
         "|---|---|---|---|---|",
@@ -230,7 +229,7 @@ def page() -> str:
         "",
         "## From Python to ROS",
         "",
-        "What the public members of the Python API are in ROS. Where there is nothing, the table says why.",
+        "ROS counterparts of the public members of the Python API. Where there is none, the table gives the reason.",
         "",
         "| Python | ROS 2 | ROS 1 |",
         "|---|---|---|",
@@ -242,12 +241,12 @@ def page() -> str:
         "",
         "## Parameters",
         "",
-        "The same in both. Those marked *live* count at once, the others when the node is configured the next time.",
+        "The same in both. Changes of those marked *live* apply immediately, others with the next configuration.",
         "",
-        "| name | default | legal | meaning |",
+        "| name | default | allowed | meaning |",
         "|---|---|---|---|",
     ]
-    for one_parameter in (*PARAMETERS, *of_joints(["<joint>"])):
+    for one_parameter in (*PARAMETERS, *joint_parameters(["<joint>"])):
         live = "" if one_parameter.fixed else " *Live.*"
         text = one_parameter.text[0].upper() + one_parameter.text[1:]
         lines.append(
@@ -257,13 +256,13 @@ def page() -> str:
         "",
         "## Names of other drivers",
         "",
-        "With the parameter `names`, the node has these, too, relative to its namespace; see",
+        "With the parameter `names`, the node also offers these names, relative to its namespace; see",
         "[Coming from other drivers](../guide/migration.md).",
         "",
         "| `names` | name | type | heptarm's own |",
         "|---|---|---|---|",
         *(
-            f"| `{preset}` | `{entry.name}` | `{entry.type}` | `{entry.ours}` |"
+            f"| `{preset}` | `{entry.name}` | `{entry.type}` | `{entry.native}` |"
             for preset, names in PRESETS.items()
             for entry in names.entries
         ),
@@ -273,7 +272,7 @@ def page() -> str:
 
 
 def main() -> int:
-    """Writes the page, or says whether it is what would be written."""
+    """Write the page, or check that it is up to date."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument(
         "--check", action="store_true", help="write nothing; fail if the page is not up to date"
