@@ -1,0 +1,22 @@
+"""Ctrl-C in tests, also where the tests run in the background.
+
+A shell starts a background job (`make test &`) with SIGINT ignored; Python then installs no handler, and every
+process that a test starts inherits that. Tests restore it where they mean Ctrl-C, and nowhere else: a Ctrl-C at the
+terminal is not for a background job.
+"""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def ctrl_c_interrupts() -> Iterator[None]:
+    """Let SIGINT raise KeyboardInterrupt here, and end the processes that are started meanwhile."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a handler becomes the default on exec
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)

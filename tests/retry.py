@@ -1,0 +1,115 @@
+"""Tries again where this machine was too busy: a plugin of pytest, and the one helper for all tests.
+
+FRI answers that come late and servo targets that do not come are faults that heptarm has to report, and on a machine
+that is busy with something else it is right to. Such a test says nothing about heptarm; it runs again. Each such case
+names its cause and is counted over the whole run with all its workers. More than a few mean that this machine is not
+what the tests take it for: then nothing is tried again any more, and the run fails. A check that fails is never tried
+again.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TypeVar
+
+import pytest
+
+T = TypeVar("T")
+
+#: So often in a run at most.
+LIMIT = 8
+#: And so often in a row.
+IN_A_ROW = 2
+#: Whatever keeps the machine busy may end meanwhile [s].
+PAUSE = 1.0
+
+_FILE = "RETRIES_OF_HEPTARM"
+_log = logging.getLogger(__name__)
+
+
+def retry(attempt: Callable[[], T], cause: Callable[[T | Exception], str]) -> T:
+    """Return what an attempt returns.
+
+    Args:
+        attempt: what may need a machine that has time.
+        cause: names what this machine was too busy for, given what the attempt returned or raised; "": the outcome
+            stands.
+    """
+    for left in range(IN_A_ROW, -1, -1):
+        try:
+            outcome = attempt()
+        except AssertionError:
+            raise
+        except Exception as error:
+            if not _again(cause(error), left):
+                raise
+        else:
+            if not _again(cause(outcome), left):
+                return outcome
+        time.sleep(PAUSE)
+    raise RuntimeError("the last attempt is never followed by another one")
+
+
+def answers_late(outcome: object) -> str:
+    """The cause of a program or a call that was told that FRI answers came late from this machine."""
+    said = str(outcome.stderr) if isinstance(outcome, subprocess.CompletedProcess) else str(outcome)
+    hint = str(getattr(outcome, "hint", ""))  # of an error of heptarm
+    failed = not isinstance(outcome, subprocess.CompletedProcess) or outcome.returncode != 0
+    return "FRI answers came late" if failed and "this machine answers late" in said + hint else ""
+
+
+def starved(outcome: object) -> str:
+    """The cause of a program or a call whose servo targets came too late."""
+    if isinstance(outcome, subprocess.CompletedProcess):
+        return "servo targets came late" if "want of targets" in outcome.stderr else ""
+    return "servo targets came late" if type(outcome).__name__ == "Starved" else ""
+
+
+def _again(cause: str, left: int) -> bool:
+    if not cause or not left:
+        return False
+    test = os.environ.get("PYTEST_CURRENT_TEST", "").removesuffix(" (call)")
+    _log.warning("tried again, because this machine was too busy: %s", cause)
+    file = Path(os.environ[_FILE])
+    with file.open("a") as lines:
+        lines.write(f"{test}: {cause}\n")
+    return len(_cases()) <= LIMIT
+
+
+def _cases() -> list[str]:
+    return Path(os.environ[_FILE]).read_text().splitlines()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Begin to count; workers of pytest-xdist count with the process that has started them."""
+    if not hasattr(config, "workerinput"):
+        descriptor, os.environ[_FILE] = tempfile.mkstemp(prefix="retries-of-heptarm-")
+        os.close(descriptor)
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Forget the count."""
+    if not hasattr(config, "workerinput"):
+        Path(os.environ.pop(_FILE)).unlink(missing_ok=True)
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Fail the run if too much was tried again."""
+    if not hasattr(session.config, "workerinput") and len(_cases()) > LIMIT:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Name every case."""
+    cases = _cases()
+    for case in cases:
+        terminalreporter.write_line(f"tried again on a busy machine: {case}", yellow=True)
+    if len(cases) > LIMIT:
+        why = f"{len(cases)} were to be tried again, of {LIMIT} at most: this machine is too busy for these tests"
+        terminalreporter.write_line(why, red=True)
