@@ -10,14 +10,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.connection import Connection
-from heptarm.arm.options import Options
+from heptarm.arm.link.connection import Connection, Options
 from heptarm.errors import ConnectionLost
 from heptarm.io.clock import RealClock
-from heptarm.io.memory import MemoryTransport, memory_pair
+from heptarm.io.transport import MemoryTransport, memory_pair
 from heptarm.wire import messages as wire
 from heptarm.wire.session import Received, Session, Side
-from heptarm.wire.transitions import SessionState
+from heptarm.wire.states import SessionState
 from tests.wire.pairs import ROBOT, welcome
 
 Reply = wire.Message | Callable[["Served", int], None]

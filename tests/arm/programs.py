@@ -8,10 +8,11 @@ import textwrap
 from pathlib import Path
 from typing import IO
 
+from tests.interrupts import ctrl_c_interrupts
+
 PROGRAM = """
-    import signal, sys, heptarm as ha
+    import sys, heptarm as ha
     from heptarm import deg, ptp
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
     arm = ha.connect(sys.argv[1], name="script", on_disconnect=sys.argv[2], watchdog=float(sys.argv[3]))
     arm.move(ptp(deg(0, 30, 0, -90, 0, 60, 0)))
     handle = arm.start(ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.2))
@@ -32,12 +33,9 @@ def script(
     """A program of its own in the middle of a motion, and what it said."""
     file = tmp_path / "program.py"
     file.write_text(textwrap.dedent(PROGRAM))
-    process = subprocess.Popen(
-        [sys.executable, str(file), target, on_disconnect, str(watchdog)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    command = [sys.executable, str(file), target, on_disconnect, str(watchdog)]
+    with ctrl_c_interrupts():
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     return process, line(process.stdout)
 
 

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.arm.conditions import condition_message, find_signal
-from heptarm.modes import CartesianImpedance
-from heptarm.when import force, io, path, torque
+from heptarm.arm.translate.conditions import condition_message
+from heptarm.values.condition.signals import force, io, path, torque
+from heptarm.values.io import Signal, find_signal
+from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.wire import messages as wire
 
 TOUCH = force(frame="base").along("z") > 10
 TABLE = 0.3
 SIGNALS = tuple(
-    wire.SignalInfo(name=name, direction=wire.IoDirection.INPUT, type=wire.IoType.BOOLEAN, low=0, high=1)
+    Signal(name, is_output=False, kind="boolean")
     for name in ("MediaFlange.UserButton", "MediaFlange.InputX3Pin3", "Cell.Button", "Line.Button")
 )
 
@@ -88,7 +89,7 @@ def test_what_makes_no_sense_is_refused(arm: ha.Arm) -> None:
         pass
     with pytest.raises(ha.CommandRejected, match="nowhere"):
         arm.move(ha.hold(1.0), until=force(frame="nowhere") > 10)
-    with pytest.raises(ha.ShapeError, match="condition is wanted"):
+    with pytest.raises(ha.ShapeError, match="must be a condition"):
         arm.move(ha.hold(1.0), until=5.0)  # type: ignore[arg-type]
     with pytest.raises(ha.CommandRejected, match="no signal"):
         arm.move(ha.hold(1.0), until=io.no_such_thing)

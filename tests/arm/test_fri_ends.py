@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 import heptarm as ha
-from heptarm.fri import SessionState
+from heptarm.fri.protocol.messages import SessionState
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.arm.peer import Peer, Served
-from tests.rt.controller import Controller
+from tests.fri_loop.controller import Controller
 
 OFFERED = ("hold", "fri", "fri_monitor", "fri_position")
 States = wire.FriSessionState

@@ -58,7 +58,7 @@ def test_inputs_are_read_and_outputs_written_in_the_loop(arm: ha.Arm) -> None:
         for name, value, words in (
             ("user_button", True, "is an input of the cabinet"),
             ("LEDRed", True, "no signal 'LEDRed' in this FRI session"),
-            ("LEDBlue", 2, "is boolean"),
+            ("LEDBlue", 2, r"\(boolean\) must be"),
         ):
             with pytest.raises(ha.CommandRejected, match=words):
                 rt.output(name, value)
@@ -92,8 +92,8 @@ def test_a_monitor_carries_signals_without_any_motion(arm: ha.Arm) -> None:
 @pytest.mark.parametrize(
     ("names", "words", "code"),
     [
-        (["Cell.Door"], "no signal .?Cell.Door", Code.UNKNOWN_NAME),
-        ([LAMP, LAMP], "is named twice", Code.UNKNOWN_NAME),
+        (["Cell.Door"], "(unknown|no) signal .?Cell.Door", Code.UNKNOWN_NAME),
+        ([LAMP, LAMP], "MediaFlange.* twice", Code.UNKNOWN_NAME),
         ([f"x{i}" for i in range(11)], "x0", None),
         ("LEDBlue", "a list of names", None),
     ],

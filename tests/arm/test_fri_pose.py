@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import AbstractContextManager, nullcontext
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -10,14 +11,16 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.arm.fri import Fri
-from heptarm.arm.fri_settings import Request
-from heptarm.fri import Missing, Policy
-from heptarm.fri.messages import CommandMode
-from heptarm.fri.version import Version
-from heptarm.rt import Client
+from heptarm.arm.fri.session import Fri
+from heptarm.arm.fri.settings import FriRequest
+from heptarm.arm.motion.handle import MotionHandle
+from heptarm.arm.translate.state import read_result
+from heptarm.fri.guard.fallback import Missing, Policy
+from heptarm.fri.loop.client import Client
+from heptarm.fri.protocol.messages import CommandMode
+from heptarm.fri.protocol.version import Version
 from heptarm.wire import messages as wire
-from tests.rt.controller import Controller
+from tests.fri_loop.controller import Controller
 
 
 class Cabinet:
@@ -27,18 +30,42 @@ class Cabinet:
         self.controller: Controller | None = None
         self.link = SimpleNamespace(peer="127.0.0.1:30000")
         self.clock = SimpleNamespace(nanos=time.monotonic_ns, sleep=time.sleep)
-        self.handle = SimpleNamespace(id=7, done=False, wait=lambda timeout: None)
 
-    def run(self, message: wire.FriOpen, programs: int, timeout: float) -> object:
+    def check_may_wait(self, call: str) -> None:
+        """Nothing waits in a callback here."""
+
+    def enter_block(self, program: object, what: str) -> None:
+        """No other block is open here."""
+
+    def leave_block(self, program: object) -> None:
+        """No other block is open here."""
+
+    def run(self, message: wire.FriOpen, program: MotionHandle) -> None:
         self.controller = Controller(message.port, wire=Version.V2_5, mode=CommandMode.CARTESIAN_POSE)
         self.running = self.controller.running()
         self.running.__enter__()
         self.controller.active()
-        return self.handle
+        self.program = program
+        program.on_accepted(7)
 
     def request(self, message: wire.FriClose) -> None:
-        self.handle.done = True
+        end = wire.MotionFinished(
+            id=message.session,
+            cause=wire.Cause.CANCELLED,
+            item=0,
+            residual=0.0,
+            duration=0.0,
+            q=(0.0,) * 7,
+            code=0,
+        )
+        self.program.on_event(end)
         self.running.__exit__(None, None, None)
+
+    def result_of(self, message: wire.MotionFinished) -> ha.Result:
+        return read_result(message, None)
+
+    def stopping_on_interrupt(self) -> AbstractContextManager[None]:
+        return nullcontext()
 
 
 def test_a_session_of_kind_pose_takes_poses_and_nothing_else() -> None:
@@ -51,7 +78,7 @@ def test_a_session_of_kind_pose_takes_poses_and_nothing_else() -> None:
         timeout=10.0,
     )
     keep = Policy(Missing.HOLD)
-    request = Request("pose", message, lambda: Client(0, realtime=False, policy=keep), has_law=False)
+    request = FriRequest("pose", message, lambda: Client(0, realtime=False, policy=keep), has_law=False)
     with Fri(cast(Any, Cabinet()), request) as rt:
         goal = ha.Pose.at(0.0, 0.0, 0.01) @ rt.start.pose
         with pytest.raises(ha.ModeConflict, match=r'q is not commanded .* "pose"') as refused:

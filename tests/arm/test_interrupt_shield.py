@@ -8,67 +8,67 @@ from collections.abc import Iterator
 
 import pytest
 
-from heptarm.arm.shield import Shield
+from heptarm.arm.link.link import InterruptShield
+from tests.interrupts import ctrl_c_interrupts
 
 
 @pytest.fixture(autouse=True)
 def handler() -> Iterator[None]:
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
+    with ctrl_c_interrupts():
+        yield
 
 
 def test_it_is_held_back_and_comes_through() -> None:
-    shield = Shield()
+    shield = InterruptShield()
     signal.raise_signal(signal.SIGINT)
     assert shield.pending
     with pytest.raises(KeyboardInterrupt):
-        shield.down()
+        shield.release()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    shield.down()
+    shield.release()
 
 
 def test_nothing_comes_of_nothing() -> None:
-    shield = Shield()
-    shield.down()
+    shield = InterruptShield()
+    shield.release()
     assert not shield.pending
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_shields_may_be_nested() -> None:
-    outer = Shield()
-    inner = Shield()
+    outer = InterruptShield()
+    inner = InterruptShield()
     signal.raise_signal(signal.SIGINT)
-    inner.down()
+    inner.release()
     assert outer.pending
     with pytest.raises(KeyboardInterrupt):
-        outer.down()
+        outer.release()
 
 
 def test_the_programs_own_handler_hears_of_it() -> None:
     heard: list[int] = []
     signal.signal(signal.SIGINT, lambda number, _: heard.append(number))
-    shield = Shield()
+    shield = InterruptShield()
     signal.raise_signal(signal.SIGINT)
     assert not heard
-    shield.down()
+    shield.release()
     assert heard == [signal.SIGINT]
 
 
 def test_an_ignored_signal_stays_ignored() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    shield = Shield()
+    shield = InterruptShield()
     assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
-    shield.down()
+    shield.release()
 
 
 def test_other_threads_are_left_alone() -> None:
     seen: list[object] = []
 
     def work() -> None:
-        shield = Shield()
+        shield = InterruptShield()
         seen.append(signal.getsignal(signal.SIGINT))
-        shield.down()
+        shield.release()
 
     thread = threading.Thread(target=work)
     thread.start()

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 import heptarm as ha
-from heptarm.when import io
+from heptarm.values.condition.signals import io
 
 WORLD = (
     "MediaFlange.UserButton<bool MediaFlange.InputX3Pin3<bool MediaFlange.OutputX3Pin11>bool MediaFlange.LEDBlue>bool "
@@ -86,7 +86,7 @@ def test_what_cannot_be_written_is_refused(arm: ha.Arm) -> None:
             arm.io.set({"OutputX3Pin11": True, name: value})  # type: ignore[dict-item]
     with pytest.raises(ha.ShapeError):
         arm.io.set({})
-    with pytest.raises(ha.CommandRejected, match="cannot be 'green'"):
+    with pytest.raises(ha.CommandRejected, match="led must be one of .*got 'green'"):
         arm.io.led = "green"
 
 
@@ -154,5 +154,5 @@ def test_process_data_keep_their_types(arm: ha.Arm) -> None:
         with pytest.raises(kind):
             arm.pad.set_process_data(name, value)
     assert arm.pad.process_data("cell.count") == "5"
-    with pytest.raises(ha.CommandRejected, match="nobody"):
+    with pytest.raises(ha.CommandRejected, match="cannot be read"):
         arm.pad.process_data("heptarm.key")

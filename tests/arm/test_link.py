@@ -12,6 +12,7 @@ import heptarm as ha
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.arm.peer import Peer
+from tests.interrupts import ctrl_c_interrupts
 
 HOME = ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0))
 
@@ -59,7 +60,7 @@ def test_silence_is_noticed() -> None:
     peer = Peer(heartbeat=0.1)
     arm = peer.arm()
     peer.clients[0].is_mute = True
-    with pytest.raises(ha.ConnectionLost, match="nothing heard"):
+    with pytest.raises(ha.ConnectionLost, match="nothing received"):
         for _ in arm.states(duration=30.0):
             pass
     arm.close()
@@ -126,7 +127,7 @@ def test_an_answer_that_does_not_come(peer: Peer) -> None:
 def test_a_cabinet_that_breaks_the_protocol(peer: Peer) -> None:
     arm = peer.arm()
     peer.clients[0].transport.send(b"GET / HTTP/1.1\r\n")
-    with pytest.raises(ha.ConnectionLost, match="frame begins"):
+    with pytest.raises(ha.ConnectionLost, match="frame must begin"):
         for _ in arm.states(duration=30.0):
             pass
     arm.close()
@@ -138,8 +139,8 @@ def test_an_interrupted_request_leaves_a_sound_link(peer: Peer) -> None:
         timer = threading.Timer(
             0.1, lambda: signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
         )
-        timer.start()
-        with pytest.raises(KeyboardInterrupt):
+        with ctrl_c_interrupts(), pytest.raises(KeyboardInterrupt):
+            timer.start()
             arm.stop()
         timer.join()
         arm.stop()

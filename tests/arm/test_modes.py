@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.modes import CartesianImpedance, JointImpedance, SineImpedance
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
+from heptarm.values.mode.sine import SineImpedance
 
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
 SOFT = (500.0, 1000.0, 2000.0, 200.0, 200.0, 200.0)

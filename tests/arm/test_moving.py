@@ -13,6 +13,7 @@ import heptarm as ha
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.arm.peer import Peer, Served
+from tests.interrupts import ctrl_c_interrupts
 
 HOME = ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0))
 
@@ -236,6 +237,94 @@ def test_ctrl_c_stops_the_arm_and_goes_on(peer: Peer) -> None:
     peer.runs(1, wire.MotionStarted(id=1, item=0), lambda *_: timer.start())
     peer.expect(wire.Stop, wire.Accepted(id=0), peer.finished(1, wire.Cause.STOPPED))
     with peer.arm() as arm:
-        with pytest.raises(KeyboardInterrupt):
+        with ctrl_c_interrupts(), pytest.raises(KeyboardInterrupt):
             arm.move(HOME, timeout=20.0)
         timer.join()
+
+
+# ----------------------------------------------------------------------- what a program is told
+
+
+def test_a_handle_that_failed_says_why_and_its_callback_receives_it(peer: Peer) -> None:
+    peer.runs(1, later(0.05, peer.finished(1, wire.Cause.SAFETY, code=int(Code.SAFETY_STOP))))
+    peer.runs(2, peer.finished(2))
+    seen: list[ha.HeptarmError | None] = []
+    done = threading.Event()
+    with peer.arm() as arm:
+        handle = arm.start(HOME)
+        handle.add_done_callback(lambda one: (seen.append(one.error), done.set()))
+        with pytest.raises(ha.MotionAborted) as raised:
+            handle.wait(timeout=20.0)
+        assert done.wait(20.0)
+        assert seen == [raised.value] == [handle.error]
+        assert handle.result is None and "failed" in repr(handle)
+        good = arm.start(HOME)
+        good.wait(timeout=20.0)
+        assert good.error is None and good.result is not None
+
+
+@pytest.mark.parametrize("wrong", [float("nan"), -1.0, "5", True, float("inf")])
+def test_a_wrong_timeout_is_refused_before_anything_is_sent(peer: Peer, wrong: object) -> None:
+    with peer.arm() as arm:
+        before = len(peer.seen)
+        calls = (
+            lambda: arm.move(HOME, timeout=wrong),  # type: ignore[arg-type]
+            lambda: arm.wait_until(lambda _: True, timeout=wrong),  # type: ignore[arg-type]
+            lambda: arm.wait_for_rest(timeout=wrong),  # type: ignore[arg-type]
+            lambda: arm.servo(goal_timeout=wrong),  # type: ignore[arg-type]
+            lambda: arm.servo(speed_timeout=wrong),  # type: ignore[arg-type]
+        )
+        for call in calls:
+            with pytest.raises(ha.CommandRejected, match="timeout must be"):
+                call()
+        assert not [one for one in peer.seen[before:] if not isinstance(one, wire.Pong)]
+
+
+@pytest.mark.parametrize("wrong", [float("nan"), -1.0, "5", True, float("inf")])
+def test_a_handle_refuses_a_wrong_timeout(peer: Peer, wrong: object) -> None:
+    peer.runs(1, later(0.1, peer.finished(1)))
+    with peer.arm() as arm:
+        handle = arm.start(HOME)
+        for call in (handle.wait, lambda timeout: list(handle.events(timeout=timeout))):
+            with pytest.raises(ha.CommandRejected, match="timeout must be"):
+                call(timeout=wrong)  # type: ignore[arg-type]
+        handle.wait(timeout=20.0)
+
+
+def test_after_a_move_the_states_show_rest(peer: Peer) -> None:
+    peer.dq, peer.motion = (0.5,) * 7, 1
+
+    def rest() -> None:
+        peer.dq, peer.motion = (0.0,) * 7, 0
+
+    timer = threading.Timer(0.15, rest)
+    peer.runs(1, peer.finished(1), check=lambda _: timer.start())
+    with peer.arm() as arm:
+        result = arm.move(HOME)
+        timer.join()
+        assert not arm.state.motion.active and not arm.state.dq.any()
+        assert result.state is not None and not result.state.dq.any()
+
+
+def test_a_move_does_not_wait_for_an_arm_that_never_rests(peer: Peer) -> None:
+    peer.runs(1, peer.finished(1))
+    with peer.arm() as arm:
+        peer.dq = (0.5,) * 7
+        result = arm.move(HOME)
+        assert result.arrived and result.state is not None and result.state.dq.any()
+        peer.dq = (0.0,) * 7
+
+
+def test_the_first_state_has_velocities(peer: Peer) -> None:
+    count = 0
+    whole = peer.state
+
+    def states() -> wire.State:
+        nonlocal count
+        count += 1
+        peer.dq = (np.nan if count == 1 else 0.0,) * 7
+        return whole()
+
+    peer.state = states  # type: ignore[method-assign]
+    with peer.arm(rate=20.0) as arm:
+        assert np.isfinite(arm.state.dq).all()

@@ -26,7 +26,7 @@ def test_the_names_of_fri_are_there_without_a_socket() -> None:
         assert name in dir(fri)
     with pytest.raises(AttributeError, match="nothing"):
         _ = fri.nothing
-    code = "import sys, heptarm.fri.session; assert not {'socket', 'heptarm.rt'} & set(sys.modules)"
+    code = "import sys, heptarm.fri.session.session; assert not {'socket', 'heptarm.fri.loop'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], timeout=60, check=True)
 
 
@@ -35,7 +35,7 @@ def test_importing_costs_nothing_and_connecting_needs_no_simulator() -> None:
         "import sys, heptarm\n"
         "assert 'numpy' not in sys.modules\n"
         "heptarm.connect, heptarm.ptp\n"
-        "bad = [m for m in sys.modules if m.startswith(('heptarm.virtual', 'mujoco', 'jpype', 'ruckig'))]\n"
+        "bad = [m for m in sys.modules if m.startswith(('heptarm.sim', 'mujoco', 'jpype', 'ruckig'))]\n"
         "assert not bad, bad\n"
     )
     done = subprocess.run(

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm import Arm, Pose, deg
-from heptarm.arm.feed import States
+from heptarm import Arm
+from heptarm.arm.link.state_stream import States
 from heptarm.values.arrays import Array
+from heptarm.values.pose import Pose, deg
 
 HOME = deg(0, 30, 0, -90, 0, 60, 0)
 SPEED = 0.2

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm import deg, ptp
+from heptarm.values.motion.ptp import ptp
+from heptarm.values.pose import deg
 from tests.arm.programs import end, script
 
 HOME = deg(0, 30, 0, -90, 0, 60, 0)

@@ -10,10 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import heptarm as ha
-from heptarm import Pose, deg, hold, lin, lin_rel, ptp
-from heptarm.arm.program import is_endless, items, listed, longest
-from heptarm.model.inverse import redundancy
-from heptarm.values.motion import Motion
+from heptarm.arm.motion.program import is_endless, listed, longest
+from heptarm.arm.translate.motions import items
+from heptarm.model.inverse_kinematics import redundancy
+from heptarm.values.motion.line import lin, lin_rel
+from heptarm.values.motion.motion import Motion, hold
+from heptarm.values.motion.ptp import ptp
+from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import robot
 from heptarm.wire import messages as wire
 

@@ -7,10 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from heptarm import Arm, State, connect, deg, hold, ptp
-from heptarm.model.inverse import redundancy
+from heptarm import Arm, State, connect
+from heptarm.model.inverse_kinematics import redundancy
 from heptarm.model.kinematics import jacobian
 from heptarm.values.arrays import Array
+from heptarm.values.motion.motion import hold
+from heptarm.values.motion.ptp import ptp
+from heptarm.values.pose import deg
+from heptarm.values.state import GROUP_NAMES
 from tests.conftest import RunningCabinet
 
 #: Inaccuracy of a simulated torque sensor [Nm].
@@ -63,19 +67,11 @@ def test_redundancy_is_that_of_the_joints(arm: Arm) -> None:
 
 def test_each_group_has_its_own_stamp(arm: Arm) -> None:
     state = settled(arm)
-    groups = (
-        state.joints,
-        state.torques,
-        state.cartesian,
-        state.external,
-        state.motion,
-        state.status,
-        state.control,
-    )
+    groups = [getattr(state.groups, name) for name in GROUP_NAMES if name != "io"]
     stamps = [group.stamp for group in groups if group is not None]
     assert len(stamps) == len(groups)
     assert max(stamps) == state.stamp
     later = settled(arm)
-    assert later.control is not None
-    assert state.control is not None
-    assert later.control.stamp > state.control.stamp
+    assert later.groups.mode is not None
+    assert state.groups.mode is not None
+    assert later.groups.mode.stamp > state.groups.mode.stamp

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import heptarm as ha
-from heptarm.values.mode import JointImpedance
+from heptarm.values.mode.impedance import JointImpedance
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.arm.peer import Peer
@@ -39,7 +39,7 @@ def test_a_cabinet_that_cannot_recover_says_so(peer: Peer) -> None:
 def test_another_ones_control_is_left_to_people(peer: Peer) -> None:
     taken = wire.Rejected(code=Code.CONTROL_TAKEN, text="eve (session 7) controls this robot")
     with peer.arm() as arm:
-        arm._connection.controls = False
+        arm._connection.in_control = False
         arm._connection.controller = "eve"
         peer.expect(wire.TakeControl, taken)
         assert arm.recover().remaining == ("let eve release control",)
@@ -59,7 +59,7 @@ def test_a_stiff_arm_that_ends_short_of_its_target_has_not_arrived(peer: Peer) -
     with peer.arm() as arm, pytest.raises(ha.ArrivalError, match=r"5\.7 deg short") as short:
         arm.move(HOME)
     assert short.value.cause is ha.Cause.FINISHED and short.value.value == 0.1
-    assert "holds the arm" in short.value.hint
+    assert "blocks the arm" in short.value.hint
 
 
 def test_a_soft_arm_may_yield(peer: Peer) -> None:

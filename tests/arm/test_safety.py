@@ -10,7 +10,11 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm import Arm, deg, hold, lin_rel, ptp
+from heptarm import Arm
+from heptarm.values.motion.line import lin_rel
+from heptarm.values.motion.motion import hold
+from heptarm.values.motion.ptp import ptp
+from heptarm.values.pose import deg
 from heptarm.values.state import OperationMode
 from tests.conftest import RunningCabinet
 
@@ -55,7 +59,7 @@ def under_way(arm: Arm, handle: ha.MotionHandle) -> ha.MotionHandle:
         ("emergency_stop", "emergency stop", "release the emergency stop"),
         ("external_emergency_stop", "emergency stop", "release the emergency stop"),
         ("operator_safety", "safeguard", "close the safeguard"),
-        ("protective_stop", "safety function", "remove what the safety stop was for"),
+        ("protective_stop", "safety function", "remove the cause of the safety stop"),
     ],
 )
 def test_a_stop_ends_what_runs_and_waits(safe: Arm, fault: str, says: str, step: str) -> None:

@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.modes import JointImpedance, Position
+from heptarm.values.condition.signals import force
+from heptarm.values.mode.impedance import JointImpedance
+from heptarm.values.mode.mode import Position
 from tests.conftest import RunningCabinet
 
 A7 = np.array([0, 0, 0, 0, 0, 0, 1.0])
@@ -63,7 +65,9 @@ def test_poses_are_followed_and_one_out_of_reach_is_refused_but_told_of(arm: ha.
         while sv.tick() and sv.t < 20.0 and arm.state.pose.distance_to(goal) > 1e-3:
             sv.set(goal)
         assert arm.state.pose.distance_to(goal) < 1e-3
-        while sv.tick() and sv.t < 20.0 and sv.stats.refused == 0:  # of two that come together the newer counts
+        while (
+            sv.tick() and sv.t < 20.0 and sv.stats.refused == 0
+        ):  # of two that come together the newer counts
             sv.set(ha.Pose.of([3.0, 0, 0], start.quat))
         sv.set(goal)
     assert sv.stats.refused > 0 and "not reachable" in sv.stats.text
@@ -124,7 +128,7 @@ def test_bad_settings_are_refused_before_anything_is_sent(arm: ha.Arm, settings:
 
 def test_a_loop_that_hangs_ends_in_a_stop_and_an_error_that_says_so(arm: ha.Arm) -> None:
     with (
-        pytest.raises(ha.Starved, match="no target came within 60 ms"),
+        pytest.raises(ha.Starved, match="no target arrived within 60 ms"),
         arm.servo("joint", watchdog=0.06, speed=0.5) as sv,
     ):
         sv.set(sv.start.q + 0.5 * A7)
@@ -183,7 +187,7 @@ def test_an_impedance_servo_is_soft_and_its_stiffness_can_change(arm: ha.Arm) ->
         sv.set(sv.start.q)
         sv.change(JointImpedance(600.0, damping=1.0))
         sv.set(sv.start.q)
-        with pytest.raises(ha.ModeConflict, match="keeps the kind"):
+        with pytest.raises(ha.ModeConflict, match="cannot change the kind"):
             sv.change(Position())
     assert sv.stats.refused == 0
 
@@ -231,3 +235,19 @@ def test_a_killed_program_leaves_an_arm_at_rest(cabinet: RunningCabinet) -> None
     child.stdout.close()
     with ha.connect(cabinet.target, control=False) as watching:
         watching.wait_for_rest(timeout=20.0)
+
+
+def test_a_move_inside_the_block_is_refused_at_once_and_the_stream_goes_on(arm: ha.Arm) -> None:
+    home = arm.state.q
+    with arm.servo("joint", rate=50, watchdog=2.0) as sv:
+        sv.set(sv.start.q)
+        began = sv.t
+        with pytest.raises(ha.ModeConflict, match=r"inside the block of arm.servo\(\).*leave the with block"):
+            arm.move(ha.ptp(home))
+        assert sv.t - began < 0.1 and sv.active
+        sv.set(sv.start.q)
+    assert sv.result is not None and sv.result.cause is ha.Cause.CANCELLED
+    with arm.servo("joint", watchdog=2.0, until=force < 999) as sv:
+        while sv.tick():
+            sv.set(sv.start.q)
+        assert arm.move(ha.ptp(home)).arrived  # the servo motion has ended: nothing to wait for

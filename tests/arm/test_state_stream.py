@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import pytest
 
-from heptarm.arm.feed import HISTORY, Feed, Queue, Sample, States
-from heptarm.arm.reading import read_robot, read_state
+from heptarm.arm.link.state_stream import HISTORY, SampleQueue, StateFeed, States, StateSample
+from heptarm.arm.translate.state import read_robot, read_state
 from heptarm.errors import ConnectFailed, ConnectionLost, HeptarmError, RemoteProtocolError
 from heptarm.io.clock import StepClock
 from heptarm.values.state import State
-from heptarm.wire.clock_offset import ClockOffset
+from heptarm.wire.clock_sync import ClockOffset
 from heptarm.wire.messages import RobotInfo
 from tests.wire.pairs import ROBOT
 
 
 def streams(
-    feed: Feed, clock: StepClock, *, rate: float | None, duration: float | None = None, size: int = 10
+    feed: StateFeed, clock: StepClock, *, rate: float | None, duration: float | None = None, size: int = 10
 ) -> States:
     return States(
         feed,
@@ -37,15 +37,15 @@ def fresh() -> None:
 
 
 def test_history_is_bounded() -> None:
-    feed = Feed(StepClock())
+    feed = StateFeed(StepClock())
     for number in range(2 * HISTORY):
         feed.push(b"%d" % number, number)
     assert [sample.number for sample in feed.history()] == list(range(HISTORY + 1, 2 * HISTORY + 1))
-    assert feed.newest == Sample(2 * HISTORY, b"%d" % (2 * HISTORY - 1), 2 * HISTORY - 1)
+    assert feed.newest == StateSample(2 * HISTORY, b"%d" % (2 * HISTORY - 1), 2 * HISTORY - 1)
 
 
 def test_every_state_in_order() -> None:
-    clock, feed = StepClock(), Feed(StepClock())
+    clock, feed = StepClock(), StateFeed(StepClock())
     states = streams(feed, clock, rate=None)
     for number in range(5):
         feed.push(b"", number)
@@ -56,19 +56,19 @@ def test_every_state_in_order() -> None:
 
 
 def test_a_full_queue_drops_the_oldest() -> None:
-    queue = Queue(3)
+    queue = SampleQueue(3)
     for number in range(10):
-        queue.put(Sample(number, b"", 0))
+        queue.put(StateSample(number, b"", 0))
     assert queue.lost == 7
     assert [queue.get(0).number for _ in range(3)] == [7, 8, 9]  # type: ignore[union-attr]
     assert queue.get(0) is None
-    queue.put(Sample(11, b"", 0))
+    queue.put(StateSample(11, b"", 0))
     assert queue.get(0) is not None and queue.get(0) is None
 
 
 def test_a_paced_stream_skips_and_never_repeats() -> None:
     clock = StepClock()
-    feed = Feed(clock)
+    feed = StateFeed(clock)
     feed.push(b"", 0)
     states = streams(feed, clock, rate=10.0)
     assert next(states).sampled == 1
@@ -81,7 +81,7 @@ def test_a_paced_stream_skips_and_never_repeats() -> None:
 
 def test_the_end_of_a_stream() -> None:
     clock = StepClock()
-    feed = Feed(clock)
+    feed = StateFeed(clock)
     feed.push(b"", 0)
     assert len(list(streams(feed, clock, rate=10.0, duration=0.0))) == 0
     states = streams(feed, clock, rate=10.0)

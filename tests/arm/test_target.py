@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import heptarm as ha
-from heptarm.arm.target import Target, parse_target
+from heptarm.arm.link.target import Target, parse_target
 
 
 @pytest.mark.parametrize(
@@ -33,6 +33,7 @@ def test_targets(text: str, target: Target) -> None:
         "sim://",
         "sim://kr6",
         "sim://localhost",
+        "sim://localhost:",
         "sim://iiwa14?colour=red",
         "sim://iiwa14?speed=fast",
         "sim://iiwa14?speed=0",
@@ -47,7 +48,7 @@ def test_targets(text: str, target: Target) -> None:
     ],
 )
 def test_bad_targets_show_good_ones(text: str) -> None:
-    with pytest.raises(ha.ConnectFailed, match="no target") as error:
+    with pytest.raises(ha.ConnectFailed, match="target must be") as error:
         ha.connect(text)
     assert "sim://iiwa14" in str(error.value) and "172.31.1.147" in str(error.value)
 

@@ -8,15 +8,13 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.arm.connection import Connection
-from heptarm.arm.tooling import Tooling
-from heptarm.arm.triggers import with_triggers
+from heptarm.arm.translate.triggers import trigger_messages
 from heptarm.do import notify, set_output
 from heptarm.model.kinematics import forward
+from heptarm.values.condition.signals import force, io, path
 from heptarm.values.io import Signal
-from heptarm.values.motion import Motion
+from heptarm.values.motion.motion import Motion
 from heptarm.values.robot import robot
-from heptarm.when import force, io, path
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 
@@ -54,7 +52,9 @@ def place(event: ha.MotionEvent) -> np.ndarray:
 def fired(handle: ha.MotionHandle) -> dict[str, ha.MotionEvent]:
     """What fired, by its label or its output."""
     events = [event for event in handle.events(timeout=60.0) if event.trigger is not None]
-    return {event.label or getattr(event.trigger.action, "signal", ""): event for event in events if event.trigger}
+    return {
+        event.label or getattr(event.trigger.action, "signal", ""): event for event in events if event.trigger
+    }
 
 
 def test_an_output_is_set_on_the_way_and_the_handle_hears_of_it(arm: ha.Arm) -> None:
@@ -98,7 +98,9 @@ def test_triggers_of_blended_motions_and_splines(arm: ha.Arm) -> None:
         (2, "half of 2"),
         (3, "near the end"),
     ]
-    assert [(item, segment) for kind, item, segment, _ in told if kind == "segment"] == [(3, k) for k in range(4)]
+    assert [(item, segment) for kind, item, segment, _ in told if kind == "segment"] == [
+        (3, k) for k in range(4)
+    ]
     assert handle.item == 3 and handle.segment == 3
 
 
@@ -140,7 +142,7 @@ def test_the_time_that_is_left_is_told(arm: ha.Arm) -> None:
 
 def test_events_end_with_a_program_that_is_cancelled(arm: ha.Arm) -> None:
     handle = arm.start([SLOWLY, BACK])
-    with pytest.raises(ha.Timeout, match="nothing was told"):
+    with pytest.raises(ha.Timeout, match="no event of motion"):
         list(handle.events(timeout=0.0))
     assert handle.wait_started(20.0)
     handle.cancel()
@@ -178,21 +180,10 @@ def test_negative_distances_do_not_come_into_being() -> None:
 
 def test_the_messages_of_triggers() -> None:
     signals = (Signal("MediaFlange.LEDBlue", is_output=True, kind="boolean"),)
-    told = (
-        wire.SignalInfo(
-            name="MediaFlange.LEDBlue",
-            direction=wire.IoDirection.OUTPUT,
-            type=wire.IoType.BOOLEAN,
-            low=0,
-            high=1,
-        ),
-    )
     motion = ACROSS.trigger(path.before_end(0.02), set_output("led_blue")).trigger(io.led_blue, notify("lit"))
-    plain = wire.Item(motion=wire.Hold(duration=1.0))
-    tooling = Tooling(Connection.__new__(Connection))  # frames are not asked for
-    (item,) = with_triggers([plain], [motion], signals, told, tooling)
+    messages = trigger_messages(motion, signals)
     end = wire.PathReached(reference=wire.PathReference.DESTINATION, distance=-0.02, delay=0.0)
-    assert item.triggers == (
+    assert messages == (
         wire.Trigger(
             condition=wire.Condition(nodes=(end,)),
             action=wire.SetSignal(signal="MediaFlange.LEDBlue", value=1.0),

@@ -13,11 +13,16 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm import Arm, deg, hold, lin_rel, ptp
-from heptarm.arm.private_cabinet import PrivateCabinet
-from heptarm.arm.target import Target
+from heptarm import Arm
+from heptarm.arm.link.local_simulator import PrivateCabinet
+from heptarm.arm.link.target import Target
+from heptarm.values.motion.line import lin_rel
+from heptarm.values.motion.motion import hold
+from heptarm.values.motion.ptp import ptp
+from heptarm.values.pose import deg
 from tests.arm.programs import end, script
 from tests.conftest import RunningCabinet
+from tests.interrupts import ctrl_c_interrupts
 
 HOME = deg(0, 30, 0, -90, 0, 60, 0)
 #: Takes about three seconds.
@@ -163,6 +168,20 @@ def test_an_observer_sees_and_stops_but_does_not_move(arm: Arm, cabinet: Running
     handle.wait(timeout=20.0)
 
 
+def test_two_clients_of_one_process_are_told_apart(arm: Arm, cabinet: RunningCabinet) -> None:
+    with ha.connect(cabinet.target, control=False) as observer:
+        with pytest.raises(ha.NotInControl) as refused:
+            observer.move(ptp(HOME))
+        mine, other = arm._connection.options.name, observer._connection.options.name
+        assert mine != other and refused.value.text.startswith(f"{mine} controls the robot, not {other}")
+    with (
+        ha.connect(cabinet.target, control=False, name=mine) as twin,
+        pytest.raises(ha.NotInControl) as refused,
+    ):
+        twin.move(ptp(HOME))
+    assert f"another client named {mine}" in refused.value.text
+
+
 def test_control_is_given_and_taken(arm: Arm, cabinet: RunningCabinet) -> None:
     with ha.connect(cabinet.target, control=False, name="other") as other:
         arm.release_control()
@@ -245,8 +264,7 @@ def test_ctrl_c_stops_the_arm(cabinet: RunningCabinet, tmp_path: Path) -> None:
 
 
 def test_ctrl_c_amid_requests_breaks_nothing(arm: Arm) -> None:
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
+    with ctrl_c_interrupts():
         for count in range(40):
             timer = threading.Timer(0.002 + count * 1e-4, os.kill, (os.getpid(), signal.SIGINT))
             with pytest.raises(KeyboardInterrupt):
@@ -256,8 +274,6 @@ def test_ctrl_c_amid_requests_breaks_nothing(arm: Arm) -> None:
             timer.join()
             assert arm.connected
             arm.stop()
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def test_a_killed_controller_is_stopped_and_replaced(cabinet: RunningCabinet, tmp_path: Path) -> None:
@@ -284,7 +300,7 @@ def test_a_frozen_controller_loses_control_and_learns_it(cabinet: RunningCabinet
         observer.wait_until(lambda s: observer.controller == "", timeout=20.0)
         process.send_signal(signal.SIGCONT)
         _, errors = end(process)
-        assert "ConnectionLost" in errors and "its controller was lost" in errors
+        assert "ConnectionLost" in errors and "lost its controller" in errors
 
 
 def test_a_lost_controller_may_let_its_motion_finish(cabinet: RunningCabinet, tmp_path: Path) -> None:
