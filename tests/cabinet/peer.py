@@ -76,7 +76,9 @@ class Peer:
         self._next += 1
         return self.seen[self._next - 1][1]
 
-    def wait_for(self, kind: type[M], where: Callable[[M], bool] = lambda _: True, timeout: float = 30.0) -> M:
+    def wait_for(
+        self, kind: type[M], where: Callable[[M], bool] = lambda _: True, timeout: float = 30.0
+    ) -> M:
         """The first message of a kind, also one that has come already."""
         found: M = self.wait(lambda _, message: isinstance(message, kind) and where(message), timeout=timeout)
         return found

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.garbage import garbage
+from bench.protocol.garbage import garbage
 from heptarm.wire import messages as wire
 from tests.cabinet.fake import FakeCabinet
 from tests.cabinet.peer import Peer, ptp, run

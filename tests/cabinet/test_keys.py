@@ -23,7 +23,7 @@ def virtual(tmp_path: Path) -> Iterator[tuple[int, Path]]:
     """Port of a virtual cabinet, and the file that tells its operator which keys to press."""
     keys = tmp_path / "keys"
     folder = classes("java_keys").rpartition(":")[2]
-    command = [sys.executable, "-m", "heptarm.virtual.cabinet", "--port", "0", "--parent-pipe"]
+    command = [sys.executable, "-m", "heptarm.sim.runtime.cabinet", "--port", "0", "--parent-pipe"]
     command += [
         "--application",
         "heptarm.keys.Operator",

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from heptarm.errors import HeptarmError
-from heptarm.values import mode as values
+from heptarm.values.mode import mode as values
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.cabinet.fake import FakeCabinet

@@ -50,7 +50,7 @@ def end(peer: Peer, accepted: wire.Accepted) -> wire.MotionFinished:
 STOPS = [
     ("emergency stop", Bits.EMERGENCY_STOP, "emergency stop was pressed", "release the emergency stop"),
     ("safeguard", Bits.OPERATOR_SAFETY_OPEN, "safeguard was opened", "close the safeguard"),
-    ("safety stop", Bits.PROTECTIVE_STOP, "safety function", "remove what the safety stop was for"),
+    ("safety stop", Bits.PROTECTIVE_STOP, "safety function", "remove the cause of the safety stop"),
 ]
 
 

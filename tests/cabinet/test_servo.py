@@ -41,7 +41,9 @@ def reached(peer: Peer, a7: float) -> None:
     """Waits until the fake's A7 is there."""
     peer.ask(wire.Subscribe(groups=wire.Groups.JOINTS, rate=100.0))
     since = len(peer.seen)
-    peer.wait(lambda _, m: isinstance(m, wire.State) and m.joints is not None and m.joints.q[6] == a7, since=since)
+    peer.wait(
+        lambda _, m: isinstance(m, wire.State) and m.joints is not None and m.joints.q[6] == a7, since=since
+    )
     peer.ask(wire.Subscribe(groups=wire.Groups.JOINTS, rate=0.0))
 
 
@@ -119,7 +121,7 @@ def test_bad_targets_are_refused_told_of_and_no_sign_of_life(cabinet: FakeCabine
             (target(servo, nan), Code.NOT_FINITE, "q[6]"),
             (target(servo, 3.5), Code.JOINT_LIMIT, "A7"),
             (target(servo, 0.1, watchdog=9.0), Code.OUT_OF_RANGE, "watchdog"),
-            (target(servo, 2.5), Code.EXECUTION_FAILED, "does not want"),
+            (target(servo, 2.5), Code.EXECUTION_FAILED, "refuses this target"),
         )
         for message, _, _ in bad:
             peer.send(message)
@@ -209,7 +211,9 @@ LINE = {"engine": wire.ServoEngine.LIN, "velocity": 1.0, "acceleration": 1.0}
 
 def test_the_straight_engine_follows_poses_and_no_joints(cabinet: FakeCabinet) -> None:
     with controller(cabinet.port) as peer:
-        servo = opened(peer, linear=wire.CartesianDynamics(velocity=0.1, orientation_acceleration=2.0), **LINE)
+        servo = opened(
+            peer, linear=wire.CartesianDynamics(velocity=0.1, orientation_acceleration=2.0), **LINE
+        )
         peer.send(wire.ServoPose(servo=servo, watchdog=2.0, xyz=(0.3, 0.0, 0.5), quat=(0.0, 0.0, 0.0, 1.0)))
         peer.send(target(servo, 0.7))
         peer.ask(wire.Subscribe(groups=wire.Groups.JOINTS, rate=100.0))
@@ -232,7 +236,9 @@ def test_the_straight_engine_follows_poses_and_no_joints(cabinet: FakeCabinet) -
         (LINE | {"speed_timeout": 0.5}, "speed_timeout"),
     ],
 )
-def test_limits_that_an_engine_does_not_heed_are_refused(cabinet: FakeCabinet, fields: Any, parameter: str) -> None:
+def test_limits_that_an_engine_does_not_heed_are_refused(
+    cabinet: FakeCabinet, fields: Any, parameter: str
+) -> None:
     with controller(cabinet.port) as peer:
         refused = peer.ask(wire.ServoOpen(**fields))
         assert isinstance(refused, wire.Rejected)

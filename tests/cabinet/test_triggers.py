@@ -61,7 +61,11 @@ def finish(peer: Peer, number: int) -> wire.MotionFinished:
 
 def told(peer: Peer, number: int) -> list[tuple[str, int]]:
     """What was told of a program, in its order."""
-    return [(type(m).__name__, m.item) for _, m in peer.seen if getattr(m, "id", None) == number and hasattr(m, "item")]
+    return [
+        (type(m).__name__, m.item)
+        for _, m in peer.seen
+        if getattr(m, "id", None) == number and hasattr(m, "item")
+    ]
 
 
 def fired(peer: Peer, number: int) -> list[wire.TriggerFired]:
@@ -91,7 +95,11 @@ def test_an_output_is_set_on_the_way_and_an_event_told_of(cabinet: FakeCabinet, 
     )
     assert finish(peer, number).cause is wire.Cause.FINISHED
     events = fired(peer, number)
-    assert [(one.trigger, one.label, one.code) for one in events] == [(0, "half way", 0), (1, "", 0), (2, "", 0)]
+    assert [(one.trigger, one.label, one.code) for one in events] == [
+        (0, "half way", 0),
+        (1, "", 0),
+        (2, "", 0),
+    ]
     assert all(one.item == 0 for one in events)
     assert [one.time for one in events] == sorted(one.time for one in events)
     half = events[0].joints
@@ -160,8 +168,16 @@ def test_an_output_that_the_robot_does_not_write_is_told_of(make: Maker) -> None
         (trigger(wire.Notify(label="x")), Code.BAD_CONDITION, "condition"),
         (trigger(wire.Notify(label="x"), at(0.1), at(0.1)), Code.BAD_CONDITION, "condition.nodes"),
         (trigger(wire.Notify(label="x" * 129), at(0.1)), Code.BAD_LENGTH, "action.label"),
-        (trigger(wire.SetSignal(signal="Flange.Knob", value=1.0), at(0.1)), Code.UNKNOWN_NAME, "action.signal"),
-        (trigger(wire.SetSignal(signal="Flange.Button", value=1.0), at(0.1)), Code.UNSUPPORTED, "action.signal"),
+        (
+            trigger(wire.SetSignal(signal="Flange.Knob", value=1.0), at(0.1)),
+            Code.UNKNOWN_NAME,
+            "action.signal",
+        ),
+        (
+            trigger(wire.SetSignal(signal="Flange.Button", value=1.0), at(0.1)),
+            Code.UNSUPPORTED,
+            "action.signal",
+        ),
         (trigger(wire.SetSignal(signal=LAMP, value=0.5), at(0.1)), Code.OUT_OF_RANGE, "action.value"),
         (trigger(wire.SetSignal(signal=LEVEL, value=11.0), at(0.1)), Code.OUT_OF_RANGE, "action.value"),
         (

@@ -2,12 +2,16 @@ package heptarm.fake;
 
 import java.io.BufferedReader;
 import java.io.InputStreamReader;
+import java.util.Arrays;
 
 import heptarm.core.Clock;
-import heptarm.core.Config;
 import heptarm.core.Log;
 import heptarm.core.RealClock;
-import heptarm.core.Server;
+import heptarm.core.Threads;
+import heptarm.core.robot.Robot;
+import heptarm.core.robot.RobotModels;
+import heptarm.core.session.CabinetServer;
+import heptarm.core.session.ServerSettings;
 
 /** The core on a fake robot: prints its port, serves until it reads a line, closes, and names the threads that are left. */
 public final class FakeCabinet {
@@ -18,11 +22,8 @@ public final class FakeCabinet {
     public static void main(String[] args) throws Exception {
         double rate = Double.parseDouble(args[0]);
         Clock clock = rate == 1.0 ? new RealClock() : new ScaledClock(rate);
-        FakeRobot robot = new FakeRobot(clock, Math.round(Double.parseDouble(args[4]) * 1e9));
-        Thread axes = new Thread(robot, "fake-robot");
-        axes.setDaemon(true);
-        axes.start();
-        Server server = new Server(robot, new Config("127.0.0.1", 0, args[1], args[2], Double.parseDouble(args[3]), 1000.0),
+        Robot robot = robot(clock, Math.round(Double.parseDouble(args[4]) * 1e9));
+        CabinetServer server = new CabinetServer(robot, new ServerSettings("127.0.0.1", 0, args[1], args[2], Double.parseDouble(args[3]), 1000.0),
                 clock, new ErrLog());
         System.out.println(server.start());
         BufferedReader in = new BufferedReader(new InputStreamReader(System.in));
@@ -34,6 +35,20 @@ public final class FakeCabinet {
         server.close();
         server.close();
         System.out.println(threads());
+    }
+
+    private static Robot robot(Clock clock, long getterNanos) {
+        FakeFaults faults = new FakeFaults(clock, getterNanos);
+        FakeSafety safety = new FakeSafety(faults);
+        FakeSignals signals = new FakeSignals(faults);
+        double[] q = new double[7];
+        FakeSensors sensors = new FakeSensors(faults, q);
+        FakeMotions motions = new FakeMotions(faults, safety, sensors, signals, q);
+        Threads.start("fake-robot", motions);
+        double[] high = {2.96, 2.09, 2.96, 2.09, 2.96, 2.09, 3.05};
+        double[] low = Arrays.stream(high).map(limit -> -limit).toArray();
+        return new Robot(RobotModels.describe("LBR_iiwa_14_R820_1", low, high), "fake", true, new String[] {"ptp", "hold"}, motions,
+                sensors, safety, new FakeTools(), signals, new FakePanel(faults, safety));
     }
 
     private static String threads() {

@@ -5,7 +5,7 @@ import java.nio.file.Files;
 import java.nio.file.Path;
 
 import heptarm.app.HeptarmApplication;
-import heptarm.doubles.Desk;
+import heptarm.doubles.runtime.ApplicationServices;
 
 /** The application with a person beside the robot, who presses the keys that a file tells, one slot a line. */
 public final class Operator extends HeptarmApplication {
@@ -31,7 +31,7 @@ public final class Operator extends HeptarmApplication {
                 Thread.sleep(10);
                 Object[] lines = Files.exists(file) ? Files.readString(file).lines().toArray() : new Object[0];
                 for (; done < lines.length; done++) {
-                    Desk.current().pad.press("heptarm", Integer.parseInt(lines[done].toString()));
+                    ApplicationServices.current().pad.press("heptarm", Integer.parseInt(lines[done].toString()));
                 }
             }
         } catch (InterruptedException | IOException e) {

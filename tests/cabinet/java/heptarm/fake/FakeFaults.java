@@ -1,0 +1,56 @@
+package heptarm.fake;
+
+import heptarm.core.Clock;
+
+/** Faults and delays to order: slow getters, failing readings, failing commands. */
+final class FakeFaults {
+    private static final long FAULT_NS = 1500000000L;
+
+    final Clock clock;
+    private final long getterNanos;
+    private volatile long blindUntil;
+    private volatile long jammedUntil;
+
+    FakeFaults(Clock clock, long getterNanos) {
+        this.clock = clock;
+        this.getterNanos = getterNanos;
+    }
+
+    /** Order a fault by the text of a message to the operator. */
+    void order(String text) {
+        switch (text) {
+            case "blind" -> blindUntil = clock.nanos() + FAULT_NS;
+            case "jammed" -> jammedUntil = clock.nanos() + FAULT_NS;
+            case "lacking" -> throw new NoClassDefFoundError("com/kuka/Option");
+            case "crash" -> throw new IllegalStateException("an error of the cabinet's API");
+            default -> { }
+        }
+    }
+
+    /** A reading of so many getters: takes their time, and fails while the robot is blind. */
+    void read(int getters) {
+        failUntil(blindUntil);
+        if (getterNanos > 0) {
+            sleep(getters * getterNanos);
+        }
+    }
+
+    /** A command: fails while the robot is jammed. */
+    void command() {
+        failUntil(jammedUntil);
+    }
+
+    private void failUntil(long until) {
+        if (clock.nanos() < until) {
+            throw new IllegalStateException("the controller did not respond");
+        }
+    }
+
+    void sleep(long nanos) {
+        try {
+            clock.sleepUntil(clock.nanos() + nanos);
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
+        }
+    }
+}

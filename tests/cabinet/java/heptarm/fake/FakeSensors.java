@@ -1,0 +1,72 @@
+package heptarm.fake;
+
+import java.util.Arrays;
+
+import heptarm.core.robot.Sensors;
+import heptarm.wire.PoseState;
+import heptarm.wire.Redundancy;
+import heptarm.wire.WrenchState;
+
+/** Readings of the fake axes. A spring pushes A7: the further it turns, the more. */
+final class FakeSensors implements Sensors {
+    private static final double SPRING = 10.0;
+    private static final double INACCURACY = 0.5;
+
+    private final FakeFaults faults;
+    private final double[] q;
+
+    /** Joint positions: shared with the motions, guarded by themselves. */
+    FakeSensors(FakeFaults faults, double[] q) {
+        this.faults = faults;
+        this.q = q;
+    }
+
+    @Override
+    public void readJoints(double[] measured, double[] commanded) {
+        faults.read(2);
+        synchronized (q) {
+            System.arraycopy(q, 0, measured, 0, 7);
+            System.arraycopy(q, 0, commanded, 0, 7);
+        }
+    }
+
+    @Override
+    public void readTorques(double[] measured, double[] external, double[] commanded) {
+        faults.read(2);
+        Arrays.fill(commanded, Double.NaN);
+        external[6] = torque();
+    }
+
+    private double torque() {
+        synchronized (q) {
+            return -SPRING * q[6];
+        }
+    }
+
+    @Override
+    public PoseState readPose(long stamp) {
+        faults.read(2);
+        double[] xyz = {0.5, 0.0, 0.5};
+        double[] quat = {0.0, 0.0, 0.0, 1.0};
+        return new PoseState(stamp, xyz, quat, xyz, quat, new Redundancy(0.0, 2, 0));
+    }
+
+    @Override
+    public WrenchState readWrench(long stamp) {
+        faults.read(1);
+        return new WrenchState(stamp, new double[3], new double[3], new double[3], new double[3]);
+    }
+
+    /** The same spring pushes along the axis of the flange, which is x of the base. */
+    @Override
+    public WrenchState readWrench(String axes, long stamp) {
+        double[] force = new double[3];
+        force["base".equals(axes) ? 0 : 2] = torque();
+        return new WrenchState(stamp, force, new double[3], new double[] {INACCURACY, 0, 0}, new double[3]);
+    }
+
+    @Override
+    public void readProgress(double[] progressAndRemaining) {
+        Arrays.fill(progressAndRemaining, Double.NaN);
+    }
+}

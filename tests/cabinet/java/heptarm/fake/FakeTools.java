@@ -1,0 +1,45 @@
+package heptarm.fake;
+
+import heptarm.core.CommandRejected;
+import heptarm.core.robot.ToolPort;
+import heptarm.wire.Code;
+import heptarm.wire.FrameInfo;
+import heptarm.wire.Pose;
+import heptarm.wire.ToolInfo;
+
+/** A project with two templates, one of whose names is listed, and one taught frame. A tool of 13 kg is refused. */
+final class FakeTools implements ToolPort {
+    private static final double REFUSED_MASS = 13.0;
+    private static final double[] UPRIGHT = {0.0, 0.0, 0.0, 1.0};
+
+    @Override
+    public ToolInfo[] templates() {
+        return new ToolInfo[] {template("listed")};
+    }
+
+    @Override
+    public ToolInfo template(String name) {
+        if (!"listed".equals(name) && !"hidden".equals(name)) {
+            return null;
+        }
+        Pose tip = new Pose(new double[] {0.0, 0.0, 0.1}, UPRIGHT);
+        return new ToolInfo(name, 1.0, new double[3], new double[6], new FrameInfo[] {new FrameInfo("tip", tip)});
+    }
+
+    @Override
+    public FrameInfo[] frames() {
+        return new FrameInfo[] {new FrameInfo("/table", new Pose(new double[] {0.5, 0.0, 0.0}, UPRIGHT))};
+    }
+
+    @Override
+    public void attach(ToolInfo tool, String motionFrame) throws CommandRejected {
+        load(tool);
+    }
+
+    @Override
+    public void load(ToolInfo workpiece) throws CommandRejected {
+        if (workpiece != null && workpiece.mass == REFUSED_MASS) {
+            throw new CommandRejected(Code.EXECUTION_FAILED, "the mass of 13 kg is refused");
+        }
+    }
+}
