@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from tests.interrupts import ctrl_c_interrupts
+
 HEPTARM = [sys.executable, "-m", "heptarm.cli.main"]
 
 
@@ -32,12 +34,13 @@ def objects(*arguments: str) -> list[dict[str, Any]]:
 @contextmanager
 def sim(*arguments: str) -> Iterator[dict[str, Any]]:
     """`heptarm sim --json` in the foreground of another process; ended as by Ctrl-C."""
-    process = subprocess.Popen(
-        [*HEPTARM, "sim", "--json", "--port", "0", *arguments], stdout=subprocess.PIPE, text=True
-    )
-    try:
-        assert process.stdout is not None
-        yield json.loads(process.stdout.readline())
-    finally:
-        process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=20) == 0
+    command = [*HEPTARM, "sim", "--json", "--port", "0", *arguments]
+    with ctrl_c_interrupts():
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    with process:
+        try:
+            assert process.stdout is not None
+            yield json.loads(process.stdout.readline())
+        finally:
+            process.send_signal(signal.SIGINT)
+            assert process.wait(timeout=20) == 0

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from heptarm.errors import CommandRejected
-from heptarm.virtual.application import background, compile_application, find
+from heptarm.sim.runtime.application import background, compile_application, find
 
 ROOT = Path(__file__).parents[2]
 SAMPLES = ROOT / "cabinet" / "samples"
@@ -52,7 +52,7 @@ PROJECT = """
 """
 
 
-def sim(folder: Path, *options: str, speed: str = "5") -> subprocess.CompletedProcess[str]:
+def sim(folder: Path, *options: str, speed: str = "5", said: str = "") -> subprocess.CompletedProcess[str]:
     command = [
         sys.executable,
         "-m",
@@ -64,7 +64,7 @@ def sim(folder: Path, *options: str, speed: str = "5") -> subprocess.CompletedPr
         "5",
         *options,
     ]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    return subprocess.run(command, input=said, capture_output=True, text=True, timeout=120, check=False)
 
 
 @pytest.fixture
@@ -118,7 +118,9 @@ def test_a_whole_project_runs_with_its_tools_frames_signals_and_background_task(
 def test_what_a_project_holds_besides_its_applications(tmp_path: Path) -> None:
     source = tmp_path / "src" / "tasks"
     source.mkdir(parents=True)
-    (source / "Base.java").write_text("package tasks; abstract class Base extends RoboticsAPIBackgroundTask {}")
+    (source / "Base.java").write_text(
+        "package tasks; abstract class Base extends RoboticsAPIBackgroundTask {}"
+    )
     (source / "One.java").write_text("package tasks; public class One extends Base {}")
     (source / "App.java").write_text("package tasks; class App extends Own {}")
     (source / "Own.java").write_text("package tasks; class Own extends RoboticsAPIApplication {}")
@@ -153,10 +155,13 @@ def test_jars_of_a_project_count_unless_they_are_kukas(lab: Path) -> None:
                 "curve = FINISHED",
                 "interrupted = CANCELLED",
                 "touched = CONDITION by condition 3",
-                "refused = items[0].motion.q[1]: A2 would be at",
+                "refused = items[0].motion.q[1]: A2 must be in",
             ),
         ),
-        ("Stir", ("spoon, moving its bowl", "stirred = CANCELLED", "mm to the side", "lamp 1.0", "ready = true")),
+        (
+            "Stir",
+            ("spoon, moving its bowl", "stirred = CANCELLED", "mm to the side", "lamp 1.0", "ready = true"),
+        ),
     ],
 )
 def test_an_application_on_heptarms_core_needs_no_network(name: str, said: tuple[str, ...]) -> None:
@@ -164,3 +169,230 @@ def test_an_application_on_heptarms_core_needs_no_network(name: str, said: tuple
     assert done.returncode == 0, done.stdout + done.stderr
     for text in said:
         assert text in done.stderr
+
+
+WILD = """\ufeffpackage lab;
+
+import java.io.ByteArrayOutputStream;
+import java.nio.charset.Charset;
+import javax.annotation.PostConstruct;
+import javax.annotation.PreDestroy;
+import javax.xml.bind.DatatypeConverter;
+import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
+import com.sun.org.apache.bcel.internal.generic.NEW;
+import sun.awt.geom.*;
+
+// Überwachung in °C
+public class Wild extends RoboticsAPIApplication {
+    private String ready = "";
+
+    @PostConstruct
+    private void construct() {
+        ready = "constructed";
+    }
+
+    @PreDestroy
+    private void destroy() {
+    }
+
+    @Override
+    public void run() {
+        String greeting = "grüß";
+        getLogger().info(ready + " " + greeting + " " + greeting.length() + " " + Charset.defaultCharset());
+        getLogger().info(DatatypeConverter.printHexBinary(greeting.getBytes())
+                + " " + new String(DatatypeConverter.parseBase64Binary("aWl3YQ=="))
+                + " " + DatatypeConverter.printHexBinary(System.getProperty("line.separator").getBytes())
+                + " " + String.format("%.2f", 0.5));
+        System.out.println("printed ü");
+    }
+}
+"""
+
+
+@needs_javac
+@pytest.mark.parametrize("encoding", ["utf-8", "windows-1252"])
+def test_sources_run_in_the_encodings_that_they_are_written_in(tmp_path: Path, encoding: str) -> None:
+    text = WILD if encoding == "utf-8" else WILD.removeprefix("\ufeff")
+    # 0x81 means nothing in windows-1252
+    bad = b"" if encoding == "utf-8" else b" \x81"
+    (tmp_path / "Wild.java").write_bytes(text.encode(encoding).replace(b"berwachung", b"berwachung" + bad))
+    done = sim(tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "constructed grüß 4 windows-1252" in done.stderr
+    assert "6772FCDF iiwa 0D0A 0.50" in done.stderr
+    assert "printed ü" in done.stderr
+
+
+def wrong(folder: Path, body: str, imports: str = "") -> str:
+    """What is said about an application that does not compile."""
+    (folder / "Wrong.java").write_text(
+        f"{imports} import com.kuka.roboticsAPI.deviceModel.LBR;"
+        "import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;\n"
+        f"class Wrong extends RoboticsAPIApplication {{ LBR robot; public void run() {{ {body} }} }}",
+        encoding="utf-8",
+    )
+    out = folder.parent / f"{folder.name}-out"
+    out.mkdir(exist_ok=True)
+    with pytest.raises(CommandRejected) as refused:
+        compile_application(folder, out)
+    assert "Wrong.java:2: error" in str(refused.value) or imports
+    return refused.value.hint
+
+
+@needs_javac
+def test_the_hint_of_a_compile_error_fits_the_error(tmp_path: Path) -> None:
+    missing = wrong(tmp_path, "".join(f"robot.dance{i}();\n" for i in range(150)))
+    for i in (0, 99, 149):
+        assert f"method dance{i}() of com.kuka.roboticsAPI.deviceModel.LBR" in missing
+    assert "report" in missing
+    assert "jar of org.apache.commons.math3" in wrong(tmp_path, "", "import org.apache.commons.math3.Thing;")
+    both = wrong(
+        tmp_path, "robot.dance(); Thing t;", "import org.acme.Thing; import com.kuka.nowhere.Thing2;"
+    )
+    assert "jar of org.acme" in both
+    assert "package com.kuka.nowhere" in both
+    assert "method dance() of com.kuka" in both
+    assert "correct the sources" not in both
+    assert "UTF-8" in wrong(tmp_path, "int \u2603 = 1;")
+    assert "public class" in wrong(tmp_path, "BASE64Encoder coder;", "import sun.nowhere.BASE64Encoder;")
+    own = wrong(tmp_path, "int x = nothing;")
+    assert "please report" not in own
+    assert "correct the sources" in own
+    assert "--app-class Wrong" in own
+
+
+@needs_javac
+def test_one_bad_file_does_not_block_an_application_that_is_chosen(lab: Path) -> None:
+    tasks = lab / "src" / "tasks"
+    tasks.mkdir()
+    (tasks / "Bad.java").write_text("package tasks; class Bad { int x = nothing; }")
+    base = "com.kuka.roboticsAPI.applicationModel.tasks.RoboticsAPIBackgroundTask"
+    for name, body in (("Watch", ""), ("Blind", "Bad bad;")):
+        (tasks / f"{name}.java").write_text(
+            f"package tasks; import {base}; public class {name} extends RoboticsAPIBackgroundTask "
+            f"{{ {body} public void run() {{}} }}"
+        )
+    out = lab.parent / "chosen"
+    out.mkdir()
+    found = compile_application(lab, out, main="Nod")
+    assert found.background == ("tasks.Watch",)
+    assert (out / "lab" / "Nod.class").exists()
+    assert "tasks.Blind is left out" in found.left_out[0]
+
+
+ASKING = """
+package lab;
+
+import javax.inject.Inject;
+import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
+import com.kuka.roboticsAPI.uiModel.ApplicationDialogType;
+
+public class Asking extends RoboticsAPIApplication {
+    @Override
+    public void run() {
+        StringBuilder answers = new StringBuilder();
+        for (int i = 0; i < 3; i++) {
+            answers.append(getApplicationUI().displayModalDialog(ApplicationDialogType.QUESTION, "Part " + i + "?",
+                    "Yes", "No", "Stop"));
+        }
+        getLogger().info("answers " + answers);
+    }
+}
+"""
+
+
+@pytest.fixture
+def asking(tmp_path: Path) -> Path:
+    (tmp_path / "Asking.java").write_text(ASKING)
+    return tmp_path
+
+
+@needs_javac
+def test_dialogs_are_answered_from_a_file_and_by_options(asking: Path) -> None:
+    file = asking / "answers.txt"
+    file.write_text("2  # stop\n\n# the rest follows\n")
+    done = sim(asking, "--answers", str(file), "--answer", "1", "--answer", "0")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "answers 210" in done.stderr
+    file.write_text("yes")
+    assert "line 1: an answer must be the number of a button" in sim(asking, "--answers", str(file)).stderr
+    done = sim(asking, "--answer", "3")
+    assert done.returncode == 1
+    assert 'the scripted answer to the dialog "Part 0?" must be 0 to 2, got 3' in done.stderr
+
+
+@needs_javac
+def test_a_typed_line_answers_a_dialog_that_says_what_to_type(asking: Path) -> None:
+    command = [
+        sys.executable,
+        "-m",
+        "heptarm.cli.main",
+        "sim",
+        "--app",
+        str(asking),
+        "--answer",
+        "0",
+        "--answer",
+        "1",
+    ]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.STDOUT, text=True) as running:
+        assert running.stdin is not None
+        assert running.stdout is not None
+        said = ""
+        for line in running.stdout:
+            said += line
+            if "waits for the operator" in line:
+                running.stdin.write("answer 7\nanswer 2\n")
+                running.stdin.flush()
+    assert running.returncode == 0, said
+    assert "type `answer 0` for Yes, `answer 1` for No, `answer 2` for Stop" in said
+    assert "no open dialog has a button 7" in said
+    assert "done: answer 2" in said
+    assert "answers 012" in said
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--view",),
+        ("--view-port", "8081"),
+        ("--host", "0.0.0.0"),
+        ("--port", "0"),
+        ("--key", "secret"),
+        ("--fri", "1.15"),
+        ("--fri-io", "G.S<bool"),
+    ],
+)
+def test_an_option_that_means_nothing_to_an_application_is_refused(
+    lab: Path, options: tuple[str, ...]
+) -> None:
+    done = sim(lab, *options)
+    assert done.returncode != 0
+    assert f"{options[0]} cannot be used with --app" in done.stderr
+
+
+@pytest.mark.parametrize("options", [("--app-class", "Nod"), ("--app-data", "a=1"), ("--answer", "0")])
+def test_an_option_of_an_application_needs_one(options: tuple[str, ...]) -> None:
+    command = [sys.executable, "-m", "heptarm.cli.main", "sim", *options]
+    done = subprocess.run(command, input="", capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode != 0
+    assert f"{options[0]} needs --app" in done.stderr
+
+
+@needs_javac
+def test_a_project_file_a_fault_and_a_payload_reach_an_application(lab: Path) -> None:
+    other = lab.parent / "other.xml"
+    other.write_text(PROJECT.replace('value="2"', 'value="3"'))
+    done = sim(lab, "--project", str(other), "--payload", "1.5", "--verbose")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "nodded 3 times" in done.stderr
+    done = sim(lab, "--fault", "set Nothing.here 1@0.3")
+    assert "set Nothing.here 1: " in done.stderr
+    done = sim(lab, "--fault", "nonsense@1")
+    assert done.returncode != 0
+    assert "'nonsense' is not understood" in done.stderr
+    assert "ended with an error" not in done.stderr
+    done = sim(lab, "--payload", "heavy")
+    assert done.returncode != 0
+    assert "does not start" in done.stderr

@@ -8,6 +8,7 @@ import subprocess
 
 import heptarm as ha
 from tests.cli.running import HEPTARM, run, sim
+from tests.interrupts import ctrl_c_interrupts
 
 
 def test_a_timed_fault_happens_and_goes() -> None:
@@ -29,9 +30,9 @@ def test_a_fault_that_is_none_says_what_there_is() -> None:
 
 
 def test_what_is_typed_is_done() -> None:
-    process = subprocess.Popen(
-        [*HEPTARM, "sim", "--json", "--port", "0"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
+    command = [*HEPTARM, "sim", "--json", "--port", "0"]
+    with ctrl_c_interrupts():
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert process.stdin is not None and process.stdout is not None
     try:
         ready = json.loads(process.stdout.readline())

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from heptarm.rt import Client
+from heptarm.fri.loop.client import Client
 from heptarm.values.pose import Pose
 from tests.cli.running import HEPTARM, run
+from tests.interrupts import ctrl_c_interrupts
 
 
 def free_port() -> int:
@@ -43,12 +44,14 @@ def controller(
 ) -> Iterator[tuple[Any, Told]]:
     """`heptarm sim --fri`; what it prints, at last also how it ended."""
     command = [*HEPTARM, "sim", "--json", "--fri", version, "--fri-client", f"127.0.0.1:{port}"]
-    with subprocess.Popen(
-        [*command, "--fri-port", "0", *arguments],
-        stdin=subprocess.PIPE if typed else None,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
+    with ctrl_c_interrupts():
+        started = subprocess.Popen(
+            [*command, "--fri-port", "0", *arguments],
+            stdin=subprocess.PIPE if typed else None,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+    with started as process:
         assert process.stdout is not None
         told = Told(process)
         try:
@@ -102,13 +105,13 @@ def test_a_bare_controller_has_signals_and_asks_for_frames() -> None:
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
-        (("--fri", "1.99"), "choose one of"),
-        (("--fri", "1.15", "--fri-command", "pose"), "it came with FRI 2.5"),
-        (("--fri", "1.15", "--fri-command", "torque", "--fri-period", "10"), "every 10 ms"),
-        (("--fri", "1.15", "--fri-period", "2.5"), "whole milliseconds"),
-        (("--fri", "1.15", "--fri-io", "Cell.Door"), "GROUP.NAME<bool is wanted"),
-        (("--fri", "1.11", "--fri-io", "Cell.Door<bool"), "they came with FRI 1.14"),
-        (("--fri", "1.15", "--fri-frame", "x" * 64), "63 octets"),
+        (("--fri", "1.99"), "must be one of"),
+        (("--fri", "1.15", "--fri-command", "pose"), "use FRI 2.5 or later"),
+        (("--fri", "1.15", "--fri-command", "torque", "--fri-period", "10"), "got 10 ms"),
+        (("--fri", "1.15", "--fri-period", "2.5"), "whole number of milliseconds"),
+        (("--fri", "1.15", "--fri-io", "Cell.Door"), "must be GROUP.NAME<TYPE"),
+        (("--fri", "1.11", "--fri-io", "Cell.Door<bool"), "use FRI 1.14 or later"),
+        (("--fri", "1.15", "--fri-frame", "x" * 64), "63 bytes"),
         (("--fri", "1.15", "--fri-client", "here"), "no IPv4 address"),
         (("--fri", "1.15", "--fri-client", "127.0.0.1:x"), "HOST:PORT"),
     ],
