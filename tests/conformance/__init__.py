@@ -1,1 +1,1 @@
-"""Conformance of a FollowJointTrajectory server, free of ROS: cases, their client, a cabinet with faults."""
+"""Conformance of a FollowJointTrajectory server, independent of ROS: cases, their client, a cabinet with faults."""

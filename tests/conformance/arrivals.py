@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from heptarm.bridge.goal import Goal, Outcome, Point
+from heptarm.ros.trajectory.goal import GoalOutcome, TrajectoryGoal, TrajectoryPoint
 from tests.conformance.case import REST, TOUCH, case, goal, last, point, stays, step, succeeds, swing
 from tests.conformance.client import Client
 
@@ -80,8 +80,8 @@ def joints_in_any_order(client: Client) -> None:
     path = swing(client)
     order = [3, 0, 6, 1, 5, 2, 4]
     there = here + path
-    wanted = Goal(
-        tuple(client.joints[i] for i in order), (Point(0.6, tuple(there[order].tolist()), dq=REST),)
+    wanted = TrajectoryGoal(
+        tuple(client.joints[i] for i in order), (TrajectoryPoint(0.6, tuple(there[order].tolist()), dq=REST),)
     )
     succeeds(client, wanted)
     assert np.abs(client.place().q - there).max() < TOUCH
@@ -93,7 +93,9 @@ def feedback_is_in_the_arms_order_and_adds_up(client: Client) -> None:
     path = swing(client)
     there = here + path
     backwards = tuple(reversed(client.joints))
-    sent = succeeds(client, Goal(backwards, (Point(1.2, tuple(there[::-1].tolist()), dq=REST),)))
+    sent = succeeds(
+        client, TrajectoryGoal(backwards, (TrajectoryPoint(1.2, tuple(there[::-1].tolist()), dq=REST),))
+    )
     told = client.feedback(sent)
     assert len(told) >= 3
     for one in told:
@@ -130,7 +132,7 @@ def a_start_in_the_future_is_waited_for(client: Client) -> None:
     sent = client.send(wanted)
     assert sent.accepted
     ended = client.result(sent)
-    assert ended.outcome is Outcome.SUCCEEDED, ended
+    assert ended.outcome is GoalOutcome.SUCCEEDED, ended
     before = [q for time, q in client.track(now) if time < now + 0.75]
     assert np.abs(np.array(before) - here).max() < 2e-3, "nothing moves before"
     assert np.abs(client.place().q - last(wanted, client)).max() < TOUCH

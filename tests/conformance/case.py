@@ -1,6 +1,6 @@
-"""What cases are made of: their registry, goals, and what is to be seen of the arm.
+"""Parts of cases: their registry, goals, and checks of the arm.
 
-A case takes a client; the arm is at rest, follows, and all parameters have their defaults.
+A case takes a client; the arm is at rest, follows commands, and all parameters have their defaults.
 """
 
 from __future__ import annotations
@@ -10,31 +10,35 @@ from typing import TypeVar
 
 import numpy as np
 
-from heptarm.bridge.goal import Code, Goal, Outcome, Point, Tolerance
+from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, Tolerance, TrajectoryGoal, TrajectoryPoint
 from heptarm.values.arrays import Array
-from tests.conformance.client import Client, Ended, Sent
+from tests.conformance.client import Client, ReceivedResult, SentGoal
 
 Case = Callable[[Client], None]
 Found = TypeVar("Found")
 CASES: dict[str, Case] = {}
 
 _OWN_BRAKES = "a motion of the cabinet brakes by the cabinet's own limits"
-#: What a way of execution cannot be asked, and why.
+_PLANNED = "a spline of the cabinet is planned as a whole, so it cannot be extended"
+#: Cases that do not apply to an execution, and why.
 UNFIT: dict[str, dict[str, str]] = {
     "spline": {
         "the_deceleration_is_a_parameter": _OWN_BRAKES,
         "cancelling_brakes_as_the_parameter_says": _OWN_BRAKES,
+        "points_streamed_at_50_hz_are_followed": _PLANNED,
+        "points_streamed_at_100_hz_are_followed": _PLANNED,
+        "points_streamed_at_250_hz_are_followed": _PLANNED,
         "an_end_that_moves_where_it_is_allowed": "a spline of the cabinet ends at rest, so such a goal is refused",
     }
 }
 
-#: A short way for every joint, different for each so that a mix-up shows [rad].
+#: A small displacement, different for every joint so that a mix-up shows [rad].
 STEP = np.array([0.05, -0.03, 0.04, 0.06, -0.05, 0.07, 0.1])
-#: Around here the arm moves [rad].
+#: The arm moves around this position [rad].
 HOME = np.array([0.0, 0.0, 0.0, -np.pi / 2, 0.0, np.pi / 2, 0.0])
-#: An arm that has arrived is so near [rad].
+#: Largest error of an arm that has arrived [rad].
 TOUCH = 0.012
-#: A machine from which nothing comes for so long stands still, and a trajectory goes on after that with a jerk [s].
+#: A gap in the messages that shows a stalled machine, after which a trajectory continues with a jerk [s].
 STALL = 0.08
 REST = (0.0,) * 7
 
@@ -48,22 +52,22 @@ def case(function: Case) -> Case:
 # -------------------------------------------------------------------------------------------- goals
 
 
-def point(time: float, q: Array, **more: tuple[float, ...]) -> Point:
-    return Point(time, tuple(float(value) for value in q), **more)
+def point(time: float, q: Array, **more: tuple[float, ...]) -> TrajectoryPoint:
+    return TrajectoryPoint(time, tuple(float(value) for value in q), **more)
 
 
-def goal(client: Client, *points: Point, **more: object) -> Goal:
-    return Goal(client.joints, points, **more)  # type: ignore[arg-type]
+def goal(client: Client, *points: TrajectoryPoint, **more: object) -> TrajectoryGoal:
+    return TrajectoryGoal(client.joints, points, **more)  # type: ignore[arg-type]
 
 
 def swing(client: Client) -> Array:
-    """A short way for all joints, back and forth: many cases do not lead the arm away."""
+    """A small displacement of all joints, back and forth, so that many cases do not move the arm away."""
     side = float((client.place().q - HOME) @ STEP)
     return -STEP if side > 0.0 else STEP
 
 
-def step(client: Client, *, time: float = 0.6, size: float = 1.0, **more: object) -> Goal:
-    """To a place a little away, at rest there."""
+def step(client: Client, *, time: float = 0.6, size: float = 1.0, **more: object) -> TrajectoryGoal:
+    """A goal a little away, at rest."""
     there = client.place().q + size * swing(client)
     return goal(client, point(time, there, dq=REST), **more)
 
@@ -72,24 +76,24 @@ def tolerances(client: Client, position: float, **more: float) -> tuple[Toleranc
     return tuple(Tolerance(joint, position, **more) for joint in client.joints)
 
 
-def last(wanted: Goal, client: Client) -> Array:
-    """Where a goal ends, in the arm's order."""
+def last(wanted: TrajectoryGoal, client: Client) -> Array:
+    """Final positions of a goal, in the arm's order."""
     values = dict(zip(wanted.joints, wanted.points[-1].q))
     return np.array([values[joint] for joint in client.joints])
 
 
-def succeeds(client: Client, wanted: Goal) -> Sent:
+def succeeds(client: Client, wanted: TrajectoryGoal) -> SentGoal:
     sent = client.send(wanted)
     assert sent.accepted, sent
     ended = client.result(sent)
-    assert ended.outcome is Outcome.SUCCEEDED and ended.code is Code.SUCCESSFUL, ended
+    assert ended.outcome is GoalOutcome.SUCCEEDED and ended.code is ErrorCode.SUCCESSFUL, ended
     if len(wanted.joints) == 7:
         assert np.abs(client.place().q - last(wanted, client)).max() < TOUCH
     return sent
 
 
-def long(client: Client, **more: object) -> Goal:
-    """A goal that something else is to end: it takes much longer than that, on a busy machine, too."""
+def long(client: Client, **more: object) -> TrajectoryGoal:
+    """A goal that something else ends; it takes long enough for a busy machine."""
     return step(client, time=5.0, size=5.0, **more)
 
 
@@ -107,7 +111,7 @@ def quiet(client: Client) -> bool:
 
 
 def arrives(client: Client, there: Array) -> None:
-    """Wait until the arm is at a place, at rest."""
+    """Wait until the arm is at a position, at rest."""
     for _ in range(1000):
         if np.abs(rests(client) - there).max() < TOUCH:
             return
@@ -115,7 +119,7 @@ def arrives(client: Client, there: Array) -> None:
 
 
 def under_way(client: Client, here: Array, far: float = 0.01) -> None:
-    """Wait until the arm has moved so far from a place [rad]; a way of execution may take some time to begin."""
+    """Wait until the arm has moved this far from a position [rad]; an execution may take some time to begin."""
     for _ in range(1000):
         if np.abs(client.place().q - here).max() > far:
             return
@@ -124,7 +128,7 @@ def under_way(client: Client, here: Array, far: float = 0.01) -> None:
 
 
 def rests(client: Client) -> Array:
-    """Wait for rest; returns where it is."""
+    """Wait for rest; returns the position."""
     for _ in range(200):
         before = client.place()
         client.sleep(0.05)
@@ -135,6 +139,6 @@ def rests(client: Client) -> Array:
     raise AssertionError("the arm does not come to rest")
 
 
-def aborted(ended: Ended, code: Code) -> None:
-    assert ended.outcome is Outcome.ABORTED and ended.code is code, ended
+def aborted(ended: ReceivedResult, code: ErrorCode) -> None:
+    assert ended.outcome is GoalOutcome.ABORTED and ended.code is code, ended
     assert ended.text, "the client is told why"

@@ -1,6 +1,6 @@
-"""Cases of the action's conformance: what upstream's suites ask of a server, in our words, and what an arm's should.
+"""Cases of the action's conformance: what ros2_control's tests require of a server, and what an arm needs beyond that.
 
-`CASES` has them by name, `UNFIT` those that a way of execution cannot be asked.
+`CASES` has them by name, `UNFIT` those that do not apply to an execution.
 """
 
 from __future__ import annotations

@@ -1,40 +1,40 @@
-"""What a case needs of a server of FollowJointTrajectory; each ROS has its own client, and so has the bare runner."""
+"""The client that a case uses; each ROS has its own, and so has the bare runner."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Protocol
 
-from heptarm.bridge.goal import Code, Goal, Outcome
-from heptarm.bridge.trajectory import Sample
+from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, TrajectoryGoal
+from heptarm.ros.trajectory.trajectory import KinematicState
 from heptarm.values.arrays import Array
 
 
 @dataclass(frozen=True)
-class Sent:
-    """A goal that was sent. ROS 2 tells no code when it rejects: None then."""
+class SentGoal:
+    """A goal that was sent. A rejection of ROS 2 has no code: None."""
 
     accepted: bool
-    code: Code | None = None
+    code: ErrorCode | None = None
     handle: object = None
 
 
 @dataclass(frozen=True)
-class Ended:
+class ReceivedResult:
     """How a goal ended."""
 
-    outcome: Outcome
-    code: Code
+    outcome: GoalOutcome
+    code: ErrorCode
     text: str
 
 
 @dataclass(frozen=True)
-class Told:
+class ReceivedFeedback:
     """A feedback message; `index` is None where the messages have none (ROS 1, older ROS 2)."""
 
     joints: tuple[str, ...]
-    desired: Sample
-    actual: Sample
+    desired: KinematicState
+    actual: KinematicState
     error: Array
     time: float
     elapsed: float
@@ -51,7 +51,7 @@ class Client(Protocol):
     """
 
     joints: tuple[str, ...]
-    preempted: tuple[Outcome, ...]
+    preempted: tuple[GoalOutcome, ...]
     timely: bool
 
     def now(self) -> float:
@@ -62,32 +62,32 @@ class Client(Protocol):
         """Let time pass."""
         ...
 
-    def place(self) -> Sample:
-        """Where the arm is, from the newest joint state."""
+    def place(self) -> KinematicState:
+        """State of the arm, from the newest joint state."""
         ...
 
     def track(self, begin: float) -> list[tuple[float, Array]]:
-        """Where the arm was, shape (7,) [rad], in every joint state from a time on, with its time stamp [s]."""
+        """Positions, shape (7,) [rad], of every joint state from a time on, with its time stamp [s]."""
         ...
 
-    def send(self, goal: Goal) -> Sent:
+    def send(self, goal: TrajectoryGoal) -> SentGoal:
         """Send a goal and wait until it is accepted or rejected."""
         ...
 
-    def cancel(self, sent: Sent) -> bool:
+    def cancel(self, sent: SentGoal) -> bool:
         """Ask to cancel; whether the server agreed."""
         ...
 
-    def result(self, sent: Sent, timeout: float = 60.0) -> Ended:
+    def result(self, sent: SentGoal, timeout: float = 60.0) -> ReceivedResult:
         """Wait for the end of a goal."""
         ...
 
-    def feedback(self, sent: Sent) -> list[Told]:
-        """What was told of a goal so far."""
+    def feedback(self, sent: SentGoal) -> list[ReceivedFeedback]:
+        """Feedback of a goal so far."""
         ...
 
     def behave(self, how: str) -> None:
-        """Make the arm one that "follows", is "frozen" or "lags"."""
+        """Make the arm follow commands ("follows"), ignore them ("frozen") or follow late ("lags")."""
         ...
 
     def override(self, value: float) -> None:
@@ -102,6 +102,6 @@ class Client(Protocol):
         """Activate or deactivate the node."""
         ...
 
-    def topic(self, goal: Goal) -> None:
+    def topic(self, goal: TrajectoryGoal) -> None:
         """Send a trajectory to the topic; one without joints and points stops."""
         ...

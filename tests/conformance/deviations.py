@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heptarm.bridge.goal import Code, Outcome, Tolerance
+from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, Tolerance
 from tests.conformance.case import (
     aborted,
     case,
@@ -45,7 +45,7 @@ def a_frozen_arm_leaves_its_path(client: Client) -> None:
     sent = client.send(step(client, time=1.0, path_tolerance=tolerances(client, 0.01)))
     assert sent.accepted
     ended = client.result(sent)
-    aborted(ended, Code.PATH_TOLERANCE_VIOLATED)
+    aborted(ended, ErrorCode.PATH_TOLERANCE_VIOLATED)
     assert any(joint in ended.text for joint in client.joints), ended.text
     stays(client, here)
 
@@ -54,7 +54,7 @@ def a_frozen_arm_leaves_its_path(client: Client) -> None:
 def a_lagging_arm_leaves_a_narrow_path(client: Client) -> None:
     client.behave("lags")
     sent = client.send(step(client, time=1.0, size=2.0, path_tolerance=tolerances(client, 0.01)))
-    aborted(client.result(sent), Code.PATH_TOLERANCE_VIOLATED)
+    aborted(client.result(sent), ErrorCode.PATH_TOLERANCE_VIOLATED)
 
 
 @case
@@ -63,7 +63,7 @@ def a_lagging_arm_may_on_a_wide_path(client: Client) -> None:
     wanted = step(client, time=1.0, size=2.0, path_tolerance=tolerances(client, 0.4), goal_time=20.0)
     sent = client.send(wanted)
     ended = client.result(sent)
-    assert ended.outcome is Outcome.SUCCEEDED, ended
+    assert ended.outcome is GoalOutcome.SUCCEEDED, ended
 
 
 @case
@@ -72,7 +72,7 @@ def one_joints_path_tolerance(client: Client) -> None:
     only = (Tolerance(client.joints[6], 0.01),)
     sent = client.send(step(client, time=1.0, path_tolerance=only))
     ended = client.result(sent)
-    aborted(ended, Code.PATH_TOLERANCE_VIOLATED)
+    aborted(ended, ErrorCode.PATH_TOLERANCE_VIOLATED)
     assert client.joints[6] in ended.text
 
 
@@ -83,7 +83,7 @@ def a_path_tolerance_counts_from_the_first_sample(client: Client) -> None:
     off = here + 0.03 * (np.arange(7) == 5)
     sent = client.send(goal(client, point(0.0, off), path_tolerance=tolerances(client, 0.01)))
     assert sent.accepted
-    aborted(client.result(sent), Code.PATH_TOLERANCE_VIOLATED)
+    aborted(client.result(sent), ErrorCode.PATH_TOLERANCE_VIOLATED)
     stays(client, here)
 
 
@@ -93,7 +93,7 @@ def a_frozen_arm_misses_its_goal(client: Client) -> None:
     client.behave("frozen")
     sent = client.send(step(client, time=0.4, goal_time=0.2))
     ended = client.result(sent)
-    aborted(ended, Code.GOAL_TOLERANCE_VIOLATED)
+    aborted(ended, ErrorCode.GOAL_TOLERANCE_VIOLATED)
     assert any(joint in ended.text for joint in client.joints), ended.text
     stays(client, here)
 
@@ -106,21 +106,21 @@ def one_joints_goal_tolerance(client: Client) -> None:
         client, time=0.4, goal_time=0.2, goal_tolerance=(*others, Tolerance(client.joints[6], 0.02))
     )
     ended = client.result(client.send(wanted))
-    aborted(ended, Code.GOAL_TOLERANCE_VIOLATED)
+    aborted(ended, ErrorCode.GOAL_TOLERANCE_VIOLATED)
     assert client.joints[6] in ended.text
 
 
 @case
 def an_impossible_goal_tolerance_fails(client: Client) -> None:
     sent = client.send(step(client, time=0.4, goal_time=0.3, goal_tolerance=tolerances(client, 1e-15)))
-    aborted(client.result(sent), Code.GOAL_TOLERANCE_VIOLATED)
+    aborted(client.result(sent), ErrorCode.GOAL_TOLERANCE_VIOLATED)
 
 
 @case
 def an_impossible_goal_time_fails(client: Client) -> None:
     client.behave("lags")
     sent = client.send(step(client, time=0.5, size=2.0, goal_time=1e-8))
-    aborted(client.result(sent), Code.GOAL_TOLERANCE_VIOLATED)
+    aborted(client.result(sent), ErrorCode.GOAL_TOLERANCE_VIOLATED)
 
 
 @case
@@ -128,7 +128,7 @@ def a_lagging_arm_has_the_goal_time_to_arrive(client: Client) -> None:
     client.behave("lags")
     sent = client.send(step(client, time=0.5, goal_time=20.0))
     ended = client.result(sent)
-    assert ended.outcome is Outcome.SUCCEEDED, ended
+    assert ended.outcome is GoalOutcome.SUCCEEDED, ended
 
 
 @case
@@ -137,7 +137,7 @@ def erased_tolerances_are_not_enforced(client: Client) -> None:
     none = tolerances(client, -1.0, velocity=-1.0)
     sent = client.send(step(client, time=0.4, path_tolerance=none, goal_tolerance=none))
     ended = client.result(sent)
-    assert ended.outcome is Outcome.SUCCEEDED, ended
+    assert ended.outcome is GoalOutcome.SUCCEEDED, ended
 
 
 @case
@@ -148,7 +148,7 @@ def an_erased_goal_time_waits(client: Client) -> None:
     client.sleep(1.2)
     client.behave("follows")
     ended = client.result(sent)
-    assert ended.outcome is Outcome.SUCCEEDED, ended
+    assert ended.outcome is GoalOutcome.SUCCEEDED, ended
 
 
 @case
@@ -160,7 +160,7 @@ def tolerances_in_any_order(client: Client) -> None:
         Tolerance(client.joints[3], 0.5),
     )
     ended = client.result(client.send(step(client, time=1.0, path_tolerance=mixed)))
-    aborted(ended, Code.PATH_TOLERANCE_VIOLATED)
+    aborted(ended, ErrorCode.PATH_TOLERANCE_VIOLATED)
     assert client.joints[6] in ended.text
 
 
@@ -168,11 +168,11 @@ def tolerances_in_any_order(client: Client) -> None:
 def a_goals_tolerances_are_forgotten_after_it(client: Client) -> None:
     client.behave("lags")
     sent = client.send(step(client, time=1.0, size=2.0, path_tolerance=tolerances(client, 0.005)))
-    aborted(client.result(sent), Code.PATH_TOLERANCE_VIOLATED)
+    aborted(client.result(sent), ErrorCode.PATH_TOLERANCE_VIOLATED)
     rests(client)
     sent = client.send(step(client, time=0.8, goal_time=20.0))
     ended = client.result(sent)
-    assert ended.outcome is Outcome.SUCCEEDED, ended
+    assert ended.outcome is GoalOutcome.SUCCEEDED, ended
 
 
 @case
@@ -187,7 +187,7 @@ def a_tolerance_of_an_unknown_joint_means_the_defaults(client: Client) -> None:
     wrong = (Tolerance("elbow", 1e-6), Tolerance(client.joints[0], 1e-6))
     sent = client.send(step(client, path_tolerance=wrong, goal_time=20.0))
     ended = client.result(sent)
-    assert ended.outcome is Outcome.SUCCEEDED, ended
+    assert ended.outcome is GoalOutcome.SUCCEEDED, ended
 
 
 @case
@@ -195,7 +195,7 @@ def default_tolerances_can_change(client: Client) -> None:
     client.behave("frozen")
     assert client.set(constraints__A7__trajectory=0.01)
     ended = client.result(client.send(step(client, time=1.0)))
-    aborted(ended, Code.PATH_TOLERANCE_VIOLATED)
+    aborted(ended, ErrorCode.PATH_TOLERANCE_VIOLATED)
     assert client.joints[6] in ended.text
 
 
@@ -204,4 +204,4 @@ def velocity_tolerance_on_the_path(client: Client) -> None:
     client.behave("frozen")
     fast = (Tolerance(client.joints[6], 0.0, 0.05),)
     ended = client.result(client.send(step(client, time=0.6, path_tolerance=fast)))
-    aborted(ended, Code.PATH_TOLERANCE_VIOLATED)
+    aborted(ended, ErrorCode.PATH_TOLERANCE_VIOLATED)

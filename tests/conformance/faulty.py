@@ -1,6 +1,6 @@
 """A virtual cabinet that takes faults as lines on its standard input; its end ends the cabinet.
 
-    .venv/bin/python tests/conformance/faulty.py [options of heptarm.virtual.cabinet]
+    .venv/bin/python tests/conformance/faulty.py [options of heptarm.sim.runtime.cabinet]
 
 follows, frozen, lags: how the arm does what its set-points say, whoever makes them. press, release: the emergency stop.
 Everything else is what the operator does, as in `heptarm sim`.
@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from heptarm.virtual import cabinet as virtual
-from heptarm.virtual.control import Control
-from heptarm.virtual.law import Sensed
-from heptarm.virtual.safety import Demand
+from heptarm.sim.control.controller import ActiveLaw
+from heptarm.sim.control.laws import MeasuredState
+from heptarm.sim.controller.safety import StopRequest
+from heptarm.sim.runtime import cabinet as virtual
 
 #: So many ticks late is an arm that lags.
 LAG = 400
@@ -73,7 +73,7 @@ def _listen() -> None:
         if word in ("follows", "frozen", "lags"):
             _behaviour = word
         elif word == "press":
-            _cabinets[0].plant.safety.demand(Demand.EMERGENCY_STOP)
+            _cabinets[0].plant.safety.request_stop(StopRequest.EMERGENCY_STOP)
         elif word == "release":
             _cabinets[0].plant.safety.withdraw()
         else:
@@ -83,13 +83,13 @@ def _listen() -> None:
 
 
 if __name__ == "__main__":
-    unruly = _Unruly(Control.torque)
+    unruly = _Unruly(ActiveLaw.torque)
 
-    def torque(control: Control, sensed: Sensed) -> Any:
+    def torque(control: ActiveLaw, sensed: MeasuredState) -> Any:
         """The law's torque for the set-points as the arm takes them."""
         return unruly.torque(control, sensed)
 
-    Control.torque = torque  # type: ignore[method-assign]
+    ActiveLaw.torque = torque  # type: ignore[method-assign]
     virtual.VirtualCabinet = _Cabinet  # type: ignore[misc]
     threading.Thread(target=_listen, daemon=True).start()
     sys.exit(virtual.main())

@@ -1,4 +1,4 @@
-"""What a node feels and is led by, and what it tells on the way; for both ROS, see `tests.conformance.surface`."""
+"""Contacts, hand guiding, teaching, triggers and collisions, for both ROS; see `tests.conformance.surface`."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ def along(probe: Probe, z: float, **more: Any) -> Any:
     return probe.make("heptarm_msgs/Motion", kind=3, pose=towards(probe, z), **more)
 
 
-def lead(stage: Stage, sent: Sent, way: float) -> None:
+def push(stage: Stage, sent: Sent, way: float) -> None:
     """Push until a joint has turned so far [rad]."""
     before = until(lambda: sent.told, "no feedback")[-1].position
     stage.do("push 0 6 6 300")
-    until(lambda: np.abs(np.subtract(sent.told[-1].position, before)).max() > way, "the arm is not led")
+    until(lambda: np.abs(np.subtract(sent.told[-1].position, before)).max() > way, "the arm is not guided")
     stage.do("push 0 0 0 0")
 
 
@@ -66,7 +66,7 @@ def case_the_arm_touches_once_and_twice(probe: Probe, stage: Stage) -> None:
     refused(act(probe, "touch", "Touch", **down, vector=vector), "both")
 
 
-def case_a_touch_is_cancelled_and_gives_way_to_others(probe: Probe, stage: Stage) -> None:
+def case_a_touch_is_cancelled_and_preempted(probe: Probe, stage: Stage) -> None:
     home(probe)
     slowly = {"direction": "-z", "frame": "base", "distance": 0.08, "force": 20.0, "speed_mps": 0.02}
     sent = probe.send("touch", "Touch", **slowly)
@@ -78,7 +78,7 @@ def case_a_touch_is_cancelled_and_gives_way_to_others(probe: Probe, stage: Stage
     sent = probe.send("touch", "Touch", **slowly)
     until(lambda: sent.told and sent.told[-1].travel > 2e-3, "the arm does not set out")
     home(probe)
-    refused(sent.end(), "took the place")
+    refused(sent.end(), "preempted")
     sent = probe.send("touch", "Touch", **slowly)
     until(lambda: sent.told and sent.told[-1].travel > 2e-3, "the arm does not set out")
     done(probe.call("stop", "std_srvs/Trigger"))
@@ -87,7 +87,7 @@ def case_a_touch_is_cancelled_and_gives_way_to_others(probe: Probe, stage: Stage
     until(lambda: states and not states[-1].motion and not states[-1].queued, "something runs on")
 
 
-def case_triggers_write_outputs_and_tell(probe: Probe, stage: Stage) -> None:
+def case_triggers_write_outputs_and_notify(probe: Probe, stage: Stage) -> None:
     home(probe)
     news = probe.listen("events", "heptarm_msgs/MotionEvent")
     signals = probe.listen("signals", "heptarm_msgs/Signals", latched=True)
@@ -142,16 +142,16 @@ def case_triggers_write_outputs_and_tell(probe: Probe, stage: Stage) -> None:
     until(lambda: lit("MediaFlange.LEDBlue"), "the output is not written")
     for wrong, words in (
         ([trigger("", label="never")], ("triggers[0].condition", "empty")),
-        ([trigger("sometimes")], ("no condition",)),
+        ([trigger("sometimes")], ("must be a condition",)),
         ([trigger("path.after()", signal="UserButton")], ("input",)),
         ([trigger("path.after()")] * 17, ("at most 16",)),
     ):
         refused(act(probe, "move_joints", "MoveJoints", position=HOME, triggers=wrong), *words)
     guided = probe.make("heptarm_msgs/Motion", kind=8, triggers=[near])
-    refused(act(probe, "run_program", "RunProgram", motions=[guided]), "hand guiding has no triggers")
+    refused(act(probe, "run_program", "RunProgram", motions=[guided]), "hand guiding cannot have triggers")
 
 
-def case_a_collision_guard_stops_motions_and_may_give_way(probe: Probe, stage: Stage) -> None:
+def case_a_collision_guard_stops_motions_and_makes_compliant(probe: Probe, stage: Stage) -> None:
     home(probe)
     seen = probe.listen("collisions", "heptarm_msgs/Collision")
     states = probe.listen("state", "heptarm_msgs/RobotState")
@@ -159,7 +159,7 @@ def case_a_collision_guard_stops_motions_and_may_give_way(probe: Probe, stage: S
     answer = done(probe.call("collision_guard", "SetCollisionGuard", threshold=[12.0]))
     assert len(answer.baseline) == 7 and "the cabinet" in answer.message
     refused(act(probe, "move_pose", "MovePose", **down), "collision at A", "12.0 Nm")
-    met = until(lambda: seen, "no collision is told")[-1]
+    met = until(lambda: seen, "no collision is reported")[-1]
     assert met.joint in ("A2", "A4") and abs(met.torque) > 12.0 and met.allowed == 12.0
     turn = probe.tell("servo/velocity", "sensor_msgs/JointState", name=["A7"], velocity=[0.2])
     until(lambda: states and not states[-1].motion, "the arm does not rest")
@@ -181,20 +181,20 @@ def case_a_collision_guard_stops_motions_and_may_give_way(probe: Probe, stage: S
     assert "this node" in answer.message
     count = len(seen)
     assert not act(probe, "move_pose", "MovePose", **down).success
-    until(lambda: len(seen) > count, "no collision is told")
-    until(lambda: states[-1].motion, "the arm does not give way")
-    home(probe)  # the guard is off, and the hold gives its place
+    until(lambda: len(seen) > count, "no collision is reported")
+    until(lambda: states[-1].motion, "the arm is not compliant")
+    home(probe)  # the guard is disabled, and a command replaces the compliant hold
     refused(probe.call("collision_guard", "SetCollisionGuard", threshold=[-1.0]), "threshold")
     refused(probe.call("collision_guard", "SetCollisionGuard", reaction="flee"), "flee", "brake, soft")
 
 
-def case_the_arm_is_led_by_hand(probe: Probe, stage: Stage) -> None:
+def case_the_arm_is_guided_by_hand(probe: Probe, stage: Stage) -> None:
     home(probe)
     before = done(probe.call("get_pose", "GetPose", frame="flange")).pose.position
     sent = probe.send("guide", "Guide", free="y", frame="base")
-    lead(stage, sent, 0.03)
+    push(stage, sent, 0.03)
     sent.cancel()
-    assert done(sent.end()).message == "ended by its client"
+    assert done(sent.end()).message == "ended by the client"
     after = done(probe.call("get_pose", "GetPose", frame="flange")).pose.position
     assert after.y - before.y > 0.005 and abs(after.z - before.z) < 5e-3
     limits = {"joint_velocity": 0.5, "q_max": [0.8] + [math.nan] * 6}
@@ -202,21 +202,21 @@ def case_the_arm_is_led_by_hand(probe: Probe, stage: Stage) -> None:
     until(lambda: sent.told, "no feedback")
     stage.do("guide")
     until(lambda: sent.told[-1].held, "the switch is not seen")
-    lead(stage, sent, 0.03)
+    push(stage, sent, 0.03)
     stage.do("let_go")
     result = done(sent.end())
-    assert "let go" in result.message and len(result.position) == 7
+    assert "released" in result.message and len(result.position) == 7
     done(act(probe, "guide", "Guide", free="xyz", frame="base", duration=0.2))
     assert done(act(probe, "guide", "Guide", free="xyz", frame="base", until="~(force > 50)")).stopped_by
     refused(act(probe, "guide", "Guide", free="w"), "xyzabc")
     refused(act(probe, "guide", "Guide", q_max=[9.0] + [math.nan] * 6), "A1")
 
 
-def case_a_way_is_taught_and_done_again(probe: Probe, stage: Stage) -> None:
+def case_a_trajectory_is_taught_and_replayed(probe: Probe, stage: Stage) -> None:
     home(probe)
     refused(act(probe, "replay", "Replay", name="nothing"), "nothing")
     sent = probe.send("teach", "Teach", free="xyz", frame="base", key="done", slot=1, name="wave")
-    lead(stage, sent, 0.06)
+    push(stage, sent, 0.06)
     stage.do("press 1 client")
     taught = done(sent.end())
     way = taught.trajectory
@@ -234,7 +234,7 @@ def case_a_way_is_taught_and_done_again(probe: Probe, stage: Stage) -> None:
             refused(tries[-1], "for want of targets")
         return bool(tries[-1].success)
 
-    until(repeated, "the way is not done again")
+    until(repeated, "the trajectory is not replayed")
     assert tries[-1].deviation < 0.3 and math.isfinite(tries[-1].lag)
     slowly = probe.send("replay", "Replay", name="wave", pace=0.05)
     until(lambda: slowly.told and slowly.told[-1].progress > 0.01, "it does not begin")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from heptarm.bridge.goal import Code, Outcome
+from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome
 from heptarm.values.arrays import Array
 from tests.conformance.case import (
     REST,
@@ -25,7 +25,7 @@ from tests.conformance.case import (
     swing,
     under_way,
 )
-from tests.conformance.client import Client, Sent
+from tests.conformance.client import Client, SentGoal
 
 # ------------------------------------------------------------------------------------- preemption
 
@@ -50,8 +50,8 @@ def a_goal_takes_the_place_of_another(client: Client) -> None:
     second = client.send(wanted)
     assert first.accepted and second.accepted
     ended = client.result(first)
-    assert ended.outcome in client.preempted and ended.code is Code.INVALID_GOAL, ended
-    assert client.result(second).outcome is Outcome.SUCCEEDED
+    assert ended.outcome in client.preempted and ended.code is ErrorCode.INVALID_GOAL, ended
+    assert client.result(second).outcome is GoalOutcome.SUCCEEDED
     assert np.abs(client.place().q - last(wanted, client)).max() < TOUCH
 
 
@@ -67,7 +67,7 @@ def many_goals_in_a_row_and_only_the_last_succeeds(client: Client) -> None:
         client.sleep(0.1)
     ends = [client.result(one) for one in sent]
     assert all(end.outcome in client.preempted for end in ends[:-1])
-    assert ends[-1].outcome is Outcome.SUCCEEDED
+    assert ends[-1].outcome is GoalOutcome.SUCCEEDED
 
 
 @case
@@ -79,8 +79,8 @@ def a_goal_with_a_future_start_takes_the_place_at_once(client: Client) -> None:
     second = client.send(goal(client, point(0.6, here, dq=REST), start=client.now() + 1.0))
     assert second.accepted
     ended = client.result(first)
-    assert ended.outcome in client.preempted and ended.code is Code.INVALID_GOAL, ended
-    assert client.result(second).outcome is Outcome.SUCCEEDED
+    assert ended.outcome in client.preempted and ended.code is ErrorCode.INVALID_GOAL, ended
+    assert client.result(second).outcome is GoalOutcome.SUCCEEDED
     assert np.abs(client.place().q - here).max() < TOUCH
 
 
@@ -93,7 +93,7 @@ def no_jump_when_a_goal_takes_the_place_of_another(client: Client) -> None:
         here = client.place().q
         second = client.send(goal(client, point(1.2, here, dq=REST)))
         assert second.accepted
-        assert client.result(second).outcome is Outcome.SUCCEEDED
+        assert client.result(second).outcome is GoalOutcome.SUCCEEDED
         return max(float(np.abs(one.error).max()) for one in client.feedback(second))
 
     assert undisturbed(client, replaced) < 0.05
@@ -110,7 +110,7 @@ def cancelling_brakes_and_holds(client: Client) -> None:
     under_way(client, here, 0.03)
     assert client.cancel(sent)
     ended = client.result(sent)
-    assert ended.outcome is Outcome.CANCELED and ended.code is Code.SUCCESSFUL, ended
+    assert ended.outcome is GoalOutcome.CANCELED and ended.code is ErrorCode.SUCCESSFUL, ended
     rest = rests(client)
     assert np.abs(rest - here).max() > 0.02, "it was under way"
     assert np.abs(rest - last(wanted, client)).max() > 0.02, "it did not go to the end"
@@ -134,7 +134,7 @@ def cancelling_goes_straight_on_while_it_brakes(client: Client) -> None:
     assert np.abs(np.delete(rest - here, joint)).max() < 5e-3
 
 
-def _mid_air(client: Client, far: float) -> tuple[Sent, float]:
+def _mid_air(client: Client, far: float) -> tuple[SentGoal, float]:
     """A7 goes at 0.4 rad/s and is so far [rad]: its goal, and in which direction it moves."""
     here = client.place().q
     sign = -1.0 if here[6] > 0 else 1.0
@@ -149,11 +149,13 @@ def _brakes(client: Client) -> tuple[Array, Array]:
     sent, sign = _mid_air(client, 0.2)
     begin = client.now()
     client.cancel(sent)
-    assert client.result(sent).outcome is Outcome.CANCELED
+    assert client.result(sent).outcome is GoalOutcome.CANCELED
     rests(client)
     track = client.track(begin)
     times, way = np.array([time for time, _ in track]), np.array([sign * q[6] for _, q in track])
-    apart = np.diff(times, prepend=-1.0) > 2e-3  # stamps may be nearer where the clocks' difference was corrected
+    apart = (
+        np.diff(times, prepend=-1.0) > 2e-3
+    )  # stamps may be nearer where the clocks' difference was corrected
     return times[apart], way[apart]
 
 
@@ -192,8 +194,8 @@ def a_goal_right_after_a_cancellation_is_accepted(client: Client) -> None:
     wanted = step(client, time=0.8, size=-0.5)
     second = client.send(wanted)
     assert second.accepted
-    assert client.result(first).outcome is Outcome.CANCELED
-    assert client.result(second).outcome is Outcome.SUCCEEDED
+    assert client.result(first).outcome is GoalOutcome.CANCELED
+    assert client.result(second).outcome is GoalOutcome.SUCCEEDED
     assert np.abs(client.place().q - last(wanted, client)).max() < TOUCH
 
 
@@ -203,7 +205,7 @@ def cancelling_before_a_future_start(client: Client) -> None:
     sent = client.send(step(client, start=client.now() + 3.0))
     client.sleep(0.1)
     assert client.cancel(sent)
-    assert client.result(sent).outcome is Outcome.CANCELED
+    assert client.result(sent).outcome is GoalOutcome.CANCELED
     stays(client, here)
 
 
@@ -214,7 +216,7 @@ def cancelling_an_ended_goal_does_nothing(client: Client) -> None:
     second = client.send(wanted)
     client.sleep(0.2)
     client.cancel(first)
-    assert client.result(second).outcome is Outcome.SUCCEEDED
+    assert client.result(second).outcome is GoalOutcome.SUCCEEDED
 
 
 @case

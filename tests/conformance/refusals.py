@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from heptarm.bridge.goal import Code, Goal, Outcome, Point
+from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, TrajectoryGoal, TrajectoryPoint
 from tests.conformance.case import CASES, REST, TOUCH, Case, case, last, stays, step, succeeds
 from tests.conformance.client import Client
 
@@ -16,39 +16,42 @@ from tests.conformance.client import Client
 class Refusal:
     """A goal that has to be rejected, with the code where codes are told."""
 
-    change: Callable[[Client, Goal], Goal]
-    code: Code
+    change: Callable[[Client, TrajectoryGoal], TrajectoryGoal]
+    code: ErrorCode
 
 
-def _points(wanted: Goal, **changes: object) -> Goal:
+def _points(wanted: TrajectoryGoal, **changes: object) -> TrajectoryGoal:
     """The same changes for the last point."""
     return replace(wanted, points=(*wanted.points[:-1], replace(wanted.points[-1], **changes)))  # type: ignore[arg-type]
 
 
-def _with(wanted: Goal, values: tuple[float, ...], index: int, value: float) -> tuple[float, ...]:
+def _with(wanted: TrajectoryGoal, values: tuple[float, ...], index: int, value: float) -> tuple[float, ...]:
     changed = list(values)
     changed[index] = value
     return tuple(changed)
 
 
-def _earlier(wanted: Goal, time: float) -> Goal:
+def _earlier(wanted: TrajectoryGoal, time: float) -> TrajectoryGoal:
     first = replace(wanted.points[0], time=time, dq=())
     return replace(wanted, points=(first, wanted.points[0]))
 
 
-_J, _G = Code.INVALID_JOINTS, Code.INVALID_GOAL
+_J, _G = ErrorCode.INVALID_JOINTS, ErrorCode.INVALID_GOAL
 REFUSALS: dict[str, Refusal] = {
-    "an_empty_goal": Refusal(lambda c, g: Goal((), ()), _J),
+    "an_empty_goal": Refusal(lambda c, g: TrajectoryGoal((), ()), _J),
     "no_points": Refusal(lambda c, g: replace(g, points=()), _G),
     "no_names": Refusal(lambda c, g: replace(g, joints=()), _J),
     "an_unknown_name": Refusal(lambda c, g: replace(g, joints=("elbow", *g.joints[1:])), _J),
     "a_name_in_capitals": Refusal(lambda c, g: replace(g, joints=tuple(n.swapcase() for n in g.joints)), _J),
     "a_joint_twice": Refusal(lambda c, g: replace(g, joints=(g.joints[0], *g.joints[:6])), _J),
     "too_few_joints": Refusal(
-        lambda c, g: replace(g, joints=g.joints[:6], points=(Point(0.6, g.points[0].q[:6]),)), _J
+        lambda c, g: replace(g, joints=g.joints[:6], points=(TrajectoryPoint(0.6, g.points[0].q[:6]),)), _J
     ),
     "too_many_joints": Refusal(
-        lambda c, g: replace(g, joints=(*g.joints, "A8"), points=(Point(0.6, (*g.points[0].q, 0.0)),)), _J
+        lambda c, g: replace(
+            g, joints=(*g.joints, "A8"), points=(TrajectoryPoint(0.6, (*g.points[0].q, 0.0)),)
+        ),
+        _J,
     ),
     "no_positions": Refusal(lambda c, g: _points(g, q=()), _G),
     "velocities_only": Refusal(lambda c, g: _points(g, q=(), dq=REST), _G),
@@ -111,7 +114,7 @@ def a_refused_goal_does_not_disturb_the_one_under_way(client: Client) -> None:
     client.sleep(0.2)
     assert not client.send(replace(wanted, joints=("elbow", *wanted.joints[1:]))).accepted
     ended = client.result(sent)
-    assert ended.outcome is Outcome.SUCCEEDED, ended
+    assert ended.outcome is GoalOutcome.SUCCEEDED, ended
     assert np.abs(client.place().q - last(wanted, client)).max() < TOUCH
 
 
@@ -122,7 +125,7 @@ def an_old_goal_is_refused_and_the_one_under_way_finished(client: Client) -> Non
     client.sleep(0.2)
     assert not client.send(replace(wanted, start=client.now() - 3.0)).accepted
     ended = client.result(sent)
-    assert ended.outcome is Outcome.SUCCEEDED, ended
+    assert ended.outcome is GoalOutcome.SUCCEEDED, ended
 
 
 @case
@@ -130,7 +133,7 @@ def an_inactive_node_rejects(client: Client) -> None:
     client.activate(on=False)
     try:
         sent = client.send(step(client))
-        assert not sent.accepted and sent.code in (None, Code.INVALID_GOAL)
+        assert not sent.accepted and sent.code in (None, ErrorCode.INVALID_GOAL)
     finally:
         client.activate(on=True)
     succeeds(client, step(client))

@@ -26,6 +26,7 @@ class Stage:
     def __init__(self, *options: str) -> None:
         self._options = options
         self.port = 0
+        self._environment = environment()  # also of a restart: it belongs to whoever has made this, see tests.processes
         self.process = self._start()
 
     def _start(self) -> subprocess.Popen[str]:
@@ -35,7 +36,7 @@ class Stage:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
-            env=environment(),
+            env=self._environment,
             start_new_session=True,
         )
         assert process.stdout is not None

@@ -1,4 +1,4 @@
-"""What a node has beside trajectories, tried through its services, actions and topics; the same for both ROS.
+"""Everything of a node besides trajectories, through its services, actions and topics; the same for both ROS.
 
 A case takes a probe: a client of one node, whose arm is on a stage with the project `PROJECT`.
 """
@@ -64,7 +64,7 @@ class Probe(Protocol):
         ...
 
     def tell(self, name: str, kind: str, /, **message: Any) -> Callable[[], None]:
-        """What publishes a message, once somebody listens."""
+        """A function that publishes a message; returns when a subscriber is known."""
         ...
 
     def make(self, kind: str, /, **fields: Any) -> Any:
@@ -76,7 +76,7 @@ class Probe(Protocol):
         ...
 
     def query(self) -> Any:
-        """What the trajectory under way wants now; None: there is none."""
+        """Desired state of the active trajectory; None: there is none."""
         ...
 
 
@@ -136,7 +136,7 @@ def case_signals_are_listed_written_and_published(probe: Probe, stage: Stage) ->
     until(lambda: dict(zip(seen[-1].names, seen[-1].values))["MediaFlange.UserButton"] == 1.0, "no button")
     stage.do("set UserButton false")
     refused(probe.call("set_signals", "SetSignals", names=["UserButton"], values=[1.0]), "input")
-    refused(probe.call("set_signals", "SetSignals", names=["offset"], values=[]), "0 values for 1")
+    refused(probe.call("set_signals", "SetSignals", names=["offset"], values=[]), "got 0")
     refused(probe.call("set_led", "SetText", value="pink"), "pink", "blue")
 
 
@@ -172,7 +172,7 @@ def case_a_condition_ends_a_motion(probe: Probe, stage: Stage) -> None:
     result = done(act(probe, "move_joints", "MoveJoints", position=HOME, until="~io.user_button | (force > 900)"))
     assert "user_button" in result.stopped_by.casefold().replace("userbutton", "user_button")
     bad = "__import__('os').system('true')"
-    refused(act(probe, "move_joints", "MoveJoints", position=HOME, until=bad), "no condition", "force.along")
+    refused(act(probe, "move_joints", "MoveJoints", position=HOME, until=bad), "must be a condition", "force.along")
     refused(act(probe, "move_joints", "MoveJoints", position=HOME, until="force > 9999"), "9999")
     home(probe)
 
@@ -202,7 +202,7 @@ def case_a_guard_ends_commands_and_servo_topics(probe: Probe, stage: Stage) -> N
         turn()
         time.sleep(0.01)
     assert abs(states[-1].position[6] - there) < 1e-3, "it does not go on by itself"
-    refused(probe.call("set_guard", "SetText", value="force"), "compared")
+    refused(probe.call("set_guard", "SetText", value="force"), "compare")
     done(probe.call("set_guard", "SetText", value=""))
     until(lambda: turn() or states[-1].position[6] > there + 0.05, "the arm does not follow again")
     until(lambda: not states[-1].motion, "the servo motion does not end")
@@ -287,7 +287,7 @@ def case_modes_with_all_their_parameters(probe: Probe, stage: Stage) -> None:
     ):
         done(probe.call("mode/force_pattern", "SetForcePattern", **pattern))
     refused(probe.call("mode/force_pattern", "SetForcePattern", pattern="star"), "star", "lissajous")
-    refused(probe.call("mode/force_pattern", "SetForcePattern", pattern="force", force=[1.0]), "6 are wanted")
+    refused(probe.call("mode/force_pattern", "SetForcePattern", pattern="force", force=[1.0]), "must have 6 numbers")
     refused(probe.call("mode/sine_impedance", "SetSineImpedance", **{**sine, "nullspace": six}), "nullspace")
     done(probe.call("mode/position", "std_srvs/Trigger"))
 
@@ -357,21 +357,21 @@ def case_an_fri_session_is_opened_commanded_and_closed(probe: Probe, stage: Stag
     until(lambda: stands("monitor", io=["LEDRed"]) and lit().success, "the output is not set")
     done(probe.call("fri/close", "std_srvs/Trigger"))
     until(lambda: not status[-1].kind, "the status does not tell of the end")
-    wish = states[-1].position[6] - 0.1
-    turn = probe.tell("fri/joint", "sensor_msgs/JointState", name=["A7"], position=[wish])
+    target_a7 = states[-1].position[6] - 0.1
+    turn = probe.tell("fri/joint", "sensor_msgs/JointState", name=["A7"], position=[target_a7])
 
     def arrived() -> bool:
         if not stands("position"):
             return False
         turn()
-        return abs(states[-1].position[6] - wish) < 2e-3
+        return abs(states[-1].position[6] - target_a7) < 2e-3
 
     until(arrived, "the arm does not follow FRI")
     done(probe.call("fri/close", "std_srvs/Trigger"))
     home(probe)
 
 
-def case_where_a_trajectory_wants_the_arm(probe: Probe, stage: Stage) -> None:
+def case_the_desired_state_of_a_trajectory(probe: Probe, stage: Stage) -> None:
     home(probe)
     assert probe.query() is None
     path = {"joint_names": [f"A{i}" for i in range(1, 8)], "points": [probe.point([*HOME[:6], 2.0], 12.0)]}
@@ -385,7 +385,7 @@ def case_where_a_trajectory_wants_the_arm(probe: Probe, stage: Stage) -> None:
             seen.append(wanted.position[6])
         return bool(seen) and seen[-1] > 0.2
 
-    until(halfway, "nothing is wanted")
+    until(halfway, "there is no desired state")
     assert seen == sorted(seen)
     done(probe.call("stop", "std_srvs/Trigger"))
     until(lambda: probe.query() is None, "the trajectory does not end")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heptarm.bridge.goal import Code, Goal, Outcome, Point
+from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, TrajectoryGoal, TrajectoryPoint
 from tests.conformance.case import (
     REST,
     TOUCH,
@@ -38,7 +38,7 @@ def an_end_that_moves_where_it_is_allowed(client: Client) -> None:
     sent = client.send(goal(client, point(0.6, here + sign * 0.1 * (np.arange(7) == 6), dq=moving)))
     assert sent.accepted
     ended = client.result(sent)
-    assert ended.outcome is Outcome.SUCCEEDED, ended
+    assert ended.outcome is GoalOutcome.SUCCEEDED, ended
     rest = rests(client)
     assert abs(rest[6] - here[6]) < 0.3, "nobody goes on for it: the arm brakes"
 
@@ -48,10 +48,10 @@ def some_joints_where_it_is_allowed(client: Client) -> None:
     assert client.set(allow_partial_joints_goal=True)
     here = client.place().q
     some = (client.joints[6], client.joints[3])
-    sent = client.send(Goal(some, (Point(0.6, (here[6] + 0.1, here[3] + 0.05)),)))
+    sent = client.send(TrajectoryGoal(some, (TrajectoryPoint(0.6, (here[6] + 0.1, here[3] + 0.05)),)))
     assert sent.accepted
     ended = client.result(sent)
-    assert ended.outcome is Outcome.SUCCEEDED, ended
+    assert ended.outcome is GoalOutcome.SUCCEEDED, ended
     moved = client.place().q - here
     assert abs(moved[6] - 0.1) < TOUCH and abs(moved[3] - 0.05) < TOUCH
     assert np.abs(np.delete(moved, [3, 6])).max() < 2e-3, "the others hold"
@@ -75,7 +75,7 @@ def _scaled(client: Client, factor: float) -> None:
     for _ in range(2):
         sent = client.send(wanted)
         ended = client.result(sent)
-        assert ended.outcome is Outcome.SUCCEEDED, ended
+        assert ended.outcome is GoalOutcome.SUCCEEDED, ended
         told = client.feedback(sent)
         late = [one for one in told if one.elapsed > 0.3]
         for one in late:
@@ -119,8 +119,51 @@ def a_trajectory_on_the_topic_takes_a_goals_place(client: Client) -> None:
     wanted = step(client, time=0.5, size=-0.5)
     client.topic(wanted)
     ended = client.result(first)
-    assert ended.outcome in client.preempted and ended.code is Code.INVALID_GOAL, ended
+    assert ended.outcome in client.preempted and ended.code is ErrorCode.INVALID_GOAL, ended
     arrives(client, last(wanted, client))
+
+
+def _streamed(client: Client, rate: float) -> None:
+    """Stream a swing of 0.3 rad in 4 s, one point a message, as MoveIt Servo does."""
+    here, duration = client.place().q, 4.0
+    away = 0.3 * (np.arange(7) == 6) * (-1.0 if here[6] > 0 else 1.0)
+    begin = client.now()
+    count = round(duration * rate)
+    for k in range(1, count + 1):
+        fraction = 0.5 - 0.5 * np.cos(np.pi * k / count)
+        client.topic(goal(client, point(1.0 / rate, here + fraction * away)))
+        client.sleep(max(0.0, begin + k / rate - client.now()))
+    took = client.now() - begin
+    arrives(client, here + away)
+    track = client.track(begin)
+    progress = np.array([(q - here) @ away / (away @ away) for _, q in track])
+    assert progress.max() < 1.03, "it overshoots"
+    if took > 1.1 * duration:  # the machine was too busy to send at this rate
+        return
+    times = np.array([time for time, _ in track]) - begin
+    reached = np.interp(0.5 * duration, times, progress)
+    assert (0.4 if client.timely else 0.2) < reached < 0.6, f"it lags: {reached:.2f}"
+    if not client.timely:  # a busy machine delivers the messages in bursts
+        return
+    speeds = np.diff(np.interp(np.arange(0.25, 0.75, 0.025) * duration, times, progress)) / (0.025 * duration)
+    fastest = 0.5 * np.pi / duration
+    ratios = (speeds / fastest).round(2).tolist()
+    assert min(ratios) > 0.6 and max(ratios) < 1.2, f"it stops between the points: {ratios}"
+
+
+@case
+def points_streamed_at_50_hz_are_followed(client: Client) -> None:
+    _streamed(client, 50.0)
+
+
+@case
+def points_streamed_at_100_hz_are_followed(client: Client) -> None:
+    _streamed(client, 100.0)
+
+
+@case
+def points_streamed_at_250_hz_are_followed(client: Client) -> None:
+    _streamed(client, 250.0)
 
 
 @case
@@ -136,9 +179,9 @@ def an_empty_trajectory_on_the_topic_stops_a_goal(client: Client) -> None:
     here = client.place().q
     sent = client.send(long(client))
     under_way(client, here)
-    client.topic(Goal((), ()))
+    client.topic(TrajectoryGoal((), ()))
     ended = client.result(sent)
-    assert ended.outcome is not Outcome.SUCCEEDED and ended.code is not Code.SUCCESSFUL, ended
+    assert ended.outcome is not GoalOutcome.SUCCEEDED and ended.code is not ErrorCode.SUCCESSFUL, ended
     rest = rests(client)
     stays(client, rest)
 
@@ -150,7 +193,7 @@ def deactivating_ends_a_goal(client: Client) -> None:
     under_way(client, here)
     client.activate(on=False)
     try:
-        aborted(client.result(sent), Code.INVALID_GOAL)
+        aborted(client.result(sent), ErrorCode.INVALID_GOAL)
         rest = rests(client)
         stays(client, rest)
     finally:
