@@ -13,7 +13,7 @@ SOURCE = HERE / "java" / "Alone.java"
 def test_an_application_on_the_core_has_what_clients_have(tmp_path: Path) -> None:
     _compile(SOURCE, tmp_path)
     said = tmp_path / "said.txt"
-    done = _run("sample.Alone", tmp_path, f"sample.file={said}", speed=2.0)
+    done = _run("sample.Alone", tmp_path, f"sample.file={said}")
     wanted = re.findall(r'say\("([^"]+)"', SOURCE.read_text())
     assert len(wanted) > 30
     assert said.read_text().splitlines() == [f"{one} = true" for one in wanted], done.stdout + done.stderr

@@ -31,6 +31,6 @@ SAID = (
 def test_paths_of_a_sunrise_application(tmp_path: Path) -> None:
     _compile(HERE / "java" / "Curving.java", tmp_path)
     said = tmp_path / "said.txt"
-    done = _run("sample.Curving", tmp_path, f"sample.file={said}", speed=2.0)
+    done = _run("sample.Curving", tmp_path, f"sample.file={said}")
     assert done.returncode == 0, done.stdout + done.stderr
     assert said.read_text().splitlines() == [f"{one} = true" for one in SAID]

@@ -13,6 +13,8 @@ from heptarm import _resources
 from heptarm.values.robot import robot
 
 HERE = Path(__file__).parent
+#: Cabinet seconds per second: applications mostly wait for motions.
+SPEED = 4.0
 
 SAID = (
     "initialize = LBR_iiwa_14_R820_1",
@@ -65,9 +67,9 @@ def _compile(source: Path, out: Path) -> None:
     subprocess.run(command, check=True)
 
 
-def _command(application: str, classes: Path, *data: str) -> list[str]:
-    command = [sys.executable, "-m", "heptarm.virtual.cabinet", "--application", application]
-    command += ["--classpath", str(classes)]
+def _command(application: str, classes: Path, *data: str, speed: float = SPEED) -> list[str]:
+    command = [sys.executable, "-m", "heptarm.sim.runtime.cabinet", "--application", application]
+    command += ["--classpath", str(classes), "--speed", str(speed)]
     for one in data:
         command += ["--data", one]
     return command
@@ -78,10 +80,10 @@ def _run(
     classes: Path,
     *data: str,
     project: Path | None = None,
-    speed: float = 1.0,
+    speed: float = SPEED,
     more: tuple[str, ...] = (),
 ) -> subprocess.CompletedProcess[str]:
-    command = [*_command(application, classes, *data), "--speed", str(speed), *more]
+    command = [*_command(application, classes, *data, speed=speed), *more]
     if project is not None:
         command += ["--project", str(project)]
     return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
@@ -98,7 +100,7 @@ def test_a_sunrise_application_behaves_as_on_a_cabinet(tmp_path: Path) -> None:
 def test_who_wakes_late_is_not_shown_the_present_for_the_past(tmp_path: Path) -> None:
     _compile(HERE / "java" / "Oversleeping.java", tmp_path)
     said = tmp_path / "said.txt"
-    done = _run("sample.Oversleeping", tmp_path, f"sample.file={said}")
+    done = _run("sample.Oversleeping", tmp_path, f"sample.file={said}", speed=1.0)  # it sleeps by the wall
     assert done.returncode == 0, done.stdout + done.stderr
     top = 0.1 * robot("iiwa14").dq_max[0]
     assert 0.5 * top < float(said.read_text()) < 1.5 * top
@@ -182,7 +184,7 @@ YIELDING = (
 def test_cartesian_impedance_of_a_sunrise_application(tmp_path: Path) -> None:
     _compile(HERE / "java" / "Yielding.java", tmp_path)
     said = tmp_path / "said.txt"
-    done = _run("sample.Yielding", tmp_path, f"sample.file={said}", speed=2.0)
+    done = _run("sample.Yielding", tmp_path, f"sample.file={said}")
     assert done.returncode == 0, done.stdout + done.stderr
     assert said.read_text().splitlines() == [f"{one} = true" for one in YIELDING]
 
@@ -216,11 +218,14 @@ def test_deselecting_an_application_is_no_failure(tmp_path: Path) -> None:
         """
     )
     _compile(source, tmp_path)
-    with subprocess.Popen(_command("sample.Endless", tmp_path), stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "running\n"
+    command = _command("sample.Endless", tmp_path)
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None  # where the application's own output goes, beside the log
+        while (line := process.stderr.readline()) != "running\n":
+            assert line, "the application ended before it ran"
         process.terminate()
-        assert process.stdout.read().splitlines() == ["STOPPING", "disposed"]
+        rest = process.stderr.read().splitlines()
+        assert [line for line in rest if line in ("STOPPING", "disposed")] == ["STOPPING", "disposed"]
         assert process.wait(timeout=10) == 0
 
 

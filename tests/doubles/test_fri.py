@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from heptarm.rt.client import Client
+from heptarm.fri.loop.client import Client
 from tests.doubles.test_doubles import HERE, _command, _compile
 
 SAID = (
@@ -42,7 +42,7 @@ def test_an_fri_application_and_its_client(tmp_path: Path) -> None:
         f'<processData dataType="java.lang.Integer" id="sample.port" defaultValue="{port}"/>'
         "</processDataContainer></persistence>"
     )
-    command = _command("sample.Overlaying", tmp_path, f"sample.file={said}")
+    command = _command("sample.Overlaying", tmp_path, f"sample.file={said}", speed=1.0)  # FRI is real time
     with (
         Client(port) as client,
         subprocess.Popen(

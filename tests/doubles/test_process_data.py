@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from heptarm import _resources
-from heptarm.virtual import cabinet, processdata
+from heptarm.sim.runtime import cabinet, project
 
 PROJECT = _resources.cabinet_sources() / "project" / "RoboticsAPI.data.xml"
 
 
 def test_our_own_project_file_is_understood() -> None:
-    data = processdata.read(PROJECT)
+    data = project.read_process_data(PROJECT)
     assert data["heptarm.port"] == 30001
     assert data["heptarm.max_rate"] == 200.0
     assert data["heptarm.key"] == ""
@@ -41,13 +41,13 @@ def test_what_does_not_fit_is_refused(text: str) -> None:
     ("text", "says"),
     [
         ("<a><processData id='x' dataType='java.lang.Integer' value='1.5'/></a>", "process data x"),
-        ("<a><processData id='x' dataType='java.lang.Boolean' value='yes'/></a>", "neither"),
+        ("<a><processData id='x' dataType='java.lang.Boolean' value='yes'/></a>", "must be true or false"),
         ("<a><processData id='x' dataType='java.util.Date' value='1'/></a>", "java.util.Date"),
-        ("no xml", "no process data"),
+        ("no xml", "not a project file"),
     ],
 )
 def test_a_broken_project_file_is_refused(tmp_path: Path, text: str, says: str) -> None:
     file = tmp_path / "data.xml"
     file.write_text(text)
     with pytest.raises(ValueError, match=says):
-        processdata.read(file)
+        project.read_process_data(file)

@@ -35,6 +35,7 @@ def test_signals_and_keys_of_a_sunrise_application(tmp_path: Path) -> None:
     command = [*_command("sample.Signalling", tmp_path, f"sample.file={said}"), "--parent-pipe"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdin is not None and process.stdout is not None
+        assert '"ready": true' in process.stdout.readline()
         _until(said, "READY")
         for words, line in (
             ("set MediaFlange.Pressure 6.5", "READY"),

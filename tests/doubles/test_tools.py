@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from heptarm.virtual import templates
+from heptarm.sim.runtime import project as templates
 from tests.doubles.test_doubles import HERE, _compile, _run
 
 SAID = (
@@ -82,7 +82,7 @@ def test_tools_as_a_sunrise_application_uses_them(tmp_path: Path, project: Path)
 
 
 def test_a_project_file_tells_its_tools_and_places(project: Path) -> None:
-    found = templates.read(project)
+    found = templates.read_project(project)
     gripper, cube = found.templates
     assert (gripper.name, gripper.is_tool, gripper.mass, gripper.moved) == ("Gripper", True, 3.0, "Tip")
     assert gripper.centre == (0.0, 0.0, 100.0, 0.0, 0.0, 0.0)
@@ -93,10 +93,13 @@ def test_a_project_file_tells_its_tools_and_places(project: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "says"),
-    [("no xml", "no project data"), (PROJECT.replace("120.0", "high"), "transformation z is 'high'")],
+    [
+        ("no xml", "not a project file"),
+        (PROJECT.replace("120.0", "high"), "transformation z must be a number, got 'high'"),
+    ],
 )
 def test_a_broken_project_is_refused(tmp_path: Path, text: str, says: str) -> None:
     file = tmp_path / "data.xml"
     file.write_text(text)
     with pytest.raises(ValueError, match=says):
-        templates.read(file)
+        templates.read_project(file)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from heptarm import _resources
-from heptarm.virtual import templates
+from heptarm.sim.runtime import project as templates
 from tests.doubles.test_doubles import HERE, _command
 
 SOURCES = ("Touring", "Counting", "Waiting", "ICounter", "Pen")
@@ -127,10 +127,11 @@ def test_a_tour_through_sunrise(tmp_path: Path, project: Path) -> None:
         ["javac", "-proc:none", "--release", "17", "-cp", path, "-d", str(tmp_path), *sources], check=True
     )
     said = tmp_path / "said.txt"
-    command = _command("sample.Touring", tmp_path, f"sample.file={said}", f"recordings={tmp_path}")
-    command += ["--project", str(project), "--speed", "2", "--parent-pipe"]
+    command = _command("sample.Touring", tmp_path, f"sample.file={said}", f"recordings={tmp_path}", speed=1.0)
+    command += ["--project", str(project), "--parent-pipe"]
     command += ["--background", "sample.Counting", "--background", "sample.Waiting"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None and '"ready": true' in process.stdout.readline()
         _until(said, "STOP ME", process)
         assert '"error": ""' in _do("protective_stop", process)
         time.sleep(0.5)  # the arm stands for a while
@@ -148,6 +149,6 @@ def test_a_tour_through_sunrise(tmp_path: Path, project: Path) -> None:
 
 
 def test_a_project_file_tells_classes_of_tools_and_arms_of_frames(project: Path) -> None:
-    found = templates.read(project)
+    found = templates.read_project(project)
     assert [one.type for one in found.templates] == ["sample.Pen"]
     assert found.redundancies == (("Table/Corner", (0.25, 2, 28)),)

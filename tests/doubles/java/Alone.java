@@ -9,13 +9,13 @@ import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 
 import heptarm.app.CabinetArm;
-import heptarm.core.Arm;
-import heptarm.core.Handle;
-import heptarm.core.Move;
-import heptarm.core.Refusal;
-import heptarm.core.Spring;
-import heptarm.core.Steering;
-import heptarm.core.Until;
+import heptarm.core.CommandRejected;
+import heptarm.core.api.Arm;
+import heptarm.core.api.Impedance;
+import heptarm.core.api.MotionHandle;
+import heptarm.core.api.Move;
+import heptarm.core.api.ServoHandle;
+import heptarm.core.api.StopCondition;
 import heptarm.wire.Axis;
 import heptarm.wire.CartesianImpedance;
 import heptarm.wire.Cause;
@@ -53,14 +53,14 @@ public class Alone extends RoboticsAPIApplication {
     }
 
     private interface Attempt {
-        void make() throws Refusal, InterruptedException;
+        void make() throws CommandRejected, InterruptedException;
     }
 
     private static int code(Attempt attempt) throws InterruptedException {
         try {
             attempt.make();
             return 0;
-        } catch (Refusal e) {
+        } catch (CommandRejected e) {
             return e.code;
         }
     }
@@ -84,7 +84,7 @@ public class Alone extends RoboticsAPIApplication {
     private void motions() throws Exception {
         Pose start = here();
         Pose over = new Pose(new double[] {start.xyz[0], start.xyz[1] + 0.05, start.xyz[2] + 0.03}, start.quat);
-        Move line = Move.lin(over).along(0.2, 1.0, 10.0).turning(0.5, 2.0, 20.0).jerk(0.5)
+        Move line = Move.lin(over).cartesian(0.2, 1.0, 10.0).rotational(0.5, 2.0, 20.0).jerk(0.5)
                 .orientation(OrientationType.CONSTANT, OrientationReference.BASE);
         say("a batch is blended", arm.move(line.blending(0.0, 0.02, 0.0), Move.lin(start)).cause == Cause.FINISHED);
         Move slow = HOME.speed(1, 1, 1, 1, 1, 1, 0.05);
@@ -105,69 +105,69 @@ public class Alone extends RoboticsAPIApplication {
 
     private void conditions() throws Exception {
         Move down = Move.linRel(0.0, 0.0, 0.15).velocity(0.1);
-        MotionFinished end = arm.move(down.until(Until.travelled(0.03).and(Until.force(1000.0).not())));
+        MotionFinished end = arm.move(down.until(StopCondition.pathFromStart(0.03).and(StopCondition.force(1000.0).not())));
         say("and, not", end.cause == Cause.CONDITION && end.fired == 3);
-        end = arm.move(down.until(Until.joint(4, -500, 500).or(Until.torque(Axis.X, -900, 900)).or(Until.left(0.1))));
+        end = arm.move(down.until(StopCondition.jointTorque(4, -500, 500).or(StopCondition.torque(Axis.X, -900, 900)).or(StopCondition.pathToEnd(0.1))));
         say("the leaf that fires is named", end.cause == Cause.CONDITION && end.fired == 3);
         arm.write("MediaFlange.LEDBlue", 0);
-        end = arm.move(down.trigger(Until.travelled(0.02), new SetSignal("MediaFlange.LEDBlue", 1)).until(Until.travelled(0.06)));
+        end = arm.move(down.trigger(StopCondition.pathFromStart(0.02), new SetSignal("MediaFlange.LEDBlue", 1)).until(StopCondition.pathFromStart(0.06)));
         say("a trigger on the way switches a lamp", end.cause == Cause.CONDITION && arm.read("MediaFlange.LEDBlue") == 1.0);
         arm.write("MediaFlange.LEDBlue", 0);
-        say("a signal that is none", code(() -> arm.move(down.until(Until.signal("No.Such", true)))) == Code.UNKNOWN_NAME);
+        say("a signal that is none", code(() -> arm.move(down.until(StopCondition.signal("No.Such", true)))) == Code.UNKNOWN_NAME);
         arm.move(HOME);
     }
 
     private void modes() throws Exception {
-        Spring soft = Spring.of(1000, 100).damping(0.9).elbow(20, 0.7).along("base");
-        Handle hold = arm.start(Move.hold(Double.NaN).mode(soft.mode()));
+        Impedance soft = Impedance.cartesian(1000, 100).damping(0.9).nullSpace(20, 0.7).along("base");
+        MotionHandle hold = arm.start(Move.hold(Double.NaN).mode(soft.mode()));
         while (!(arm.mode() instanceof CartesianImpedance)) {
             Thread.sleep(5);
         }
         say("the mode is read back", ((CartesianImpedance) arm.mode()).damping[0] == 0.9);
         hold.cancel();
         hold.await();
-        say("joints as springs", arm.move(Move.linRel(0, 0, -0.02).mode(Spring.joints(800))).cause == Cause.FINISHED);
+        say("joints as springs", arm.move(Move.linRel(0, 0, -0.02).mode(Impedance.joints(800))).cause == Cause.FINISHED);
         double[] none = new double[6];
         double[] along = {5, 0, 0, 0, 0, 0};
-        say("a pattern", arm.move(Move.hold(0.2).mode(soft.swinging(along, along, none))).cause == Cause.FINISHED);
-        say("a stiffness that is none", code(() -> arm.move(HOME.mode(Spring.of(9000, 100).mode()))) == Code.OUT_OF_RANGE);
+        say("a pattern", arm.move(Move.hold(0.2).mode(soft.sine(along, along, none))).cause == Cause.FINISHED);
+        say("a stiffness that is none", code(() -> arm.move(HOME.mode(Impedance.cartesian(9000, 100).mode()))) == Code.OUT_OF_RANGE);
         arm.move(HOME);
     }
 
     private void servo() throws Exception {
-        Steering stream = arm.servo(0.3, 0.3, 2.0, Spring.joints(900));
+        ServoHandle stream = arm.servo(0.3, 0.3, 2.0, Impedance.joints(900));
         double[] there = {0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.1};
-        stream.pass(there, new double[] {0, 0, 0, 0, 0, 0, 0.02});
+        stream.followVelocity(there, new double[] {0, 0, 0, 0, 0, 0, 0.02});
         while (arm.joints()[6] < 0.09) {
             Thread.sleep(5);
         }
-        stream.change(Spring.joints(500));
-        say("its kind of mode stays", code(() -> stream.change(Spring.of(1000, 100).mode())) == Code.MODE_CONFLICT);
+        stream.changeMode(Impedance.joints(500));
+        say("its kind of mode stays", code(() -> stream.changeMode(Impedance.cartesian(1000, 100).mode())) == Code.MODE_CONFLICT);
         say("a stream ends at rest", stream.close().cause == Cause.CANCELLED);
     }
 
     private void tools() throws Exception {
-        say("no tool is attached", Arrays.asList(arm.fitted()).equals(Arrays.asList("", "", "flange")));
+        say("no tool is attached", Arrays.asList(arm.attached()).equals(Arrays.asList("", "", "flange")));
         say("one that nobody knows", code(() -> arm.attach("hammer")) == Code.UNKNOWN_NAME);
         arm.define(GRIPPER);
         double before = arm.pose().xyz[2];
         arm.attach("gripper");
-        say("it is known and attached", arm.tools().length == 1 && "tip".equals(arm.fitted()[2]));
+        say("it is known and attached", arm.tools().length == 1 && "tip".equals(arm.attached()[2]));
         say("its frame is moved", Math.abs(arm.pose().xyz[2] - before) > 0.05);
         arm.load(PIECE);
-        say("it holds a piece", "piece".equals(arm.fitted()[1]));
+        say("it holds a piece", "piece".equals(arm.attached()[1]));
         say("whose weight is no external load", Math.abs(arm.wrench("base").force[2]) < 1.0);
         say("a frame that nobody knows", code(() -> arm.wrench("moon")) == Code.UNKNOWN_NAME);
         say("it turns about its tip", turnsAboutTip());
-        Handle busy = arm.start(Move.hold(Double.NaN));
+        MotionHandle busy = arm.start(Move.hold(Double.NaN));
         say("nothing changes while the arm moves", code(() -> arm.detach()) == Code.BUSY);
         busy.cancel();
         busy.await();
         arm.unload(PIECE);
         arm.attach("gripper", "camera");
-        say("another frame", "camera".equals(arm.fitted()[2]));
+        say("another frame", "camera".equals(arm.attached()[2]));
         arm.detach();
-        say("and off it is", "".equals(arm.fitted()[0]));
+        say("and off it is", "".equals(arm.attached()[0]));
     }
 
     private boolean turnsAboutTip() throws Exception {

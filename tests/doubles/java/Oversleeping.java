@@ -9,7 +9,7 @@ import javax.inject.Inject;
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 
-import heptarm.doubles.PlantClock;
+import heptarm.doubles.plant.PlantClock;
 
 /** Looks at a moving arm every 10 ms and sometimes wakes 0.3 s late; what it sees belongs to the time that it is told. */
 public class Oversleeping extends RoboticsAPIApplication {
