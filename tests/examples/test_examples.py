@@ -9,14 +9,17 @@ from pathlib import Path
 
 import pytest
 
+from tests.retry import answers_late, retry
+
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
 def test_example(example: Path, cabinet) -> None:
     environment = os.environ | {"HEPTARM_TARGET": cabinet.target}
-    for left in (2, 1, 0):
-        done = subprocess.run(
+
+    def run() -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
             [sys.executable, str(example)],
             capture_output=True,
             text=True,
@@ -24,7 +27,7 @@ def test_example(example: Path, cabinet) -> None:
             env=environment,
             check=False,
         )
-        if not left or "this machine answers late" not in done.stderr:
-            break  # else it was too busy for FRI; the example is told so
+
+    done = retry(run, answers_late)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() and "Traceback" not in done.stderr
