@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from heptarm.fri import messages as m
-from heptarm.fri.version import Version
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.version import Version
 
 number = st.floats(allow_nan=False, allow_infinity=False)
 u32 = st.integers(0, 2**32 - 1)

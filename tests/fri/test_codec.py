@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from heptarm.fri import codec, version
-from heptarm.fri import messages as m
-from heptarm.fri.protobuf import MalformedMessage, put_bytes, put_packed, put_unpacked, put_varint
-from heptarm.fri.template import CommandTemplate, MonitoringReader
-from heptarm.fri.version import Version
+from heptarm.fri.protocol import codec, version
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.fast_codec import CommandTemplate, MonitoringReader
+from heptarm.fri.protocol.protobuf import MalformedMessage, put_bytes, put_packed, put_unpacked, put_varint
+from heptarm.fri.protocol.version import Version
 
 from . import strategies as some
 from .golden import COMMAND_1X, COMMAND_27, MONITORING_1X
@@ -123,7 +123,7 @@ def test_any_octets_only_raise_malformed(wire: Version, data: st.DataObject, oct
 def test_joint_arrays_of_another_length_are_refused(size: int) -> None:
     body = put_bytes(1, put_unpacked(1, (0.5,) * size))
     message = COMMAND_1X[:12] + put_bytes(2, body)
-    with pytest.raises(MalformedMessage, match=f"has {size} values, exactly 7"):
+    with pytest.raises(MalformedMessage, match=f"must have 7 values, got {size}"):
         codec.decode_command(message, Version.V1_15)
 
 
@@ -143,7 +143,7 @@ def test_another_version_is_named_in_words() -> None:
         codec.decode_command(COMMAND_1X, Version.V2_7)
     with pytest.raises(MalformedMessage, match="wrong CRC"):
         codec.decode_command(COMMAND_27[:-1] + b"\0", Version.V2_7)
-    with pytest.raises(MalformedMessage, match="id is 212993, 2380098"):
+    with pytest.raises(MalformedMessage, match="id must be 2380098, got 212993"):
         codec.decode_monitoring(COMMAND_1X, Version.V1_15)
 
 
@@ -162,7 +162,7 @@ def test_what_a_version_cannot_carry_is_refused_on_writing() -> None:
         (m.Command(header, io=(signal,)), Version.V1_11, "IO"),
         (m.Command(header, io=(signal,) * 11), Version.V1_15, "at most 10"),
         (m.Command(header, pose=m.Transformation("p", joints)), Version.V1_15, "Cartesian pose"),
-        (m.Command(header, q=(0.0,) * 6), Version.V1_15, "exactly 7"),
+        (m.Command(header, q=(0.0,) * 6), Version.V1_15, "must have 7 values"),
         (m.Command(header, io=(replace(signal, name="x" * 64),)), Version.V1_15, "1 to 63"),
     ):
         with pytest.raises(ValueError, match=text):

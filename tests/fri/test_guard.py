@@ -11,8 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from heptarm.errors import LimitError
-from heptarm.fri.guard import Guard, Limited, _brake, _overrun
-from heptarm.fri.limits import Limits
+from heptarm.fri.guard.joint_guard import JointGuard, Limited, Limits, brake, overrun
 from heptarm.values.robot import robot
 
 LIMITS = Limits.of(robot("iiwa14"))
@@ -20,19 +19,19 @@ START = (0.1, 0.4, -0.1, -1.2, 0.2, 0.9, 0.0)
 STILL = (0.0,) * 7
 
 
-def begun(*, q: tuple[float, ...] = START, dq: tuple[float, ...] = STILL, period: float = 1e-3) -> Guard:
-    guard = Guard(LIMITS)
+def begun(*, q: tuple[float, ...] = START, dq: tuple[float, ...] = STILL, period: float = 1e-3) -> JointGuard:
+    guard = JointGuard(LIMITS)
     guard.start(q, dq, period=period)
     return guard
 
 
-def run(guard: Guard, wishes: Iterable[object]) -> np.ndarray:
+def run(guard: JointGuard, wishes: Iterable[object]) -> np.ndarray:
     """What is sent, shape (n, 7)."""
     return np.array([list(guard.position(wish)) for wish in wishes])  # type: ignore[arg-type]
 
 
 def check(
-    guard: Guard, sent: np.ndarray, q: tuple[float, ...] = START, dq: tuple[float, ...] = STILL
+    guard: JointGuard, sent: np.ndarray, q: tuple[float, ...] = START, dq: tuple[float, ...] = STILL
 ) -> None:
     """The finite differences of what was sent, from the start on, keep every limit."""
     period, limits = guard.period, guard.limits
@@ -103,11 +102,11 @@ def test_braking_never_goes_further_than_foretold(
 ) -> None:
     top, jerk = top * period**2, jerk * period**3
     speed, acceleration, way, furthest = 2.0 * v * period, a * top, 0.0, 0.0
-    foretold = _overrun(speed, acceleration, top, jerk)
+    foretold = overrun(speed, acceleration, top, jerk)
     for _ in range(100_000):
         if abs(speed) < 1e-15 and abs(acceleration) < 1e-15:
             break
-        acceleration = _brake(speed, acceleration, top, jerk)
+        acceleration = brake(speed, acceleration, top, jerk)
         speed += acceleration
         way += speed
         furthest = max(furthest, way)
@@ -133,7 +132,9 @@ def test_a_step_is_walked_up_without_overshoot_and_ends_exactly() -> None:
     check(guard, sent)
     assert (sent <= np.array(goal) + 1e-12).all() and tuple(sent[-1]) == goal and guard.is_still
     assert np.abs(sent[900] - goal).max() < 1e-6, "and it takes little more than the fastest way"
-    assert any("A1: velocity limited" in line and "500 rad/s asked" in line for line in guard.report.lines)
+    assert any(
+        "A1: velocity limited" in line and "500 rad/s requested" in line for line in guard.report.lines
+    )
 
 
 def test_no_number_keeps_the_last_wish_and_is_named() -> None:
@@ -142,7 +143,7 @@ def test_no_number_keeps_the_last_wish_and_is_named() -> None:
     sent = run(guard, [broken] * 10)
     assert (sent == np.array(START)).all()
     assert guard.report.counts[Limited.NOT_FINITE][0] == 10
-    assert guard.report.lines == ["A1: asked for no finite number in 10 cycles; the last one was kept"]
+    assert guard.report.lines == ["A1: target not finite in 10 cycles; the last one was kept"]
 
 
 def test_ten_times_the_velocity_is_followed_as_fast_as_it_may() -> None:
@@ -160,7 +161,7 @@ def test_a_goal_beyond_the_range_ends_at_its_edge() -> None:
     sent = run(guard, [(9.0, *START[1:])] * 4000)
     check(guard, sent)
     assert sent[-1, 0] == pytest.approx(LIMITS.q_max[0], abs=1e-6)
-    assert guard.report.lines[0] == "A1: position limited in 4000 cycles: 9 rad asked, 2.95 allowed"
+    assert guard.report.lines[0] == "A1: position limited in 4000 cycles: 9 rad requested, 2.95 allowed"
 
 
 def test_a_start_outside_the_range_goes_only_inwards() -> None:
@@ -182,7 +183,7 @@ def test_a_start_in_motion_has_no_jump() -> None:
 
 
 def test_the_reach_around_the_interpolator_bounds_the_wish() -> None:
-    guard = Guard(Limits.of(robot("iiwa14"), reach=0.05))
+    guard = JointGuard(Limits.of(robot("iiwa14"), reach=0.05))
     guard.start(START, STILL, period=1e-3)
     for _ in range(2000):
         sent = guard.position([value + 1.0 for value in START], ipo=START)
@@ -203,7 +204,7 @@ def test_torques_keep_magnitude_and_rate_and_start_from_zero(wishes: list[tuple[
 def test_torque_reports_magnitude() -> None:
     guard = begun()
     guard.torque((1e6, *STILL[1:]))
-    assert guard.report.lines == ["A1: torque limited in 1 cycle: 1e+06 Nm asked, 304 allowed"]
+    assert guard.report.lines == ["A1: torque limited in 1 cycle: 1e+06 Nm requested, 304 allowed"]
     guard.start(START, STILL, period=1e-3)
     assert guard.tau == [0.0] * 7, "a new start begins without torque"
 
@@ -211,5 +212,5 @@ def test_torque_reports_magnitude() -> None:
 def test_limits_without_room_are_refused() -> None:
     with pytest.raises(LimitError, match="empty"):
         Limits.of(robot("iiwa7"), margin=4.0)
-    with pytest.raises(LimitError, match="dq_max is 0"):
-        Limits.of(robot("iiwa7"), share=0.0)
+    with pytest.raises(LimitError, match="dq_max must be positive, got 0 rad/s"):
+        Limits.of(robot("iiwa7"), fraction=0.0)

@@ -12,10 +12,10 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from heptarm.fri import codec
-from heptarm.fri import messages as m
-from heptarm.fri.template import MonitoringReader
-from heptarm.fri.version import COMMAND_ID, MONITORING_ID, Version, unwrap, wrap
+from heptarm.fri.protocol import codec
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.fast_codec import MonitoringReader
+from heptarm.fri.protocol.version import COMMAND_ID, MONITORING_ID, Version, unwrap, wrap
 
 from . import strategies as some
 from .golden import COMMAND_1X, COMMAND_27, MONITORING_1X

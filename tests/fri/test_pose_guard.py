@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from heptarm.errors import LimitError
-from heptarm.fri.pose_guard import PoseGuard, PoseLimits, between, moved
+from heptarm.fri.guard.pose_guard import PoseGuard, PoseLimits, between, moved
 
 LIMITS = PoseLimits()
 START = (0.5, 0.1, 0.4, 0.0, 1.0, 0.0, 0.0)
@@ -66,7 +66,7 @@ def test_a_step_of_half_a_metre_becomes_a_motion_that_ends_there() -> None:
     assert sent[:, 0].max() <= goal[0] + 1e-9, "it does not go beyond"
     assert len(sent[np.abs(sent[:, 0] - goal[0]) > 1e-9]) < 2400, "2 s at 0.25 m/s, and the ramps"
     assert guard.report.lines[0].startswith("flange: velocity limited in ")
-    assert "500 m/s asked, 0.25 allowed" in guard.report.lines[0]
+    assert "500 m/s requested, 0.25 allowed" in guard.report.lines[0]
     assert guard.report.lines[1].startswith("flange: acceleration limited in ")
 
 
@@ -91,8 +91,8 @@ def test_what_is_no_number_keeps_the_last_wish() -> None:
     run(guard, [goal] * 1000)
     for wish in ((NAN,) * 7, (math.inf,) * 7, (*goal[:3], 0.0, 0.0, 0.0, 0.0), (goal[0], NAN, *goal[2:])):
         assert guard.pose(wish) == pytest.approx(goal) and guard.was_limited
-    assert any("flange: asked for no finite number in 3 cycles" in line for line in guard.report.lines)
-    assert any("rotation: asked for no finite number in 3 cycles" in line for line in guard.report.lines)
+    assert any("flange: target not finite in 3 cycles" in line for line in guard.report.lines)
+    assert any("rotation: target not finite in 3 cycles" in line for line in guard.report.lines)
     sent = run(guard, [(NAN, NAN, goal[2] + 0.02, NAN, NAN, NAN, NAN)] * 1000)
     assert sent[-1] == pytest.approx(moved(goal, (0.0, 0.0, 0.02, 0, 0, 0))), "one coordinate is a number"
 
@@ -115,7 +115,9 @@ def test_the_reach_is_a_ball_around_the_interpolator() -> None:
     goal = moved(START, (0.3, 0.4, 0.0, 0.0, 0.0, 0.0))
     sent = [guard.pose(goal, START) for _ in range(1500)]
     assert sent[-1][:3] == pytest.approx((0.53, 0.14, 0.4))
-    assert any("flange: reach limited" in line and "0.5 m asked, 0.05" in line for line in guard.report.lines)
+    assert any(
+        "flange: reach limited" in line and "0.5 m requested, 0.05" in line for line in guard.report.lines
+    )
 
 
 coordinate = st.floats(-1.0, 1.0) | st.sampled_from([NAN, math.inf, 1e300, 0.5])
@@ -139,7 +141,7 @@ def test_whatever_is_asked_the_limits_are_kept(asked: list[tuple[object, int]], 
 
 
 def test_a_limit_that_is_none() -> None:
-    with pytest.raises(LimitError, match=r"angular_velocity is 0; a positive number"):
+    with pytest.raises(LimitError, match=r"angular_velocity must be positive, got 0 rad/s"):
         PoseLimits(angular_velocity=0.0)
 
 
@@ -171,4 +173,4 @@ def test_an_elbow_reaches_its_wish_and_the_report_names_it() -> None:
     guard.elbow(NAN)
     assert guard.e1 == 0.8
     assert any("elbow: velocity limited" in line for line in guard.report.lines)
-    assert any("elbow: asked for no finite number" in line for line in guard.report.lines)
+    assert any("elbow: target not finite" in line for line in guard.report.lines)

@@ -10,13 +10,12 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
 from heptarm.errors import CommandRejected
-from heptarm.fri import codec
-from heptarm.fri import messages as m
-from heptarm.fri.event import Kind
-from heptarm.fri.messages import CommandMode, Quality, SessionState
-from heptarm.fri.session import Session
-from heptarm.fri.setpoint import Setpoint
-from heptarm.fri.version import Version
+from heptarm.fri.protocol import codec
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
+from heptarm.fri.protocol.version import Version
+from heptarm.fri.session.answers import Setpoint
+from heptarm.fri.session.session import Kind, Session
 
 from . import strategies as some
 
@@ -255,9 +254,9 @@ def test_io_and_transformations_are_checked_against_what_the_controller_offers()
     assert answer is not None and answer.io[0].value == 1 and answer.transformations == (base,)
     assert answer.q == IPO
     for wrong, text in (
-        (Setpoint(io=(replace(output, name="FRI.In"),)), "no output"),
-        (Setpoint(io=(replace(output, type=m.IoType.ANALOG),)), "is BOOLEAN, not ANALOG"),
-        (Setpoint(transformations=(replace(base, name="Other"),)), "asks for no transformation"),
+        (Setpoint(io=(replace(output, name="FRI.In"),)), "has no output"),
+        (Setpoint(io=(replace(output, type=m.IoType.ANALOG),)), "must be BOOLEAN, got ANALOG"),
+        (Setpoint(transformations=(replace(base, name="Other"),)), "requests no transformation"),
     ):
         session.receive(monitoring(wire, session.sent, active, io=signals, requested=(base,)), 0)
         with pytest.raises(CommandRejected, match=text):

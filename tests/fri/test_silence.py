@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from heptarm.fri.guard import Guard
-from heptarm.fri.limits import Limits
-from heptarm.fri.silence import carried_on, part_carried_on, speed_after
+from heptarm.fri.guard.gap_recovery import joints_after_gap, motion_in_gap, vector_in_gap
+from heptarm.fri.guard.joint_guard import JointGuard, Limits
 from heptarm.values.robot import robot
 
 LIMITS = Limits.of(robot("iiwa14"))
@@ -51,7 +50,7 @@ def test_place_and_speed_are_told_from_the_way(controller: Way, time: float, spe
     way, end = controller(speed, time)
     then, now = chain - lag * speed, chain + way - lag * end
     for is_exact in (True, False):
-        (place,), (later,) = carried_on(
+        (place,), (later,) = joints_after_gap(
             [chain], [speed], [then], [now], time=time, period=PERIOD, is_exact=is_exact
         )
         # a reading that lags has made up for it when the arm stands
@@ -62,7 +61,7 @@ def test_place_and_speed_are_told_from_the_way(controller: Way, time: float, spe
 @pytest.mark.parametrize("time", [0.03, 0.06, 0.12, 0.4])
 @pytest.mark.parametrize("controller", [goes_on, stands, brakes, coasts])
 def test_what_is_sent_after_it_makes_no_step_of_the_velocity(controller: Way, time: float) -> None:
-    guard, start = Guard(LIMITS), (0.1, 0.4, -0.1, -1.2, 0.2, 0.9, 0.0)
+    guard, start = JointGuard(LIMITS), (0.1, 0.4, -0.1, -1.2, 0.2, 0.9, 0.0)
     guard.start(start, (0.0,) * 7, period=PERIOD)
     goal = [value + 1.0 for value in start]
     for _ in range(60):
@@ -72,7 +71,7 @@ def test_what_is_sent_after_it_makes_no_step_of_the_velocity(controller: Way, ti
     chain = [q - v for q, v in zip(guard.q, guard.v, strict=True)]
     ways, ends = zip(*(controller(v, time) for v in speeds), strict=True)
     there = np.add(chain, ways)
-    places, later = carried_on(
+    places, later = joints_after_gap(
         chain, speeds, chain, there.tolist(), time=time, period=PERIOD, is_exact=True
     )
     guard.start(places, later, period=PERIOD)
@@ -88,23 +87,23 @@ def test_what_is_sent_after_it_makes_no_step_of_the_velocity(controller: Way, ti
 
 def test_an_arm_that_was_pushed_or_jumps_in_its_readings_is_not_followed() -> None:
     soft = {"time": 0.06, "period": PERIOD, "is_exact": False}
-    assert carried_on([0.4], [0.0], [0.3], [0.1], **soft) == ([0.4], [0.0])  # type: ignore[arg-type]
-    (place,), (speed,) = carried_on([0.4], [0.5], [0.3], [2.0], **soft)  # type: ignore[arg-type]
+    assert joints_after_gap([0.4], [0.0], [0.3], [0.1], **soft) == ([0.4], [0.0])  # type: ignore[arg-type]
+    (place,), (speed,) = joints_after_gap([0.4], [0.5], [0.3], [2.0], **soft)  # type: ignore[arg-type]
     assert place == pytest.approx(0.4 + 0.03) and speed == 0.5, "no further than with the old speed"
     exact = {**soft, "is_exact": True}
-    assert carried_on([0.4], [0.0], [0.4], [0.9], **exact) == ([0.4], [0.0])  # type: ignore[arg-type]
+    assert joints_after_gap([0.4], [0.0], [0.4], [0.9], **exact) == ([0.4], [0.0])  # type: ignore[arg-type]
 
 
 @given(st.floats(-2, 2), st.floats(-1, 1), st.floats(1e-3, 2.0))
 def test_the_speed_is_never_more_than_before_nor_the_other_way(speed: float, way: float, time: float) -> None:
-    gone, later = speed_after(speed, way, time)
+    gone, later = motion_in_gap(speed, way, time)
     assert abs(later) <= abs(speed) and later * speed >= 0.0
     assert abs(gone) <= abs(speed * time) and gone * speed >= 0.0
 
 
 def test_a_pose_is_carried_on_along_its_direction() -> None:
-    assert part_carried_on((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), 0.05) == ([0.0] * 3, [0.0] * 3)
-    way, speed = part_carried_on((0.0, 0.2, 0.0), (0.5, 0.01, 0.0), 0.05)  # it went on, and was pushed aside
+    assert vector_in_gap((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), 0.05) == ([0.0] * 3, [0.0] * 3)
+    way, speed = vector_in_gap((0.0, 0.2, 0.0), (0.5, 0.01, 0.0), 0.05)  # it went on, and was pushed aside
     assert way == pytest.approx([0.0, 0.01, 0.0]) and speed == pytest.approx([0.0, 0.2, 0.0])
-    way, speed = part_carried_on((0.0, 0.2, 0.0), (0.0, -0.01, 0.0), 0.05)
+    way, speed = vector_in_gap((0.0, 0.2, 0.0), (0.0, -0.01, 0.0), 0.05)
     assert way == speed == [0.0, 0.0, 0.0]
