@@ -9,10 +9,10 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from heptarm.fri import codec
-from heptarm.fri import messages as m
-from heptarm.fri.messages import CommandMode, Quality, SessionState
-from heptarm.fri.version import Version
+from heptarm.fri.protocol import codec
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
+from heptarm.fri.protocol.version import Version
 
 IPO = (0.1, 0.4, -0.1, -1.2, 0.2, 0.9, 0.0)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from heptarm.rt import Output, Params, State
+from heptarm.fri.loop.user_api import Output, Params, State
 
 
 def offset(state: State, out: Output, params: Params) -> None:

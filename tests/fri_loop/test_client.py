@@ -18,13 +18,14 @@ import numpy as np
 import pytest
 
 from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, NotReady, ShapeError, Timeout
-from heptarm.fri import messages as m
-from heptarm.fri.messages import CommandMode, Quality, SessionState
-from heptarm.fri.policy import Missing, Policy
-from heptarm.fri.version import Version
-from heptarm.rt import Client, Output, Params, State
-from heptarm.rt.launch import importable
-from heptarm.rt.layout import PID
+from heptarm.fri.guard.fallback import Missing, Policy
+from heptarm.fri.loop.client import Client
+from heptarm.fri.loop.process import importable
+from heptarm.fri.loop.shared_memory import PID
+from heptarm.fri.loop.user_api import Output, Params, State
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
+from heptarm.fri.protocol.version import Version
 from heptarm.values.pose import Pose
 
 from .controller import IPO, Controller
@@ -40,7 +41,7 @@ def client() -> Iterator[Client]:
 
 
 def test_from_nothing_to_commanding_and_a_second_session_without_restarting(client: Client) -> None:
-    assert client.session is SessionState.IDLE and "nothing has arrived" in client.trouble
+    assert client.session is SessionState.IDLE and "no message received" in client.trouble
     with pytest.raises(NotReady, match="firewall"):
         _ = client.state
     with pytest.raises(Timeout, match="no FRI message within"):
@@ -217,10 +218,10 @@ def test_signals_are_read_and_written(client: Client) -> None:
         for name, value, words in (
             ("FRI.In", 1.0, "is an input of the cabinet"),
             ("FRI.Door", 1.0, "no signal 'FRI.Door' in this FRI session"),
-            ("FRI.Out", 2, "is boolean; it cannot be 2"),
-            ("FRI.Code", -1, "is unsigned; it cannot be -1"),
-            ("FRI.Code", 1.5, "it cannot be 1.5"),
-            ("FRI.Code", math.nan, "it cannot be nan"),
+            ("FRI.Out", 2, "must be True or False, got 2"),
+            ("FRI.Code", -1, r"\(unsigned\) must be 0, 1, 2, ..., got -1"),
+            ("FRI.Code", 1.5, "got 1.5"),
+            ("FRI.Code", math.nan, "got nan"),
         ):
             with pytest.raises(CommandRejected, match=words):
                 client.output(name, value)
@@ -232,7 +233,7 @@ def test_a_frame_that_is_asked_for_is_told(client: Client) -> None:
     with controller.running():
         client.wait("MONITORING_WAIT")
         assert client.wanted_frames == ("PBase",)
-        with pytest.raises(CommandRejected, match="asks for no frame 'Part'"):
+        with pytest.raises(CommandRejected, match="requests no frame 'Part'"):
             client.frame("Part", Pose.at(0.0, 0.0, 0.3))
         with pytest.raises(ShapeError):
             client.frame("PBase", np.eye(4))
@@ -250,11 +251,11 @@ def test_a_frame_that_is_asked_for_is_told(client: Client) -> None:
 def test_a_taken_port_and_bad_arguments_are_refused_in_words(client: Client) -> None:
     with pytest.raises(ConnectFailed, match="another program"):
         Client(client.port, realtime=False)
-    with pytest.raises(CommandRejected, match="FRI '1.9' is not known"):
+    with pytest.raises(CommandRejected, match="got '1.9'"):
         Client(0, version="1.9")
-    with pytest.raises(CommandRejected, match="history is 1"):
+    with pytest.raises(CommandRejected, match="history must be 16 to 1048576 states, got 1"):
         Client(0, history=1)
-    with pytest.raises(ShapeError, match="q has shape"):
+    with pytest.raises(ShapeError, match="q must have shape"):
         client.command(q=[1.0])
     client.close()
     client.close()
@@ -296,7 +297,7 @@ def _braked_after_a_kill() -> tuple[Controller, int]:
     script = textwrap.dedent(
         """
         import numpy as np, os, sys
-        from heptarm.rt import Client
+        from heptarm.fri import Client
         client = Client(0, realtime=False)
         print(client.port, flush=True)
         begin = client.wait("COMMANDING_ACTIVE")

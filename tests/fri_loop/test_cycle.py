@@ -10,18 +10,16 @@ import numpy as np
 import pytest
 
 from heptarm.errors import ShapeError
-from heptarm.fri import codec
-from heptarm.fri import messages as m
-from heptarm.fri.limits import Limits
-from heptarm.fri.messages import CommandMode, SessionState
-from heptarm.fri.policy import Missing, Policy
-from heptarm.fri.version import Version
-from heptarm.io.shared import Block
-from heptarm.rt import layout as at
-from heptarm.rt.cycle import Cycle, Law
-from heptarm.rt.exchange import REPEATS
-from heptarm.rt.params import Params
-from heptarm.rt.state import State
+from heptarm.fri.guard.fallback import Missing, Policy
+from heptarm.fri.guard.joint_guard import Limits
+from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.loop.cycle import REPEATS, Cycle, Law
+from heptarm.fri.loop.user_api import Params, State
+from heptarm.fri.protocol import codec
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.messages import CommandMode, SessionState
+from heptarm.fri.protocol.version import Version
+from heptarm.io.shared import MemoryBlock
 from heptarm.values.robot import robot
 
 from .controller import IPO, Controller
@@ -42,7 +40,7 @@ class Bench:
         **params: object,
     ) -> None:
         values, schema = Params.flat(params)  # type: ignore[arg-type]
-        block = Block(at.Layout.words(history=256, params=values.size))
+        block = MemoryBlock(at.Layout.words(history=256, params=values.size))
         block.unlink()
         self.layout = at.Layout(block, history=256, params=values.size)
         self.layout.params.write(values)
@@ -243,7 +241,7 @@ def test_outputs_are_written_until_the_cabinet_shows_them() -> None:
     want(bench, Out=(2, 0))
     bench.run(80)
     assert sum(bool(one.io) for one in bench.sent[-80:]) == REPEATS
-    assert any(b"does not take FRI.Out = 0: it shows 1" in words.tobytes() for words in _events(bench))
+    assert any(b"does not accept FRI.Out = 0: it shows 1" in words.tobytes() for words in _events(bench))
     assert bench.states[-1].io["out"] is True and bench.sent[-1].q == IPO
 
 
@@ -263,7 +261,9 @@ def test_signals_that_come_and_go() -> None:
     assert json.loads(bench.layout.offered.read() or "")["signals"] == "[]"
     want(bench, Out=(1, 1))
     bench.run(2)
-    assert any(b"'FRI.Out' is no output of this FRI session" in words.tobytes() for words in _events(bench))
+    assert any(
+        b"this FRI session no longer has an output 'FRI.Out'" in words.tobytes() for words in _events(bench)
+    )
 
 
 def test_a_law_reads_inputs_and_writes_outputs() -> None:
@@ -309,7 +309,7 @@ def test_parameters_have_names_and_shapes() -> None:
     params.goal = [3.0, 2.0, 1.0]
     params.set(k=1.0, goal=[0.0, 0.0, 0.0])
     assert params.k == 1.0 and not params.goal.any() and len(changed) == 2
-    with pytest.raises(ShapeError, match="goal has shape"):
+    with pytest.raises(ShapeError, match="goal must have shape"):
         params.goal = 1.0
     with pytest.raises(AttributeError, match="there are k, goal"):
         params.speed = 1.0

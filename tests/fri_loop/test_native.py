@@ -10,14 +10,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from heptarm.fri.messages import CommandMode, Quality, SessionState
-from heptarm.fri.policy import Missing, Policy
-from heptarm.fri.protobuf import put_bytes, put_varint
-from heptarm.fri.version import MONITORING_ID, Version
-from heptarm.rt import layout as at
-from heptarm.rt.native import HANDBACK, LAW, Native, Unavailable, library
-from heptarm.rt.output import Output
-from heptarm.rt.state import State
+from heptarm.fri.guard.fallback import Missing, Policy
+from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.loop.native import HANDBACK, LAW, Native, Unavailable, library
+from heptarm.fri.loop.user_api import Output, State
+from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
+from heptarm.fri.protocol.protobuf import put_bytes, put_varint
+from heptarm.fri.protocol.version import MONITORING_ID, Version
 
 from .controller import IPO
 from .laws import offset, torque
@@ -40,7 +39,7 @@ class Twins:
         self.pure, self.other = Bench(**options), Bench(**options)  # type: ignore[arg-type]
         for bench in (self.pure, self.other):
             if isinstance(policy, Policy):
-                bench.cycle.filler.policy = policy
+                bench.cycle.fallback.policy = policy
         self.native = Native(self.other.cycle)
         self.out = Output.on(
             self.native.memory.out_q, self.native.memory.out_tau, self.native.memory.out_wrench
@@ -71,19 +70,19 @@ class Twins:
         bench, native = self.other, self.native
         size = native.turn(datagram, bench.now)
         if size == HANDBACK:
-            native.take()
+            native.sync_to_python()
             octets = bench.cycle.turn(datagram, bench.now)
             bench.cycle.finish(bench.now + 30_000)
             session = bench.cycle.session
             if session.sample is not None and session.received == bench.now:
                 self._last = datagram
             if self._last:
-                native.give(self._last)
+                native.sync_from_python(self._last)
             return octets
         self.plain += 1
         if size == LAW:
             states = bench.layout.states
-            bench.cycle.ask(State(states.floats[states.count % len(states.ints)]), self.out, bench.now)
+            bench.cycle.call_law(State(states.floats[states.count % len(states.ints)]), self.out, bench.now)
             native.memory.is_ending = bench.cycle.is_ending
             size = native.answer()
         native.finish(bench.now + 30_000)
@@ -127,7 +126,7 @@ class Twins:
 
     def check(self) -> None:
         """Counts, histograms and the guard's report are equal too."""
-        self.native.take()
+        self.native.sync_to_python()
         one, two = self.pure.layout.block.ints, self.other.layout.block.ints
         for start, end in (
             (at.COUNTS, at.LIMITED_COUNTS),

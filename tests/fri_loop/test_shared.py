@@ -7,19 +7,19 @@ import multiprocessing
 import numpy as np
 import pytest
 
-from heptarm.io.shared import Block, Note, Ring
+from heptarm.io.shared import MemoryBlock, Note, Ring
 
 WIDTH, SLOTS = 16, 4
 
 
 def _write(path: str, count: int) -> None:
-    ring = Ring(Block(path=path), head=0, start=8, slots=SLOTS, width=WIDTH)
+    ring = Ring(MemoryBlock(path=path), head=0, start=8, slots=SLOTS, width=WIDTH)
     for value in range(count):
         ring.write(np.full(WIDTH - 1, float(value)))
 
 
 def test_a_ring_that_is_overrun_by_another_process_is_never_read_torn() -> None:
-    block = Block(8 + SLOTS * WIDTH)
+    block = MemoryBlock(8 + SLOTS * WIDTH)
     ring = Ring(block, head=0, start=8, slots=SLOTS, width=WIDTH)
     writer = multiprocessing.get_context("fork").Process(target=_write, args=(block.path, 100_000))
     writer.start()
@@ -36,7 +36,7 @@ def test_a_ring_that_is_overrun_by_another_process_is_never_read_torn() -> None:
 
 
 def test_a_ring_keeps_its_last_slots() -> None:
-    block = Block(8 + SLOTS * WIDTH)
+    block = MemoryBlock(8 + SLOTS * WIDTH)
     block.unlink()
     ring = Ring(block, head=0, start=8, slots=SLOTS, width=WIDTH)
     assert ring.newest() is None and ring.read(0) is None
@@ -51,7 +51,7 @@ def test_a_ring_keeps_its_last_slots() -> None:
 
 
 def test_a_note_stands_until_the_next_one() -> None:
-    block = Block(64)
+    block = MemoryBlock(64)
     block.unlink()
     note = Note(block, start=0, words=8)
     assert note.read() == ""
@@ -60,5 +60,5 @@ def test_a_note_stands_until_the_next_one() -> None:
     assert note.read() == "läuft"
     note.write("")
     assert note.read() == "" and note.tick != before
-    with pytest.raises(ValueError, match="48 fit"):
+    with pytest.raises(ValueError, match="at most 48 bytes, got 49"):
         note.write("x" * 49)
