@@ -16,7 +16,7 @@ import classfile  # noqa: E402
 import toolchain  # noqa: E402
 
 REFUSALS = classfile.Refusals.load(ROOT / "cabinet" / "java7.txt", ("com/kuka/",))
-JARS = ROOT / "src" / "heptarm" / "virtual" / "jars"
+JARS = ROOT / "src" / "heptarm" / "sim" / "jars"
 
 
 @pytest.fixture(scope="module")

@@ -48,8 +48,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_wheel_carries_jars_and_cabinet_sources(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     for jar in ("heptarm-core.jar", "heptarm-app.jar", "heptarm-doubles-not-for-robots.jar"):
-        assert f"heptarm/virtual/jars/{jar}" in names
-    assert "heptarm/virtual/models/iiwa14.xml" in names
+        assert f"heptarm/sim/jars/{jar}" in names
+    assert "heptarm/sim/models/iiwa14.xml" in names
     assert "heptarm/py.typed" in names
     assert any(name.startswith("heptarm/_cabinet/core/src/") and name.endswith(".java") for name in names)
     assert any(name.startswith("heptarm/_cabinet/app/src/") and name.endswith(".java") for name in names)

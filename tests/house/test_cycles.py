@@ -1,0 +1,107 @@
+"""No module of heptarm imports one that imports it: what is executed on import forms no circle.
+
+Imports inside functions and those for type checkers are no part of it; neither can make an import fail. A package's
+own `__init__` counts where somebody imports a name from it, not where a module in it is imported.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+SOURCES = Path(__file__).resolve().parents[2] / "src"
+PACKAGE = "heptarm"
+
+
+def _modules() -> dict[str, Path]:
+    """Every module by its name."""
+    found = {}
+    for path in sorted((SOURCES / PACKAGE).rglob("*.py")):
+        parts = path.relative_to(SOURCES).with_suffix("").parts
+        found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return found
+
+
+def _executed(nodes: list[ast.stmt]) -> Iterator[ast.Import | ast.ImportFrom]:
+    """The imports that run when a module does."""
+    for node in nodes:
+        if isinstance(node, (ast.Import, ast.ImportFrom)):
+            yield node
+        elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            yield from _executed(node.orelse)
+        elif not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            for block in ("body", "orelse", "finalbody"):
+                yield from _executed(getattr(node, block, []))
+            for handler in getattr(node, "handlers", []):
+                yield from _executed(handler.body)
+
+
+def _targets(node: ast.Import | ast.ImportFrom, package: str, known: dict[str, Path]) -> Iterator[str]:
+    """The modules of heptarm that an import names."""
+    if isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names if alias.name in known)
+        return
+    base = node.module or ""
+    if node.level:
+        parents = package.split(".")
+        base = ".".join([*parents[: len(parents) - node.level + 1], *([base] if base else [])])
+    for alias in node.names:
+        inner = f"{base}.{alias.name}"
+        if inner in known:
+            yield inner
+        elif base in known:
+            yield base
+
+
+def imports() -> dict[str, set[str]]:
+    """For each module those that it imports when it is imported."""
+    known = _modules()
+    graph = {}
+    for name, path in known.items():
+        package = name if path.name == "__init__.py" else name.rpartition(".")[0]
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        found = (target for node in _executed(tree.body) for target in _targets(node, package, known))
+        graph[name] = {target for target in found if target != name}
+    return graph
+
+
+def _circles(graph: dict[str, set[str]]) -> list[list[str]]:
+    """One circle for each group of modules that import each other, the shortest."""
+    found: list[list[str]] = []
+    seen: set[str] = set()
+    for start in sorted(graph):
+        before: dict[str, str] = {}
+        front = [start]
+        while front and start not in before:
+            ahead = []
+            for name in front:
+                for target in sorted(graph[name]):
+                    if target not in before:
+                        before[target] = name
+                        ahead.append(target)
+            front = ahead
+        if start not in before or start in seen:
+            continue
+        circle = [start]
+        while (name := before[circle[-1]]) != start:
+            circle.append(name)
+        found.append([start, *reversed(circle[1:]), start])
+        seen.update(circle)
+    return found
+
+
+def test_imports_form_no_circle() -> None:
+    graph = imports()
+    assert len(graph) > 50, "the walk has found the package"
+    circles = "\n".join("  " + " -> ".join(circle) for circle in _circles(graph))
+    assert not circles, (
+        f"modules import each other:\n{circles}\n"
+        "Move what both need into a module below them; an import inside a function only hides the circle."
+    )
+
+
+def test_a_circle_is_found() -> None:
+    graph = {"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a", "e"}, "e": {"d"}}
+    assert _circles(graph) == [["b", "c", "b"], ["d", "e", "d"]]
+    assert not _circles({"a": {"b", "c"}, "b": {"c"}, "c": set()})
