@@ -18,8 +18,7 @@ from heptarm.model.dynamics import (
     mass_matrix,
 )
 from heptarm.model.kinematics import forward, jacobian
-from heptarm.values.links import LINKS, Body
-from heptarm.values.robot import ROBOTS, RobotModel
+from heptarm.values.robot import ROBOTS, Body, RobotModel
 from tests.model.arms import MODELS, random_q
 
 ALL = list(ROBOTS.values())
@@ -33,12 +32,10 @@ def by_name(robot: RobotModel) -> str:
 def mujoco_model(robot: RobotModel, load: Body | None = None) -> tuple[object, object]:
     """The plant's model without the assumptions that are not rigid-body dynamics, perhaps with a load."""
     mujoco = pytest.importorskip("mujoco")
-    spec = mujoco.MjSpec.from_string(
-        files("heptarm.virtual").joinpath("models", f"{robot.name}.xml").read_text()
-    )
+    spec = mujoco.MjSpec.from_string(files("heptarm.sim").joinpath("models", f"{robot.name}.xml").read_text())
     if load is not None:
         xx, yy, zz, xy, xz, yz = load.inertia
-        tool = spec.body("link_7").add_body(name="load", pos=LINKS[robot.name].flange)
+        tool = spec.body("link_7").add_body(name="load", pos=robot.links.flange)
         tool.mass, tool.ipos, tool.fullinertia = load.mass, load.com, [xx, yy, zz, xy, xz, yz]
         tool.explicitinertial = True
     model = spec.compile()
@@ -71,7 +68,7 @@ def test_that_of_mujoco(robot: RobotModel, load: Body | None) -> None:
 def test_links_are_those_of_the_plant(robot: RobotModel) -> None:
     pytest.importorskip("mujoco")
     model, _ = mujoco_model(robot)
-    links = LINKS[robot.name]
+    links = robot.links
     for index in range(7):
         body = model.body(f"link_{index + 1}")  # type: ignore[attr-defined]
         assert body.mass[0] == links.mass[index]
@@ -82,7 +79,7 @@ def test_links_are_those_of_the_plant(robot: RobotModel) -> None:
 @pytest.mark.parametrize("robot", ALL, ids=by_name)
 def test_that_of_pinocchio(robot: RobotModel) -> None:
     pin = pytest.importorskip("pinocchio")
-    links = LINKS[robot.name]
+    links = robot.links
     model = pin.Model()
     parent = 0
     y, z = (pin.JointModelRY, pin.JointModelRZ)
@@ -137,15 +134,15 @@ def test_gravity_is_the_slope_of_the_potential(robot: RobotModel) -> None:
 
 @pytest.mark.parametrize(("name", "moving"), [("iiwa7", 19.04), ("iiwa14", 22.85)])
 def test_moving_mass(name: str, moving: float) -> None:
-    assert LINKS[name].mass.sum() == pytest.approx(moving, abs=0.01)
+    assert ROBOTS[name].links.mass.sum() == pytest.approx(moving, abs=0.01)
 
 
 def test_refuses() -> None:
-    with pytest.raises(LimitError, match=r"mass is -1; allowed is \[0, 50\] kg"):
+    with pytest.raises(LimitError, match=r"mass must be in \[0, 50\] kg, got -1 kg"):
         Body(-1.0, (0, 0, 0))
-    with pytest.raises(LimitError, match="no body has the principal inertias 0, 0, 1"):
+    with pytest.raises(LimitError, match="principal moments 0, 0, 1"):
         Body(1.0, (0, 0, 0), (0, 0, 1, 0, 0, 0))
-    with pytest.raises(ShapeError, match="com has shape"):
+    with pytest.raises(ShapeError, match="com must have shape"):
         Body(1.0, (0, 0))
-    with pytest.raises(ShapeError, match="dq has shape"):
+    with pytest.raises(ShapeError, match="dq must have shape"):
         coriolis(ROBOTS["iiwa7"], np.zeros(7), np.zeros(6))
