@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.rl.batch import BatchReach
-from heptarm.rl.plant import PlantEngine
-from heptarm.rl.randomise import STRONG, Randomisation
+from heptarm.rl.sim.batch import BatchReach
+from heptarm.rl.sim.plant_engine import PlantEngine
+from heptarm.rl.sim.randomisation import STRONG, Randomisation
 from heptarm.rl.task import ReachTask
 
 

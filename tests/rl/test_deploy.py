@@ -11,20 +11,20 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.modes import JointImpedance
-from heptarm.rl.deploy import Settings, circle, deploy
+from heptarm.rl.deploy import DeploySettings, circle, deploy
 from heptarm.rl.film import chain, film
-from heptarm.rl.guard import Guard, Watch
+from heptarm.rl.pilot import PolicyGuard, Watch
 from heptarm.rl.policy import shipped
-from heptarm.rl.report import Report
+from heptarm.rl.report import EpisodeReport
 from heptarm.rl.task import ReachTask
+from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.robot import robot
 
 FAST = "sim://iiwa14?speed=2"
 POINT = (0.55, 0.1, 0.4)
 
 
-def tried(arm: ha.Arm, *arguments: Any, **named: Any) -> Report:
+def tried(arm: ha.Arm, *arguments: Any, **named: Any) -> EpisodeReport:
     """A deployment that begins anew if the guard, or the cabinet, found this machine too busy."""
     for _ in range(3):
         try:
@@ -35,12 +35,14 @@ def tried(arm: ha.Arm, *arguments: Any, **named: Any) -> Report:
 
 
 @pytest.fixture(scope="module")
-def reached() -> Report:
+def reached() -> EpisodeReport:
     with ha.connect(FAST, watchdog=5.0) as arm:
-        return tried(arm, shipped(feature=True), [POINT, (0.65, -0.15, 0.3)], settings=Settings(homing=0.6))
+        return tried(
+            arm, shipped(feature=True), [POINT, (0.65, -0.15, 0.3)], settings=DeploySettings(homing=0.6)
+        )
 
 
-def test_the_shipped_policy_reaches_its_targets(reached: Report) -> None:
+def test_the_shipped_policy_reaches_its_targets(reached: EpisodeReport) -> None:
     assert reached.success_rate == 1.0 and reached.mean < 0.02
     assert reached.facts["virtual"] and reached.facts["guard"].get("box", 0) == 0
     np.testing.assert_allclose(reached.paths, reached.task.tip(reached.joints))
@@ -48,7 +50,7 @@ def test_the_shipped_policy_reaches_its_targets(reached: Report) -> None:
 
 def test_the_one_with_the_feature_does_so_softly_and_late() -> None:
     with ha.connect(FAST, watchdog=5.0) as arm:
-        settings = Settings(mode=JointImpedance(300.0), latency=0.06, homing=0.6)
+        settings = DeploySettings(mode=JointImpedance(300.0), latency=0.06, homing=0.6)
         report = tried(arm, shipped(feature=True), [POINT], settings=settings)
     assert report.success_rate == 1.0 and report.mean < 0.012
 
@@ -74,9 +76,9 @@ def test_targets_outside_the_box_and_foreign_robots_are_refused_before_anything_
                 deploy(arm, shipped(feature=True), [bad])
         assert np.abs(arm.state.q - before).max() < 1e-4
     with pytest.raises(ha.LimitError, match="latency"):
-        Settings(latency=3.0)
+        DeploySettings(latency=3.0)
     with pytest.raises(ha.LimitError, match="volume"):
-        Guard(low=(1.0, 0.0, 0.0))
+        PolicyGuard(low=(1.0, 0.0, 0.0))
 
 
 class Wild:
@@ -94,9 +96,9 @@ class Wild:
 
 
 def test_a_wild_policy_stays_in_the_box_and_within_the_limits() -> None:
-    guard = Guard(low=(0.3, -0.3, 0.3), high=(0.7, 0.3, 0.8))
+    guard = PolicyGuard(low=(0.3, -0.3, 0.3), high=(0.7, 0.3, 0.8))
     with ha.connect(FAST, watchdog=5.0) as arm:
-        report = tried(arm, Wild(), [POINT, POINT], settings=Settings(guard=guard, homing=0.6))
+        report = tried(arm, Wild(), [POINT, POINT], settings=DeploySettings(guard=guard, homing=0.6))
         arm.wait_for_rest()
     assert (report.paths > np.array(guard.low) - 0.03).all()
     assert (report.paths < np.array(guard.high) + 0.03).all()
@@ -106,7 +108,7 @@ def test_a_wild_policy_stays_in_the_box_and_within_the_limits() -> None:
 def test_the_guard_brings_commands_back() -> None:
     model = robot("iiwa14")
     home = np.array(ReachTask().home)
-    watch = Watch(Guard(speed=0.6), model, period=1 / 30)
+    watch = Watch(PolicyGuard(speed=0.6), model, period=1 / 30)
     assert (watch.allow(home, home) == home).all() and not any(watch.counts.values())
     hasty = watch.allow(home, home + 0.5)
     assert np.abs(hasty - home).max() == pytest.approx(0.02)
@@ -125,7 +127,7 @@ def test_deploying_needs_neither_torch_nor_mujoco() -> None:
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
-def test_film_and_row_of_pictures(reached: Report, tmp_path: Path) -> None:
+def test_film_and_row_of_pictures(reached: EpisodeReport, tmp_path: Path) -> None:
     gif = film(reached, tmp_path / "reach.gif", episodes=1, every=20)
     assert gif.read_bytes()[:6] in (b"GIF87a", b"GIF89a")
     assert film(reached, tmp_path / "reach.png").read_bytes()[:4] == b"\x89PNG"

@@ -14,9 +14,9 @@ import gymnasium
 
 import heptarm.rl
 from heptarm.errors import CommandRejected, LimitError, NotReady, ShapeError
-from heptarm.rl.batch import BatchReach
 from heptarm.rl.evaluate import evaluate
-from heptarm.rl.randomise import NONE, Randomisation
+from heptarm.rl.sim.batch import BatchReach
+from heptarm.rl.sim.randomisation import NONE, Randomisation
 from heptarm.rl.task import ReachTask
 
 heptarm.rl.register()
@@ -86,7 +86,7 @@ def test_misuse_is_refused() -> None:
 
 def vector(envs: int, task: ReachTask) -> object:
     pytest.importorskip("stable_baselines3", reason="stable_baselines3 is not installed")
-    from heptarm.rl.vector import VectorReach
+    from heptarm.rl.sim.vector_env import VectorReach
 
     return VectorReach(BatchReach(task, envs=envs))
 
@@ -153,7 +153,7 @@ def test_its_ppo_learns_on_the_same_simulator() -> None:
 def test_warp_moves_the_arms_alike() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of Warp's own, as about a GPU that is not there
-        from heptarm.rl.warp import WarpEngine
+        from heptarm.rl.sim.warp_engine import WarpEngine
 
         task = ReachTask(steps=30)
         hard = Randomisation(

@@ -10,7 +10,7 @@ import pytest
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.rl.evaluate import evaluate, held_back
-from heptarm.rl.report import Report
+from heptarm.rl.report import EpisodeReport
 from heptarm.rl.task import ReachTask
 
 
@@ -54,10 +54,10 @@ def test_a_function_needs_its_task() -> None:
         evaluate(still, np.zeros((2, 4)), task=ReachTask())
 
 
-def by_hand() -> Report:
+def by_hand() -> EpisodeReport:
     """Three episodes of four decisions: reached at once, late, never."""
     distances = np.array([[0.03, 0.02, 0.01, 0.004], [0.3, 0.2, 0.035, 0.008], [0.5, 0.4, 0.3, 0.2]])
-    return Report(
+    return EpisodeReport(
         ReachTask(),
         np.zeros((3, 3)),
         distances,
@@ -84,7 +84,7 @@ def test_a_report_in_files(tmp_path: Path) -> None:
     entries = json.loads(report.save(tmp_path / "reach.json").read_text())
     assert entries["success_rate"] == pytest.approx(2 / 3)
     assert entries["per_target"]["time_to_reach"][2] is None
-    again = Report.load(report.save(tmp_path / "reach.npz"))
+    again = EpisodeReport.load(report.save(tmp_path / "reach.npz"))
     assert (again.distances == report.distances).all()
     assert again.facts == report.facts
     picture = report.plot(tmp_path / "reach.png")
@@ -95,6 +95,6 @@ def test_a_report_in_files(tmp_path: Path) -> None:
 
 def test_arrays_that_do_not_belong_together_make_no_report() -> None:
     with pytest.raises(ShapeError, match="belong"):
-        Report(
+        EpisodeReport(
             ReachTask(), np.zeros((2, 3)), np.zeros((3, 4)), np.zeros((3, 5, 3)), joints=np.zeros((3, 5, 7))
         )

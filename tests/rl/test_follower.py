@@ -7,7 +7,7 @@ import pytest
 
 from heptarm.errors import LimitError, ShapeError
 from heptarm.rl.follower import Follower
-from heptarm.rl.guard import Guard
+from heptarm.rl.pilot import PolicyGuard
 from heptarm.rl.policy import shipped
 
 JOINTS = [f"left_A{i}" for i in range(1, 8)]
@@ -76,4 +76,4 @@ def test_bad_targets_are_refused_and_the_last_one_stays(follower: Follower) -> N
             follower.on_target(bad)
     assert follower.command(0.0) is not None
     with pytest.raises(ShapeError, match="seven"):
-        Follower(shipped(), JOINTS[:6], guard=Guard())
+        Follower(shipped(), JOINTS[:6], guard=PolicyGuard())

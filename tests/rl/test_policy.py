@@ -49,9 +49,9 @@ def test_one_arm_and_many_get_the_same_actions_within_bounds() -> None:
 
 def test_it_decides_what_the_torch_network_does() -> None:
     torch = pytest.importorskip("torch")
-    from heptarm.rl import ppo
+    from heptarm.rl.train import ppo
 
-    agent = ppo.Agent(17, 7, ppo.Settings())
+    agent = ppo.Agent(17, 7, ppo.PpoSettings())
     seen = np.random.default_rng(3).normal(size=(40, 17)).astype(np.float32)
     agent.scaler.add(*(torch.tensor(v, dtype=torch.float64) for v in (40.0, seen.mean(0), 40 * seen.var(0))))
     with torch.no_grad():
@@ -77,16 +77,16 @@ def test_a_policy_runs_without_torch(tmp_path: Path) -> None:
 
 
 def test_files_that_are_no_policies_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(HeptarmError, match=r"there is no .*gone\.npz"):
+    with pytest.raises(HeptarmError, match=r"policy file .*gone\.npz"):
         Policy.load(tmp_path / "gone.npz")
     (tmp_path / "text.npz").write_text("hello")
-    with pytest.raises(HeptarmError, match="no policy"):
+    with pytest.raises(HeptarmError, match="must be a policy file"):
         Policy.load(tmp_path / "text.npz")
     np.savez(tmp_path / "other.npz", a=np.zeros(3))
-    with pytest.raises(HeptarmError, match="no policy"):
+    with pytest.raises(HeptarmError, match="must be a policy file"):
         Policy.load(tmp_path / "other.npz")
     np.savez(tmp_path / "pickle.npz", about=np.array([{"format": 1}], dtype=object))
-    with pytest.raises(HeptarmError, match="no policy"):
+    with pytest.raises(HeptarmError, match="must be a policy file"):
         Policy.load(tmp_path / "pickle.npz")
     np.savez(tmp_path / "later.npz", about=np.array(json.dumps({"format": 99})))
     with pytest.raises(HeptarmError, match="format 99"):

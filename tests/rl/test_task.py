@@ -8,7 +8,7 @@ import pytest
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.model.kinematics import forward, jacobian
 from heptarm.rl import kinematics
-from heptarm.rl.randomise import LEVELS, Randomisation, level
+from heptarm.rl.sim.randomisation import LEVELS, Randomisation, level
 from heptarm.rl.task import ReachTask
 from heptarm.values.robot import ROBOTS
 

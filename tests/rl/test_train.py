@@ -17,14 +17,15 @@ pytest.importorskip("torch", reason="torch is not installed")
 import torch
 
 from heptarm.errors import CommandRejected, HeptarmError, LimitError
-from heptarm.rl import ppo
 from heptarm.rl.evaluate import evaluate
 from heptarm.rl.policy import Policy
-from heptarm.rl.randomise import LEVELS, MILD
+from heptarm.rl.sim.randomisation import LEVELS, MILD
 from heptarm.rl.task import ReachTask
-from heptarm.rl.train import Recipe, Row, Trained, beside, train
+from heptarm.rl.train import ppo
+from heptarm.rl.train.recipe import Recipe
+from heptarm.rl.train.train import Row, Trained, beside, train
 
-SMALL = ppo.Settings(envs=16, horizon=8, minibatches=2, epochs=2, hidden=(16,))
+SMALL = ppo.PpoSettings(envs=16, horizon=8, minibatches=2, epochs=2, hidden=(16,))
 UPDATE = 16 * 8
 
 
@@ -50,7 +51,7 @@ def same(one: Policy, other: Policy) -> bool:
 
 
 def test_advantages_are_those_of_the_definition() -> None:
-    settings = ppo.Settings(discount=0.9, trace=0.8)
+    settings = ppo.PpoSettings(discount=0.9, trace=0.8)
     random = torch.Generator().manual_seed(0)
     reward, value, after = (torch.rand((5, 1), generator=random) for _ in range(3))
     done = torch.tensor([0.0, 0.0, 1.0, 0.0, 0.0])[:, None]
@@ -130,7 +131,7 @@ def test_checkpoints_are_written_under_way(tmp_path: Path) -> None:
 
 def test_what_cannot_go_on_says_why(tmp_path: Path) -> None:
     path = tmp_path / "reach.npz"
-    with pytest.raises(HeptarmError, match="to go on from"):
+    with pytest.raises(HeptarmError, match="does not exist"):
         train(resume=path)
     train(recipe(1), out=path)
     with pytest.raises(CommandRejected, match="differs"):
@@ -150,9 +151,9 @@ def test_bad_arguments_are_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> N
     with pytest.raises(LimitError, match="seed"):
         Recipe(seed=-1)
     with pytest.raises(LimitError, match="minibatches"):
-        ppo.Settings(envs=3, horizon=5, minibatches=4)
+        ppo.PpoSettings(envs=3, horizon=5, minibatches=4)
     with pytest.raises(LimitError, match="rate"):
-        ppo.Settings(rate=0.0)
+        ppo.PpoSettings(rate=0.0)
     monkeypatch.setenv("WORLD_SIZE", "2")
     monkeypatch.setenv("RANK", "2")
     with pytest.raises(LimitError, match="RANK"):
@@ -180,9 +181,9 @@ def test_a_gpu_trains_too() -> None:
 WORKER = """
 import sys
 from heptarm.rl.task import ReachTask
-from heptarm.rl.train import Recipe, train
-from heptarm.rl.ppo import Settings
-small = Settings(envs=16, horizon=8, minibatches=2, epochs=2, hidden=(16,))
+from heptarm.rl.train.train import Recipe, train
+from heptarm.rl.train.ppo import PpoSettings
+small = PpoSettings(envs=16, horizon=8, minibatches=2, epochs=2, hidden=(16,))
 out, rank, resume = sys.argv[1], sys.argv[2], sys.argv[3]
 recipe = Recipe(ReachTask(steps=20, feature="kinematic"), steps=6 * 2 * 16 * 8, settings=small, seed=3)
 rows = []
@@ -234,7 +235,7 @@ def test_two_workers_learn_one_policy_and_go_on_after_an_interruption(tmp_path: 
 @pytest.mark.slow
 def test_it_learns_in_half_a_minute() -> None:
     task = ReachTask(feature="kinematic")
-    settings = ppo.Settings(action_cost=0.0, spread_end=-1.0)  # the usual ones are for a longer training
+    settings = ppo.PpoSettings(action_cost=0.0, spread_end=-1.0)  # the usual ones are for a longer training
     trained = train(Recipe(task, steps=350_000, seed=1, randomisation=MILD, settings=settings))
     report = evaluate(trained.policy, 200)
     assert report.mean < 0.03
