@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from heptarm.bridge.conditions import condition_of
 from heptarm.errors import CommandRejected, LimitError
-from heptarm.when import Condition, force, io, path, torque
+from heptarm.ros.interface.conditions import condition_of
+from heptarm.values.condition.condition import Condition
+from heptarm.values.condition.signals import force, io, path, torque
 
 
 @pytest.mark.parametrize(
@@ -63,7 +64,7 @@ def test_no_text_is_no_condition(text: str) -> None:
     ],
 )
 def test_anything_else_is_refused_in_words(text: str) -> None:
-    with pytest.raises(CommandRejected, match="which is no condition") as caught:
+    with pytest.raises(CommandRejected, match="must be a condition") as caught:
         condition_of(text)
     assert caught.value.parameter == "until" and "force.along" in caught.value.hint
 

@@ -1,4 +1,4 @@
-"""Ways of execution on a cabinet, driven as a node drives them: arrival, preemption, cancellation, a stop."""
+"""Executions on a cabinet, used as a node uses them: arrival, preemption, cancellation, a stop."""
 
 from __future__ import annotations
 
@@ -9,14 +9,21 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from heptarm.bridge.driver import Driver
-from heptarm.bridge.goal import Code, End, Goal, GoalRefused, Outcome, Point
-from heptarm.bridge.parameters import Configuration
-from heptarm.bridge.runner import Feedback
 from heptarm.errors import CommandRejected
-from heptarm.values.collision import Collision
-from heptarm.values.event import MotionEvent
-from heptarm.values.motion import ptp
+from heptarm.ros.node.driver import Driver
+from heptarm.ros.node.parameters import NodeConfiguration
+from heptarm.ros.trajectory.goal import (
+    ErrorCode,
+    GoalOutcome,
+    GoalRefused,
+    GoalResult,
+    TrajectoryGoal,
+    TrajectoryPoint,
+)
+from heptarm.ros.trajectory.runner import GoalFeedback
+from heptarm.values.condition.collision import Collision
+from heptarm.values.motion.ptp import ptp
+from heptarm.values.result import MotionEvent
 from heptarm.values.state import State
 from tests.conftest import RunningCabinet
 
@@ -28,12 +35,12 @@ PATIENT = {"constraints.goal_time": 20.0, "watchdog": 5.0, "fri.period": 10}
 LONG = 8.0
 
 
-class Ears:
-    """Hears what a node would."""
+class Recorder:
+    """Records what a node would publish."""
 
     def __init__(self) -> None:
-        self.told: list[Feedback] = []
-        self.ends: list[End] = []
+        self.feedback: list[GoalFeedback] = []
+        self.ends: list[GoalResult] = []
         self.moved: list[int] = []  # stamps of the cabinet at which the arm moved [ns]
         self._changed = threading.Condition()
 
@@ -53,12 +60,12 @@ class Ears:
     def on_collision(self, found: Collision) -> None:
         pass
 
-    def on_feedback(self, feedback: Feedback) -> None:
+    def on_feedback(self, feedback: GoalFeedback) -> None:
         with self._changed:
-            self.told.append(feedback)
+            self.feedback.append(feedback)
             self._changed.notify_all()
 
-    def on_end(self, end: End) -> None:
+    def on_result(self, end: GoalResult) -> None:
         with self._changed:
             self.ends.append(end)
             self._changed.notify_all()
@@ -69,14 +76,20 @@ class Ears:
 
 
 @pytest.fixture(params=["servo", "spline", "fri"])
-def way(request: pytest.FixtureRequest) -> str:
+def execution(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
 @pytest.fixture
-def driver(cabinet: RunningCabinet, way: str) -> Iterator[Driver]:
-    values = {"target": cabinet.target, "execution": way, "servo.watchdog": 2.0, "speed": 0.5, **PATIENT}
-    driver = Driver(Configuration.of(values), Ears())
+def driver(cabinet: RunningCabinet, execution: str) -> Iterator[Driver]:
+    values = {
+        "target": cabinet.target,
+        "execution": execution,
+        "servo.watchdog": 2.0,
+        "speed": 0.5,
+        **PATIENT,
+    }
+    driver = Driver(NodeConfiguration.of(values), Recorder())
     driver.activate()
     driver.start(ptp(HOME)).wait()
     yield driver
@@ -84,107 +97,117 @@ def driver(cabinet: RunningCabinet, way: str) -> Iterator[Driver]:
 
 
 @pytest.fixture
-def ears(driver: Driver) -> Ears:
-    assert isinstance(driver._listener, Ears)
+def recorder(driver: Driver) -> Recorder:
+    assert isinstance(driver._listener, Recorder)
     return driver._listener
 
 
-def goal(driver: Driver, away: np.ndarray = AWAY, duration: float = 2.0) -> Goal:
+def goal(driver: Driver, away: np.ndarray = AWAY, duration: float = 2.0) -> TrajectoryGoal:
     """There and no further, in a curve."""
     now = driver.arm.state.q_cmd
     shares = 0.5 * (1 - np.cos(np.pi * np.linspace(0, 1, 11)[1:]))
     times = np.linspace(0, duration, 11)[1:]
-    points = [Point(float(t), tuple(now + s * away)) for t, s in zip(times, shares, strict=True)]
-    return Goal(joints=driver.configuration.joints, points=tuple(points))
+    points = [TrajectoryPoint(float(t), tuple(now + s * away)) for t, s in zip(times, shares, strict=True)]
+    return TrajectoryGoal(joints=driver.configuration.joints, points=tuple(points))
 
 
-def steadily(driver: Driver, ears: Ears, attempt: Callable[[], None]) -> None:
+def steadily(driver: Driver, recorder: Recorder, attempt: Callable[[], None]) -> None:
     """Again where the cabinet has ended an FRI session: it does so when answers come late, as from a busy machine."""
     for _ in range(10):
         try:
             attempt()
             return
         except AssertionError:
-            if not any("FRI" in end.text for end in ears.ends):
+            if not any("FRI" in end.text for end in recorder.ends):
                 raise
         driver.start(ptp(HOME)).wait()
-        ears.ends.clear()
-        ears.told.clear()
+        recorder.ends.clear()
+        recorder.feedback.clear()
     raise AssertionError("no FRI session lasts")
 
 
-def test_goals_arrive_one_after_the_other(driver: Driver, ears: Ears) -> None:
+def test_goals_arrive_one_after_the_other(driver: Driver, recorder: Recorder) -> None:
     def there_and_back() -> None:
         for number, away in enumerate((AWAY, -AWAY), 1):
             driver.accept(goal(driver, away))
-            ears.until(lambda: len(ears.ends) == number)  # noqa: B023
-            assert (ears.ends[-1].outcome, ears.ends[-1].code) == (Outcome.SUCCEEDED, Code.SUCCESSFUL)
+            recorder.until(lambda: len(recorder.ends) == number)  # noqa: B023
+            assert (recorder.ends[-1].outcome, recorder.ends[-1].code) == (
+                GoalOutcome.SUCCEEDED,
+                ErrorCode.SUCCESSFUL,
+            )
         assert np.abs(driver.arm.state.q - HOME).max() < 0.01
-        assert max(feedback.time for feedback in ears.told) > 1.5  # told now and then, not at the very end
+        assert (
+            max(feedback.time for feedback in recorder.feedback) > 1.5
+        )  # told now and then, not at the very end
 
-    steadily(driver, ears, there_and_back)
-
-
-def test_a_goal_takes_the_place_of_another_and_is_cancelled(driver: Driver, ears: Ears) -> None:
-    steadily(driver, ears, lambda: _replaced_and_cancelled(driver, ears))
+    steadily(driver, recorder, there_and_back)
 
 
-def _replaced_and_cancelled(driver: Driver, ears: Ears) -> None:
+def test_a_goal_preempts_another_and_is_cancelled(driver: Driver, recorder: Recorder) -> None:
+    steadily(driver, recorder, lambda: _replaced_and_cancelled(driver, recorder))
+
+
+def _replaced_and_cancelled(driver: Driver, recorder: Recorder) -> None:
     first = driver.accept(goal(driver, duration=LONG))
-    ears.until(lambda: bool(ears.ends) or (bool(ears.told) and ears.told[-1].time > 0.5))
+    recorder.until(
+        lambda: bool(recorder.ends) or (bool(recorder.feedback) and recorder.feedback[-1].time > 0.5)
+    )
     second = driver.accept(goal(driver, duration=LONG))
-    ears.until(lambda: bool(ears.ends))
-    assert (ears.ends[0].number, ears.ends[0].outcome) == (first, Outcome.PREEMPTED)
-    ears.until(lambda: len(ears.ends) > 1 or (ears.told[-1].number == second and ears.told[-1].time > 0.3))
+    recorder.until(lambda: bool(recorder.ends))
+    assert (recorder.ends[0].number, recorder.ends[0].outcome) == (first, GoalOutcome.PREEMPTED)
+    last = recorder.feedback
+    recorder.until(lambda: len(recorder.ends) > 1 or (last[-1].number == second and last[-1].time > 0.3))
     assert driver.cancel(second)
-    ears.until(lambda: len(ears.ends) == 2)
-    assert ears.ends[1].outcome is Outcome.CANCELED
+    recorder.until(lambda: len(recorder.ends) == 2)
+    assert recorder.ends[1].outcome is GoalOutcome.CANCELED
     assert np.abs(driver.arm.wait_for_rest(timeout=PATIENCE).dq).max() < 0.01
 
 
-def test_a_command_ends_a_goal_and_the_next_goal_works(driver: Driver, ears: Ears) -> None:
-    steadily(driver, ears, lambda: _commanded(driver, ears))
+def test_a_command_ends_a_goal_and_the_next_goal_works(driver: Driver, recorder: Recorder) -> None:
+    steadily(driver, recorder, lambda: _commanded(driver, recorder))
 
 
-def _commanded(driver: Driver, ears: Ears) -> None:
+def _commanded(driver: Driver, recorder: Recorder) -> None:
     driver.accept(goal(driver, duration=LONG))
-    ears.until(lambda: bool(ears.ends) or (bool(ears.told) and ears.told[-1].time > 0.3))
+    recorder.until(
+        lambda: bool(recorder.ends) or (bool(recorder.feedback) and recorder.feedback[-1].time > 0.3)
+    )
     driver.stop()
-    ears.until(lambda: bool(ears.ends))
-    assert ears.ends[-1].outcome is Outcome.ABORTED
-    assert ears.ends[-1].text
-    ears.ends.clear()
+    recorder.until(lambda: bool(recorder.ends))
+    assert recorder.ends[-1].outcome is GoalOutcome.ABORTED
+    assert recorder.ends[-1].text
+    recorder.ends.clear()
     deadline = time.monotonic() + PATIENCE
-    while not ears.ends and time.monotonic() < deadline:  # the arm may still be braking
+    while not recorder.ends and time.monotonic() < deadline:  # the arm may still be braking
         try:
             driver.accept(goal(driver, -AWAY, 3.0))
             break
         except GoalRefused:
             time.sleep(0.1)
-    ears.until(lambda: bool(ears.ends))
-    assert ears.ends[-1].outcome is Outcome.SUCCEEDED, ears.ends
+    recorder.until(lambda: bool(recorder.ends))
+    assert recorder.ends[-1].outcome is GoalOutcome.SUCCEEDED, recorder.ends
 
 
-def test_a_way_that_is_not_there_is_refused_by_name() -> None:
+def test_an_unknown_execution_is_refused_by_name() -> None:
     with pytest.raises(CommandRejected, match="teleport"):
-        Configuration.of({"execution": "teleport"})
+        NodeConfiguration.of({"execution": "teleport"})
 
 
 def test_a_spline_goes_through_the_points_as_fast_as_the_trajectory(cabinet: RunningCabinet) -> None:
     values = {"target": cabinet.target, "execution": "spline", "speed": 0.5, **PATIENT}
-    ears = Ears()
-    driver = Driver(Configuration.of(values), ears)
+    recorder = Recorder()
+    driver = Driver(NodeConfiguration.of(values), recorder)
     driver.activate()
     try:
         driver.start(ptp(HOME)).wait()
         driver.arm.wait_for_rest(timeout=PATIENCE)
-        ears.moved.clear()
+        recorder.moved.clear()
         driver.accept(goal(driver, AWAY, 4.0))
-        ears.until(lambda: bool(ears.ends))
-        assert ears.ends[-1].outcome is Outcome.SUCCEEDED, ears.ends
-        took = (ears.moved[-1] - ears.moved[0]) * 1e-9
+        recorder.until(lambda: bool(recorder.ends))
+        assert recorder.ends[-1].outcome is GoalOutcome.SUCCEEDED, recorder.ends
+        took = (recorder.moved[-1] - recorder.moved[0]) * 1e-9
         assert 0.6 * 4.0 < took < 1.25 * 4.0
-        off = max(float(np.abs(told.desired.q - told.actual.q).max()) for told in ears.told)
+        off = max(float(np.abs(told.desired.q - told.actual.q).max()) for told in recorder.feedback)
         assert off < 0.02  # the curve between the points is the cabinet's
     finally:
         driver.close()

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.bridge.motions import motion_of, pose_of, program_of
-from heptarm.bridge.parameters import Configuration
 from heptarm.do import notify, set_output
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.when import path
+from heptarm.ros.interface.motions import motion_of, pose_of, program_of
+from heptarm.ros.node.parameters import NodeConfiguration
+from heptarm.values.condition.signals import path
 
 HERE = np.arange(7) * 0.1
 EMPTY: dict[str, Any] = {
@@ -35,7 +35,7 @@ EMPTY: dict[str, Any] = {
 class FakeDriver:
     """A driver of an arm that stands still."""
 
-    configuration = Configuration.of({})
+    configuration = NodeConfiguration.of({})
     arm = SimpleNamespace(state=SimpleNamespace(q_cmd=HERE))
 
 
@@ -121,14 +121,14 @@ def test_a_message_is_the_motion_that_python_makes(given: SimpleNamespace, wante
 @pytest.mark.parametrize(
     ("given", "error", "words"),
     [
-        (message(9), CommandRejected, "kind 9"),
-        (message(0, position=[0.0]), ShapeError, "one for each"),
+        (message(9), CommandRejected, "got 9"),
+        (message(0, position=[0.0]), ShapeError, "must have one number"),
         (message(1, pose=stamped("table")), ShapeError, "table"),
         (message(1, speed_mps=-1.0), LimitError, "speed_mps"),
         (message(4), ShapeError, "segments"),
-        (message(4, segments=[segment(7)]), CommandRejected, "kind 7"),
-        (message(5, joint_names=["A1", "A2"], position=[0.0, 0.1, 0.0]), ShapeError, "3 numbers; 2"),
-        (message(5), ShapeError, "0 numbers; 7"),
+        (message(4, segments=[segment(7)]), CommandRejected, "got 7"),
+        (message(5, joint_names=["A1", "A2"], position=[0.0, 0.1, 0.0]), ShapeError, "2 numbers for each point, got 3"),
+        (message(5), ShapeError, "7 numbers for each point, got 0"),
         (message(1, redundancy=[0.0] * 4), ShapeError, "4 numbers"),
         (message(0, near=[0.0] * 7, redundancy=[0.1]), CommandRejected, "both choose"),
     ],
@@ -152,9 +152,9 @@ def test_motions_of_a_program_have_their_triggers() -> None:
     )
     assert second == ha.hold(inf)
     for wrong, words in (
-        (message(1, triggers=[trigger("")]), r"triggers\[0\].condition is empty"),
-        (message(1, triggers=[near, trigger("now")]), "no condition"),
-        (message(8, triggers=[near]), "hand guiding has no triggers"),
+        (message(1, triggers=[trigger("")]), r"triggers\[0\].condition must be a condition"),
+        (message(1, triggers=[near, trigger("now")]), "must be a condition"),
+        (message(8, triggers=[near]), "hand guiding cannot have triggers"),
     ):
         with pytest.raises(CommandRejected, match=words):
             program_of(driver, [wrong])

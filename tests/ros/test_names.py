@@ -8,9 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from heptarm.bridge.names import PRESETS, joint_target, pose_target
-from heptarm.bridge.parameters import Configuration
 from heptarm.errors import ShapeError
+from heptarm.ros.interface.motions import joint_target, pose_target
+from heptarm.ros.interface.names import PRESETS
+from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.values.pose import Pose
 
 HERE = np.arange(7) * 0.1
@@ -22,7 +23,7 @@ class FakeDriver:
     """A driver of an arm that stands still."""
 
     arm = SimpleNamespace(state=SimpleNamespace(q_cmd=HERE, pose_cmd=POSE))
-    configuration = Configuration.of({})
+    configuration = NodeConfiguration.of({})
 
 
 def test_nan_keeps_a_joint() -> None:

@@ -1,15 +1,15 @@
-"""What a runner will command is known ahead, and over FRI the loop's process has it: courses, the law, its table."""
+"""The preview of a runner predicts its commands, and the process of the FRI loop follows it."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from heptarm.bridge.fri_execution import _Overlay
-from heptarm.bridge.fri_law import follow
-from heptarm.bridge.goal import Goal, Point
-from heptarm.bridge.runner import Measured, Runner, Settings
-from heptarm.rt import Output, Params
+from heptarm.fri.loop.user_api import Output, Params
+from heptarm.ros.trajectory.fri_execution import _FriStream
+from heptarm.ros.trajectory.fri_law import follow
+from heptarm.ros.trajectory.goal import TrajectoryGoal, TrajectoryPoint
+from heptarm.ros.trajectory.runner import ExecutionSettings, MeasuredJoints, TrajectoryRunner
 from heptarm.values.robot import robot
 
 NAMES = tuple(f"A{i}" for i in range(1, 8))
@@ -17,21 +17,23 @@ HOME = np.array([0.0, 0.0, 0.0, -1.5, 0.0, 1.5, 0.0])
 PERIOD = 0.005
 
 
-def goal(*, start: float | None = None) -> Goal:
+def goal(*, start: float | None = None) -> TrajectoryGoal:
     """A curve of a second; every joint another way."""
     times = np.linspace(0.0, 1.0, 11)[1:]
     away = np.linspace(0.1, 0.4, 7)
     way = [HOME + away * (10 * t**3 - 15 * t**4 + 6 * t**5) for t in times]
     speed = [away * 30 * t**2 * (1 - t) ** 2 for t in times]
-    points = tuple(Point(float(t), tuple(q), tuple(v)) for t, q, v in zip(times, way, speed, strict=True))
-    return Goal(NAMES, points, start)
+    points = tuple(
+        TrajectoryPoint(float(t), tuple(q), tuple(v)) for t, q, v in zip(times, way, speed, strict=True)
+    )
+    return TrajectoryGoal(NAMES, points, start)
 
 
 class Stage:
     """A runner and an arm that is where it is told to be."""
 
     def __init__(self) -> None:
-        self.runner = Runner(NAMES, robot("iiwa14"), Settings())
+        self.runner = TrajectoryRunner(NAMES, robot("iiwa14"), ExecutionSettings())
         self.now, self.q, self.scaling = 10.0, HOME, 1.0
         self.numbers: list[int] = []
         self.step()
@@ -39,24 +41,24 @@ class Stage:
     def step(self):
         """One step; the arm is there at once."""
         self.now += PERIOD
-        step = self.runner.advance(self.now, Measured(self.now, self.q, np.zeros(7), self.scaling))
+        step = self.runner.advance(self.now, MeasuredJoints(self.now, self.q, np.zeros(7), self.scaling))
         self.q = step.command.q
         return step
 
-    def accept(self, wanted: Goal) -> int:
+    def accept(self, wanted: TrajectoryGoal) -> int:
         number = self.runner.accept(
-            wanted, now=self.now, state=Measured(self.now, self.q, np.zeros(7), self.scaling)
+            wanted, now=self.now, state=MeasuredJoints(self.now, self.q, np.zeros(7), self.scaling)
         )
         self.numbers.append(number)
         return number
 
-    def foretold(self, count: int) -> float:
-        """How far the next commands are from what their course said before [rad]."""
-        course = self.step().course
+    def prediction_error(self, count: int) -> float:
+        """Largest difference between the next commands and their preview [rad]."""
+        preview = self.step().preview
         times = self.now + PERIOD * np.arange(1.0, count + 1.0)
-        told = course.positions(times)
+        predicted = preview.positions(times)
         done = np.array([self.step().command.q for _ in range(count)])
-        return float(np.abs(told - done).max())
+        return float(np.abs(predicted - done).max())
 
 
 @pytest.fixture
@@ -64,33 +66,33 @@ def stage() -> Stage:
     return Stage()
 
 
-def test_a_course_tells_what_will_be_commanded(stage: Stage) -> None:
+def test_a_preview_predicts_commands(stage: Stage) -> None:
     stage.accept(goal())
-    assert stage.foretold(100) < 1e-12
-    assert stage.foretold(150) < 1e-12, "beyond its end, too"
+    assert stage.prediction_error(100) < 1e-12
+    assert stage.prediction_error(150) < 1e-12, "beyond its end, too"
 
 
-def test_a_course_tells_of_a_start_to_come(stage: Stage) -> None:
+def test_a_preview_has_a_future_start(stage: Stage) -> None:
     stage.accept(goal(start=stage.now + 0.2))
-    assert stage.foretold(200) < 1e-12
+    assert stage.prediction_error(200) < 1e-12
 
 
-def test_a_course_goes_at_the_pace_of_the_override(stage: Stage) -> None:
+def test_a_preview_has_the_speed_of_the_override(stage: Stage) -> None:
     stage.accept(goal())
     stage.step()
     stage.scaling = 0.3
-    assert stage.foretold(100) < 1e-12
+    assert stage.prediction_error(100) < 1e-12
 
 
-def test_a_course_tells_how_a_cancelled_goal_brakes(stage: Stage) -> None:
+def test_a_preview_has_the_braking_of_a_cancelled_goal(stage: Stage) -> None:
     number = stage.accept(goal())
     for _ in range(100):
         before = stage.step()
     assert stage.runner.cancel(number, stage.now + 1.0)
     after = stage.step()
-    assert after.course.key != before.course.key
+    assert after.preview.key != before.preview.key
     assert np.abs(after.command.q - before.command.q - PERIOD * before.command.dq).max() < 1e-4, "no jump"
-    assert stage.foretold(100) < 1e-12
+    assert stage.prediction_error(100) < 1e-12
     assert not stage.runner.busy
 
 
@@ -109,15 +111,15 @@ def test_a_cancelled_goal_brakes_from_the_speed_that_it_has(stage: Stage, scalin
     assert (np.abs(speeds[-1]) < 1e-9).all()
 
 
-def test_a_goal_that_takes_a_place_goes_on_without_a_jump(stage: Stage) -> None:
+def test_a_preempting_goal_continues_without_a_jump(stage: Stage) -> None:
     stage.accept(goal())
     for _ in range(100):
         before = stage.step()
-    back = Goal(NAMES, (Point(1.0, tuple(HOME), (0.0,) * 7),))
+    back = TrajectoryGoal(NAMES, (TrajectoryPoint(1.0, tuple(HOME), (0.0,) * 7),))
     stage.accept(back)
     after = stage.step()
     assert np.abs(after.command.q - before.command.q - PERIOD * before.command.dq).max() < 2e-4
-    assert stage.foretold(150) < 1e-12
+    assert stage.prediction_error(150) < 1e-12
 
 
 # ------------------------------------------------------------------------------------------ FRI
@@ -182,22 +184,22 @@ def test_the_law_mirrors_before_there_are_set_points_and_brakes_after_the_last(s
 
 def test_over_fri_a_goal_is_commanded_at_its_times_however_late_this_process_is(session: Session) -> None:
     """Here it looks every 0.2 s only, and messages come late: what is commanded is the trajectory all the same."""
-    runner = Runner(NAMES, robot("iiwa14"), Settings())
-    still = Measured(100.0, HOME, np.zeros(7))
+    runner = TrajectoryRunner(NAMES, robot("iiwa14"), ExecutionSettings())
+    still = MeasuredJoints(100.0, HOME, np.zeros(7))
     start = 100.3
     runner.accept(goal(start=start), now=100.0, state=still)
-    overlay = _Overlay(session, PERIOD)  # type: ignore[arg-type]
+    overlay = _FriStream(session, PERIOD)  # type: ignore[arg-type]
     reference = Stage()
     reference.accept(goal())
     begin = reference.now
-    wanted = reference.step().course
+    wanted = reference.step().preview
     done, times = [], []
     for k in range(300):
         session.t = k * PERIOD
         if k % 40 == 0:
             now = overlay.tick()
             assert now is not None and now > 100.0 + session.t
-            overlay.follow(runner.advance(now, Measured(now, HOME, np.zeros(7))))
+            overlay.command(runner.advance(now, MeasuredJoints(now, HOME, np.zeros(7))))
         done.append(session.commanded())
         times.append(100.0 + session.t + PERIOD - start)  # it is there a period later
     told = wanted.positions(begin + np.maximum(times, 0.0))
@@ -205,9 +207,9 @@ def test_over_fri_a_goal_is_commanded_at_its_times_however_late_this_process_is(
 
 
 def test_over_fri_a_cancellation_takes_effect_ahead_of_what_is_commanded(session: Session) -> None:
-    runner = Runner(NAMES, robot("iiwa14"), Settings())
-    number = runner.accept(goal(), now=100.0, state=Measured(100.0, HOME, np.zeros(7)))
-    overlay = _Overlay(session, PERIOD)  # type: ignore[arg-type]
+    runner = TrajectoryRunner(NAMES, robot("iiwa14"), ExecutionSettings())
+    number = runner.accept(goal(), now=100.0, state=MeasuredJoints(100.0, HOME, np.zeros(7)))
+    overlay = _FriStream(session, PERIOD)  # type: ignore[arg-type]
     done = []
     for k in range(250):
         session.t = k * PERIOD
@@ -215,7 +217,7 @@ def test_over_fri_a_cancellation_takes_effect_ahead_of_what_is_commanded(session
         assert now is not None
         if k == 100:
             assert runner.cancel(number, 100.0 + session.t)
-        overlay.follow(runner.advance(now, Measured(now, HOME, np.zeros(7))))
+        overlay.command(runner.advance(now, MeasuredJoints(now, HOME, np.zeros(7))))
         done.append(session.commanded())
     speeds = np.diff(np.array(done), axis=0) / PERIOD
     slowing = np.diff(speeds[99:], axis=0) / PERIOD
@@ -226,9 +228,9 @@ def test_over_fri_a_cancellation_takes_effect_ahead_of_what_is_commanded(session
 
 def test_over_fri_clocks_that_part_bend_the_way_of_no_axis(session: Session, monkeypatch) -> None:
     """The controller loses 20 ms at once: what is commanded follows by and by, without a step."""
-    runner = Runner(NAMES, robot("iiwa14"), Settings())
-    runner.accept(goal(), now=100.0, state=Measured(100.0, HOME, np.zeros(7)))
-    overlay = _Overlay(session, PERIOD)  # type: ignore[arg-type]
+    runner = TrajectoryRunner(NAMES, robot("iiwa14"), ExecutionSettings())
+    runner.accept(goal(), now=100.0, state=MeasuredJoints(100.0, HOME, np.zeros(7)))
+    overlay = _FriStream(session, PERIOD)  # type: ignore[arg-type]
     lost = 0.0
     monkeypatch.setattr(overlay, "_between", lambda state: 100.0 + lost)
     done = []
@@ -237,8 +239,8 @@ def test_over_fri_clocks_that_part_bend_the_way_of_no_axis(session: Session, mon
         lost = 0.02 if k >= 60 else 0.0
         now = overlay.tick()
         assert now is not None
-        overlay.follow(runner.advance(now, Measured(now, HOME, np.zeros(7))))
+        overlay.command(runner.advance(now, MeasuredJoints(now, HOME, np.zeros(7))))
         done.append(session.commanded())
     jerk = np.diff(np.array(done), n=3, axis=0)[40:180] / PERIOD**3
     assert np.abs(jerk).max() < 60.0, "the goal's own, and a little"
-    assert overlay._ours(session.t) - session.t > 100.0
+    assert overlay._local(session.t) - session.t > 100.0

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from heptarm.bridge.names import PRESETS
-from heptarm.bridge.parameters import PARAMETERS, Configuration
+from heptarm.ros.interface.names import PRESETS
+from heptarm.ros.node.parameters import PARAMETERS, NodeConfiguration
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "ros_table.py"
 
@@ -55,11 +55,15 @@ def test_what_the_rows_name_is_declared_by_both_nodes(table, ros: str) -> None:
 def test_every_service_topic_and_action_of_ours_is_told_in_a_row(table) -> None:
     told = {name for rows in table.API.values() for entry in rows.values() for name in table.names_of(entry)}
     ours = {name for _, name in table.declared(table.SOURCES["ROS 2"])}
-    assert ours - told <= {"~/joint_trajectory", "~/query_state", "/tf"}  # ROS' own, and what Python needs not
+    assert ours - told <= {
+        "~/joint_trajectory",
+        "~/query_state",
+        "/tf",
+    }  # ROS' own, and what Python needs not
 
 
 def test_other_drivers_names_stand_for_ours(table) -> None:
     ours = {name for _, name in table.declared(table.SOURCES["ROS 1"])}
     for preset in PRESETS.values():
-        assert {entry.ours for entry in preset.entries} <= ours
-        assert Configuration.of(dict(preset.defaults)).joints
+        assert {entry.native for entry in preset.entries} <= ours
+        assert NodeConfiguration.of(dict(preset.defaults)).joints

@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from heptarm.bridge.action import watch
-from heptarm.bridge.task import Task
 from heptarm.errors import MotionAborted, NoContact, StaleState
+from heptarm.ros.interface.action import wait_for_task
+from heptarm.ros.node.task import ArmTask
 
 
 class FakeArm:
@@ -32,8 +32,8 @@ class FakeArm:
         raise MotionAborted("motion 1 was stopped")
 
 
-def task(arm: Any, work: Any) -> Task:
-    return Task(arm, "the touch", work)
+def task(arm: Any, work: Any) -> ArmTask:
+    return ArmTask(arm, "the touch", work)
 
 
 def test_what_it_returns_and_what_it_raises() -> None:
@@ -47,7 +47,7 @@ def test_what_it_returns_and_what_it_raises() -> None:
     with pytest.raises(NoContact, match="nothing"):
         bad.result()
     good.end("too late")
-    assert not good.why and not arm.stops
+    assert not good.end_reason and not arm.stops
 
 
 @pytest.mark.parametrize("deaf", [0, 3])
@@ -57,7 +57,7 @@ def test_it_is_stopped_until_it_gives_up(deaf: int) -> None:
     assert not long.wait(0.05)
     long.end("cancelled")
     long.end("something else")
-    assert long.done and long.why == "cancelled" and arm.stops == deaf + 1
+    assert long.done and long.end_reason == "cancelled" and arm.stops == deaf + 1
     with pytest.raises(MotionAborted):
         long.result()
 
@@ -65,11 +65,11 @@ def test_it_is_stopped_until_it_gives_up(deaf: int) -> None:
 def test_a_goal_whose_client_fails_leaves_nothing_running() -> None:
     arm = FakeArm()
     long = task(arm, arm.move)
-    client: Any = SimpleNamespace(has_cancelled=lambda: 1 / 0)
+    client: Any = SimpleNamespace(is_cancel_requested=lambda: 1 / 0)
 
     def stale() -> None:
         raise StaleState("the newest state is 2 s old")  # no reason to end
 
     with pytest.raises(ZeroDivisionError):
-        watch(long, client, stale)
-    assert long.done and long.why
+        wait_for_task(long, client, stale)
+    assert long.done and long.end_reason

@@ -1,0 +1,56 @@
+"""What all actions share: the most active goals, and that each of them ends."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from heptarm.errors import CommandRejected, NotReady
+from heptarm.ros.interface.action import MAX_GOALS, ActionDispatcher, ActionResult, GoalWork, RosAction
+from heptarm.ros.interface.actions import ACTIONS
+from heptarm.ros.interface.context import NodeContext
+from heptarm.ros.trajectory.goal import GoalOutcome
+
+CLIENT: Any = SimpleNamespace(publish_feedback=lambda fields: None, is_cancel_requested=lambda: False)
+
+
+def dispatcher() -> ActionDispatcher:
+    driver: Any = SimpleNamespace(arm=None)
+    ros: Any = SimpleNamespace()
+    return ActionDispatcher(NodeContext(driver, ros))
+
+
+def action(work: Any) -> RosAction:
+    def begin(context: NodeContext, goal: object) -> GoalWork:
+        if isinstance(work, CommandRejected):
+            raise work
+        return lambda client: work()
+
+    return RosAction("~/anything", "heptarm_msgs/Anything", begin)
+
+
+def test_active_goals_are_limited_to_the_threads() -> None:
+    actions = dispatcher()
+    row = action(lambda: ActionResult(GoalOutcome.SUCCEEDED, "done"))
+    for _ in range(2 * MAX_GOALS):
+        with pytest.raises(CommandRejected, match="invalid"):
+            actions.begin(action(CommandRejected("invalid")), None)
+    works = [actions.begin(row, None) for _ in range(MAX_GOALS)]
+    with pytest.raises(NotReady, match=f"{MAX_GOALS} goals are active"):
+        actions.begin(row, None)
+    assert works[0](CLIENT).text == "done"
+    actions.begin(row, None)
+
+
+def test_an_internal_error_ends_the_goal(caplog: pytest.LogCaptureFixture) -> None:
+    end = dispatcher().begin(action(lambda: 1 / 0), None)(CLIENT)
+    assert end.outcome is GoalOutcome.ABORTED and "ZeroDivisionError" in end.text
+    assert "ZeroDivisionError" in caplog.text
+    result = end.fill(SimpleNamespace(success=True, message=""))
+    assert not result.success and "internal error" in result.message
+
+
+def test_names_of_actions_are_unique() -> None:
+    assert len({row.name for row in ACTIONS}) == len(ACTIONS) == 9
