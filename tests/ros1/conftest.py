@@ -27,6 +27,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             for module in ("rospy", "rosgraph", "actionlib", "genpy", "control_msgs"):
                 item.add_marker(pytest.mark.filterwarnings(f"ignore::DeprecationWarning:{module}"))
                 item.add_marker(pytest.mark.filterwarnings(f"ignore::ResourceWarning:{module}"))
+            # rospy leaves sockets of ended connections to the garbage collector; other leaks fail a test
+            unclosed = "ignore:Exception ignored in. <socket.socket:pytest.PytestUnraisableExceptionWarning"
+            item.add_marker(pytest.mark.filterwarnings(unclosed))
 
 
 @pytest.fixture(scope="session")

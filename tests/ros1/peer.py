@@ -27,9 +27,9 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from heptarm.bridge.goal import Code, Goal, Outcome, Tolerance
-from heptarm.bridge.trajectory import Sample
-from tests.conformance.client import Ended, Sent, Told
+from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, Tolerance, TrajectoryGoal
+from heptarm.ros.trajectory.trajectory import KinematicState
+from tests.conformance.client import ReceivedFeedback, ReceivedResult, SentGoal
 from tests.conformance.stage import ROOT, Stage
 
 #: A busy machine may need long for what is quick [s].
@@ -191,7 +191,7 @@ def publisher(name: str, kind: Any) -> rospy.Publisher:
     return one
 
 
-def trajectory(goal: Goal) -> JointTrajectory:
+def trajectory(goal: TrajectoryGoal) -> JointTrajectory:
     message = JointTrajectory(joint_names=list(goal.joints))
     if goal.start is not None:
         message.header.stamp = rospy.Time.from_sec(goal.start)
@@ -214,7 +214,7 @@ def _tolerance(one: Tolerance) -> JointTolerance:
     )
 
 
-def action_goal(goal: Goal) -> FollowJointTrajectoryGoal:
+def action_goal(goal: TrajectoryGoal) -> FollowJointTrajectoryGoal:
     return FollowJointTrajectoryGoal(
         trajectory=trajectory(goal),
         path_tolerance=[_tolerance(one) for one in goal.path_tolerance],
@@ -223,8 +223,8 @@ def action_goal(goal: Goal) -> FollowJointTrajectoryGoal:
     )
 
 
-def _sample(point: JointTrajectoryPoint) -> Sample:
-    return Sample(
+def _sample(point: JointTrajectoryPoint) -> KinematicState:
+    return KinematicState(
         np.array(point.positions), np.array(point.velocities), np.array(point.accelerations or [0.0] * 7)
     )
 
@@ -237,7 +237,7 @@ def stamp(message: Any) -> float:
 class Client:
     """A client as the cases of conformance want it."""
 
-    preempted = (Outcome.PREEMPTED,)
+    preempted = (GoalOutcome.PREEMPTED,)
     timely = False
 
     def __init__(self, stage: Stage | None, name: str = "/heptarm", prefix: str = "") -> None:
@@ -248,7 +248,7 @@ class Client:
         self.status = collect(f"{name}/status", Status)
         self._action = actionlib.ActionClient(f"{name}/follow_joint_trajectory", FollowJointTrajectoryAction)
         self._topic = rospy.Publisher(f"{name}/joint_trajectory", JointTrajectory, queue_size=1)
-        self._told: dict[int, list[Told]] = {}
+        self._told: dict[int, list[ReceivedFeedback]] = {}
         self._before: dict[str, object] = {}  # of parameters that were changed, by their paths
 
     def ready(self) -> None:
@@ -263,19 +263,19 @@ class Client:
     def sleep(self, seconds: float) -> None:
         time.sleep(seconds)
 
-    def place(self) -> Sample:
+    def place(self) -> KinematicState:
         now = self.now()  # a busy machine may still be handing over older ones
         until(lambda: self.states and stamp(self.states[-1]) >= now, "no joint states come")
         message = self.states[-1]
         assert tuple(message.name) == self.joints
-        return Sample(np.array(message.position), np.array(message.velocity), np.zeros(7))
+        return KinematicState(np.array(message.position), np.array(message.velocity), np.zeros(7))
 
     def track(self, begin: float) -> list[tuple[float, Any]]:
         found = [(stamp(message), message) for message in list(self.states)]
         return [(time, np.array(message.position)) for time, message in found if time >= begin]
 
-    def send(self, goal: Goal) -> Sent:
-        told: list[Told] = []
+    def send(self, goal: TrajectoryGoal) -> SentGoal:
+        told: list[ReceivedFeedback] = []
         handle = self._action.send_goal(
             action_goal(goal), feedback_cb=lambda _, feedback: told.append(self._telling(feedback))
         )
@@ -287,30 +287,32 @@ class Client:
             until(lambda: handle.get_result() is not None, "a rejected goal has no result")
             result = handle.get_result()
             assert result.error_string, "a rejection says why"
-            return Sent(False, Code(result.error_code), handle)
+            return SentGoal(False, ErrorCode(result.error_code), handle)
         self._told[id(handle)] = told
-        return Sent(True, handle=handle)
+        return SentGoal(True, handle=handle)
 
-    def cancel(self, sent: Sent) -> bool:
+    def cancel(self, sent: SentGoal) -> bool:
         handle: Any = sent.handle
         handle.cancel()
         return True
 
-    def result(self, sent: Sent, timeout: float = PATIENCE) -> Ended:
+    def result(self, sent: SentGoal, timeout: float = PATIENCE) -> ReceivedResult:
         handle: Any = sent.handle
         done = actionlib.CommState.DONE
         until(lambda: handle.get_comm_state() == done, "the goal does not end", timeout)
         result = handle.get_result()
-        code = Code(result.error_code)
+        code = ErrorCode(result.error_code)
         outcome = {
-            GoalStatus.SUCCEEDED: Outcome.SUCCEEDED,
-            GoalStatus.ABORTED: Outcome.ABORTED,
+            GoalStatus.SUCCEEDED: GoalOutcome.SUCCEEDED,
+            GoalStatus.ABORTED: GoalOutcome.ABORTED,
             # one word for two ends; the code tells which
-            GoalStatus.PREEMPTED: Outcome.CANCELED if code is Code.SUCCESSFUL else Outcome.PREEMPTED,
+            GoalStatus.PREEMPTED: GoalOutcome.CANCELED
+            if code is ErrorCode.SUCCESSFUL
+            else GoalOutcome.PREEMPTED,
         }[handle.get_terminal_state()]
-        return Ended(outcome, code, result.error_string)
+        return ReceivedResult(outcome, code, result.error_string)
 
-    def feedback(self, sent: Sent) -> list[Told]:
+    def feedback(self, sent: SentGoal) -> list[ReceivedFeedback]:
         return list(self._told[id(sent.handle)])
 
     def behave(self, how: str) -> None:
@@ -354,13 +356,13 @@ class Client:
         answer = call(f"{self.name}/{'activate' if on else 'deactivate'}", Trigger)
         assert answer.success, answer.message
 
-    def topic(self, goal: Goal) -> None:
+    def topic(self, goal: TrajectoryGoal) -> None:
         until(self._topic.get_num_connections, "nobody listens to trajectories")
         self._topic.publish(trajectory(goal))
 
     @staticmethod
-    def _telling(one: Any) -> Told:
-        return Told(
+    def _telling(one: Any) -> ReceivedFeedback:
+        return ReceivedFeedback(
             tuple(one.joint_names),
             _sample(one.desired),
             _sample(one.actual),

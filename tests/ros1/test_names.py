@@ -15,7 +15,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from heptarm.bridge.names import PRESETS
+from heptarm.ros.interface.names import PRESETS
 from tests.conformance.stage import Stage
 from tests.ros1.peer import NodeProcess, active, collect, publisher, until
 

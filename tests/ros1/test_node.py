@@ -98,7 +98,7 @@ def test_a_pose_in_another_frame_is_refused_in_words(client: Client, node: NodeP
     message = PoseStamped()
     message.header.frame_id, message.pose.orientation.w = "table", 1.0
     publisher("/heptarm/command/pose", PoseStamped).publish(message)
-    node.waits_for("the pose is given in 'table'")
+    node.waits_for("got 'table'")
     assert np.abs(client.place().q - here).max() < 1e-3
 
 
@@ -160,9 +160,9 @@ def test_life_cycle(client: Client) -> None:
 
 
 def step_nowhere(client: Client):
-    from heptarm.bridge.goal import Goal, Point
+    from heptarm.ros.trajectory.goal import TrajectoryGoal, TrajectoryPoint
 
-    return Goal(client.joints, (Point(1.0, (0.0,) * 7),))
+    return TrajectoryGoal(client.joints, (TrajectoryPoint(1.0, (0.0,) * 7),))
 
 
 def test_parameters_change_while_the_node_runs_and_the_fixed_ones_do_not(
@@ -171,5 +171,5 @@ def test_parameters_change_while_the_node_runs_and_the_fixed_ones_do_not(
     assert client.set(allow_partial_joints_goal=True)
     assert not client.set(state_rate=50.0)
     rospy.set_param("/heptarm/constraints/goal_time", -5.0)
-    node.waits_for("the old parameters count")
+    node.waits_for("parameters not applied")
     rospy.delete_param("/heptarm/constraints/goal_time")

@@ -20,7 +20,7 @@ from heptarm_msgs.srv import (
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from heptarm.bridge.services import SERVICES
+from heptarm.ros.interface.services import SERVICES
 from tests.conformance.case import rests, step, succeeds
 from tests.ros1.peer import Client, call, publisher, until
 

@@ -94,7 +94,12 @@ def arena(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
 def probe(ros: None, arena: Stage) -> Iterator[Client]:
     node = NodeProcess(arena.target, ns="/surface", **surface.PARAMETERS)
     client = Client()
-    surface.ready(client)
+    try:
+        surface.ready(client)
+    except BaseException:
+        node.end()
+        print(node.said)
+        raise
     yield client
     assert node.end() == 0, node.said
 

@@ -14,7 +14,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from std_srvs.srv import Trigger
 
-from heptarm.bridge.goal import Code, Outcome
+from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome
 from tests.conformance.case import long, quiet, rests, step
 from tests.conformance.stage import Stage
 from tests.ros1.peer import Client, NodeProcess, call, collect, until
@@ -50,7 +50,7 @@ def test_a_killed_client_leaves_a_node_that_lives(client: Client) -> None:
     # its goal is finished, as upstream's servers do
     until(lambda: np.abs(client.place().q - here - 0.1).max() < 0.012, "the goal is not finished")
     rests(client)
-    assert client.result(client.send(step(client, size=-1.0))).code is Code.SUCCESSFUL
+    assert client.result(client.send(step(client, size=-1.0))).code is ErrorCode.SUCCESSFUL
 
 
 @pytest.fixture(scope="module")
@@ -74,16 +74,16 @@ def test_an_emergency_stop_ends_the_goal(other: Client) -> None:
     until(lambda: other.feedback(sent), "the goal does not begin")
     other.stage.do("press")
     ended = other.result(sent)
-    assert ended.outcome is Outcome.ABORTED and ended.code is Code.INVALID_GOAL
+    assert ended.outcome is GoalOutcome.ABORTED and ended.code is ErrorCode.INVALID_GOAL
     until(lambda: other.status[-1].emergency_stop, "the status does not tell")
     refused = other.send(step(other))
-    assert not refused.accepted and refused.code is Code.INVALID_GOAL
+    assert not refused.accepted and refused.code is ErrorCode.INVALID_GOAL
     other.stage.do("release")
     until(lambda: not other.status[-1].emergency_stop, "the status does not tell")
     until(lambda: call("/other/heptarm/recover", Trigger).success, "the arm does not recover")
     until(lambda: other.status[-1].ready_to_move, "the status does not tell")
     rests(other)
-    assert other.result(other.send(step(other))).code is Code.SUCCESSFUL
+    assert other.result(other.send(step(other))).code is ErrorCode.SUCCESSFUL
 
 
 def test_a_cabinet_without_power_and_back(other: Client) -> None:
@@ -92,7 +92,7 @@ def test_a_cabinet_without_power_and_back(other: Client) -> None:
     until(lambda: other.feedback(sent), "the goal does not begin")
     other.stage.kill()
     ended = other.result(sent)
-    assert ended.outcome is Outcome.ABORTED and ended.code is Code.INVALID_GOAL
+    assert ended.outcome is GoalOutcome.ABORTED and ended.code is ErrorCode.INVALID_GOAL
     until(lambda: not other.status[-1].connected, "the status does not tell")
     until(lambda: any(one.status[0].level == 2 for one in reports), "diagnostics do not tell")
     until(lambda: quiet(other), "old states are repeated")
@@ -103,7 +103,7 @@ def test_a_cabinet_without_power_and_back(other: Client) -> None:
     rests(other)
     times = [message.header.stamp.to_nsec() for message in other.states]
     assert len(set(times)) == len(times)
-    assert other.result(other.send(step(other))).code is Code.SUCCESSFUL
+    assert other.result(other.send(step(other))).code is ErrorCode.SUCCESSFUL
 
 
 def test_a_node_that_the_system_stops_for_a_while(other: Client, spare_node: NodeProcess) -> None:
@@ -114,22 +114,22 @@ def test_a_node_that_the_system_stops_for_a_while(other: Client, spare_node: Nod
     time.sleep(2.0)
     spare_node.process.send_signal(signal.SIGCONT)
     ended = other.result(sent)
-    assert (ended.outcome, ended.code) == (Outcome.ABORTED, Code.INVALID_GOAL), ended
+    assert (ended.outcome, ended.code) == (GoalOutcome.ABORTED, ErrorCode.INVALID_GOAL), ended
     rests(other)
-    assert other.result(other.send(step(other))).code is Code.SUCCESSFUL
+    assert other.result(other.send(step(other))).code is ErrorCode.SUCCESSFUL
 
 
 def step_anywhere(client: Client):
-    from heptarm.bridge.goal import Goal, Point
+    from heptarm.ros.trajectory.goal import TrajectoryGoal, TrajectoryPoint
 
-    return Goal(client.joints, (Point(5.0, (0.0,) * 7),))
+    return TrajectoryGoal(client.joints, (TrajectoryPoint(5.0, (0.0,) * 7),))
 
 
 def test_without_a_cabinet_or_with_a_wrong_parameter_it_waits_and_says_so(ros: None, stage: Stage) -> None:
     lonely = NodeProcess("127.0.0.1:9", name="lonely")
     wrong = NodeProcess(stage.target, name="wrong", servo__rate=-3)
     lonely.waits_for("not configured")
-    wrong.waits_for("servo.rate is -3")
+    wrong.waits_for("servo.rate must be in [1, 500], got -3")
     assert lonely.end() == 0, lonely.said
     assert wrong.end(signal.SIGTERM) == 0, wrong.said
 
@@ -139,4 +139,4 @@ def test_the_arm_comes_to_rest_when_the_node_ends(other: Client, spare_node: Nod
     until(lambda: other.feedback(sent), "the goal does not begin")
     assert spare_node.end(signal.SIGTERM) == 0, spare_node.said
     ended = other.result(sent)
-    assert ended.outcome is Outcome.ABORTED, ended
+    assert ended.outcome is GoalOutcome.ABORTED, ended
