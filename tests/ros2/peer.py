@@ -10,7 +10,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from heptarm_msgs.srv import SetNumber
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
-from rcl_interfaces.srv import SetParameters
+from rcl_interfaces.srv import GetParameters, SetParameters
 from rclpy.action import ActionClient
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -32,9 +32,9 @@ from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from heptarm.bridge.goal import Code, Goal, Outcome, Tolerance
-from heptarm.bridge.trajectory import Sample
-from tests.conformance.client import Ended, Sent, Told
+from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, Tolerance, TrajectoryGoal
+from heptarm.ros.trajectory.trajectory import KinematicState
+from tests.conformance.client import ReceivedFeedback, ReceivedResult, SentGoal
 from tests.conformance.stage import Stage
 
 #: Discovery can take some seconds, and a busy machine many more [s].
@@ -51,9 +51,9 @@ DEFAULTS: dict[str, object] = {
     "constraints__A7__trajectory": 0.0,
 }
 OUTCOMES = {
-    GoalStatus.STATUS_SUCCEEDED: Outcome.SUCCEEDED,
-    GoalStatus.STATUS_ABORTED: Outcome.ABORTED,
-    GoalStatus.STATUS_CANCELED: Outcome.CANCELED,
+    GoalStatus.STATUS_SUCCEEDED: GoalOutcome.SUCCEEDED,
+    GoalStatus.STATUS_ABORTED: GoalOutcome.ABORTED,
+    GoalStatus.STATUS_CANCELED: GoalOutcome.CANCELED,
 }
 
 
@@ -151,6 +151,8 @@ class Ros:
         if name not in self._actions:
             made = self._executor.create_task(ActionClient, self.node, kind, name)
             self._actions[name] = self.wait(made, f"no client of {name} can be made")
+            until(self._actions[name].server_is_ready, f"there is no action {name}")
+            self._meet(name)
         client = self._actions[name]
         until(client.server_is_ready, f"there is no action {name}")
         return client
@@ -159,9 +161,39 @@ class Ros:
         """A client of a service that is there."""
         if name not in self._clients:
             self._clients[name] = self.node.create_client(kind, name)
+            self._meet(name)
         client = self._clients[name]
         until(client.service_is_ready, f"there is no service {name}")
         return client
+
+    def _meet(self, name: str) -> None:
+        """Wait until the node of a service or an action has discovered all clients that there are here by now.
+
+        A client knows that it has discovered a server, but not whether the server has discovered it, and until then
+        answers are lost. Discovery goes in the order in which clients are made. So one that is made now asks for
+        nothing, and again after a second: when it is answered, all those before it can be.
+        """
+        nodes = [f"{above}/get_parameters" for above in map(str, PurePosixPath(name).parents)]
+
+        def parameters() -> str:
+            there = {service for service, _ in self.node.get_service_names_and_types()}
+            return next((service for service in nodes if service in there), "")
+
+        service = until(parameters, f"no node with {name} is there")
+        probe = self.node.create_client(GetParameters, service)
+        until(probe.service_is_ready, f"there is no service {service}")
+        deadline = time.monotonic() + PATIENCE
+        while time.monotonic() < deadline:
+            asked = probe.call_async(GetParameters.Request())
+            try:
+                self.wait(asked, "no answer", timeout=1.0)
+                break
+            except TimeoutError:
+                probe.remove_pending_request(asked)
+        else:
+            raise TimeoutError(f"{service} does not answer")
+        done = self._executor.create_task(self.node.destroy_client, probe)
+        self.wait(done, "a client does not end")
 
     def call(self, kind: type, name: str, request: Any) -> Any:
         """Call a service."""
@@ -206,7 +238,7 @@ def to_duration(seconds: float) -> Duration:
     return Duration(sec=nanos // 10**9, nanosec=nanos % 10**9)
 
 
-def trajectory(goal: Goal) -> JointTrajectory:
+def trajectory(goal: TrajectoryGoal) -> JointTrajectory:
     message = JointTrajectory(joint_names=list(goal.joints))
     if goal.start is not None:
         message.header.stamp = to_time(goal.start)
@@ -229,7 +261,7 @@ def _tolerance(one: Tolerance) -> JointTolerance:
     )
 
 
-def action_goal(goal: Goal) -> FollowJointTrajectory.Goal:
+def action_goal(goal: TrajectoryGoal) -> FollowJointTrajectory.Goal:
     message = FollowJointTrajectory.Goal(trajectory=trajectory(goal))
     message.path_tolerance = [_tolerance(one) for one in goal.path_tolerance]
     message.goal_tolerance = [_tolerance(one) for one in goal.goal_tolerance]
@@ -239,8 +271,8 @@ def action_goal(goal: Goal) -> FollowJointTrajectory.Goal:
     return message
 
 
-def _sample(point: JointTrajectoryPoint) -> Sample:
-    return Sample(
+def _sample(point: JointTrajectoryPoint) -> KinematicState:
+    return KinematicState(
         np.array(point.positions), np.array(point.velocities), np.array(point.accelerations or [0.0] * 7)
     )
 
@@ -273,7 +305,7 @@ def fresh(ros: Ros, found: list[Any]) -> Any:
 class Client:
     """A client as the cases of conformance want it."""
 
-    preempted = (Outcome.ABORTED,)
+    preempted = (GoalOutcome.ABORTED,)
     timely = False
 
     def __init__(
@@ -288,7 +320,7 @@ class Client:
         self.states = ros.collect(JointState, f"{name.rpartition('/')[0]}/joint_states")
         self.status = ros.collect(Status, f"{name}/status", latched=True)
         self._topic = ros.node.create_publisher(JointTrajectory, f"{name}/joint_trajectory", 1)
-        self._told: dict[int, list[Told]] = {}
+        self._told: dict[int, list[ReceivedFeedback]] = {}
         self._changed: set[str] = set()
         self._how, self._override = "follows", 1.0
 
@@ -307,39 +339,41 @@ class Client:
     def sleep(self, seconds: float) -> None:
         time.sleep(seconds)
 
-    def place(self) -> Sample:
+    def place(self) -> KinematicState:
         now = self.now()  # a busy machine may still be handing over older ones
         until(lambda: self.states and stamp(self.states[-1]) >= now, "no joint states come")
         message = self.states[-1]
         assert tuple(message.name) == self.joints
-        return Sample(np.array(message.position), np.array(message.velocity), np.zeros(7))
+        return KinematicState(np.array(message.position), np.array(message.velocity), np.zeros(7))
 
     def track(self, begin: float) -> list[tuple[float, Any]]:
         found = [(stamp(message), message) for message in list(self.states)]
         return [(time, np.array(message.position)) for time, message in found if time >= begin]
 
-    def send(self, goal: Goal) -> Sent:
-        told: list[Told] = []
+    def send(self, goal: TrajectoryGoal) -> SentGoal:
+        told: list[ReceivedFeedback] = []
         future = self._action.send_goal_async(
             action_goal(goal), feedback_callback=lambda message: told.append(self._telling(message.feedback))
         )
         handle = self.ros.wait(future, "the goal is neither accepted nor rejected")
         if not handle.accepted:
-            return Sent(False)
+            return SentGoal(False)
         self._told[id(handle)] = told
-        return Sent(True, handle=(handle, handle.get_result_async()))
+        return SentGoal(True, handle=(handle, handle.get_result_async()))
 
-    def cancel(self, sent: Sent) -> bool:
+    def cancel(self, sent: SentGoal) -> bool:
         handle, _ = sent.handle  # type: ignore[misc]
         answer = self.ros.wait(handle.cancel_goal_async(), "cancelling is not answered")
         return bool(answer.goals_canceling)
 
-    def result(self, sent: Sent, timeout: float = PATIENCE) -> Ended:
+    def result(self, sent: SentGoal, timeout: float = PATIENCE) -> ReceivedResult:
         _, future = sent.handle  # type: ignore[misc]
         answer = self.ros.wait(future, "the goal does not end", timeout)
-        return Ended(OUTCOMES[answer.status], Code(answer.result.error_code), answer.result.error_string)
+        return ReceivedResult(
+            OUTCOMES[answer.status], ErrorCode(answer.result.error_code), answer.result.error_string
+        )
 
-    def feedback(self, sent: Sent) -> list[Told]:
+    def feedback(self, sent: SentGoal) -> list[ReceivedFeedback]:
         handle, _ = sent.handle  # type: ignore[misc]
         return list(self._told[id(handle)])
 
@@ -387,13 +421,13 @@ class Client:
         answer = self.ros.call(GetState, f"{self.name}/get_state", GetState.Request())
         return str(answer.current_state.label)
 
-    def topic(self, goal: Goal) -> None:
+    def topic(self, goal: TrajectoryGoal) -> None:
         until(self._topic.get_subscription_count, "nobody listens to trajectories")
         self._topic.publish(trajectory(goal))
 
     @staticmethod
-    def _telling(one: FollowJointTrajectory.Feedback) -> Told:
-        return Told(
+    def _telling(one: FollowJointTrajectory.Feedback) -> ReceivedFeedback:
+        return ReceivedFeedback(
             tuple(one.joint_names),
             _sample(one.desired),
             _sample(one.actual),

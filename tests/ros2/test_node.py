@@ -19,7 +19,7 @@ from std_msgs.msg import Empty
 from std_srvs.srv import Trigger
 
 import heptarm as ha
-from heptarm.bridge import parameters
+from heptarm.ros.node import parameters
 from tests.conformance.case import TOUCH, long, rests, step, succeeds, under_way
 from tests.conformance.stage import Stage
 from tests.ros2.peer import Client, NodeProcess, Ros, fresh, until
@@ -92,7 +92,7 @@ def test_told_to_end_in_mid_air_it_leaves_the_arm_at_rest(
 
 def test_every_parameter_is_described(client: Client, ros: Ros) -> None:
     names = list(ros.call(ListParameters, "/heptarm/list_parameters", ListParameters.Request()).result.names)
-    ours = [*parameters.PARAMETERS, *parameters.of_joints([f"A{i}" for i in range(1, 8)])]
+    ours = [*parameters.PARAMETERS, *parameters.joint_parameters([f"A{i}" for i in range(1, 8)])]
     assert {one.name for one in ours} <= set(names)
     request = DescribeParameters.Request(names=[one.name for one in ours])
     told = ros.call(DescribeParameters, "/heptarm/describe_parameters", request).descriptors
@@ -114,7 +114,9 @@ def test_parameters_that_count_later_are_refused_while_connected(client: Client)
 
 def test_joint_states_are_complete_ordered_and_stamped_by_this_machine(client: Client, ros: Ros) -> None:
     before, start = client.now(), len(client.states)
-    until(lambda: len(client.states) > start + 50 and seconds(client.states[-1]) >= before, "joint states come")
+    until(
+        lambda: len(client.states) > start + 50 and seconds(client.states[-1]) >= before, "joint states come"
+    )
     found = client.states[start:]
     for message in found:
         assert tuple(message.name) == client.joints
@@ -204,7 +206,7 @@ def test_a_pose_in_another_frame_is_refused(client: Client, node: NodeProcess) -
     message.header.frame_id = "moon"
     message.pose.orientation.w = 1.0
     publish(client, PoseStamped, "/heptarm/command/pose", message)
-    node.waits_for("the pose is given in 'moon'")
+    node.waits_for("got 'moon'")
 
 
 def test_servo_topics_and_their_watchdog(client: Client) -> None:
@@ -223,7 +225,6 @@ def test_servo_topics_and_their_watchdog(client: Client) -> None:
     assert np.abs((rest - here)[:6]).max() < 5e-3
     publisher = client.ros.node.create_publisher(JointState, "/heptarm/servo/joint", 1)
     until(publisher.get_subscription_count, "nobody listens")
-
 
     def back() -> bool:
         publisher.publish(joint_state(client, here))

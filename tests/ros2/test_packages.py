@@ -21,10 +21,11 @@ import xacro
 import yaml
 from sensor_msgs.msg import JointState
 
-from heptarm.bridge.parameters import PARAMETERS, Configuration, of_joints
 from heptarm.model.kinematics import forward
+from heptarm.ros.node.parameters import PARAMETERS, NodeConfiguration, joint_parameters
 from heptarm.values.robot import ROBOTS
 from tests.conformance.stage import Stage
+from tests.interrupts import ctrl_c_interrupts
 from tests.ros2.peer import Ros, until
 
 ROOT = Path(__file__).parents[2]
@@ -79,7 +80,7 @@ def test_an_arm_expands_with_the_limits_of_its_data_sheet(model: str) -> None:
     arm = expand(URDF / "heptarm.urdf.xacro", model=model)
     robot = ROBOTS[model]
     joints = [joint for joint in arm.findall("joint") if joint.get("type") == "revolute"]
-    assert tuple(joint.get("name") for joint in joints) == Configuration.of({}).joints
+    assert tuple(joint.get("name") for joint in joints) == NodeConfiguration.of({}).joints
     for values, name in (
         (robot.q_min, "lower"),
         (robot.q_max, "upper"),
@@ -106,7 +107,7 @@ def test_prefix_and_origin() -> None:
     names = [e.get("name") for e in (*arm.findall("link"), *arm.findall("joint")) if e.get("name") != "world"]
     assert len(names) == len(set(names)) and all(name and name.startswith("left_") for name in names)
     np.testing.assert_allclose(tip(arm, np.zeros(7), "left_link_0")[:3, 3], [1, 2, 3])
-    configuration = Configuration.of({"prefix": "left_"})
+    configuration = NodeConfiguration.of({"prefix": "left_"})
     links = {link.get("name") for link in arm.findall("link")}
     assert {configuration.frame("base"), configuration.frame("flange")} <= links
 
@@ -198,7 +199,7 @@ def test_a_launch_file_declares_what_it_uses_and_starts_what_there_is(path: Path
     declared = {arg.get("name") for arg in launch.findall("arg")}
     assert all(arg.get("description") for arg in launch.findall("arg"))
     assert set(re.findall(r"\$\(var (\w+)\)", path.read_text())) <= declared
-    known = {one.name for one in (*PARAMETERS, *of_joints([f"A{i}" for i in range(1, 8)]))}
+    known = {one.name for one in (*PARAMETERS, *joint_parameters([f"A{i}" for i in range(1, 8)]))}
     for node in launch.iter("node"):
         if node.get("pkg") == "heptarm_ros2":
             assert (
@@ -225,13 +226,13 @@ def test_the_nodes_parameter_file_has_its_defaults() -> None:
     given = flat(
         yaml.safe_load((ROS2 / "heptarm_bringup/config/heptarm.yaml").read_text())["/**"]["ros__parameters"]
     )
-    Configuration.of(given)
+    NodeConfiguration.of(given)
     defaults = {one.name: one.default for one in PARAMETERS}
     assert given == {name: defaults[name] for name in given}
 
 
 def test_controllers_and_moveit_have_the_nodes_joints_and_action() -> None:
-    joints = list(Configuration.of({}).joints)
+    joints = list(NodeConfiguration.of({}).joints)
     controllers = yaml.safe_load((ROS2 / "heptarm_bringup/config/controllers.yaml").read_text())
     assert controllers["joint_trajectory_controller"]["ros__parameters"]["joints"] == joints
     moveit = yaml.safe_load((ROS2 / "heptarm_moveit_config/config/moveit_controllers.yaml").read_text())
@@ -309,14 +310,16 @@ def test_upstreams_launch_reads_them(path: Path) -> None:
 
 
 @pytest.mark.skipif(
-    shutil.which("ros2") is None, reason="upstream's launch is in no wheel: this needs an installation of ROS 2"
+    shutil.which("ros2") is None,
+    reason="upstream's launch is in no wheel: this needs an installation of ROS 2",
 )
 def test_upstreams_launch_starts_the_node(stage: Stage, ros: Ros) -> None:
     if subprocess.run(["ros2", "pkg", "prefix", "heptarm_bringup"], check=False).returncode:
         pytest.skip("heptarm_bringup is in no workspace that is sourced")
     command = ["ros2", "launch", "heptarm_bringup", "heptarm.launch.xml", f"target:={stage.target}"]
     command += ["namespace:=launched", "prefix:=l_", "description:=false"]
-    process = subprocess.Popen(command, start_new_session=True)
+    with ctrl_c_interrupts():
+        process = subprocess.Popen(command, start_new_session=True)
     try:
         states = ros.collect(JointState, "/launched/joint_states")
         until(lambda: states, "the node does not start")

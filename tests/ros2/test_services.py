@@ -10,7 +10,7 @@ from geometry_msgs.msg import Point, Pose, Quaternion
 from heptarm_msgs.srv import AttachTool, GetNames, SetJointImpedance, SetNumber, SetText
 from std_srvs.srv import Trigger
 
-from heptarm.bridge.services import SERVICES
+from heptarm.ros.interface.services import SERVICES
 from tests.conformance.case import rests, step, succeeds
 from tests.ros2.peer import Client, Ros, until
 

@@ -96,7 +96,12 @@ def arena(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Stage]:
 def probe(ros: Ros, arena: Stage) -> Iterator[Client]:
     node = NodeProcess(arena.target, space="/surface", **(PATIENT | surface.PARAMETERS))
     client = Client(ros)
-    surface.ready(client)
+    try:
+        surface.ready(client)
+    except BaseException:
+        node.end()
+        print(node.said)
+        raise
     yield client
     node.finish()
 

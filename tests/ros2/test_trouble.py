@@ -13,7 +13,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from std_srvs.srv import Trigger
 
-from heptarm.bridge.goal import Code, Goal, Outcome, Point
+from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, TrajectoryGoal, TrajectoryPoint
 from tests.conformance.case import long, quiet, rests, stays, step, succeeds, under_way
 from tests.conformance.stage import ROOT, Stage
 from tests.ros2.peer import PATIENT, Client, NodeProcess, Ros, stamp, until
@@ -41,7 +41,7 @@ def test_an_emergency_stop_ends_a_goal_and_refuses_others(victim: Client, spare:
     under_way(victim, here)
     spare.do("press")
     ended = victim.result(sent)
-    assert (ended.outcome, ended.code) == (Outcome.ABORTED, Code.INVALID_GOAL)
+    assert (ended.outcome, ended.code) == (GoalOutcome.ABORTED, ErrorCode.INVALID_GOAL)
     assert "emergency stop" in ended.text
     rest = rests(victim)
     assert not victim.send(step(victim)).accepted
@@ -103,11 +103,11 @@ def test_a_cabinet_that_dies_and_comes_back(
     spare.kill()
     killed = victim.now()
     ended = victim.result(sent)
-    assert (ended.outcome, ended.code) == (Outcome.ABORTED, Code.INVALID_GOAL)
+    assert (ended.outcome, ended.code) == (GoalOutcome.ABORTED, ErrorCode.INVALID_GOAL)
     assert ended.text
     until(lambda: tough_is(found, b"\x02"), "diagnostics tell of it")
     until(lambda: quiet(victim), "old states are repeated")
-    assert not victim.send(Goal(victim.joints, (Point(1.0, tuple(here)),))).accepted
+    assert not victim.send(TrajectoryGoal(victim.joints, (TrajectoryPoint(1.0, tuple(here)),))).accepted
     spare.restart()
     until(lambda: stamp(victim.states[-1]) > killed, "states come again")
     until(lambda: tough_is(found, b"\x00"), "diagnostics are well again")
@@ -126,6 +126,6 @@ def test_a_node_that_the_system_stops_for_a_while(victim: Client, tough: NodePro
     time.sleep(2.0)
     tough.process.send_signal(signal.SIGCONT)
     ended = victim.result(sent)
-    assert (ended.outcome, ended.code) == (Outcome.ABORTED, Code.INVALID_GOAL), ended
+    assert (ended.outcome, ended.code) == (GoalOutcome.ABORTED, ErrorCode.INVALID_GOAL), ended
     rests(victim)
     succeeds(victim, step(victim))
