@@ -133,7 +133,7 @@ def test_the_command_names_runs_and_reports(
         "yes": False,
         "target": None,
     }
-    assert check.run(only=("model",), list_only=True, junit=None, as_json=True, **options) == 0
+    assert check.check("model", list_only=True, junit=None, as_json=True, **options) == 0
     told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert told[0]["scenario"] == "model.forward" and told[0]["risk"] == "still"
 
@@ -148,7 +148,7 @@ def test_the_command_names_runs_and_reports(
 
     monkeypatch.setattr(check, "connect", lambda *_, **__: Lent())
     junit = tmp_path / "report.xml"
-    assert check.run(only=("model.forward",), list_only=False, junit=junit, as_json=True, **options) == 0
+    assert check.check("model.forward", list_only=False, junit=junit, as_json=True, **options) == 0
     *outcomes, last = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
     assert outcomes[0]["verdict"] == "shown" and outcomes[0]["measured"] and last["ok"]
     assert ElementTree.parse(junit).getroot().get("tests") == "1"
