@@ -13,11 +13,13 @@ from operator import or_
 from typing import Any
 
 import heptarm as ha
-from heptarm import Arm, Pose, Redundancy, Tool
+from heptarm import Arm, Tool
 from heptarm.do import notify, set_output
-from heptarm.modes import CartesianImpedance, JointImpedance, SineImpedance
-from heptarm.values.guiding import hand_guide
-from heptarm.values.signals import Force, force, io, path, torque
+from heptarm.values.condition.signals import Force, force, io, path, torque
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
+from heptarm.values.mode.sine import SineImpedance
+from heptarm.values.motion.hand_guiding import hand_guide
+from heptarm.values.pose import Pose, Redundancy
 
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
 THERE = Pose.xyz_abc(0.5, 0.0, 0.5, *ha.deg(180, 0, 180))

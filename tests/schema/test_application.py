@@ -10,8 +10,8 @@ import pytest
 
 import heptarm as ha
 import sample_bodies
-from heptarm.arm.private_cabinet import PrivateCabinet
-from heptarm.arm.target import Target
+from heptarm.arm.link.local_simulator import PrivateCabinet
+from heptarm.arm.link.target import Target
 from heptarm.wire import messages as wire
 from heptarm.wire.messages import Message
 from tests.cabinet.peer import NONCE, Closed, Peer
@@ -48,9 +48,9 @@ def picture(cabinet: PrivateCabinet) -> tuple[object, ...]:
     """What a refused request might have changed."""
     with ha.connect(f"sim://{cabinet.host}:{cabinet.port}", control=False, timeout=PATIENCE) as arm:
         arm.subscribe(groups=("joints", "motion", "safety", "mode", "io"))
-        state = arm.wait_until(lambda s: s.signals is not None and s.control is not None, timeout=PATIENCE)
-        assert state.motion is not None and state.control is not None
-        motion, control = state.motion, state.control
+        state = arm.wait_until(lambda s: s.groups.io is not None and s.groups.mode is not None, timeout=PATIENCE)
+        assert state.motion is not None and state.groups.mode is not None
+        motion, control = state.motion, state.groups.mode
         told = (motion.id, motion.queued, motion.override, control.mode, control.tool, control.workpiece)
         return (*told, control.frame, tuple(state.io.items()), tuple(np.round(state.q, 4)), arm.controller)
 

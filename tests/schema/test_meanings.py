@@ -13,11 +13,13 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm import Arm, Pose, Tool
-from heptarm.arm.modes import mode_message
-from heptarm.modes import CartesianImpedance, SineImpedance
-from heptarm.values.motion import Motion
-from heptarm.values.signals import Force, io, path, torque
+from heptarm import Arm, Tool
+from heptarm.arm.translate.modes import mode_message
+from heptarm.values.condition.signals import Force, io, path, torque
+from heptarm.values.mode.impedance import CartesianImpedance
+from heptarm.values.mode.sine import SineImpedance
+from heptarm.values.motion.motion import Motion
+from heptarm.values.pose import Pose
 from heptarm.wire import messages as wire
 from tests.schema.calls import HOME
 
