@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from heptarm.sim.planning.command import Order
+from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
-from heptarm.virtual.order import Order
-from heptarm.virtual.plant import Plant
 
 READY = (0.0, 0.5, 0.0, -1.3, 0.0, 0.9, 0.0)
 

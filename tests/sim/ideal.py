@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.model.kinematics import forward
+from heptarm.sim.controller.interpolator import FAST_JERK
+from heptarm.sim.controller.safety import StopRequest
+from heptarm.sim.planning.command import TICK, Order
+from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from heptarm.values.robot import robot
-from heptarm.virtual.interpolator import FAST_JERK
-from heptarm.virtual.order import Order
-from heptarm.virtual.plant import Plant
-from heptarm.virtual.safety import Demand
-from heptarm.virtual.tick import TICK
-from tests.virtual.driving import READY
+from tests.sim.driving import READY
 
 LINE = (0.05, 0.25, 0.05, 0.0, 0.0, 0.0, 1.0)
 BASE = (0.0, 0.0, 0.0, 1.0)
@@ -81,7 +80,7 @@ class Ideal(Plant):
 
     def press(self) -> None:
         """Press the emergency stop."""
-        self.safety.demand(Demand.EMERGENCY_STOP)
+        self.safety.request_stop(StopRequest.EMERGENCY_STOP)
 
 
 def stopping_time(plant: Plant, how: str) -> float:
@@ -104,10 +103,8 @@ def stopping_time(plant: Plant, how: str) -> float:
     if run.profile is None:
         return 0.0
     place, speed, acceleration = run.profile.at(run.time)
-    limits, halts = run.plan.braking, run.plan.halts
-    if halts is not None:
-        leg = next(i for i, mark in enumerate(halts.marks) if place < mark or mark == halts.marks[-1])
-        limits = halts.courses[leg].brakes(place, speed)
+    assert run.plan.timing is not None
+    limits = run.plan.timing.stop_limits(place, speed)
     return braking(speed, abs(acceleration), limits.acceleration, limits.jerk)
 
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
+from heptarm.sim.planning.command import Order, PlanError
+from heptarm.sim.planning.planner import plan
+from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
-from heptarm.virtual.order import Order, PlanError
-from heptarm.virtual.plant import Plant
-from heptarm.virtual.route import plan
-from tests.virtual.driving import READY, Ear, Track, numbers, ready, run
+from tests.sim.driving import READY, Ear, Track, numbers, ready, run
 
 SPEED = 0.25
 SIDES = ((0, 0.15, 0), (0.1, 0.15, 0), (0.1, 0, 0), (0, 0, 0))
@@ -67,7 +67,9 @@ def test_the_speed_at_a_blended_corner_is_at_least_30_percent(zone: float) -> No
     track = run(plant, order)
     assert ear.causes == ["started", "done"] and ear.parts == [1, 2, 3]
     speed, seen = speeds(track, plant), points(plant, track.q_cmd)
-    moving = slice(int(np.argmax(speed > 0.5 * SPEED)), len(speed) - int(np.argmax(speed[::-1] > 0.5 * SPEED)))
+    moving = slice(
+        int(np.argmax(speed > 0.5 * SPEED)), len(speed) - int(np.argmax(speed[::-1] > 0.5 * SPEED))
+    )
     assert speed[moving].min() >= 0.3 * SPEED
     assert speed.max() <= SPEED * 1.01
     for corner in SIDES[:3]:
@@ -110,9 +112,7 @@ def test_a_blend_goes_from_one_speed_to_the_other() -> None:
 def test_joints_blend_with_lines_and_arcs() -> None:
     plant, ear = ready(), PartEar()
     start = start_of(plant)
-    arc = Order(
-        1, "circ", via=at(start, (0.05, 0.05, 0)), pose=at(start, (0, 0.1, 0)), cart_velocity=SPEED
-    )
+    arc = Order(1, "circ", via=at(start, (0.05, 0.05, 0)), pose=at(start, (0, 0.1, 0)), cart_velocity=SPEED)
     parts = (
         Order(1, "ptp", joints=(0.3, *READY[1:]), blending=(0, 0.05, 0)),
         Order(1, "lin", pose=numbers(start), cart_velocity=SPEED, blending=(0.3, 0, 0)),
@@ -169,7 +169,10 @@ def test_motions_that_lead_nowhere_are_passed_over() -> None:
     start = start_of(plant)
     here = Order(1, "lin", pose=numbers(start), blending=(0, 0.02, 0))
     there = Order(1, "lin", pose=at(start, (0, 0.05, 0)), blending=(0, 0.02, 0))
-    run(plant, Order(1, "batch", parts=(here, there, replace(there, id=2), here), listener=ear, part_listener=ear))
+    run(
+        plant,
+        Order(1, "batch", parts=(here, there, replace(there, id=2), here), listener=ear, part_listener=ear),
+    )
     assert ear.causes == ["started", "done"] and np.abs(plant.snapshot.q - READY).max() < 2e-4
     run(plant, Order(2, "batch", parts=(here, here), listener=(still := PartEar())))
     assert still.causes == ["started", "done"]

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.values.mode import CartesianImpedance, JointImpedance, SineImpedance
+from heptarm.sim.planning.command import Order
+from heptarm.sim.plant.plant import Plant
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
+from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.pose import Pose
-from heptarm.virtual.order import Order
-from heptarm.virtual.plant import Plant
-from tests.virtual.driving import READY, Ear, numbers, ready
+from tests.sim.driving import READY, Ear, numbers, ready
 
 HERE = np.array(READY)
 NAN = math.nan

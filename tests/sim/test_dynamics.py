@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
+from heptarm.sim.planning.command import Order
+from heptarm.sim.planning.planner import plan
 from heptarm.values.pose import Pose
 from heptarm.values.robot import robot
-from heptarm.virtual.order import Order
-from heptarm.virtual.route import plan
-from tests.virtual.driving import READY, numbers
+from tests.sim.driving import READY, numbers
 
 ROBOT = robot("iiwa14")
 START = np.array(READY)

@@ -11,18 +11,20 @@ import pytest
 
 from heptarm.errors import Unreachable
 from heptarm.model.kinematics import jacobian
+from heptarm.sim.controller import queue as queue_module
+from heptarm.sim.planning.command import Order, PlanError
+from heptarm.sim.planning.jerk_profile import ProfileLimits, brake, change
+from heptarm.sim.planning.path import CartesianPath
+from heptarm.sim.planning.plan import Plan
+from heptarm.sim.planning.planner import plan
+from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
-from heptarm.virtual import queue as queue_module
-from heptarm.virtual.order import Order, PlanError
-from heptarm.virtual.path import CartesianPath
-from heptarm.virtual.planner import Plan, plan
-from heptarm.virtual.plant import Plant
-from heptarm.virtual.profile import Limits, brake, travel
-from tests.virtual.driving import READY, Ear, ready, run
+from tests.sim.driving import READY, Ear, ready, run
 
 THERE = (0.8, 0.3, 0.1, -1.0, 0.2, 0.7, -0.2)
 LINE = (0.05, 0.25, 0.05, 0.0, 0.0, 0.0, 1.0)
 BASE = (0.0, 0.0, 0.0, 1.0)
+REST = (0.0, 0.0, 0.0)
 
 
 def test_an_order_right_after_a_stop_is_not_stopped() -> None:
@@ -37,15 +39,15 @@ def test_an_order_right_after_a_stop_is_not_stopped() -> None:
 
 def test_a_profile_on_the_edge_between_two_kinds_is_found() -> None:
     for way in (0.2, *np.linspace(1e-4, 3.0, 500)):
-        profile = travel(Limits(1.48 / way, 10.0 / way, 100.0 / way))
+        profile = change(REST, 1.0, ProfileLimits(1.48 / way, 10.0 / way, 100.0 / way))
         assert profile.at(profile.duration)[0] == pytest.approx(1.0, abs=1e-9)
-        brake(profile.at(profile.duration / 3), Limits(1.48 / way, 10.0 / way, 100.0 / way))
+        brake(profile.at(profile.duration / 3), ProfileLimits(1.48 / way, 10.0 / way, 100.0 / way))
 
 
 @pytest.mark.parametrize("way", [4.7e-9, 1.2e-8, 1.9e-8, 1e-6, 1e-3])
 def test_a_motion_of_next_to_no_length_can_be_braked_at_any_time(way: float) -> None:
-    limits = Limits(1.7 / way, 10.0 / way, 100.0 / way)
-    law = travel(limits)
+    limits = ProfileLimits(1.7 / way, 10.0 / way, 100.0 / way)
+    law = change(REST, 1.0, limits)
     for at in np.linspace(0.0, law.duration, 40):
         stop = brake(law.at(float(at)), limits)
         assert abs(stop.at(stop.duration)[1]) < 1e-3 * limits.velocity

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward, jacobian
-from heptarm.virtual.order import Order
-from heptarm.virtual.plant import Plant
-from tests.virtual.driving import ready
+from heptarm.sim.planning.command import Order
+from heptarm.sim.plant.plant import Plant
+from tests.sim.driving import ready
 
 
 def test_at_rest_the_sensors_show_gravity_and_nothing_external() -> None:

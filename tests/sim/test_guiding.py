@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import jacobian
-from heptarm.values.guiding import HandGuide, hand_guide
-from heptarm.virtual.order import Order
-from heptarm.virtual.plant import Plant
-from heptarm.virtual.safety import Demand
-from tests.virtual.driving import Ear, ready, run
+from heptarm.sim.controller.safety import StopRequest
+from heptarm.sim.planning.command import Order
+from heptarm.sim.plant.plant import Plant
+from heptarm.values.motion.hand_guiding import HandGuide, hand_guide
+from tests.sim.driving import Ear, ready, run
 
 NAN = np.nan
 SIDEWAYS = (0.0, 60.0, 0.0)
@@ -210,7 +210,7 @@ def test_cancelling_while_a_stop_brakes_it_brakes_it_no_other_way() -> None:
         plant, _ = begun()
         plant.apply_wrench(SIDEWAYS)
         plant.step(400)
-        plant.safety.demand(Demand.EMERGENCY_STOP)
+        plant.safety.request_stop(StopRequest.EMERGENCY_STOP)
         plant.step(5)
         if cancels:
             plant.stop()

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from heptarm.model.kinematics import forward
+from heptarm.sim.planning.command import Order, PlanError
+from heptarm.sim.plant.plant import Plant
 from heptarm.values.pose import Pose
 from heptarm.values.robot import ROBOTS
-from heptarm.virtual.order import Order, PlanError
-from heptarm.virtual.plant import Plant
-from tests.virtual.driving import READY, Ear, numbers, ready, run
+from tests.sim.driving import READY, Ear, numbers, ready, run
 
 SEVENTH = (0.1,) * 7
 
@@ -58,7 +58,7 @@ def test_acceleration_and_jerk_stay_within_the_limits() -> None:
 def test_a_ptp_to_a_pose_takes_the_arm_position_that_was_named() -> None:
     plant = ready()
     goal = np.array((0.3, 0.4, 0.2, -1.1, 0.1, 0.8, 0.2))
-    from heptarm.model.inverse import redundancy
+    from heptarm.model.inverse_kinematics import redundancy
 
     named = redundancy(plant.robot, goal.tolist())
     target = Pose.from_matrix(forward(plant.robot, goal))

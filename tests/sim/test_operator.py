@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from heptarm.virtual import ring
-from heptarm.virtual.operator import WORDS, Operator, timed, understood
-from heptarm.virtual.order import Order
-from heptarm.virtual.safety import Demand, Mode
-from tests.virtual.driving import Ear, ready
-from tests.virtual.ideal import KINDS, begin
+from heptarm.sim.controller.safety import StopRequest
+from heptarm.sim.planning.command import Order
+from heptarm.sim.runtime.operator import WORDS, SimulatedOperator, timed, understood
+from heptarm.sim.seam import OperationMode, SafetyFlags, StateWords
+from tests.sim.driving import Ear, ready
+from tests.sim.ideal import KINDS, begin
 
 
 @pytest.mark.parametrize("words", sorted(WORDS))
@@ -30,10 +30,10 @@ def test_every_word_of_the_help_is_understood(words: str) -> None:
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        ("", "say one of"),
+        ("", "actions are"),
         ("explode", "emergency_stop"),
         ("override", "1 to 1 values"),
-        ("override 2", "0 to 1"),
+        ("override 2", "must be in \\[0, 1\\]"),
         ("override half", "numbers"),
         ("drive_error 8", "1 to 7"),
         ("push 1 2", "3 to 4"),
@@ -41,30 +41,30 @@ def test_every_word_of_the_help_is_understood(words: str) -> None:
         ("t1 now", "0 to 0 values"),
         ("set Cell.Door", "2 to 2"),
         ("set Cell.Door ajar", "true or false"),
-        ("set Cell.Door 1", "no signal 'Cell.Door'"),
-        ("press 4", "slots"),
+        ("set Cell.Door 1", "unknown or ambiguous"),
+        ("press 4", "slot must be"),
         ("press 1 heptarm third", "the second"),
         ("press 1", "no user key 1"),
-        ("answer 0", "no dialog"),
+        ("answer 0", "no open dialog"),
     ],
 )
 def test_what_is_not_understood_changes_nothing(words: str, says: str) -> None:
     plant = ready()
     with pytest.raises(ValueError, match=says):
-        Operator(plant).do(words)
-    assert not plant.safety.latched and plant.safety.mode is Mode.AUT
+        SimulatedOperator(plant).do(words)
+    assert not plant.safety.latched and plant.safety.mode is OperationMode.AUT
 
 
 def test_faults_come_at_their_time_and_go() -> None:
     plant = begin("hold")
-    operator = Operator(plant)
+    operator = SimulatedOperator(plant)
     operator.schedule("clear@0.3")
     operator.schedule("e-stop @ 0.1 s")
     halted = []
     for _ in range(400):
         operator.tick()
         plant.tick()
-        halted.append(plant.safety.halts)
+        halted.append(plant.safety.stop_requested)
     assert halted.index(True) in range(98, 102) and sum(halted) == 200
     with pytest.raises(ValueError, match="NAME@SECONDS"):
         timed("emergency_stop")
@@ -74,16 +74,16 @@ def test_faults_come_at_their_time_and_go() -> None:
 
 def test_two_stops_are_cleared_one_by_one() -> None:
     plant = ready()
-    operator = Operator(plant)
+    operator = SimulatedOperator(plant)
     operator.do("gate")
     operator.do("external_emergency_stop")
     plant.step()
-    flags = int(plant.ring.ints[1, ring.FLAGS])
-    assert flags & ring.EXTERNAL_STOP and flags & ring.SAFEGUARD_OPEN
+    flags = int(plant.ring.ints[1, StateWords.FLAGS])
+    assert flags & SafetyFlags.EXTERNAL_STOP and flags & SafetyFlags.SAFEGUARD_OPEN
     operator.do("clear gate")
-    assert plant.safety.demands == {Demand.EXTERNAL_EMERGENCY_STOP}
+    assert plant.safety.stop_requests == {StopRequest.EXTERNAL_EMERGENCY_STOP}
     operator.do("clear")
-    assert not plant.safety.demands and plant.safety.latched
+    assert not plant.safety.stop_requests and plant.safety.latched
     operator.do("start")
     assert not plant.safety.latched
 
@@ -94,7 +94,7 @@ def test_two_stops_are_cleared_one_by_one() -> None:
 )
 def test_errors_end_what_runs_off_its_path(words: str, text: str) -> None:
     plant, ear = begin("hold"), Ear()
-    operator = Operator(plant)
+    operator = SimulatedOperator(plant)
     operator.do(words)  # nothing runs but the hold
     plant.stop()
     plant.safety.withdraw()
@@ -113,7 +113,7 @@ def test_errors_end_what_runs_off_its_path(words: str, text: str) -> None:
 
 def test_a_push_ends_by_itself() -> None:
     plant = ready()
-    Operator(plant).do("push 0 20 0 0.1")
+    SimulatedOperator(plant).do("push 0 20 0 0.1")
     plant.step(80)
     assert plant.snapshot.wrench[1] == pytest.approx(20.0, abs=0.5)
     plant.step(100)
@@ -122,7 +122,7 @@ def test_a_push_ends_by_itself() -> None:
 
 def test_signals_are_set_and_keys_pressed_also_at_a_time() -> None:
     plant = ready()
-    operator = Operator(plant)
+    operator = SimulatedOperator(plant)
     place = plant.signals.place("Cell.Door", is_output=False)
     plant.signals.place("Flange.Door", is_output=False)
     pressed: list[tuple[str, int]] = []
@@ -133,7 +133,7 @@ def test_signals_are_set_and_keys_pressed_also_at_a_time() -> None:
         operator.tick()
         plant.tick()
     assert plant.ring.signals[place] == plant.signals.get("Cell.Door") == 1.0
-    with pytest.raises(ValueError, match="or several"):
+    with pytest.raises(ValueError, match="ambiguous"):
         operator.do("set Door 0")
     operator.do("press 2")
     operator.do("press 0 heptarm")

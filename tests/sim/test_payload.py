@@ -7,12 +7,12 @@ import pytest
 
 from heptarm.model import dynamics
 from heptarm.model.kinematics import forward
+from heptarm.sim.planning.command import Order
+from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
-from heptarm.values.links import Body, symmetric
-from heptarm.values.mode import JointImpedance
-from heptarm.virtual.order import Order
-from heptarm.virtual.plant import Plant
-from tests.virtual.driving import READY, Ear
+from heptarm.values.mode.impedance import JointImpedance
+from heptarm.values.robot import Body, symmetric
+from tests.sim.driving import READY, Ear
 
 G = 9.81
 LOAD = Body(3.0, np.array((0.02, 0.0, 0.1)), inertia=np.array((0.02, 0.03, 0.025, 0.001, 0.0, 0.002)))
@@ -22,9 +22,9 @@ NOTHING = Body(0.0, np.zeros(3))
 def held(*, declared: Body | None = None, hanging: Body | None = None) -> Plant:
     plant = Plant("iiwa14", q=READY)
     if declared is not None:
-        plant.carries(declared)
+        plant.set_load_data(declared)
     if hanging is not None:
-        plant.hang(hanging)
+        plant.set_payload(hanging)
     plant.step(500)
     return plant
 
@@ -58,10 +58,10 @@ def test_a_load_that_was_not_declared_is_an_external_force() -> None:
 
 def test_declaring_it_takes_the_force_away() -> None:
     plant = held(hanging=LOAD)
-    plant.carries(LOAD)
+    plant.set_load_data(LOAD)
     plant.step(500)
     assert np.abs(plant.snapshot.wrench).max() < 1e-6
-    plant.carries(Body(5.0, LOAD.com, inertia=LOAD.inertia))
+    plant.set_load_data(Body(5.0, LOAD.com, inertia=LOAD.inertia))
     plant.step(500)
     lacking = Body(2.0, LOAD.com)
     assert np.allclose(plant.snapshot.wrench, -weight(plant, lacking), atol=0.05)
@@ -102,7 +102,7 @@ def test_the_simulated_dynamics_are_those_of_the_model_with_the_load(which: Body
 
 def test_a_load_changes_without_a_jerk_while_the_arm_rests() -> None:
     plant = held()
-    plant.carries(LOAD)
+    plant.set_load_data(LOAD)
     fastest = 0.0
     for _ in range(300):
         plant.tick()
@@ -114,7 +114,7 @@ def test_inertia_counts_as_it_was_given() -> None:
     body = Body(1.0, np.zeros(3), inertia=np.array((0.3, 0.2, 0.25, 0.02, 0.01, -0.03)))
     plant = Plant("iiwa14", q=READY)
     before = _spatial(plant)
-    plant.carries(body)
+    plant.set_load_data(body)
     plant.step(1)
     assert np.allclose(_spatial(plant) - before, symmetric(body.inertia), atol=2e-3)
 

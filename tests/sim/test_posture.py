@@ -7,9 +7,9 @@ from math import pi
 import numpy as np
 import pytest
 
-from heptarm.model import inverse
+from heptarm.model import inverse_kinematics
+from heptarm.sim.plant.plant import posture
 from heptarm.values.robot import ROBOTS
-from heptarm.virtual.posture import posture
 
 
 def _difference(a: float, b: float) -> float:
@@ -22,7 +22,7 @@ def test_arm_angle_and_status_are_those_of_the_model(name: str) -> None:
     for shares in np.random.default_rng(0).uniform(-1, 1, (2000, 7)):
         q = (robot.q_max * shares).tolist()
         e1, status = posture(robot, q)
-        wanted = inverse.redundancy(robot, q)
+        wanted = inverse_kinematics.redundancy(robot, q)
         assert status == wanted.status
         assert _difference(e1, wanted.e1) < 1e-7
 
@@ -40,5 +40,5 @@ def test_arm_angle_and_status_are_those_of_the_model(name: str) -> None:
 def test_so_they_are_where_the_arm_is_straight_or_upright(q: tuple[float, ...]) -> None:
     robot = ROBOTS["iiwa14"]
     e1, status = posture(robot, q)
-    wanted = inverse.redundancy(robot, q)
+    wanted = inverse_kinematics.redundancy(robot, q)
     assert status == wanted.status and _difference(e1, wanted.e1) < 1e-6

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from heptarm.virtual.order import Order
-from heptarm.virtual.plant import Plant
-from tests.virtual.driving import READY, Ear, ready, run
+from heptarm.sim.planning.command import Order
+from heptarm.sim.plant.plant import Plant
+from tests.sim.driving import READY, Ear, ready, run
 
 THERE = (0.8, 0.3, 0.1, -1.0, 0.2, 0.7, -0.2)
 

@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward, jacobian
+from heptarm.sim.controller.interpolator import REDUCED_SPEED
+from heptarm.sim.controller.safety import SafetyController, StopRequest
+from heptarm.sim.planning.command import Order
+from heptarm.sim.plant.plant import Plant
+from heptarm.sim.seam import SLOTS, OperationMode, SafetyFlags, StateWords
 from heptarm.values.arrays import Array
-from heptarm.values.mode import JointImpedance
-from heptarm.virtual import ring
-from heptarm.virtual.interpolator import REDUCED_SPEED
-from heptarm.virtual.order import Order
-from heptarm.virtual.plant import Plant
-from heptarm.virtual.safety import Demand, Mode, Safety
-from tests.virtual.driving import READY, Ear, ready, run
-from tests.virtual.ideal import KINDS, LINE, begin, stopping_time
+from heptarm.values.mode.impedance import JointImpedance
+from tests.sim.driving import READY, Ear, ready, run
+from tests.sim.ideal import KINDS, LINE, begin, stopping_time
 
-STOPS = (Demand.EMERGENCY_STOP, Demand.OPERATOR_SAFETY, Demand.PROTECTIVE_STOP)
+STOPS = (StopRequest.EMERGENCY_STOP, StopRequest.OPERATOR_SAFETY, StopRequest.PROTECTIVE_STOP)
 
 
 def flags(plant: Plant) -> int:
-    return int(plant.ring.ints[plant.tick_count % ring.SLOTS, ring.FLAGS])
+    return int(plant.ring.ints[plant.tick_count % SLOTS, StateWords.FLAGS])
 
 
 def to_standstill(plant: Plant, *, most: int = 1500) -> int:
@@ -36,69 +36,69 @@ def to_standstill(plant: Plant, *, most: int = 1500) -> int:
 
 
 def test_a_stop_is_latched_until_somebody_resumes() -> None:
-    safety = Safety()
-    assert not (safety.halts or safety.latched)
-    safety.demand(Demand.EMERGENCY_STOP)
+    safety = SafetyController()
+    assert not (safety.stop_requested or safety.latched)
+    safety.request_stop(StopRequest.EMERGENCY_STOP)
     safety.resume()
-    assert safety.halts and safety.latched  # nobody resumes while the button is pressed
-    safety.withdraw(Demand.EMERGENCY_STOP)
-    assert not safety.halts and safety.latched
+    assert safety.stop_requested and safety.latched  # nobody resumes while the button is pressed
+    safety.withdraw(StopRequest.EMERGENCY_STOP)
+    assert not safety.stop_requested and safety.latched
     safety.resume()
     assert not safety.latched
 
 
 def test_the_enabling_switch_counts_in_t1_and_t2_only() -> None:
-    safety = Safety()
+    safety = SafetyController()
     assert not safety.lacks_enabling
-    safety.choose(Mode.T2)
-    assert safety.halts and safety.lacks_enabling
+    safety.choose(OperationMode.T2)
+    assert safety.stop_requested and safety.lacks_enabling
     safety.enable()
-    assert not safety.halts and safety.latched  # pressing it alone does not let the arm go on
+    assert not safety.stop_requested and safety.latched  # pressing it alone does not let the arm go on
     safety.resume()
     safety.release()
-    assert safety.halts and safety.latched
-    safety.choose(Mode.AUT)
-    assert not safety.halts and safety.latched
+    assert safety.stop_requested and safety.latched
+    safety.choose(OperationMode.AUT)
+    assert not safety.stop_requested and safety.latched
 
 
 def test_two_demands_both_have_to_go() -> None:
-    safety = Safety()
-    safety.demand(Demand.EMERGENCY_STOP)
-    safety.demand(Demand.OPERATOR_SAFETY)
-    safety.withdraw(Demand.OPERATOR_SAFETY)
-    assert safety.halts
+    safety = SafetyController()
+    safety.request_stop(StopRequest.EMERGENCY_STOP)
+    safety.request_stop(StopRequest.OPERATOR_SAFETY)
+    safety.withdraw(StopRequest.OPERATOR_SAFETY)
+    assert safety.stop_requested
     safety.withdraw()
-    assert not safety.halts
+    assert not safety.stop_requested
 
 
 # ---------------------------------------------------------------------------------- stops on the path
 
 
 @pytest.mark.parametrize("demand", STOPS)
-def test_a_stop_brakes_closes_the_brakes_and_the_motion_goes_on_afterwards(demand: Demand) -> None:
+def test_a_stop_brakes_closes_the_brakes_and_the_motion_goes_on_afterwards(demand: StopRequest) -> None:
     plant, ear = ready(), Ear()
     plant.submit(Order(1, "ptp", joints=KINDS["ptp"].joints, listener=ear))
     plant.step(500)
     speed = np.abs(plant.snapshot.dq).max()
-    plant.safety.demand(demand)
+    plant.safety.request_stop(demand)
     ticks = to_standstill(plant)
     assert ticks * 1e-3 < speed / plant.robot.ddq_max.min() + 0.1
     plant.step(100)
     seen = flags(plant)
-    assert seen & ring.PROTECTIVE_STOP and seen & ring.PAUSED
-    assert not seen & (ring.READY | ring.BRAKES_OPEN)
-    assert bool(seen & ring.EMERGENCY_STOP) is (demand is Demand.EMERGENCY_STOP)
-    assert bool(seen & ring.SAFEGUARD_OPEN) is (demand is Demand.OPERATOR_SAFETY)
+    assert seen & SafetyFlags.PROTECTIVE_STOP and seen & SafetyFlags.PAUSED
+    assert not seen & (SafetyFlags.READY | SafetyFlags.BRAKES_OPEN)
+    assert bool(seen & SafetyFlags.EMERGENCY_STOP) is (demand is StopRequest.EMERGENCY_STOP)
+    assert bool(seen & SafetyFlags.SAFEGUARD_OPEN) is (demand is StopRequest.OPERATOR_SAFETY)
     assert ear.causes == ["started"]  # the motion waits
     plant.safety.withdraw(demand)
     plant.step(300)
-    assert flags(plant) & (ring.READY | ring.PAUSED) == ring.READY | ring.PAUSED
+    assert flags(plant) & (SafetyFlags.READY | SafetyFlags.PAUSED) == SafetyFlags.READY | SafetyFlags.PAUSED
     assert np.abs(plant.snapshot.dq).max() < 1e-3
     plant.resume()
     run(plant)
     assert ear.causes == ["started", "done"]
     assert np.abs(plant.snapshot.q - KINDS["ptp"].joints).max() < 1e-4
-    assert flags(plant) & ring.BRAKES_OPEN
+    assert flags(plant) & SafetyFlags.BRAKES_OPEN
 
 
 @pytest.mark.parametrize("at", [60, 250, 500, 800])
@@ -108,7 +108,7 @@ def test_a_stop_keeps_the_path(kind: str, at: int) -> None:
     plant = begin(kind)
     for _ in range(at):
         plant.tick()
-    plant.safety.demand(Demand.EMERGENCY_STOP)
+    plant.safety.request_stop(StopRequest.EMERGENCY_STOP)
     places, accelerations = [], []
     for _ in range(400):
         plant.tick()
@@ -146,7 +146,7 @@ def test_brakes_hold_a_soft_arm_against_a_push() -> None:
     plant = ready()
     plant.submit(Order(1, "hold", mode=JointImpedance(50.0)))
     plant.step(100)
-    plant.safety.demand(Demand.EMERGENCY_STOP)
+    plant.safety.request_stop(StopRequest.EMERGENCY_STOP)
     plant.step(500)
     before = plant.snapshot.q
     plant.apply_wrench((0.0, 60.0, 0.0))
@@ -166,7 +166,7 @@ def test_brakes_hold_a_soft_arm_against_a_push() -> None:
 
 def test_what_waits_begins_after_the_stop_only() -> None:
     plant, ear = ready(), Ear()
-    plant.safety.demand(Demand.OPERATOR_SAFETY)
+    plant.safety.request_stop(StopRequest.OPERATOR_SAFETY)
     plant.submit(Order(1, "ptp", joints=(0.1, *READY[1:]), listener=ear))
     plant.step(200)
     assert ear.causes == []
@@ -181,7 +181,7 @@ def test_a_motion_can_be_cancelled_during_a_stop() -> None:
     plant.submit(Order(1, "ptp", joints=KINDS["ptp"].joints, listener=ear))
     plant.submit(Order(2, "ptp", joints=READY, listener=next_ear))
     plant.step(400)
-    plant.safety.demand(Demand.EMERGENCY_STOP)
+    plant.safety.request_stop(StopRequest.EMERGENCY_STOP)
     plant.step(40)
     plant.stop()
     plant.step(1200)
@@ -202,14 +202,14 @@ def test_a_drive_error_fails_what_runs_and_has_to_be_acknowledged() -> None:
     plant.trip("drive error in A3")
     plant.step(1200)
     assert ear.heard[-1] == ("error", "drive error in A3") and plant.idle
-    assert flags(plant) & ring.DRIVE_ERROR and not flags(plant) & ring.READY
+    assert flags(plant) & SafetyFlags.DRIVE_ERROR and not flags(plant) & SafetyFlags.READY
     plant.resume()
     plant.step(2)
-    assert flags(plant) & ring.PAUSED
+    assert flags(plant) & SafetyFlags.PAUSED
     plant.acknowledge()
     plant.resume()
     plant.step(2)
-    assert flags(plant) & (ring.READY | ring.PAUSED) == ring.READY
+    assert flags(plant) & (SafetyFlags.READY | SafetyFlags.PAUSED) == SafetyFlags.READY
     run(plant, Order(2, "ptp", joints=READY, listener=(after := Ear())))
     assert after.causes == ["started", "done"]
 
@@ -217,7 +217,7 @@ def test_a_drive_error_fails_what_runs_and_has_to_be_acknowledged() -> None:
 @pytest.mark.parametrize("kind", ["ptp", "lin", "servo"])
 def test_t1_keeps_the_moved_frame_slow(kind: str) -> None:
     fastest, last = {}, {}
-    for mode in (Mode.T1, Mode.T2):
+    for mode in (OperationMode.T1, OperationMode.T2):
         plant = begin(kind)
         plant.safety.choose(mode)
         plant.safety.enable()
@@ -229,14 +229,14 @@ def test_t1_keeps_the_moved_frame_slow(kind: str) -> None:
             if plant.idle:
                 break
         fastest[mode], last[mode] = max(speeds), plant.snapshot.q_cmd
-    assert fastest[Mode.T1] <= 0.25 < fastest[Mode.T2]
-    assert fastest[Mode.T1] > 0.8 * REDUCED_SPEED
-    assert np.abs(last[Mode.T1] - last[Mode.T2]).max() < 1e-6
+    assert fastest[OperationMode.T1] <= 0.25 < fastest[OperationMode.T2]
+    assert fastest[OperationMode.T1] > 0.8 * REDUCED_SPEED
+    assert np.abs(last[OperationMode.T1] - last[OperationMode.T2]).max() < 1e-6
 
 
 def test_letting_the_enabling_switch_go_pauses() -> None:
     plant, ear = ready(), Ear()
-    plant.safety.choose(Mode.T2)
+    plant.safety.choose(OperationMode.T2)
     plant.safety.enable()
     plant.resume()
     plant.submit(Order(1, "lin_rel", offset=LINE, reference=(0.0, 0.0, 0.0, 1.0), listener=ear))
@@ -293,7 +293,7 @@ def test_brakes_close_without_a_jolt_under_a_load() -> None:
     plant = ready()
     plant.apply_wrench((60.0, 60.0, 25.0))
     plant.step(1000)
-    plant.safety.demand(Demand.EMERGENCY_STOP)
+    plant.safety.request_stop(StopRequest.EMERGENCY_STOP)
     fastest = 0.0
     for _ in range(600):
         plant.tick()

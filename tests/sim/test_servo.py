@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from heptarm.sim.controller.safety import StopRequest
+from heptarm.sim.planning.command import Order
+from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
-from heptarm.values.mode import JointImpedance
-from heptarm.virtual.order import Order
-from heptarm.virtual.plant import Plant
-from heptarm.virtual.safety import Demand
-from tests.virtual.driving import READY, Ear, ready
+from heptarm.values.mode.impedance import JointImpedance
+from tests.sim.driving import READY, Ear, ready
 
 KINDS = ("servo", "direct")
 HERE = np.array(READY)
@@ -224,7 +224,7 @@ def test_whoever_cancels_a_motion_that_a_stop_halts_turns_nothing_back(kind: str
         plant.ring.post(7, HERE + 0.5)
         plant.step(600)
         path = [plant.snapshot.q_cmd]
-        plant.safety.demand(Demand.OPERATOR_SAFETY)
+        plant.safety.request_stop(StopRequest.OPERATOR_SAFETY)
         for tick in range(300):
             if tick == lag:
                 plant.stop_fast() if fast else plant.cancel()

@@ -1,4 +1,4 @@
-"""The shared ring is never seen torn, and the pacer keeps time."""
+"""The shared ring is never seen torn, and the loop keeps time."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import threading
 import numpy as np
 import pytest
 
-from heptarm.virtual import ring
-from heptarm.virtual.plant import Plant
-from tests.virtual.driving import ready
+from heptarm.sim.plant.plant import Plant
+from heptarm.sim.seam import SLOTS, HeaderWords, SafetyFlags, StateWords
+from tests.sim.driving import ready
 
 
 def test_a_slot_holds_the_state_of_its_tick() -> None:
@@ -20,15 +20,15 @@ def test_a_slot_holds_the_state_of_its_tick() -> None:
     slot = plant.ring.read(300)
     assert slot is not None
     assert np.array_equal(slot[2:9], plant.snapshot.q) and np.array_equal(slot[9:16], plant.snapshot.q_cmd)
-    assert slot.view(np.int64)[ring.TIME] == 300_000_000 == plant.time_ns
-    assert slot.view(np.int64)[ring.FLAGS] & ring.READY
+    assert slot.view(np.int64)[StateWords.TIME] == 300_000_000 == plant.time_ns
+    assert slot.view(np.int64)[StateWords.FLAGS] & SafetyFlags.READY
 
 
 def test_overwritten_and_torn_slots_read_as_none() -> None:
     plant = ready()
     plant.step(300)
-    assert plant.ring.read(300 - ring.SLOTS) is None and plant.ring.read(301) is None
-    plant.ring.ints[300 % ring.SLOTS, ring.SEQ] = 2 * 300 + 1  # as while it is written
+    assert plant.ring.read(300 - SLOTS) is None and plant.ring.read(301) is None
+    plant.ring.ints[300 % SLOTS, StateWords.SEQ] = 2 * 300 + 1  # as while it is written
     assert plant.ring.read(300) is None
 
 
@@ -38,7 +38,7 @@ def test_somebody_is_woken_only_when_their_time_has_come() -> None:
     plant.on_wake = woken.append
     plant.step(10)
     assert woken == []
-    plant.ring.header[ring.WAKE] = 15_000_000
+    plant.ring.header[HeaderWords.WAKE] = 15_000_000
     plant.step(4)
     assert woken == []
     plant.step(1)
@@ -51,11 +51,11 @@ def test_a_reader_never_sees_a_torn_slot_while_the_plant_ticks() -> None:
 
     def look() -> None:
         while not stop.is_set():
-            tick = int(plant.ring.header[ring.NEWEST])
+            tick = int(plant.ring.header[HeaderWords.NEWEST])
             slot = plant.ring.read(tick)
             if slot is not None:
                 read[0] += 1
-                if slot.view(np.int64)[ring.TIME] != tick * 1_000_000:
+                if slot.view(np.int64)[StateWords.TIME] != tick * 1_000_000:
                     wrong.append(tick)
 
     reader = threading.Thread(target=look)
@@ -68,14 +68,14 @@ def test_a_reader_never_sees_a_torn_slot_while_the_plant_ticks() -> None:
 
 _PACE = """
 import sys, threading, time
-from heptarm.virtual.pacer import Pacer
-from heptarm.virtual.plant import Plant
+from heptarm.sim.runtime.realtime_loop import RealtimeLoop
+from heptarm.sim.plant.plant import Plant
 plant = Plant()
-pacer = Pacer(plant.ring, plant.tick, speed=float(sys.argv[1]))
-threading.Timer(0.5, pacer.stop).start()
+loop = RealtimeLoop(plant.ring, plant.tick, speed=float(sys.argv[1]))
+threading.Timer(0.5, loop.stop).start()
 began = time.monotonic()
-pacer.run()
-report = pacer.report
+loop.run()
+report = loop.statistics
 print(report.ticks / (time.monotonic() - began), report.tick_us["p50"], report.lateness_us["p50"])
 """
 
@@ -86,7 +86,7 @@ def _pace(speed: float) -> list[float]:
     return [float(word) for word in done.stdout.split()]
 
 
-def test_the_pacer_keeps_the_pace_that_was_asked_for() -> None:
+def test_the_loop_keeps_the_requested_speed() -> None:
     per_second, tick, _ = _pace(1.0)
     assert 100 < per_second < 1100 and tick > 0.0  # time that the machine does not give is given up
     assert 100 < _pace(4.0)[0] < 4400
@@ -95,18 +95,18 @@ def test_the_pacer_keeps_the_pace_that_was_asked_for() -> None:
 
 _STALL = """
 import sys, time
-from heptarm.virtual.pacer import Pacer
-from heptarm.virtual.ring import Ring
+from heptarm.sim.runtime.realtime_loop import RealtimeLoop
+from heptarm.sim.plant.shared_state import SharedState
 began = []
 def tick():
     began.append(time.monotonic())
     if len(began) % 50 == 25:
         time.sleep(0.01)
     if len(began) == 300:
-        pacer.stop()
-pacer = Pacer(Ring(), tick)
-pacer.room = float(sys.argv[1])
-pacer.run()
+        loop.stop()
+loop = RealtimeLoop(SharedState(), tick)
+loop.answer_gap = float(sys.argv[1])
+loop.run()
 print(min(later - first for first, later in zip(began, began[1:])))
 """
 
@@ -120,9 +120,7 @@ def test_beside_an_fri_session_no_ticks_follow_each_other_without_a_pause(room: 
 
 
 def test_a_plant_needs_no_jvm() -> None:
-    code = (
-        "import sys; from heptarm.virtual.plant import Plant; Plant().step(5); print('jpype' in sys.modules)"
-    )
+    code = "import sys; from heptarm.sim.plant.plant import Plant; Plant().step(5); print('jpype' in sys.modules)"
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
     )

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
+from heptarm.sim.control.cartesian_impedance import RAMP, OverlaidForce
 from heptarm.values.arrays import Array
-from heptarm.values.directions import DIRECTIONS
-from heptarm.values.mode import CartesianImpedance, SineImpedance
+from heptarm.values.mode.directions import DIRECTIONS
+from heptarm.values.mode.impedance import CartesianImpedance
+from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.pose import Pose
 from heptarm.values.robot import robot
-from heptarm.virtual.impedance import RAMP
-from heptarm.virtual.sine import Pattern
-from tests.virtual.yielding import ASKEW, Arm
+from tests.sim.yielding import ASKEW, Arm
 
 NOWHERE = np.zeros(6)
 #: Of an amplitude or a frequency: what the issue of this feature promises.
@@ -26,13 +26,13 @@ ACCURACY = 0.05
 # ------------------------------------------------------------------------------------------- the pattern itself
 
 
-def over(pattern: Pattern, seconds: float, index: int) -> Array:
+def over(pattern: OverlaidForce, seconds: float, index: int) -> Array:
     """One direction of a pattern, millisecond by millisecond."""
     return np.array([pattern.force(t * 1e-3, NOWHERE)[index] for t in range(round(seconds * 1000))])
 
 
 def test_a_sine_has_bias_amplitude_frequency_and_phase() -> None:
-    pattern = Pattern(SineImpedance.sine("y", frequency=2.0, amplitude=8.0, phase=0.5, bias=3.0))
+    pattern = OverlaidForce(SineImpedance.sine("y", frequency=2.0, amplitude=8.0, phase=0.5, bias=3.0))
     t = np.arange(1000) * 1e-3
     assert over(pattern, 1.0, 1) == pytest.approx(3.0 + 8.0 * np.sin(4 * math.pi * t + 0.5))
     assert not over(pattern, 1.0, 0).any()
@@ -40,35 +40,35 @@ def test_a_sine_has_bias_amplitude_frequency_and_phase() -> None:
 
 
 def test_it_rises_holds_falls_and_is_gone() -> None:
-    pattern = Pattern(SineImpedance.force(z=-10.0).timed(rise_time=1.0, hold_time=2.0, fall_time=0.5))
+    pattern = OverlaidForce(SineImpedance.force(z=-10.0).timed(rise_time=1.0, hold_time=2.0, fall_time=0.5))
     times = (0.0, 0.25, 1.0, 2.9, 3.25, 3.5, 9.0)
     assert [pattern.force(t, NOWHERE)[2] for t in times] == pytest.approx([0, -2.5, -10, -10, -5, 0, 0])
     assert pattern.end == 3.5
 
 
 def test_the_total_time_ends_it_with_its_fall() -> None:
-    pattern = Pattern(
+    pattern = OverlaidForce(
         SineImpedance.force(z=8.0).timed(rise_time=1.0, hold_time=60.0, fall_time=2.0, total_time=5.0)
     )
     assert [pattern.force(t, NOWHERE)[2] for t in (0.5, 3.0, 4.0, 5.0)] == pytest.approx([4, 8, 4, 0])
-    short = Pattern(SineImpedance.force(z=8.0).timed(rise_time=1.0, hold_time=0.0, fall_time=1.0))
+    short = OverlaidForce(SineImpedance.force(z=8.0).timed(rise_time=1.0, hold_time=0.0, fall_time=1.0))
     assert [short.force(t, NOWHERE)[2] for t in (0.5, 1.0, 1.5, 2.0)] == pytest.approx([4, 8, 4, 0])
 
 
 def test_without_times_it_lasts() -> None:
-    assert Pattern(SineImpedance.force(x=1.0)).force(1e5, NOWHERE)[0] == 1.0
+    assert OverlaidForce(SineImpedance.force(x=1.0)).force(1e5, NOWHERE)[0] == 1.0
 
 
 def test_a_force_limit_cuts_the_peaks() -> None:
     mode = SineImpedance(amplitude=[10.0] * 6, frequency=[1.0] * 6, force_limit=[4.0] + [math.nan] * 5)
-    assert over(Pattern(mode), 1.0, 0).max() == 4.0
-    assert over(Pattern(mode), 1.0, 0).min() == -4.0
-    assert over(Pattern(mode), 1.0, 1).max() == pytest.approx(10.0)
+    assert over(OverlaidForce(mode), 1.0, 0).max() == 4.0
+    assert over(OverlaidForce(mode), 1.0, 0).min() == -4.0
+    assert over(OverlaidForce(mode), 1.0, 1).max() == pytest.approx(10.0)
 
 
 def test_beyond_the_position_limit_only_what_pulls_back_acts() -> None:
     mode = SineImpedance(bias=[10.0, 10.0, -10.0, 0.0, 0.0, 0.0], position_limit=[0.01] * 3 + [math.nan] * 3)
-    pattern = Pattern(mode)
+    pattern = OverlaidForce(mode)
     assert pattern.force(1.0, np.array([0.005, 0, 0, 0, 0, 0]))[0] == 10.0
     assert 0.0 < pattern.force(1.0, np.array([0.009, 0, 0, 0, 0, 0]))[0] < 10.0
     assert pattern.force(1.0, np.array([0.011, -0.02, 0.02, 0, 0, 0])).tolist() == [
@@ -79,12 +79,12 @@ def test_beyond_the_position_limit_only_what_pulls_back_acts() -> None:
         0.0,
         0.0,
     ]
-    closed = Pattern(SineImpedance(bias=[10.0] * 6, position_limit=[0.0] * 6))
+    closed = OverlaidForce(SineImpedance(bias=[10.0] * 6, position_limit=[0.0] * 6))
     assert not closed.force(1.0, np.full(6, 1e-4)).any()
 
 
 def test_a_lissajous_figure_closes_after_five_periods_of_its_first_axis() -> None:
-    pattern = Pattern(SineImpedance.lissajous("xy", frequency=2.0, amplitude=8.0))
+    pattern = OverlaidForce(SineImpedance.lissajous("xy", frequency=2.0, amplitude=8.0))
     x, y = over(pattern, 5.0, 0), over(pattern, 5.0, 1)
     assert x[:2500] == pytest.approx(x[2500:], abs=1e-9)
     assert y[:2500] == pytest.approx(y[2500:], abs=1e-9)
@@ -94,7 +94,7 @@ def test_a_lissajous_figure_closes_after_five_periods_of_its_first_axis() -> Non
 
 
 def test_a_spiral_goes_evenly_outwards_and_back() -> None:
-    pattern = Pattern(SineImpedance.spiral("xz", frequency=3.0, amplitude=12.0, total_time=4.0))
+    pattern = OverlaidForce(SineImpedance.spiral("xz", frequency=3.0, amplitude=12.0, total_time=4.0))
     x, z = over(pattern, 4.5, 0), over(pattern, 4.5, 2)
     t = np.arange(4500) * 1e-3
     assert np.hypot(x, z) == pytest.approx(12.0 * np.maximum(0.0, 1.0 - np.abs(t - 2.0) / 2.0), abs=1e-9)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
-from heptarm.values.orientation import Orientation
+from heptarm.sim.planning.command import Order, PlanError
+from heptarm.sim.plant.plant import Plant
+from heptarm.values.motion.orientation import Orientation
 from heptarm.values.pose import Pose
-from heptarm.virtual.order import Order, PlanError
-from heptarm.virtual.plant import Plant
-from tests.virtual.driving import READY, Ear, numbers, ready, run
-from tests.virtual.test_batch import check_limits, points, speeds, start_of
+from tests.sim.driving import READY, Ear, numbers, ready, run
+from tests.sim.test_batch import check_limits, points, speeds, start_of
 
 KNOTS = ((0.05, 0.05, 0.0), (0.0, 0.12, 0.03), (0.06, 0.2, 0.0), (0.0, 0.25, -0.03))
 JOINTS = (
@@ -74,7 +74,9 @@ def test_constant_keeps_and_ignore_leaves_the_orientation_to_the_neighbours() ->
     assert max(Pose.from_matrix(forward(plant.robot, q)).angle_to(start) for q in track.q_cmd[::20]) < 1e-6
     plant = ready()
     kinds = ("ignore", "ignore", "ignore", "variable")
-    parts = [segment("spl", pose, orientation=Orientation(kind)) for pose, kind in zip(poses, kinds, strict=True)]
+    parts = [
+        segment("spl", pose, orientation=Orientation(kind)) for pose, kind in zip(poses, kinds, strict=True)
+    ]
     track = run(plant, Order(1, "spline", parts=tuple(parts)))
     seen = [Pose.from_matrix(forward(plant.robot, q)) for q in track.q_cmd]
     middle = min(seen, key=poses[1].distance_to)
@@ -110,7 +112,9 @@ def test_every_segment_has_its_speed_and_a_corner_is_a_halt() -> None:
     assert speed.max() == pytest.approx(0.3, rel=0.02)
     plant = ready()
     corner = to(start, 0, 0.1, 0)
-    track = run(plant, Order(1, "spline", parts=(segment("lin", corner), segment("lin", to(start, 0.1, 0.1, 0)))))
+    track = run(
+        plant, Order(1, "spline", parts=(segment("lin", corner), segment("lin", to(start, 0.1, 0.1, 0))))
+    )
     seen = points(plant, track.q_cmd)
     assert np.linalg.norm(seen - corner.xyz, axis=1).min() < 1e-6
     check_limits(track, plant)

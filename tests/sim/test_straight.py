@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
+from heptarm.sim.planning.command import Order
+from heptarm.sim.plant.plant import Plant
+from heptarm.sim.seam import StraightLimits
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
-from heptarm.virtual.order import Order
-from heptarm.virtual.plant import Plant
-from tests.virtual.driving import READY, Ear, numbers, ready
+from tests.sim.driving import READY, Ear, numbers, ready
 
-LIMITS = (0.2, 0.2, 0.2, 0.5, 0.5, 0.5, 1.0, 1.0, 1.0, 3.0, 3.0, 3.0)
+LIMITS = StraightLimits(velocity=(0.2, 0.2, 0.2, 0.5, 0.5, 0.5), acceleration=(1.0, 1.0, 1.0, 3.0, 3.0, 3.0))
 TCP = Pose.xyz_abc(0.02, 0.0, 0.15, 0.3, 0.0, 0.2)
 
 
@@ -78,7 +79,9 @@ def test_a_rotation_keeps_its_speed_and_acceleration_across_targets() -> None:
     for step in range(900):
         if step % 40 == 0:  # the goal turns about an axis that turns itself
             angle = min(step, 500) * 1e-3
-            plant.ring.post(7, (Pose.of(start.xyz, start.quat) @ Pose.xyz_abc(0, 0, 0, angle, angle / 2, 0)).array)
+            plant.ring.post(
+                7, (Pose.of(start.xyz, start.quat) @ Pose.xyz_abc(0, 0, 0, angle, angle / 2, 0)).array
+            )
         _, (pose,) = places(plant, 1)
         spins.append(2e3 * (Pose.of((0, 0, 0), before.quat).inverse() @ pose).quat[:3])
         before = pose
@@ -100,7 +103,7 @@ def test_a_target_across_the_way_bends_it_without_a_halt() -> None:
 
 
 def test_cancelling_brakes_on_the_line_within_what_a_motion_may() -> None:
-    plant, ear, start = serving(straight=(0.5,) * 6 + (0.4,) * 6)
+    plant, ear, start = serving(straight=StraightLimits(velocity=(0.5,) * 6, acceleration=(0.4,) * 6))
     goal = start.xyz + [0.0, 0.3, 0.1]
     plant.ring.post(7, Pose.of(goal, start.quat).array)
     places(plant, 900)
@@ -137,7 +140,14 @@ def test_the_override_and_a_pause_slow_it_down() -> None:
 def test_a_line_that_slowly_ends_at_the_reach_of_the_arm_is_an_error_too() -> None:
     plant, ear = Plant("iiwa14", q=(0.0, 0.5, 0.0, -0.02, 0.0, 0.9, 0.0)), Ear()
     start = Pose.from_matrix(forward(plant.robot, plant.snapshot.q_cmd))
-    plant.submit(Order(7, "straight", straight=(1e-4,) * 6 + (1.0,) * 6, listener=ear))
+    plant.submit(
+        Order(
+            7,
+            "straight",
+            straight=StraightLimits(velocity=(1e-4,) * 6, acceleration=(1.0,) * 6),
+            listener=ear,
+        )
+    )
     plant.step(2)
     outward = start.xyz - (0.0, 0.0, plant.robot.d_bs)
     plant.ring.post(7, Pose.of(start.xyz + 0.01 * outward, start.quat).array)
@@ -148,7 +158,9 @@ def test_a_line_that_slowly_ends_at_the_reach_of_the_arm_is_an_error_too() -> No
 
 
 @pytest.mark.parametrize("goal", [(2.0, 0.0, 0.5), (0.0, 0.0, 0.35)])
-def test_a_line_that_leaves_the_workspace_ends_the_motion_in_a_controlled_stop(goal: tuple[float, ...]) -> None:
+def test_a_line_that_leaves_the_workspace_ends_the_motion_in_a_controlled_stop(
+    goal: tuple[float, ...],
+) -> None:
     plant, ear, start = serving()
     plant.ring.post(7, Pose.of(goal, start.quat).array)
     fastest = 0.0

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from heptarm.model.kinematics import forward
+from heptarm.sim.planning.command import ConditionWatch, Order
+from heptarm.sim.plant.plant import Plant
+from heptarm.sim.seam import Condition, PathReached, PathReference, SignalIs
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
-from heptarm.virtual.order import Order, Watch
-from heptarm.virtual.plant import Plant
-from tests.virtual.driving import READY, ready, run
+from tests.sim.driving import READY, ready, run
 
-START, END = 0.0, 1.0
+START, END = PathReference
 SPEED = 0.1
 
 
@@ -28,8 +29,8 @@ class Log:
     def add(self, what: str) -> None:
         self.told.append((what, forward(self.plant.robot, self.plant.interpolator.command.after)[:3, 3]))
 
-    def watch(self, name: str, *condition: float, part: int = -1) -> Watch:
-        return Watch(condition, lambda: self.add(name), part=part)
+    def watch(self, name: str, condition: Condition, *, part: int = -1) -> ConditionWatch:
+        return ConditionWatch(condition, lambda: self.add(name), part=part)
 
     def started(self) -> None:
         self.add("started")
@@ -49,11 +50,20 @@ class Log:
         return dict(self.told)[name] - self.told[0][1]
 
 
-def corner(plant: Plant, log: Log, *watches: Watch, kind: str = "batch", blend: float = 0.0) -> Order:
+def point(reference: PathReference, distance: float, delay: float = 0.0) -> PathReached:
+    """A point of the path."""
+    return PathReached(reference=reference, distance=distance, delay=delay)
+
+
+def corner(
+    plant: Plant, log: Log, *watches: ConditionWatch, kind: str = "batch", blend: float = 0.0
+) -> Order:
     """100 mm along y, then 100 mm along z."""
     here = Pose.from_matrix(forward(plant.robot, plant.snapshot.q))
     parts = tuple(
-        Order(1, "lin", pose=tuple(Pose(here.xyz + way, here.quat).array.tolist()), blending=(0.0, blend, 0.0))
+        Order(
+            1, "lin", pose=tuple(Pose(here.xyz + way, here.quat).array.tolist()), blending=(0.0, blend, 0.0)
+        )
         for way in ((0.0, 0.1, 0.0), (0.0, 0.1, 0.1))
     )
     paced = tuple(Order(1, "lin", pose=p.pose, blending=p.blending, cart_velocity=SPEED) for p in parts)
@@ -65,14 +75,14 @@ def test_points_count_from_the_ends_of_their_own_part(kind: str) -> None:
     plant = ready()
     log = Log(plant)
     watches = (
-        log.watch("second half", 9, START, 0.05, 0.0, part=1),
-        log.watch("first end", 9, END, 0.0, 0.0, part=0),
-        log.watch("first near end", 9, END, -0.03, 0.0, part=0),
-        log.watch("last end", 9, END, 0.0, 0.0, part=1),
-        log.watch("start", 9, START, 0.0, 0.0, part=0),
-        log.watch("beyond", 9, START, 0.11, 0.0, part=0),
-        log.watch("second start", 9, START, 0.0, 0.0, part=1),
-        log.watch("whole", 9, START, 0.12, 0.0),
+        log.watch("second half", point(START, 0.05), part=1),
+        log.watch("first end", point(END, 0.0), part=0),
+        log.watch("first near end", point(END, -0.03), part=0),
+        log.watch("last end", point(END, 0.0), part=1),
+        log.watch("start", point(START, 0.0), part=0),
+        log.watch("beyond", point(START, 0.11), part=0),
+        log.watch("second start", point(START, 0.0), part=1),
+        log.watch("whole", point(START, 0.12)),
     )
     run(plant, corner(plant, log, *watches, kind=kind))
     assert log.names[:3] == ["started", "start", "first near end"] and "beyond" not in log.names
@@ -93,7 +103,7 @@ def test_points_count_from_the_ends_of_their_own_part(kind: str) -> None:
 def test_a_blended_motion_begins_in_the_middle_of_the_blend() -> None:
     plant = ready()
     log = Log(plant)
-    order = corner(plant, log, log.watch("second", 9, START, 0.0, 0.0, part=1), blend=0.03)
+    order = corner(plant, log, log.watch("second", point(START, 0.0), part=1), blend=0.03)
     run(plant, order)
     _, y, z = log.way("second")
     assert 0.07 < y < 0.1 and y + z == pytest.approx(0.1, abs=2e-3) and z > 1e-3
@@ -102,8 +112,8 @@ def test_a_blended_motion_begins_in_the_middle_of_the_blend() -> None:
 def test_other_conditions_count_while_their_part_runs() -> None:
     plant = ready()
     log = Log(plant)
-    held = (7, 0.0, 0.0)  # signal 0 is false, always
-    watches = (log.watch("second", *held, part=1), log.watch("first", *held, part=0))
+    held = SignalIs(place=0)  # signal 0 is false, always
+    watches = (log.watch("second", held, part=1), log.watch("first", held, part=0))
     run(plant, corner(plant, log, *watches))
     assert log.names == ["started", "first", "part 1", "second", "done"]
     assert log.way("second") == pytest.approx((0.0, 0.1, 0.0), abs=1e-3)
@@ -112,7 +122,7 @@ def test_other_conditions_count_while_their_part_runs() -> None:
 def test_a_delay_may_reach_into_the_next_part() -> None:
     plant = ready()
     log = Log(plant)
-    run(plant, corner(plant, log, log.watch("late", 9, END, 0.0, 0.5, part=0)))
+    run(plant, corner(plant, log, log.watch("late", point(END, 0.0, delay=0.5), part=0)))
     y, z = log.way("late")[1:]
     assert y == pytest.approx(0.1, abs=1e-3) and 0.005 < z < 0.06
 
@@ -121,7 +131,7 @@ def test_override_and_pause_move_no_point() -> None:
     plant = ready()
     log = Log(plant)
     plant.override = 0.4
-    plant.submit(corner(plant, log, log.watch("point", 9, START, 0.05, 0.0, part=1)))
+    plant.submit(corner(plant, log, log.watch("point", point(START, 0.05), part=1)))
     plant.step(1000)
     plant.pause()
     plant.step(2000)
@@ -137,7 +147,7 @@ def test_override_and_pause_move_no_point() -> None:
 def test_what_is_cancelled_before_does_not_fire() -> None:
     plant = ready()
     log = Log(plant)
-    plant.submit(corner(plant, log, log.watch("point", 9, START, 0.09, 0.0, part=1)))
+    plant.submit(corner(plant, log, log.watch("point", point(START, 0.09), part=1)))
     plant.step(800)
     plant.cancel()
     run(plant)
@@ -148,9 +158,9 @@ def test_an_arm_that_is_there_already_has_the_ends_only() -> None:
     plant = ready()
     log = Log(plant)
     watches = (
-        log.watch("start", 9, START, 0.0, 0.0),
-        log.watch("end", 9, END, -0.01, 0.0),
-        log.watch("on the way", 9, START, 0.01, 0.0),
+        log.watch("start", point(START, 0.0)),
+        log.watch("end", point(END, -0.01)),
+        log.watch("on the way", point(START, 0.01)),
     )
     run(plant, Order(1, "ptp", joints=READY, listener=log, watches=watches))
     assert log.names == ["started", "start", "end", "done"]

@@ -9,13 +9,14 @@ import mujoco
 import numpy as np
 
 from heptarm.model.kinematics import forward
+from heptarm.sim.control.cartesian_impedance import CartesianImpedanceLaw, FlangeKinematics
+from heptarm.sim.control.laws import MeasuredState
+from heptarm.sim.plant.world import MODELS
 from heptarm.values.arrays import Array
-from heptarm.values.mode import CartesianImpedance, SineImpedance
+from heptarm.values.mode.impedance import CartesianImpedance
+from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.pose import Pose
 from heptarm.values.robot import robot
-from heptarm.virtual.impedance import CartesianSpring, Flange
-from heptarm.virtual.law import Sensed
-from heptarm.virtual.world import MODELS
 
 #: An arm that is nowhere near a singularity, its axes askew to the base's.
 ASKEW = (0.2, 0.6, -0.3, -1.3, 0.4, 0.9, 0.5)
@@ -46,13 +47,15 @@ class Arm:
         self.data = mujoco.MjData(self.model)
         self.data.qpos[:7] = q
         mujoco.mj_forward(self.model, self.data)
-        self.flange = Flange(self.model, self.data)
+        self.flange = FlangeKinematics(self.model, self.data)
         self.tcp = Pose.at() if tcp is None else tcp
-        self.law = CartesianSpring(mode, self.robot, self.flange, tcp=self.tcp.array.tolist(), axes=axes)
+        self.law = CartesianImpedanceLaw(
+            mode, self.robot, self.flange, tcp=self.tcp.array.tolist(), axes=axes
+        )
         d, nv = self.data, self.model.nv
         self.mass = np.zeros((nv, nv))
         self.start = np.array(q, dtype=np.float64)
-        self.sensed = Sensed(
+        self.sensed = MeasuredState(
             d.qpos[:7], d.qvel[:7], self.mass[:7, :7], d.qfrc_bias[:7], d.qfrc_passive[:7], *[self.start] * 3
         )
         self.push = np.zeros(6)  # on the moved frame, base axes
