@@ -15,9 +15,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from heptarm.errors import ConnectionLost, Timeout
-from heptarm.rt import Client
-from heptarm.rt import layout as at
-from tests.virtual_fri.scenarios import QUALITY
+from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.loop.client import Client
+from tests.sim_fri.scenarios import QUALITY
 
 ROOT = Path(__file__).parents[2]
 #: Nobody waits longer than that on however busy a machine [s].
@@ -25,19 +25,20 @@ PATIENCE = 120.0
 
 _CONTROLLER = """
 import sys
-from heptarm.fri.version import Version
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.standalone import Settings, Standalone, words
-from tests.virtual_fri.rig import Arm
+from heptarm.fri.protocol.version import Version
+from heptarm.sim.fri.settings import SessionConfiguration
+from heptarm.sim.fri.settings import describe
+from heptarm.sim.runtime.standalone_fri import StandaloneSettings, Standalone
+from tests.sim_fri.rig import Arm
 
 client, own = ("127.0.0.1", int(sys.argv[1])), int(sys.argv[2])
-settings = Settings(configuration=Configuration(Version.V1_15, 5), client=client, port=own)
-Standalone(Arm(), settings, listener=lambda event: print(words(event), flush=True)).run()
+settings = StandaloneSettings(configuration=SessionConfiguration(Version.V1_15, 5), client=client, port=own)
+Standalone(Arm(), settings, listener=lambda event: print(describe(event), flush=True)).run()
 """
 
 _USER = """
 import sys, time
-from heptarm.rt import Client
+from heptarm.fri import Client
 client = Client(int(sys.argv[1]), timeout=120.0)
 client.wait("COMMANDING_ACTIVE", timeout=120.0)
 print("active", flush=True)
@@ -107,7 +108,7 @@ def controllers(times: int) -> int:
                 while True:
                     client.next(timeout=0.2)
             except Timeout as error:
-                assert "sends no more" in str(error), error
+                assert "has stopped sending" in str(error), error
         assert client.stats.commanded > times and client.stats.restarts >= times - 1
     return times
 
@@ -140,4 +141,4 @@ def _without_loop(port: int) -> None:
             while True:
                 client.next(timeout=PATIENCE)
         except ConnectionLost as error:
-            assert "its process is gone" in str(error), error
+            assert "its process has ended" in str(error), error

@@ -7,25 +7,23 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.fri.limits import Limits
-from heptarm.fri.messages import CommandMode
-from heptarm.fri.policy import Missing, Policy
-from heptarm.fri.version import Version
-from heptarm.io.shared import Block
-from heptarm.rt import layout as at
-from heptarm.rt.cycle import Cycle, Law
-from heptarm.rt.params import Params
+from heptarm.fri.guard.fallback import Missing, Policy
+from heptarm.fri.guard.joint_guard import Limits
+from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.loop.cycle import Cycle, Law
+from heptarm.fri.loop.user_api import Params
+from heptarm.fri.protocol.messages import CommandMode
+from heptarm.fri.protocol.version import Version
+from heptarm.io.shared import MemoryBlock
+from heptarm.sim.fri.controller import Controller
+from heptarm.sim.fri.overlay import MotionOverlay, control_mode
+from heptarm.sim.fri.sessions import PlantArm
+from heptarm.sim.fri.settings import OverlayEnded, SessionConfiguration
+from heptarm.sim.planning.command import TICK_NS
+from heptarm.sim.plant.plant import Plant, Snapshot
 from heptarm.values.arrays import Array
-from heptarm.values.mode import Mode, Position
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.controller import Controller
-from heptarm.virtual.fri.events import OverlayEnded
-from heptarm.virtual.fri.overlay import MotionOverlay
-from heptarm.virtual.fri.plant_arm import PlantArm
-from heptarm.virtual.fri.standalone import control_of
-from heptarm.virtual.plant import Plant, Snapshot
-from heptarm.virtual.tick import TICK_NS
-from tests.virtual_fri.rig import READY, State
+from heptarm.values.mode.mode import Mode, Position
+from tests.sim_fri.rig import READY, State
 
 #: The client's clock begins here [ns].
 EPOCH = 10**12
@@ -56,7 +54,7 @@ class Lockstep:
         q: tuple[float, ...] = READY,
     ) -> None:
         values, schema = Params.flat(params or {})
-        block = Block(at.Layout.words(history=64, params=values.size))
+        block = MemoryBlock(at.Layout.words(history=64, params=values.size))
         block.unlink()
         self.layout = at.Layout(block, history=64, params=values.size)
         self.layout.params.write(values)
@@ -72,14 +70,14 @@ class Lockstep:
         self.track: list[Snapshot] = []
         self.ends: list[OverlayEnded] = []
         self._arm = PlantArm(self.plant)
-        self._controller = Controller(Configuration(Version.V1_15, 1), self.plant.robot)
+        self._controller = Controller(SessionConfiguration(Version.V1_15, 1), self.plant.robot)
         self._answer: bytes | None = None
         self._held: list[bytes] | None = None
         self._controller.open()
         self._until(State.MONITORING_READY)
         control = control or Position()
         self._arm.hold(control)
-        self._controller.start(MotionOverlay(command, control_of(control)))
+        self._controller.start(MotionOverlay(command, control_mode(control)))
         self._until(State.COMMANDING_ACTIVE)
         self.start: Array = self.plant.snapshot.q_cmd
         self.track.clear()

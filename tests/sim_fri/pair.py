@@ -4,29 +4,28 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from heptarm.fri import messages as m
-from heptarm.fri.session import Session
-from heptarm.fri.setpoint import Setpoint
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.controller import Controller
-from heptarm.virtual.fri.events import Event, OverlayEnded
-from heptarm.virtual.fri.faults import NONE, Faults, Line
-from heptarm.virtual.fri.overlay import MotionOverlay
-from heptarm.virtual.tick import TICK_NS
-from tests.virtual_fri.rig import Arm, State
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.session.answers import Setpoint
+from heptarm.fri.session.session import Session
+from heptarm.sim.fri.controller import Controller
+from heptarm.sim.fri.faults import NONE, FaultyLink, LinkFaults
+from heptarm.sim.fri.overlay import MotionOverlay
+from heptarm.sim.fri.settings import Event, OverlayEnded, SessionConfiguration
+from heptarm.sim.planning.command import TICK_NS
+from tests.sim_fri.rig import Arm, State
 
 
 @dataclass
 class Pair:
     """A controller and heptarm's client, one tick after the other; the client's answers take 0.3 ms."""
 
-    configuration: Configuration
-    faults: Faults = NONE
+    configuration: SessionConfiguration
+    faults: LinkFaults = NONE
     setpoint: Setpoint = field(default_factory=Setpoint)
 
     def __post_init__(self) -> None:
         self.arm, self.session, self.now = Arm(), Session(), 0
-        self.there, self.back = Line(self.faults), Line(self.faults)
+        self.there, self.back = FaultyLink(self.faults), FaultyLink(self.faults)
         self.events: list[Event] = []
         self.alive = True  # the client's process
         self.renew()

@@ -7,18 +7,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from heptarm.fri import messages as m
-from heptarm.fri.codec import decode_monitoring, encode_command
-from heptarm.fri.version import Version
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.codec import decode_monitoring, encode_command
+from heptarm.fri.protocol.version import Version
+from heptarm.sim.control.laws import Superposition
+from heptarm.sim.fri.controller import Controller
+from heptarm.sim.fri.overlay import MotionOverlay, Reading
+from heptarm.sim.fri.settings import Event, OverlayEnded, Refused, SessionConfiguration, StateChanged
+from heptarm.sim.planning.command import TICK_NS
+from heptarm.sim.plant.shared_state import SharedState
+from heptarm.sim.seam import HeaderWords
 from heptarm.values.arrays import Array
-from heptarm.values.mode import Mode
+from heptarm.values.mode.mode import Mode
 from heptarm.values.robot import RobotModel, robot
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.controller import Controller
-from heptarm.virtual.fri.events import Event, OverlayEnded, Refused, StateChanged
-from heptarm.virtual.fri.overlay import MotionOverlay, Reading, Superposition
-from heptarm.virtual.ring import NEWEST, Ring
-from heptarm.virtual.tick import TICK_NS
 
 State = m.SessionState
 READY = (0.0, 0.5, 0.1, -1.3, 0.2, 0.9, 0.0)
@@ -39,7 +40,7 @@ class Arm:
         self.loads: list[tuple[Array | None, Array | None]] = []
         self.mode: Mode | None = None
         self.holds = 0
-        self.ring = Ring()
+        self.ring = SharedState()
 
     def reading(self) -> Reading:
         q, ipo = tuple(self.q.tolist()), tuple(self.q_ipo.tolist())
@@ -52,7 +53,7 @@ class Arm:
         self.action = action
 
     def tick(self) -> None:
-        self.ring.header[NEWEST] += 1
+        self.ring.header[HeaderWords.NEWEST] += 1
         if self.action is not None:
             self.q = self.action.q
             self.loads.append((self.action.tau, self.action.wrench))
@@ -123,12 +124,12 @@ class Rig:
     """Both sides of a session; an answer arrives `latency` after its message, None of the answers if it is silent."""
 
     version: Version = Version.V1_15
-    configuration: Configuration | None = None
+    configuration: SessionConfiguration | None = None
     latency: int = 300_000
     silent: bool = False
 
     def __post_init__(self) -> None:
-        self.configuration = self.configuration or Configuration(self.version)
+        self.configuration = self.configuration or SessionConfiguration(self.version)
         self.version = self.configuration.version
         self.arm = Arm()
         self.controller = Controller(self.configuration, self.arm.robot, epoch_ns=1_700_000_000 * 10**9)

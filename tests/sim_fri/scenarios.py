@@ -5,20 +5,20 @@ from __future__ import annotations
 import random
 from collections.abc import Callable
 
-from heptarm.fri import messages as m
-from heptarm.fri.session import Session
-from heptarm.fri.version import Version
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.faults import Faults, Line, translate
-from heptarm.virtual.fri.overlay import MotionOverlay
-from tests.virtual_fri.pair import Pair
-from tests.virtual_fri.rig import State
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.version import Version
+from heptarm.fri.session.session import Session
+from heptarm.sim.fri.faults import FaultyLink, LinkFaults, translate
+from heptarm.sim.fri.overlay import MotionOverlay
+from heptarm.sim.fri.settings import SessionConfiguration
+from tests.sim_fri.pair import Pair
+from tests.sim_fri.rig import State
 
 QUALITY = "possible connection problem"
 
 
 def _lines(pair: Pair, **faults: float) -> None:
-    pair.there, pair.back = (Line(Faults(seed=random.randrange(10**6), **faults)) for _ in range(2))
+    pair.there, pair.back = (FaultyLink(LinkFaults(seed=random.randrange(10**6), **faults)) for _ in range(2))
 
 
 def lossy(pair: Pair) -> str:
@@ -90,7 +90,7 @@ FAULTS: tuple[Callable[[Pair], str], ...] = (
 def again(fault: Callable[[Pair], str], times: int) -> int:
     """Let it happen so many times in one session of the controller; returns how often all went as designed."""
     random.seed(7)
-    pair = Pair(Configuration(Version.V2_7 if fault is corrupt else Version.V1_15))
+    pair = Pair(SessionConfiguration(Version.V2_7 if fault is corrupt else Version.V1_15))
     for turn in range(1, times + 1):
         pair.active(MotionOverlay())
         text = fault(pair)
@@ -106,7 +106,7 @@ def again(fault: Callable[[Pair], str], times: int) -> int:
         counts = pair.session.counters
         assert fault is not reordered or counts.reordered >= turn
         assert fault is not corrupt or counts.malformed >= turn
-        pair.there, pair.back = Line(), Line()
+        pair.there, pair.back = FaultyLink(), FaultyLink()
         pair.arm.safety, pair.setpoint.q = m.Safety.NORMAL_OPERATION, None
         if not pair.alive or fault is foreign:
             pair.session, pair.alive = Session(), True
@@ -117,7 +117,7 @@ def again(fault: Callable[[Pair], str], times: int) -> int:
 
 def duplicates(times: int) -> int:
     """A third of all datagrams comes twice, in both directions; commanding goes on, and no second one counts."""
-    pair = Pair(Configuration(Version.V1_15))
+    pair = Pair(SessionConfiguration(Version.V1_15))
     pair.active(MotionOverlay())
     for turn in range(1, times + 1):
         _lines(pair, duplicate=0.3)
@@ -130,7 +130,7 @@ def duplicates(times: int) -> int:
 
 def garbage(times: int) -> int:
     """Garbage to both sides in a session that stands; it goes on, and every piece is counted."""
-    generator, pair = random.Random(5), Pair(Configuration(Version.V2_7))
+    generator, pair = random.Random(5), Pair(SessionConfiguration(Version.V2_7))
     pair.active(MotionOverlay())
     for turn in range(1, times + 1):
         for _ in range(10):

@@ -7,15 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from heptarm.fri import messages as m
-from heptarm.fri.event import Kind
-from heptarm.fri.setpoint import Setpoint
-from heptarm.fri.version import Version
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.faults import Faults, Line
-from heptarm.virtual.fri.overlay import CONTROLS, MotionOverlay
-from tests.virtual_fri.pair import Pair
-from tests.virtual_fri.rig import READY, State
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.version import Version
+from heptarm.fri.session.answers import Setpoint
+from heptarm.fri.session.session import Kind
+from heptarm.sim.fri.faults import FaultyLink, LinkFaults
+from heptarm.sim.fri.overlay import CONTROLS, MotionOverlay
+from heptarm.sim.fri.settings import SessionConfiguration
+from tests.sim_fri.pair import Pair
+from tests.sim_fri.rig import READY, State
 
 LEGAL = [
     (version, mode)
@@ -28,7 +28,7 @@ LEGAL = [
 @pytest.mark.parametrize(("version", "mode"), LEGAL)
 @pytest.mark.parametrize("receive", [(1, 1), (1, 3), (5, 1)])
 def test_the_two_agree_on_everything(version: Version, mode: m.CommandMode, receive: tuple[int, int]) -> None:
-    pair = Pair(Configuration(version, *receive))
+    pair = Pair(SessionConfiguration(version, *receive))
     pair.active(MotionOverlay(mode, CONTROLS[mode][0]))
     session, controller = pair.session, pair.controller
     assert session.mode is mode and session.multiplier == receive[1]
@@ -45,7 +45,7 @@ def test_the_two_agree_on_everything(version: Version, mode: m.CommandMode, rece
 
 
 def test_the_arm_follows_the_clients_setpoints() -> None:
-    pair = Pair(Configuration(Version.V2_7))
+    pair = Pair(SessionConfiguration(Version.V2_7))
     pair.active(MotionOverlay())
     for step in range(1, 301):
         pair.setpoint.q = (READY[0] + 5e-4 * step, *READY[1:])
@@ -57,7 +57,7 @@ def test_the_arm_follows_the_clients_setpoints() -> None:
 
 @pytest.mark.parametrize("version", Version)
 def test_one_client_outlives_a_hundred_sessions(version: Version) -> None:
-    pair = Pair(Configuration(version))
+    pair = Pair(SessionConfiguration(version))
     for _ in range(100 if version is Version.V1_15 else 5):
         pair.active(MotionOverlay())
         pair.run(5)
@@ -69,7 +69,7 @@ def test_one_client_outlives_a_hundred_sessions(version: Version) -> None:
 
 
 def test_a_session_that_is_torn_off_is_followed_by_another() -> None:
-    pair = Pair(Configuration(Version.V2_7))
+    pair = Pair(SessionConfiguration(Version.V2_7))
     for _ in range(5):
         pair.active(MotionOverlay())
         pair.renew()  # as when the controller's process is killed: no last word
@@ -80,7 +80,7 @@ def test_a_session_that_is_torn_off_is_followed_by_another() -> None:
 @given(
     st.sampled_from(Version),
     st.builds(
-        Faults,
+        LinkFaults,
         loss=st.floats(0, 0.3),
         duplicate=st.floats(0, 0.3),
         corrupt=st.floats(0, 0.1),
@@ -90,13 +90,13 @@ def test_a_session_that_is_torn_off_is_followed_by_another() -> None:
     ),
 )
 @settings(max_examples=8, deadline=None)
-def test_after_any_faults_the_two_find_each_other_again(version: Version, faults: Faults) -> None:
-    pair = Pair(Configuration(version))
+def test_after_any_faults_the_two_find_each_other_again(version: Version, faults: LinkFaults) -> None:
+    pair = Pair(SessionConfiguration(version))
     pair.active(MotionOverlay())
-    pair.there, pair.back = Line(faults), Line(faults)
+    pair.there, pair.back = FaultyLink(faults), FaultyLink(faults)
     pair.run(300)
     assert (pair.arm.leaps <= 1.2 * pair.arm.robot.dq_max * 1e-3 + 1e-12).all()
-    pair.there, pair.back = Line(), Line()
+    pair.there, pair.back = FaultyLink(), FaultyLink()
     pair.controller.stop()
     pair.run(700)  # a counter that was damaged under way may silence the client for a moment
     pair.active(MotionOverlay())

@@ -8,15 +8,15 @@ from math import inf, nan, sin
 import numpy as np
 import pytest
 
-from heptarm.fri import messages as m
-from heptarm.fri.version import Version
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.version import Version
 from heptarm.model.kinematics import forward
+from heptarm.sim.fri import cartesian, controller
+from heptarm.sim.fri.controller import MIRRORED
+from heptarm.sim.fri.overlay import MotionOverlay
+from heptarm.sim.fri.settings import SessionConfiguration
 from heptarm.values.pose import Pose
-from heptarm.virtual.fri import cartesian, controller
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.controller import MIRRORED
-from heptarm.virtual.fri.overlay import MotionOverlay
-from tests.virtual_fri.rig import READY, Law, Rig, State, mirror
+from tests.sim_fri.rig import READY, Law, Rig, State, mirror
 
 TORQUE = MotionOverlay(m.CommandMode.TORQUE, m.ControlMode.JOINT_IMPEDANCE)
 WRENCH = MotionOverlay(m.CommandMode.WRENCH, m.ControlMode.CARTESIAN_IMPEDANCE)
@@ -53,7 +53,7 @@ def wave(time: float, amplitude: float) -> float:
 @pytest.mark.parametrize("version", Version)
 @pytest.mark.parametrize("receive", [(1, 1), (1, 2), (5, 1), (10, 1)])
 def test_the_arm_follows_a_law_one_receive_period_behind(version: Version, receive: tuple[int, int]) -> None:
-    rig = Rig(configuration=Configuration(version, *receive)).active()
+    rig = Rig(configuration=SessionConfiguration(version, *receive)).active()
     start = rig.now * 1e-9
     rig.client.law = sine(0.3, start)
     first = len(rig.arm.track)
@@ -146,11 +146,15 @@ def test_a_pose_without_redundancy_keeps_a3() -> None:
 @pytest.mark.parametrize(
     ("fields", "cause", "text"),
     [
-        ({"q": beside(4, 0.5)}, "limit", "Illegal axis delta: A4 by 28.648 deg in 1 ms; 0.090 deg are legal"),
+        (
+            {"q": beside(4, 0.5)},
+            "limit",
+            "Illegal axis delta: A4 by 28.648 deg in 1 ms; allowed is 0.090 deg",
+        ),
         ({"q": beside(1, 1.9e-3)}, "limit", "Illegal axis delta: A1"),
         ({"q": beside(7, 3.2)}, "limit", "Illegal axis position: A7"),
-        ({"q": beside(3, nan)}, "limit", "Illegal axis position: A3 is no finite number"),
-        ({"q": beside(3, -inf)}, "limit", "Illegal axis position: A3 is no finite number"),
+        ({"q": beside(3, nan)}, "limit", "Illegal axis position: A3 is not finite"),
+        ({"q": beside(3, -inf)}, "limit", "Illegal axis position: A3 is not finite"),
         ({"q": None}, "field", "Illegal command: no joint position in command mode POSITION"),
     ],
 )
@@ -171,16 +175,16 @@ def test_an_illegal_position_ends_the_motion_and_the_arm_has_not_moved(
     [
         (TORQUE, {"tau": None}, "no joint torque"),
         (TORQUE, {"q": None}, "no joint position"),
-        (TORQUE, {"tau": (0.0, 400.0, *(0.0,) * 5)}, "Illegal torque: A2 400 Nm; 320 Nm are legal"),
+        (TORQUE, {"tau": (0.0, 400.0, *(0.0,) * 5)}, "Illegal torque: A2 400 Nm; allowed is 320 Nm"),
         (TORQUE, {"tau": (0.0,) * 6 + (nan,)}, "Illegal torque: A7"),
         (TORQUE, {"q": beside(2, 0.2)}, "Illegal axis delta: A2"),
         (WRENCH, {"wrench": None}, "no wrench"),
         (WRENCH, {"wrench": (0.0, 0.0, -501.0, 0.0, 0.0, 0.0)}, "Illegal wrench"),
         (WRENCH, {"wrench": (0.0, 0.0, nan, 0.0, 0.0, 0.0)}, "Illegal wrench"),
         (POSE, {"pose": None}, "no Cartesian pose"),
-        (POSE, {"pose": m.Transformation("p", (nan, 0, 0, 1, 0, 0, 0))}, "no finite pose"),
+        (POSE, {"pose": m.Transformation("p", (nan, 0, 0, 1, 0, 0, 0))}, "must be finite"),
         (POSE, {"pose": m.Transformation("p", (400, 0, 400, 2, 0, 0, 0))}, "unit quaternion"),
-        (POSE, {"pose": m.Transformation("p", (4000.0, 0, 400, 1, 0, 0, 0))}, "leads to the Cartesian pose"),
+        (POSE, {"pose": m.Transformation("p", (4000.0, 0, 400, 1, 0, 0, 0))}, "is not reachable"),
         (POSE, {"redundancy": m.Redundancy(m.RedundancyStrategy.E1, inf)}, "redundancy"),
         (POSE, {"redundancy": m.Redundancy(m.RedundancyStrategy.E1, 0.5)}, "Illegal axis delta"),
     ],
@@ -236,8 +240,8 @@ def test_the_next_overlay_begins_where_the_arm_is() -> None:
 @pytest.mark.parametrize(
     ("overlay", "fields", "text"),
     [
-        (MotionOverlay(), {"q": beside(5, 0.1)}, "its A5 is 5.73 deg beside the interpolator's"),
-        (MotionOverlay(), {"q": beside(5, nan)}, "its A5 is nan deg beside"),
+        (MotionOverlay(), {"q": beside(5, 0.1)}, "its A5 is 5.73 deg off the interpolator's"),
+        (MotionOverlay(), {"q": beside(5, nan)}, "its A5 is nan deg off"),
         (TORQUE, {"tau": None}, "its answers carry no joint torque"),
         (WRENCH, {"wrench": None}, "its answers carry no wrench"),
         (POSE, {"pose": m.Transformation("p", (0, 0, 0, 1, 0, 0, 0))}, "mm and"),

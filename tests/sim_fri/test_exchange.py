@@ -8,13 +8,12 @@ from dataclasses import replace
 import pytest
 
 from heptarm.errors import CommandRejected
-from heptarm.fri import messages as m
-from heptarm.fri.codec import encode_command, encode_monitoring
-from heptarm.fri.version import Version
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.events import FrameProvided, OutputWritten
-from heptarm.virtual.tick import TICK_NS
-from tests.virtual_fri.rig import Rig, State, mirror
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.codec import encode_command, encode_monitoring
+from heptarm.fri.protocol.version import Version
+from heptarm.sim.fri.settings import FrameProvided, OutputWritten, SessionConfiguration
+from heptarm.sim.planning.command import TICK_NS
+from tests.sim_fri.rig import Rig, State, mirror
 
 IN, OUT = m.IoDirection.INPUT, m.IoDirection.OUTPUT
 SIGNALS = (
@@ -26,7 +25,7 @@ SIGNALS = (
 
 
 def with_signals(version: Version = Version.V1_15) -> Rig:
-    return Rig(configuration=Configuration(version, signals=SIGNALS))
+    return Rig(configuration=SessionConfiguration(version, signals=SIGNALS))
 
 
 @pytest.mark.parametrize("version", [Version.V1_15, Version.V2_5, Version.V2_7])
@@ -69,10 +68,10 @@ def test_a_signal_that_may_not_be_written_is_told_once(value: m.IoValue, text: s
 def test_the_cabinets_side_cannot_set_nonsense() -> None:
     exchange = with_signals().controller.exchange
     for name, value, text in (
-        ("Flange.Door", 1, "no signal"),
-        ("Flange.Led", 2, "cannot be 2"),
-        ("Tool.Code", -1, "cannot be"),
-        ("Tool.Pressure", float("inf"), "cannot be"),
+        ("Flange.Door", 1, "not registered"),
+        ("Flange.Led", 2, "got 2"),
+        ("Tool.Code", -1, "must be a"),
+        ("Tool.Pressure", float("inf"), "must be a"),
     ):
         with pytest.raises(CommandRejected, match=text):
             exchange.set(name, value)
@@ -81,24 +80,24 @@ def test_the_cabinets_side_cannot_set_nonsense() -> None:
 @pytest.mark.parametrize(
     ("signals", "text"),
     [
-        (SIGNALS * 3, "12 signals"),
-        ((SIGNALS[0], SIGNALS[0]), "each name once"),
-        ((replace(SIGNALS[0], name="x" * 64),), "1 to 63 octets"),
-        ((replace(SIGNALS[0], name=""),), "1 to 63 octets"),
+        (SIGNALS * 3, "got 12"),
+        ((SIGNALS[0], SIGNALS[0]), "must be unique"),
+        ((replace(SIGNALS[0], name="x" * 64),), "1 to 63 bytes"),
+        ((replace(SIGNALS[0], name=""),), "1 to 63 bytes"),
     ],
 )
 def test_signals_that_fri_cannot_carry(signals: tuple[m.IoValue, ...], text: str) -> None:
     with pytest.raises(CommandRejected, match=text):
-        Configuration(Version.V1_15, signals=signals)
+        SessionConfiguration(Version.V1_15, signals=signals)
     with pytest.raises(CommandRejected, match="FRI 1.11 has no signals"):
-        Configuration(Version.V1_11, signals=SIGNALS)
-    with pytest.raises(CommandRejected, match="6 transformations"):
-        Configuration(Version.V1_11, transformations=tuple("abcdef"))
+        SessionConfiguration(Version.V1_11, signals=SIGNALS)
+    with pytest.raises(CommandRejected, match="got 6"):
+        SessionConfiguration(Version.V1_11, transformations=tuple("abcdef"))
 
 
 @pytest.mark.parametrize("version", Version)
 def test_the_client_provides_a_frame_that_is_asked_for(version: Version) -> None:
-    rig = Rig(configuration=Configuration(version, transformations=("PBase", "Part")))
+    rig = Rig(configuration=SessionConfiguration(version, transformations=("PBase", "Part")))
     values = (
         (0.0, 0, 300, 1, 0, 0, 0) if version.traits.quaternions else (1.0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 300)
     )
@@ -164,7 +163,7 @@ def test_an_answer_to_what_was_never_sent_is_refused() -> None:
         rig.controller.receive(encode_command(stray, Version.V1_15), rig.now)
     assert rig.controller.traffic.refused == 2
     rig.run(1)
-    assert rig.told == ["an answer to a message that this session has not sent, or long ago"]
+    assert rig.told == ["an answer to a message that this session did not send, or sent too long ago"]
 
 
 @pytest.mark.parametrize(

@@ -8,22 +8,22 @@ from dataclasses import dataclass, field
 import pytest
 
 from heptarm.errors import LimitError
-from heptarm.fri import messages as m
-from heptarm.fri.codec import decode_monitoring
-from heptarm.fri.protobuf import MalformedMessage
-from heptarm.fri.version import Version, recognise
-from heptarm.virtual.fri.events import OverlayEnded
-from heptarm.virtual.fri.faults import NONE, Damage, Faults, Line, Scenario
-from heptarm.virtual.fri.overlay import MotionOverlay
-from heptarm.virtual.tick import TICK_NS
-from tests.virtual_fri.rig import Arm, Rig, State
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.codec import decode_monitoring
+from heptarm.fri.protocol.protobuf import MalformedMessage
+from heptarm.fri.protocol.version import Version, recognise
+from heptarm.sim.fri.faults import NONE, FaultScenario, FaultyLink, LinkFaultCounts, LinkFaults
+from heptarm.sim.fri.overlay import MotionOverlay
+from heptarm.sim.fri.settings import OverlayEnded
+from heptarm.sim.planning.command import TICK_NS
+from tests.sim_fri.rig import Arm, Rig, State
 
 MS = 1_000_000
 
 
-def sent(faults: Faults, count: int = 2000) -> tuple[list[tuple[int, int]], Damage]:
+def sent(faults: LinkFaults, count: int = 2000) -> tuple[list[tuple[int, int]], LinkFaultCounts]:
     """What becomes of datagrams 0, 1, 2 … sent each millisecond: when each arrived [ms], and the counts."""
-    line, found = Line(faults), []
+    line, found = FaultyLink(faults), []
     for tick in range(count + 200):
         if tick < count:
             line.send(tick.to_bytes(4, "big") * 5, tick * MS)
@@ -33,37 +33,39 @@ def sent(faults: Faults, count: int = 2000) -> tuple[list[tuple[int, int]], Dama
 
 def test_a_good_line_carries_everything_at_once() -> None:
     found, damage = sent(NONE)
-    assert found == [(n, n) for n in range(2000)] and damage == Damage(passed=2000)
+    assert found == [(n, n) for n in range(2000)] and damage == LinkFaultCounts(passed=2000)
 
 
 @pytest.mark.parametrize(
     ("faults", "count", "share"),
     [
-        (Faults(loss=0.1), lambda d: d.lost, 0.1),
-        (Faults(duplicate=0.2), lambda d: d.duplicated, 0.2),
-        (Faults(corrupt=0.05), lambda d: d.corrupted, 0.05),
-        (Faults(reorder=0.1), lambda d: d.reordered, 0.1),
+        (LinkFaults(loss=0.1), lambda d: d.lost, 0.1),
+        (LinkFaults(duplicate=0.2), lambda d: d.duplicated, 0.2),
+        (LinkFaults(corrupt=0.05), lambda d: d.corrupted, 0.05),
+        (LinkFaults(reorder=0.1), lambda d: d.reordered, 0.1),
     ],
 )
-def test_a_share_is_that_share(faults: Faults, count: Callable[[Damage], int], share: float) -> None:
+def test_a_share_is_that_share(
+    faults: LinkFaults, count: Callable[[LinkFaultCounts], int], share: float
+) -> None:
     found, damage = sent(faults)
     assert count(damage) == pytest.approx(2000 * share, rel=0.2)
     assert damage.passed == 2000 - damage.lost + damage.duplicated and len(found) == damage.passed
 
 
 def test_delay_and_jitter_are_times() -> None:
-    found, _ = sent(Faults(delay=0.005, jitter=0.01))
+    found, _ = sent(LinkFaults(delay=0.005, jitter=0.01))
     waits = [arrived - number for arrived, number in found]
     assert min(waits) >= 5 and max(waits) <= 16 and len(set(waits)) > 5
 
 
 def test_reordering_changes_neighbours() -> None:
-    numbers = [number for _, number in sent(Faults(reorder=0.1))[0]]
+    numbers = [number for _, number in sent(LinkFaults(reorder=0.1))[0]]
     assert sorted(numbers) == list(range(2000)) and numbers != sorted(numbers)
 
 
 def test_a_burst_holds_everything_back_to_its_end() -> None:
-    found, _ = sent(Faults(burst=0.02, burst_time=0.005))
+    found, _ = sent(LinkFaults(burst=0.02, burst_time=0.005))
     by_tick: dict[int, int] = {}
     for tick, _ in found:
         by_tick[tick] = by_tick.get(tick, 0) + 1
@@ -72,14 +74,14 @@ def test_a_burst_holds_everything_back_to_its_end() -> None:
 
 
 def test_in_silence_nothing_passes() -> None:
-    numbers = [number for _, number in sent(Faults(silence=((0.1, 0.3), (1.0, 1.1))))[0]]
+    numbers = [number for _, number in sent(LinkFaults(silence=((0.1, 0.3), (1.0, 1.1))))[0]]
     assert numbers == [n for n in range(2000) if not (100 <= n < 300 or 1000 <= n < 1100)]
 
 
 def test_the_same_seed_gives_the_same_faults() -> None:
     faults = {"loss": 0.1, "duplicate": 0.1, "corrupt": 0.1, "reorder": 0.1, "jitter": 0.003}
-    assert sent(Faults(seed=5, **faults)) == sent(Faults(seed=5, **faults))
-    assert sent(Faults(seed=5, **faults)) != sent(Faults(seed=6, **faults))
+    assert sent(LinkFaults(seed=5, **faults)) == sent(LinkFaults(seed=5, **faults))
+    assert sent(LinkFaults(seed=5, **faults)) != sent(LinkFaults(seed=6, **faults))
 
 
 @pytest.mark.parametrize(
@@ -87,7 +89,7 @@ def test_the_same_seed_gives_the_same_faults() -> None:
 )
 def test_nonsense_is_refused(name: str, value: float) -> None:
     with pytest.raises(LimitError, match=name):
-        Faults(**{name: value})
+        LinkFaults(**{name: value})
 
 
 # ------------------------------------------------------------------------------ sessions under faults
@@ -97,7 +99,7 @@ def test_nonsense_is_refused(name: str, value: float) -> None:
 class Trial:
     """A session that is commanding without faults, then under a scenario."""
 
-    scenario: Scenario
+    scenario: FaultScenario
     version: Version = Version.V1_15
     rig: Rig = field(init=False)
     unreadable: int = 0
@@ -105,7 +107,7 @@ class Trial:
     def __post_init__(self) -> None:
         self.rig = Rig(self.version).active()
         self.rig.run(200)
-        self.there, self.back = Line(self.scenario.to_client), Line(self.scenario.from_client)
+        self.there, self.back = FaultyLink(self.scenario.to_client), FaultyLink(self.scenario.from_client)
         self.begin = self.rig.now
 
     def run(self, ticks: int) -> Trial:
@@ -121,7 +123,7 @@ class Trial:
             rig.events += rig.controller.events()
             rig.arm.tick()
             assert datagram is not None
-            self.there.send(self.scenario.spoken(datagram, self.version, elapsed), rig.now)
+            self.there.send(self.scenario.sent(datagram, self.version, elapsed), rig.now)
             for message in self.there.arrived(rig.now):
                 try:
                     answer_now = rig.client.answer(message)
@@ -146,7 +148,7 @@ class Trial:
 
 
 def test_a_good_line_keeps_commanding() -> None:
-    trial = Trial(Scenario()).run(500)
+    trial = Trial(FaultScenario()).run(500)
     assert trial.causes == [] and trial.rig.controller.quality is m.Quality.EXCELLENT
 
 
@@ -154,14 +156,16 @@ def test_a_good_line_keeps_commanding() -> None:
 @pytest.mark.parametrize(
     ("faults", "least"),
     [
-        (Faults(loss=0.01), m.Quality.GOOD),
-        (Faults(duplicate=0.3), m.Quality.EXCELLENT),
-        (Faults(jitter=0.0005), m.Quality.EXCELLENT),
+        (LinkFaults(loss=0.01), m.Quality.GOOD),
+        (LinkFaults(duplicate=0.3), m.Quality.EXCELLENT),
+        (LinkFaults(jitter=0.0005), m.Quality.EXCELLENT),
     ],
 )
-def test_small_faults_keep_commanding(faults: Faults, least: m.Quality, seed: int) -> None:
-    faults = Faults(**{name: getattr(faults, name) for name in ("loss", "duplicate", "jitter")}, seed=seed)
-    trial = Trial(Scenario(from_client=faults)).run(500)
+def test_small_faults_keep_commanding(faults: LinkFaults, least: m.Quality, seed: int) -> None:
+    faults = LinkFaults(
+        **{name: getattr(faults, name) for name in ("loss", "duplicate", "jitter")}, seed=seed
+    )
+    trial = Trial(FaultScenario(from_client=faults)).run(500)
     assert trial.causes == [] and trial.rig.controller.quality >= least
 
 
@@ -174,8 +178,8 @@ def test_small_faults_keep_commanding(faults: Faults, least: m.Quality, seed: in
 def test_great_faults_end_commanding_by_quality(
     faults: dict[str, float], version: Version, seed: int
 ) -> None:
-    both = Faults(seed=seed, **faults)
-    trial = Trial(Scenario(to_client=both, from_client=both), version)
+    both = LinkFaults(seed=seed, **faults)
+    trial = Trial(FaultScenario(to_client=both, from_client=both), version)
     while not trial.causes and trial.rig.now < 3_000 * MS:
         trial.run(20)
     # a damaged command of a version without CRC may still be one, and then asks for something illegal
@@ -184,13 +188,13 @@ def test_great_faults_end_commanding_by_quality(
 
 
 def test_silence_ends_commanding_and_the_next_overlay_works() -> None:
-    trial = Trial(Scenario(to_client=Faults(silence=((0.05, 0.25),)))).run(400)
+    trial = Trial(FaultScenario(to_client=LinkFaults(silence=((0.05, 0.25),)))).run(400)
     assert trial.causes == ["quality"] and trial.rig.controller.state is State.MONITORING_READY
     trial.works_again()
 
 
 def test_a_safety_stop_ends_commanding_and_the_next_overlay_works() -> None:
-    trial = Trial(Scenario(stops=(((0.05, 0.25), m.Safety.STOP_1),))).run(100)
+    trial = Trial(FaultScenario(stops=(((0.05, 0.25), m.Safety.STOP_1),))).run(100)
     assert trial.causes == ["safety"]
     trial.works_again()
 
@@ -198,17 +202,17 @@ def test_a_safety_stop_ends_commanding_and_the_next_overlay_works() -> None:
 @pytest.mark.parametrize("own", Version)
 @pytest.mark.parametrize("other", Version)
 def test_a_cabinet_can_speak_another_version(own: Version, other: Version) -> None:
-    trial = Trial(Scenario(version=other), own)
+    trial = Trial(FaultScenario(version=other), own)
     rig, scenario = trial.rig, trial.scenario
     datagram = rig.controller.tick(Arm().reading(), rig.now)
     assert datagram is not None
-    strange = scenario.spoken(datagram, own, 0.0)
+    strange = scenario.sent(datagram, own, 0.0)
     told, spoken = recognise(strange), decode_monitoring(strange, other)
     assert told is other or {told, other} == {Version.V1_11, Version.V1_15}
     assert spoken.header == decode_monitoring(datagram, own).header
 
 
 def test_a_wrong_version_ends_commanding_by_quality() -> None:
-    trial = Trial(Scenario(version=Version.V2_7, strange=((0.1, 0.3),))).run(200)
+    trial = Trial(FaultScenario(version=Version.V2_7, strange=((0.1, 0.3),))).run(200)
     assert trial.causes == ["quality"] and trial.unreadable > 50
     trial.works_again()

@@ -9,8 +9,8 @@ from collections.abc import Callable
 
 import pytest
 
-from tests.virtual_fri import kills, scenarios
-from tests.virtual_fri.pair import Pair
+from tests.sim_fri import kills, scenarios
+from tests.sim_fri.pair import Pair
 
 
 @pytest.mark.parametrize("fault", scenarios.FAULTS)

@@ -7,15 +7,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from bench import fri_laws as laws
-from bench.fri_hold import BENT, FORCE, GAP, WAY, YIELDING
-from heptarm.fri.messages import CommandMode
-from heptarm.model.inverse import solve
+from bench.fri import laws
+from bench.fri.hold import BENT, COMPLIANT, FORCE, GAP, OFFSET
+from heptarm.fri.protocol.messages import CommandMode
+from heptarm.model.inverse_kinematics import solve
 from heptarm.model.kinematics import forward
 from heptarm.values.arrays import Array
-from heptarm.values.mode import JointImpedance
+from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.robot import robot
-from tests.virtual_fri.lockstep import Lockstep
+from tests.sim_fri.lockstep import Lockstep
 
 IIWA = robot("iiwa14")
 
@@ -45,17 +45,17 @@ def test_lost_and_late_messages_do_not_jolt_an_arm_in_motion() -> None:
 
 
 def test_torques_alone_lead_the_floating_arm_and_hold_it_against_a_push() -> None:
-    params = {"start": BENT, "goal": BENT + WAY}
+    params = {"start": BENT, "goal": BENT + OFFSET}
     both = Lockstep(
         laws.balance, params, command=CommandMode.TORQUE, control=JointImpedance(0.0), q=tuple(BENT)
     )
     both.run(3.5)
-    assert np.abs(both.plant.snapshot.q - BENT - WAY).max() < 1e-3
+    assert np.abs(both.plant.snapshot.q - BENT - OFFSET).max() < 1e-3
     both.plant.apply_wrench((0.0, 15.0, 0.0), duration=0.5)
     both.run(0.5)
-    assert np.abs(both.plant.snapshot.q - BENT - WAY).max() > 0.01
+    assert np.abs(both.plant.snapshot.q - BENT - OFFSET).max() > 0.01
     both.run(2.0)
-    assert np.abs(both.plant.snapshot.q - BENT - WAY).max() < 1e-3
+    assert np.abs(both.plant.snapshot.q - BENT - OFFSET).max() < 1e-3
     assert both.ends == both.limited == []
 
 
@@ -63,7 +63,7 @@ def test_a_wrench_presses_on_the_table_with_its_force() -> None:
     above = forward(IIWA, BENT)
     above[2, 3] = GAP
     q = tuple(solve(IIWA, above, near=BENT.tolist()).tolist())
-    both = Lockstep(laws.press, {"force": FORCE}, command=CommandMode.WRENCH, control=YIELDING, q=q)
+    both = Lockstep(laws.press, {"force": FORCE}, command=CommandMode.WRENCH, control=COMPLIANT, q=q)
     both.run(3.0)
     forces = np.array([state.wrench[2] for state in both.track])
     assert forces[0] == 0.0, "it begins above the table"
@@ -96,7 +96,7 @@ def far_too_fast(both: Lockstep) -> None:
     ("wild", "words"),
     [
         (step, ("velocity limited", "acceleration limited")),
-        (no_number, ("no finite number",)),
+        (no_number, ("not finite",)),
         (far_too_fast, ("velocity limited", "position limited")),
     ],
 )

@@ -8,20 +8,19 @@ from math import cos, pi
 import numpy as np
 import pytest
 
-from heptarm.fri import messages as m
-from heptarm.fri.version import Version
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.version import Version
 from heptarm.model.kinematics import forward
+from heptarm.sim.fri.controller import Controller
+from heptarm.sim.fri.overlay import MotionOverlay, control_mode
+from heptarm.sim.fri.sessions import PlantArm
+from heptarm.sim.fri.settings import OverlayEnded, SessionConfiguration
+from heptarm.sim.planning.command import TICK_NS
+from heptarm.sim.plant.plant import Plant
 from heptarm.values.arrays import Array
-from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, Position
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.controller import Controller
-from heptarm.virtual.fri.events import OverlayEnded
-from heptarm.virtual.fri.overlay import MotionOverlay
-from heptarm.virtual.fri.plant_arm import PlantArm
-from heptarm.virtual.fri.standalone import control_of
-from heptarm.virtual.plant import Plant
-from heptarm.virtual.tick import TICK_NS
-from tests.virtual_fri.rig import READY, Client, Law, State, mirror
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
+from heptarm.values.mode.mode import Mode, Position
+from tests.sim_fri.rig import READY, Client, Law, State, mirror
 
 FLOATING = JointImpedance(0.0)
 
@@ -36,7 +35,7 @@ class World:
     def __post_init__(self) -> None:
         self.plant = Plant("iiwa14", q=READY)
         self.arm = PlantArm(self.plant)
-        self.controller = Controller(Configuration(Version.V1_15, self.period), self.arm.robot)
+        self.controller = Controller(SessionConfiguration(Version.V1_15, self.period), self.arm.robot)
         self.answer: bytes | None = None
         self.q: list[Array] = []
         self.ends: list[OverlayEnded] = []
@@ -66,7 +65,7 @@ class World:
         while self.controller.state is not State.MONITORING_READY:
             self.run(1)
         self.arm.hold(control)
-        self.controller.start(MotionOverlay(mode, control_of(control)))
+        self.controller.start(MotionOverlay(mode, control_mode(control)))
         while self.controller.state is not State.COMMANDING_ACTIVE:
             self.run(1)
 

@@ -10,24 +10,23 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from heptarm.fri.limits import Limits
-from heptarm.fri.messages import CommandMode
-from heptarm.fri.policy import Missing, Policy
-from heptarm.fri.version import Version
-from heptarm.io.shared import Block
+from heptarm.fri.guard.fallback import Missing, Policy
+from heptarm.fri.guard.joint_guard import Limits
+from heptarm.fri.loop import shared_memory as at
+from heptarm.fri.loop.cycle import Cycle, Law
+from heptarm.fri.loop.user_api import Output, Params, State
+from heptarm.fri.protocol.messages import CommandMode
+from heptarm.fri.protocol.version import Version
+from heptarm.io.shared import MemoryBlock
 from heptarm.model.kinematics import forward
-from heptarm.rt import Output, State
-from heptarm.rt import layout as at
-from heptarm.rt.cycle import Cycle, Law
-from heptarm.rt.params import Params
+from heptarm.sim.fri.sessions import PlantArm
+from heptarm.sim.fri.settings import SessionConfiguration, describe
+from heptarm.sim.plant.plant import Plant
+from heptarm.sim.runtime.standalone_fri import Standalone, StandaloneSettings
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.plant_arm import PlantArm
-from heptarm.virtual.fri.standalone import Settings, Standalone, words
-from heptarm.virtual.plant import Plant
-from tests.virtual_fri.rig import READY
-from tests.virtual_fri.rig import State as Session
+from tests.sim_fri.rig import READY
+from tests.sim_fri.rig import State as Session
 
 HERE = "127.0.0.1"
 EPOCH = 10**12
@@ -38,7 +37,7 @@ class Both:
     """Controller, plant and the client's loop, one after the other on the ticks' clock; between them is a network."""
 
     def __init__(self, law: Law | None) -> None:
-        block = Block(at.Layout.words(history=64, params=0))
+        block = MemoryBlock(at.Layout.words(history=64, params=0))
         block.unlink()
         self.layout = at.Layout(block, history=64, params=0)
         self.plant = Plant("iiwa14", q=READY)
@@ -55,15 +54,15 @@ class Both:
         self.socket.settimeout(20.0)
         self.said: list[str] = []
         self.track: list[Array] = []  # where the flange is, shape (3,) [m]
-        settings = Settings(
-            configuration=Configuration(Version.V2_5, 1),
+        settings = StandaloneSettings(
+            configuration=SessionConfiguration(Version.V2_5, 1),
             client=self.socket.getsockname(),
             port=0,
             command=CommandMode.CARTESIAN_POSE,
             speed=0.0,
         )
         self.controller = Standalone(
-            PlantArm(self.plant), settings, listener=lambda event: self.said.append(words(event))
+            PlantArm(self.plant), settings, listener=lambda event: self.said.append(describe(event))
         )
 
     def run(self, seconds: float) -> None:
@@ -90,7 +89,7 @@ class Both:
 
     @property
     def limited(self) -> list[str]:
-        return self.cycle.posing.guard.report.lines
+        return self.cycle.pose_commander.guard.report.lines
 
     @property
     def is_commanding(self) -> bool:
@@ -159,5 +158,5 @@ def test_a_step_of_half_a_metre_and_numbers_that_are_none() -> None:
         speeds = np.diff(np.array(both.track), axis=0) * 1e3
         assert 0.24 < np.linalg.norm(speeds, axis=1).max() < 0.26
         assert any("flange: velocity limited" in line and "0.25 allowed" in line for line in both.limited)
-        assert any("rotation: asked for no finite number" in line for line in both.limited)
+        assert any("rotation: target not finite" in line for line in both.limited)
         assert both.is_commanding and not any("overlay ended" in line for line in both.said)

@@ -6,15 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from heptarm.fri.messages import Quality
-from heptarm.virtual.fri.quality import LOST_PERIODS, LOST_TIME, Meter
+from heptarm.fri.protocol.messages import Quality
+from heptarm.sim.fri.quality import LOST_PERIODS, LOST_TIME, QualityMeter
 
 MS = 1_000_000
 
 
-def fed(receive_ms: int, answers: list[int | None]) -> Meter:
+def fed(receive_ms: int, answers: list[int | None]) -> QualityMeter:
     """A meter after receive periods that were answered after so many ns, or not at all."""
-    meter = Meter(receive_ms * MS)
+    meter = QualityMeter(receive_ms * MS)
     replies = []
     for period, latency in enumerate(answers):
         now = period * receive_ms * MS
@@ -53,7 +53,7 @@ def test_so_many_lost_or_late_in_a_hundred(lost: int, late: int, quality: Qualit
 
 
 def test_quality_is_earned() -> None:
-    meter = Meter(MS)
+    meter = QualityMeter(MS)
     classes = []
     for period in range(100):
         meter.asked(period, period * MS)
@@ -75,11 +75,11 @@ def test_silence_at_1_khz_is_noticed_after_26_ms() -> None:
 
 @pytest.mark.parametrize(("receive_ms", "window"), [(1, 100), (10, 100), (20, 50), (50, 20), (100, 20)])
 def test_the_window_lasts_about_a_second(receive_ms: int, window: int) -> None:
-    assert Meter(receive_ms * MS).window == window
+    assert QualityMeter(receive_ms * MS).window == window
 
 
 def test_an_answer_after_it_was_lost_changes_nothing() -> None:
-    meter = Meter(MS)
+    meter = QualityMeter(MS)
     meter.asked(0, 0)
     meter.advance(MS + LOST_TIME)
     assert meter.counts.lost == 1
@@ -105,7 +105,7 @@ def test_every_receive_period_is_judged_once_and_by_the_rule(
     counts = meter.counts
     assert counts.on_time + counts.late + counts.lost == len(answers)
     assert counts.on_time == sum(a is not None and a <= receive_ms * MS for a in answers)
-    share = meter.share
+    share = meter.fraction
     expected = (
         Quality.EXCELLENT
         if share >= 0.99 - 1e-12

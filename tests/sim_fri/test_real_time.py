@@ -6,21 +6,22 @@ import subprocess
 import sys
 from pathlib import Path
 
-from heptarm.fri.version import Version, recognise
-from tests.virtual_fri.rig import State
-from tests.virtual_fri.test_udp import Peer
+from heptarm.fri.protocol.version import Version, recognise
+from tests.sim_fri.rig import State
+from tests.sim_fri.test_udp import Peer
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = """
 import sys, threading
-from heptarm.fri.version import Version
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.standalone import Settings, Standalone, words
-from tests.virtual_fri.rig import Arm
+from heptarm.fri.protocol.version import Version
+from heptarm.sim.fri.settings import SessionConfiguration
+from heptarm.sim.fri.settings import describe
+from heptarm.sim.runtime.standalone_fri import StandaloneSettings, Standalone
+from tests.sim_fri.rig import Arm
 
 client = ("127.0.0.1", int(sys.argv[1]))
-settings = Settings(configuration=Configuration(Version.V2_7, 10), client=client, port=0)
-standalone = Standalone(Arm(), settings, listener=lambda event: print(words(event)))
+settings = StandaloneSettings(configuration=SessionConfiguration(Version.V2_7, 10), client=client, port=0)
+standalone = Standalone(Arm(), settings, listener=lambda event: print(describe(event)))
 threading.Thread(target=lambda: (sys.stdin.read(), standalone.stop()), daemon=True).start()
 standalone.run()
 print("end", flush=True)

@@ -12,14 +12,13 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule, run_state_machine_as_test
 
 from heptarm.errors import CommandRejected
-from heptarm.fri import messages as m
-from heptarm.fri.codec import encode_command
-from heptarm.fri.version import Version
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.events import OverlayEnded, StateChanged
-from heptarm.virtual.fri.overlay import CONTROLS, MotionOverlay
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.codec import encode_command
+from heptarm.fri.protocol.version import Version
+from heptarm.sim.fri.overlay import CONTROLS, MotionOverlay
+from heptarm.sim.fri.settings import OverlayEnded, SessionConfiguration, StateChanged
 from tests.fri import strategies as messages
-from tests.virtual_fri.rig import READY, Rig, State, mirror
+from tests.sim_fri.rig import READY, Rig, State, mirror
 
 W, R, CW, CA = State.MONITORING_WAIT, State.MONITORING_READY, State.COMMANDING_WAIT, State.COMMANDING_ACTIVE
 LEGAL = {
@@ -47,7 +46,7 @@ class Session(RuleBasedStateMachine):
         latency=st.sampled_from([100_000, 900_000, 2_500_000]),
     )
     def begin(self, version: Version, receive: tuple[int, int], latency: int) -> None:
-        self.rig = Rig(configuration=Configuration(version, *receive), latency=latency)
+        self.rig = Rig(configuration=SessionConfiguration(version, *receive), latency=latency)
         self.started = 0
         self.rig.controller.open()
 

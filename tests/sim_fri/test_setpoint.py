@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from heptarm.sim.fri.limits import COAST, OVERSPEED, CommandInterpolator
 from heptarm.values.arrays import Array
 from heptarm.values.robot import robot
-from heptarm.virtual.fri.setpoint import COAST, OVERSPEED, SetPoint
 
 ARM = robot("iiwa14")
 ZERO = np.zeros(7)
 
 
-def along(set_point: SetPoint, ticks: int) -> Array:
+def along(set_point: CommandInterpolator, ticks: int) -> Array:
     """A1 in each of so many ticks."""
     return np.array([set_point.tick()[0] for _ in range(ticks)])
 
@@ -22,9 +22,9 @@ def a1(value: float) -> Array:
     return np.array((value, *(0.0,) * 6))
 
 
-def steady(ticks: int, speed: float, commands: int = 20) -> SetPoint:
+def steady(ticks: int, speed: float, commands: int = 20) -> CommandInterpolator:
     """A set-point that follows commands of a steady speed [rad/s]."""
-    set_point = SetPoint(ARM, ZERO, ticks=ticks)
+    set_point = CommandInterpolator(ARM, ZERO, ticks=ticks)
     for index in range(1, commands + 1):
         set_point.command(a1(index * ticks * 1e-3 * speed), after=ticks)
         if index < commands:
@@ -33,7 +33,7 @@ def steady(ticks: int, speed: float, commands: int = 20) -> SetPoint:
 
 
 def test_at_1_ms_a_command_is_taken_as_it_is() -> None:
-    set_point = SetPoint(ARM, ZERO, ticks=1)
+    set_point = CommandInterpolator(ARM, ZERO, ticks=1)
     for value in (1e-3, 1.5e-3, 0.0):
         set_point.command(a1(value), after=1)
         assert along(set_point, 1) == pytest.approx([value], abs=1e-15)
@@ -57,14 +57,14 @@ def test_it_goes_on_a_while_then_brakes_within_the_axes_acceleration(ticks: int)
 
 
 def test_it_coasts_no_further_than_a_limit() -> None:
-    set_point = SetPoint(ARM, a1(ARM.q_max[0] - 2e-3), ticks=1)
+    set_point = CommandInterpolator(ARM, a1(ARM.q_max[0] - 2e-3), ticks=1)
     set_point.command(a1(ARM.q_max[0] - 1e-3), after=1)
     path = along(set_point, 50)
     assert path[-1] == ARM.q_max[0] and path.max() == ARM.q_max[0]
 
 
 def test_it_comes_back_to_commands_without_a_leap() -> None:
-    set_point = SetPoint(ARM, ZERO, ticks=1)
+    set_point = CommandInterpolator(ARM, ZERO, ticks=1)
     set_point.command(a1(0.05), after=60)
     path = np.concatenate([[0.0], along(set_point, 1)])
     set_point.command(a1(0.05), after=1)

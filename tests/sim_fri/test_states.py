@@ -5,12 +5,11 @@ from __future__ import annotations
 import pytest
 
 from heptarm.errors import CommandRejected, LimitError, ModeConflict
-from heptarm.fri import messages as m
-from heptarm.fri.version import Version
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.events import QualityChanged
-from heptarm.virtual.fri.overlay import CONTROLS, MotionOverlay
-from tests.virtual_fri.rig import Rig, State
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.version import Version
+from heptarm.sim.fri.overlay import CONTROLS, MotionOverlay
+from heptarm.sim.fri.settings import QualityChanged, SessionConfiguration
+from tests.sim_fri.rig import Rig, State
 
 MODES = [(mode, control) for mode, controls in CONTROLS.items() for control in controls]
 
@@ -133,7 +132,7 @@ def test_a_session_is_opened_once_and_closed_as_often_as_one_likes() -> None:
     rig = Rig().ready()
     rig.controller.close()
     rig.controller.close()
-    with pytest.raises(ModeConflict, match="opened once"):
+    with pytest.raises(ModeConflict, match="opened only once"):
         rig.controller.open()
 
 
@@ -174,31 +173,31 @@ def test_a_pose_overlay_came_with_version_2(version: Version) -> None:
 
 def test_a_torque_overlay_needs_an_answer_every_5_ms() -> None:
     torque = MotionOverlay(m.CommandMode.TORQUE, m.ControlMode.JOINT_IMPEDANCE)
-    Rig(configuration=Configuration(Version.V1_15, 5)).active(torque)
-    with pytest.raises(CommandRejected, match="answer every 6 ms"):
-        Rig(configuration=Configuration(Version.V1_15, 2, 3)).active(torque)
+    Rig(configuration=SessionConfiguration(Version.V1_15, 5)).active(torque)
+    with pytest.raises(CommandRejected, match="got 6 ms"):
+        Rig(configuration=SessionConfiguration(Version.V1_15, 2, 3)).active(torque)
 
 
 @pytest.mark.parametrize(
     ("period", "multiplier", "text"),
     [
-        (0, 1, "every 1 to 100 ms"),
-        (101, 1, "every 1 to 100 ms"),
-        (1, 0, "answer every 0 ms"),
+        (0, 1, "period_ms must be in .*, got 0"),
+        (101, 1, "got 101"),
+        (1, 0, "multiplier must be in .*, got 0"),
         (1, 101, "101 ms"),
         (50, 3, "150 ms"),
     ],
 )
 def test_periods_have_limits(period: int, multiplier: int, text: str) -> None:
     with pytest.raises(LimitError, match=text):
-        Configuration(Version.V1_15, period, multiplier)
+        SessionConfiguration(Version.V1_15, period, multiplier)
 
 
 @pytest.mark.parametrize(
     ("period", "multiplier"), [(1, 1), (1, 2), (2, 5), (5, 1), (10, 1), (10, 10), (100, 1)]
 )
 def test_every_period_and_multiplier_reaches_active(period: int, multiplier: int) -> None:
-    rig = Rig(configuration=Configuration(Version.V1_15, period, multiplier)).active()
+    rig = Rig(configuration=SessionConfiguration(Version.V1_15, period, multiplier)).active()
     rig.run(500)
     assert rig.controller.state is State.COMMANDING_ACTIVE
     assert rig.controller.quality is m.Quality.EXCELLENT and rig.controller.meter.counts.lost == 0

@@ -11,24 +11,26 @@ import numpy as np
 import pytest
 
 from heptarm.errors import CommandRejected, ConnectFailed
-from heptarm.fri import messages as m
-from heptarm.fri.version import Version, recognise
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.version import Version, recognise
 from heptarm.io.clock import StepClock
-from heptarm.values.mode import CartesianImpedance, JointImpedance, Position
-from heptarm.virtual.fri.configuration import Configuration
-from heptarm.virtual.fri.events import (
+from heptarm.sim.fri.faults import FaultScenario, LinkFaults
+from heptarm.sim.fri.overlay import CONTROLS, MotionOverlay
+from heptarm.sim.fri.server import Server, source_port
+from heptarm.sim.fri.settings import (
     Event,
     OutputWritten,
     OverlayEnded,
     QualityChanged,
     Refused,
+    SessionConfiguration,
     StateChanged,
+    describe,
 )
-from heptarm.virtual.fri.faults import Faults, Scenario
-from heptarm.virtual.fri.overlay import CONTROLS, MotionOverlay
-from heptarm.virtual.fri.server import Server, source_port
-from heptarm.virtual.fri.standalone import PAUSE, Settings, Standalone, command_mode, words
-from tests.virtual_fri.rig import READY, Arm, Client, State, mirror
+from heptarm.sim.runtime.standalone_fri import PAUSE, Standalone, StandaloneSettings, command_mode
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
+from heptarm.values.mode.mode import Position
+from tests.sim_fri.rig import READY, Arm, Client, State, mirror
 
 HERE = "127.0.0.1"
 
@@ -57,7 +59,7 @@ class Peer:
 class Bench:
     """Server, arm and peer, turn by turn."""
 
-    def __init__(self, configuration: Configuration, scenario: Scenario | None = None) -> None:
+    def __init__(self, configuration: SessionConfiguration, scenario: FaultScenario | None = None) -> None:
         self.arm, self.clock, self.events = Arm(), StepClock(), list[Event]()
         self.peer = Peer(configuration.version, configuration.multiplier)
         self.configuration = configuration
@@ -108,8 +110,10 @@ class Bench:
 
 
 @contextmanager
-def bench(version: Version = Version.V1_15, *args: int, scenario: Scenario | None = None) -> Iterator[Bench]:
-    bench = Bench(Configuration(version, *args), scenario)
+def bench(
+    version: Version = Version.V1_15, *args: int, scenario: FaultScenario | None = None
+) -> Iterator[Bench]:
+    bench = Bench(SessionConfiguration(version, *args), scenario)
     try:
         yield bench
     finally:
@@ -204,7 +208,7 @@ def test_a_flood_holds_up_nothing() -> None:
 
 
 def test_a_client_that_dies_ends_commanding_and_its_successor_commands() -> None:
-    with bench(scenario=Scenario()) as b:
+    with bench(scenario=FaultScenario()) as b:
         b.active()
         b.run(60, answering=False)
         assert b.controller.state is State.MONITORING_WAIT and b.arm.action is None
@@ -217,7 +221,7 @@ def test_a_client_that_dies_ends_commanding_and_its_successor_commands() -> None
 
 
 def test_a_scenario_acts_on_both_directions_and_on_the_robot() -> None:
-    scenario = Scenario(from_client=Faults(duplicate=1.0), stops=(((0.5, 0.6), m.Safety.STOP_0),))
+    scenario = FaultScenario(from_client=LinkFaults(duplicate=1.0), stops=(((0.5, 0.6), m.Safety.STOP_0),))
     with bench(scenario=scenario) as b:
         b.active()
         b.run(700)
@@ -246,11 +250,11 @@ def test_beside_a_client_on_this_machine_any_port_will_do() -> None:
 
 @pytest.mark.parametrize(
     ("client", "text"),
-    [((HERE, 0), "port 0"), ((HERE, 70000), "70000"), (("no..host", 1), "no IPv4")],
+    [((HERE, 0), "got 0"), ((HERE, 70000), "70000"), (("no..host", 1), "no IPv4")],
 )
 def test_an_address_that_is_none(client: tuple[str, int], text: str) -> None:
     with pytest.raises(ConnectFailed, match=text):
-        Server(Configuration(Version.V1_15), Arm(), client=client, port=0)
+        Server(SessionConfiguration(Version.V1_15), Arm(), client=client, port=0)
 
 
 @pytest.mark.parametrize(
@@ -285,18 +289,20 @@ def offered(arm: Arm, **settings: object) -> Iterator[tuple[Standalone, Peer, li
     version = Version.V2_5
     peer = Peer(version)
     options = {
-        "configuration": Configuration(version),
+        "configuration": SessionConfiguration(version),
         "client": peer.address,
         "port": 0,
         "speed": 0.0,
     } | settings
-    standalone = Standalone(arm, Settings(**options), listener=lambda event: said.append(words(event)))  # type: ignore[arg-type]
-    try:
-        standalone.server.open()
-        yield standalone, peer, said
-    finally:
-        standalone.server.release()
-        peer.socket.close()
+    with peer.socket:
+        standalone = Standalone(
+            arm, StandaloneSettings(**options), listener=lambda event: said.append(describe(event))
+        )  # type: ignore[arg-type]
+        try:
+            standalone.server.open()
+            yield standalone, peer, said
+        finally:
+            standalone.server.release()
 
 
 def test_it_offers_an_overlay_as_soon_as_the_client_answers_well() -> None:
@@ -355,12 +361,18 @@ def test_it_offers_nothing_during_a_safety_stop() -> None:
 @pytest.mark.parametrize(
     ("settings", "text"),
     [
-        ({"command": m.CommandMode.TORQUE, "mode": Position()}, "TORQUE under control mode POSITION"),
         (
-            {"command": m.CommandMode.CARTESIAN_POSE, "configuration": Configuration(Version.V1_11)},
+            {"command": m.CommandMode.TORQUE, "mode": Position()},
+            "TORQUE is not possible in control mode POSITION",
+        ),
+        (
+            {"command": m.CommandMode.CARTESIAN_POSE, "configuration": SessionConfiguration(Version.V1_11)},
             "CARTESIAN_POSE",
         ),
-        ({"command": m.CommandMode.TORQUE, "configuration": Configuration(Version.V1_11, 10)}, "every 10 ms"),
+        (
+            {"command": m.CommandMode.TORQUE, "configuration": SessionConfiguration(Version.V1_11, 10)},
+            "got 10 ms",
+        ),
     ],
 )
 def test_what_does_not_go_together_is_refused_before_a_port_is_taken(
@@ -368,15 +380,15 @@ def test_what_does_not_go_together_is_refused_before_a_port_is_taken(
 ) -> None:
     with pytest.raises(CommandRejected, match=text), offered(Arm(), **settings):
         pass
-    with pytest.raises(CommandRejected, match="there are monitor, position"):
+    with pytest.raises(CommandRejected, match="one of monitor, position"):
         command_mode("velocity")
 
 
 def test_events_have_words() -> None:
     io = m.IoValue("A.B", m.IoType.BOOLEAN, m.IoDirection.OUTPUT, 1)
-    assert words(StateChanged(State.IDLE, State.MONITORING_WAIT)) == "session MONITORING_WAIT -> IDLE"
-    assert words(QualityChanged(m.Quality.GOOD, m.Quality.FAIR, 0.00025, 0.0001)) == (
+    assert describe(StateChanged(State.IDLE, State.MONITORING_WAIT)) == "session MONITORING_WAIT -> IDLE"
+    assert describe(QualityChanged(m.Quality.GOOD, m.Quality.FAIR, 0.00025, 0.0001)) == (
         "quality FAIR -> GOOD (latency 0.25 ms, jitter 0.10 ms)"
     )
-    assert words(OverlayEnded("cancelled", "")) == "overlay ended: cancelled"
-    assert words(Refused("no")) == "no" and words(OutputWritten(io)) == "output A.B = 1"
+    assert describe(OverlayEnded("cancelled", "")) == "overlay ended: cancelled"
+    assert describe(Refused("no")) == "no" and describe(OutputWritten(io)) == "output A.B = 1"

@@ -6,14 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from heptarm.fri import messages as m
-from heptarm.fri.codec import encode_monitoring
-from heptarm.fri.version import Version
-from heptarm.virtual.fri.writer import KEPT, Writer
+from heptarm.fri.protocol import messages as m
+from heptarm.fri.protocol.codec import encode_monitoring
+from heptarm.fri.protocol.version import Version
+from heptarm.sim.fri.monitoring import KEPT, MonitoringEncoder
 from tests.fri import strategies as messages
 
 WRITERS = {
-    version: Writer(version) for version in Version
+    version: MonitoringEncoder(version) for version in Version
 }  # as a session has one: what it kept must not leak
 
 
@@ -24,7 +24,7 @@ def test_octet_for_octet_as_the_codec(data: st.DataObject, version: Version) -> 
 
 
 def test_equal_signals_are_not_always_the_same() -> None:
-    writer = Writer(Version.V1_15)
+    writer = MonitoringEncoder(Version.V1_15)
     for value in (0.0, -0.0):
         signal = m.IoValue("A.B", m.IoType.ANALOG, m.IoDirection.INPUT, value)
         message = m.Monitoring(m.Header(0, 0), monitor=m.MonitorData(io=(signal,)))
@@ -32,7 +32,7 @@ def test_equal_signals_are_not_always_the_same() -> None:
 
 
 def test_it_forgets_before_it_remembers_too_much() -> None:
-    writer = Writer(Version.V1_15)
+    writer = MonitoringEncoder(Version.V1_15)
     for period in range(3 * KEPT):
         info = m.ConnectionInfo(m.SessionState.IDLE, m.Quality.POOR, period, 1)
         message = m.Monitoring(m.Header(period, 0), connection=info)
@@ -55,4 +55,4 @@ def test_it_forgets_before_it_remembers_too_much() -> None:
 )
 def test_what_a_version_cannot_carry_is_refused(version: Version, data: m.MonitorData, text: str) -> None:
     with pytest.raises(ValueError, match=text):
-        Writer(version).encode(m.Monitoring(m.Header(0, 0), monitor=data))
+        MonitoringEncoder(version).encode(m.Monitoring(m.Header(0, 0), monitor=data))
