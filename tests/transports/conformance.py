@@ -17,7 +17,7 @@ Pair = tuple[Transport, Transport]
 
 
 def receive(transport: Transport, size: int, *, chunk: int = 65536, seconds: float = 3.0) -> bytes:
-    """Receive that many octets."""
+    """Receive that many bytes."""
     buffer, got = memoryview(bytearray(chunk)), b""
     deadline = time.monotonic() + seconds
     while len(got) < size and time.monotonic() < deadline:
@@ -29,7 +29,7 @@ def receive(transport: Transport, size: int, *, chunk: int = 65536, seconds: flo
 class Conformance:
     """Subclasses say how to make a connected pair."""
 
-    MUCH = 8192  # times 256 octets
+    MUCH = 8192  # times 256 bytes
 
     def make(self) -> Pair:
         raise AssertionError("make() is the subclass's")
@@ -41,7 +41,7 @@ class Conformance:
         ours.close()
         theirs.close()
 
-    def test_octets_go_both_ways(self, pair: Pair) -> None:
+    def test_bytes_go_both_ways(self, pair: Pair) -> None:
         ours, theirs = pair
         ours.send(b"up")
         theirs.send(b"down")
@@ -49,7 +49,7 @@ class Conformance:
 
     @given(parts=st.lists(st.binary(max_size=300), max_size=20), chunk=st.integers(1, 400))
     @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.differing_executors])
-    def test_any_split_and_merge_keeps_the_octets(self, parts: list[bytes], chunk: int) -> None:
+    def test_any_split_and_merge_keeps_the_bytes(self, parts: list[bytes], chunk: int) -> None:
         ours, theirs = self.make()
         try:
             whole = b"".join(parts)

@@ -9,7 +9,7 @@ import pytest
 
 from heptarm.errors import ConnectFailed, ConnectionLost
 from heptarm.io import tcp
-from heptarm.io.memory import memory_pair
+from heptarm.io.transport import memory_pair
 from tests.transports.conformance import Conformance, Pair
 
 
@@ -22,7 +22,7 @@ class TestMemoryInPieces(Conformance):
     def make(self) -> Pair:
         return memory_pair(chunk=7)
 
-    MUCH = 4  # seven octets at a time take their time
+    MUCH = 4  # seven bytes at a time are slow
 
 
 class TestTcp(Conformance):
@@ -51,7 +51,7 @@ def test_a_port_that_is_taken() -> None:
 
 
 def test_nobody_comes() -> None:
-    with tcp.listening() as listener, pytest.raises(ConnectFailed, match="nobody connected"):
+    with tcp.listening() as listener, pytest.raises(ConnectFailed, match="no client connected"):
         listener.accept(timeout=0.01)
 
 
