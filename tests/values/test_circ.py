@@ -11,11 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.circ import Circ, arc, circ
-from heptarm.values.motion import lin
-from heptarm.values.orientation import Orientation
-from heptarm.values.pose import Pose, deg
-from heptarm.values.redundancy import Redundancy
+from heptarm.values.motion.circle import Circ, arc, circ
+from heptarm.values.motion.line import lin
+from heptarm.values.motion.orientation import Orientation
+from heptarm.values.pose import Pose, Redundancy, deg
 
 START = Pose.xyz_abc(0.6, 0.0, 0.4, *deg(180, 0, 180))
 VIA, END = Pose.at(0.65, 0.05, 0.4), Pose.at(0.6, 0.1, 0.4)
@@ -28,7 +27,7 @@ def test_an_arc_is_a_value() -> None:
         pickle.loads(pickle.dumps(motion))
     )
     assert isinstance(motion, Circ) and motion.orientation == Orientation("variable", "path")
-    assert motion.under(0.3).joints.velocity.tolist() == [0.3] * 7
+    assert motion.limited_to(0.3).dynamics.joint_speed.tolist() == [0.3] * 7
 
 
 @given(
@@ -73,9 +72,9 @@ def test_planes_turn_by_the_right_hand() -> None:
         (
             lambda: circ(VIA, END, orientation="joint", reference="path"),
             CommandRejected,
-            "relative to the path",
+            "has no reference",
         ),
-        (lambda: lin(END, reference="tool"), CommandRejected, "base, path"),
+        (lambda: lin(END, reference="tool"), CommandRejected, "'base', 'path', got 'tool'"),
         (lambda: circ(VIA, END, speed_mps=-1.0), LimitError, "speed_mps"),
         (lambda: circ(VIA, END, near=np.zeros(7), redundancy=Redundancy(0.1, 2)), CommandRejected, "near"),
         (lambda: arc(START, 6.28, centre=(0.5, 0, 0.4)), LimitError, "6.1"),

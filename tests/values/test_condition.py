@@ -9,9 +9,10 @@ from math import inf
 import pytest
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.values.condition import (
+from heptarm.values.condition.condition import (
     AllOf,
     AnyOf,
+    Condition,
     Inverted,
     OneOf,
     PathReached,
@@ -20,7 +21,7 @@ from heptarm.values.condition import (
     check_condition,
     condition_nodes,
 )
-from heptarm.values.force_condition import (
+from heptarm.values.condition.force import (
     ForceAbove,
     ForceOutside,
     JointTorqueOutside,
@@ -28,7 +29,7 @@ from heptarm.values.force_condition import (
     ShearForceAbove,
     TorqueOutside,
 )
-from heptarm.when import Condition, force, io, path, torque
+from heptarm.values.condition.signals import force, io, path, torque
 
 TOUCH = force.along("z") > 15
 HIT = abs(torque[3]) > 8
@@ -57,8 +58,8 @@ HIT = abs(torque[3]) > 8
         (io["Cell.Part"] > 5, SignalOutside("Cell.Part", -1e300, 5)),
         (io["Cell.Part"] < 5, SignalOutside("Cell.Part", 5, 1e300)),
         (path.after(0.1), PathReached(0.1)),
-        (path.before_end(0.15, seconds=0.3), PathReached(-0.15, -0.3, from_start=False)),
-        (path.before_end(), PathReached(0.0, from_start=False)),
+        (path.before_end(0.15, seconds=0.3), PathReached(-0.15, -0.3, reference="destination")),
+        (path.before_end(), PathReached(0.0, reference="destination")),
     ],
 )
 def test_a_comparison_makes_a_value(built: Condition, wanted: Condition) -> None:
@@ -91,7 +92,7 @@ def test_nodes_are_in_postfix_order_and_one_of_two_is_written_out() -> None:
         ~TOUCH,
         HIT,
         ~TOUCH & HIT,
-        (TOUCH ^ HIT).written_out,
+        (TOUCH ^ HIT).expanded,
     ]
     assert all(part == TOUCH ^ HIT for _, part in condition_nodes(TOUCH ^ HIT))
 

@@ -8,15 +8,21 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.values.condition import AnyOf
-from heptarm.values.contact import TapCounter, TapWatch, direction_of
-from heptarm.values.force_condition import JointTorqueOutside
-from heptarm.values.state import Joints, State, Torques
+from heptarm.skills.taps import TapCounter, TapWatch
+from heptarm.values.condition.condition import AnyOf
+from heptarm.values.condition.contact import direction_of
+from heptarm.values.condition.force import JointTorqueOutside
+from heptarm.values.state import Groups, Joints, State, Torques
 
 
 def state(tau_ext: list[float], dq: float = 0.0) -> State:
     zeros = np.zeros(7)
-    return State(Joints(1, zeros, zeros, np.full(7, dq)), Torques(1, zeros, np.array(tau_ext), zeros))
+    return State(
+        Groups(
+            joints=Joints(1, zeros, zeros, np.full(7, dq)),
+            torques=Torques(1, zeros, np.array(tau_ext), zeros),
+        )
+    )
 
 
 def test_directions() -> None:

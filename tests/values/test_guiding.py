@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.modes import CartesianImpedance, yielding
+from heptarm.values.mode.compliance import compliance
+from heptarm.values.mode.impedance import CartesianImpedance
+from heptarm.values.motion.motion import limited_to
 
 NAN = np.nan
 
@@ -20,7 +22,7 @@ def test_hand_guiding_keeps_what_it_is_given() -> None:
     assert guide == ha.hand_guide(
         q_max=[0.5] + [NAN] * 6, cartesian_velocity=0.2, at_limit="all", outside="pull"
     )
-    assert guide.under(0.1) is guide
+    assert limited_to(guide, 0.1) is guide
 
 
 @pytest.mark.parametrize(
@@ -40,14 +42,14 @@ def test_wrong_limits_are_refused(given: dict[str, object], complaint: str) -> N
 
 
 def test_yielding_is_soft_where_it_is_told_to_be() -> None:
-    mode = yielding("xa", frame="base", stiffness=3000.0, turning=200.0)
+    mode = compliance("xa", frame="base", stiffness=3000.0, turning=200.0)
     assert isinstance(mode, CartesianImpedance) and mode.frame == "base"
     assert mode.stiffness.tolist() == [0.0, 3000.0, 3000.0, 200.0, 200.0, 0.0]
     for wrong in ("", "xx", "xq", 3):
         with pytest.raises(ha.ShapeError, match="xyzabc"):
-            yielding(wrong)  # type: ignore[arg-type]
+            compliance(wrong)  # type: ignore[arg-type]
     with pytest.raises(ha.LimitError, match="stiffness"):
-        yielding("x", stiffness=6000.0)
+        compliance("x", stiffness=6000.0)
 
 
 # ------------------------------------------------------------------------------------------ trajectories

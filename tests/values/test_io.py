@@ -8,7 +8,7 @@ import pytest
 
 from heptarm.errors import CommandRejected, StaleState
 from heptarm.values.io import Signal, SignalValues
-from heptarm.values.state import State
+from heptarm.values.state import Groups, State
 
 SEEN = SignalValues(5, {"MediaFlange.UserButton": True, "MediaFlange.InputX3Pin3": False, "Cell.Level": 2.5})
 
@@ -25,12 +25,12 @@ def test_by_full_name_by_part_and_as_attribute() -> None:
 
 
 def test_a_value_of_a_state() -> None:
-    state = State(signals=SEEN)
+    state = State(Groups(io=SEEN))
     assert state.io.user_button and state.stamp == 5
-    assert state == State(signals=SignalValues(5, dict(SEEN))) and hash(state) == hash(
+    assert state == State(Groups(io=SignalValues(5, dict(SEEN)))) and hash(state) == hash(
         pickle.loads(pickle.dumps(state))
     )
-    assert state != State(signals=SignalValues(6, dict(SEEN)))
+    assert state != State(Groups(io=SignalValues(6, dict(SEEN))))
     with pytest.raises(StaleState, match="io"):
         _ = State().io
 

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.mode import CartesianImpedance, JointImpedance, Mode, Position, SineImpedance
-from heptarm.values.motion import BASE, TOOL
+from heptarm.values.frames import BASE, TOOL
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
+from heptarm.values.mode.mode import Mode, Position
+from heptarm.values.mode.sine import SineImpedance
 from heptarm.wire import messages as wire
 
 NAN = math.nan
@@ -87,7 +89,7 @@ def test_arrays_are_copied_and_frozen() -> None:
 
 def test_a_copy_with_other_values_is_checked_as_well() -> None:
     assert replace(SOFT, damping=1.0).stiffness.tolist() == SOFT.stiffness.tolist()
-    with pytest.raises(LimitError, match=r"damping\[0\] is 2"):
+    with pytest.raises(LimitError, match=r"damping\[0\] must .*got 2"):
         replace(SOFT, damping=2.0)
 
 
@@ -181,82 +183,98 @@ def six(index: int, value: float) -> list[float]:
 @pytest.mark.parametrize(
     ("make", "error", "text"),
     [
-        (lambda: JointImpedance([1.0] * 6), ShapeError, r"stiffness has shape \(6,\); \(7,\) is wanted"),
-        (lambda: JointImpedance("soft"), ShapeError, "7 numbers are wanted"),
-        (lambda: JointImpedance(-1), LimitError, r"stiffness\[0\] is -1; allowed is \[0, 5000\] Nm/rad"),
-        (lambda: JointImpedance([1.0] * 6 + [5001]), LimitError, r"stiffness\[6\] is 5001"),
-        (lambda: JointImpedance(NAN), LimitError, r"stiffness\[0\] is nan"),
-        (lambda: JointImpedance(1.0, damping=1.1), LimitError, r"damping\[0\] is 1.1; allowed is \[0, 1\]"),
-        (lambda: JointImpedance(1.0, damping=None), ShapeError, "7 numbers are wanted"),
-        (lambda: CartesianImpedance(300.0), ShapeError, r"6 numbers are wanted .three along the axes"),
-        (lambda: CartesianImpedance([1.0] * 7), ShapeError, r"stiffness has shape \(7,\)"),
-        (lambda: CartesianImpedance(six(2, 5001)), LimitError, r"\[2\] is 5001; allowed is \[0, 5000\] N/m"),
-        (lambda: CartesianImpedance(six(3, 301)), LimitError, r"\[3\] is 301; allowed is \[0, 300\] Nm/rad"),
-        (lambda: CartesianImpedance(six(0, -0.1)), LimitError, r"stiffness\[0\] is -0.1"),
-        (lambda: CartesianImpedance(six(5, NAN)), LimitError, r"stiffness\[5\] is nan"),
+        (lambda: JointImpedance([1.0] * 6), ShapeError, r"stiffness must have shape \(7,\), got \(6,\)"),
+        (lambda: JointImpedance("soft"), ShapeError, "must be 7 numbers"),
+        (lambda: JointImpedance(-1), LimitError, r"stiffness\[0\] must be in \[0, 5000\] Nm/rad, got -1"),
+        (lambda: JointImpedance([1.0] * 6 + [5001]), LimitError, r"stiffness\[6\] must .*got 5001"),
+        (lambda: JointImpedance(NAN), LimitError, r"stiffness\[0\] must .*got nan"),
+        (lambda: JointImpedance(1.0, damping=1.1), LimitError, r"damping\[0\] must be in \[0, 1\], got 1.1"),
+        (lambda: JointImpedance(1.0, damping=None), ShapeError, "must be 7 numbers"),
+        (lambda: CartesianImpedance(300.0), ShapeError, r"must be 6 numbers.*three along the axes"),
+        (lambda: CartesianImpedance([1.0] * 7), ShapeError, r"stiffness must have shape .*got \(7,\)"),
+        (lambda: CartesianImpedance(six(2, 5001)), LimitError, r"\[2\] must be in \[0, 5000\] N/m, got 5001"),
+        (lambda: CartesianImpedance(six(3, 301)), LimitError, r"\[3\] must be in \[0, 300\] Nm/rad, got 301"),
+        (lambda: CartesianImpedance(six(0, -0.1)), LimitError, r"stiffness\[0\] must .*got -0.1"),
+        (lambda: CartesianImpedance(six(5, NAN)), LimitError, r"stiffness\[5\] must .*got nan"),
         (
             lambda: CartesianImpedance(damping=0.05),
             LimitError,
-            r"damping\[0\] is 0.05; allowed is \[0.1, 1\]",
+            r"damping\[0\] must be in \[0.1, 1\], got 0.05",
         ),
-        (lambda: CartesianImpedance(damping=[True] * 6), ShapeError, "6 numbers are wanted"),
-        (lambda: CartesianImpedance(nullspace_stiffness=-1), LimitError, "nullspace_stiffness is -1"),
-        (lambda: CartesianImpedance(nullspace_stiffness=NAN), LimitError, "nullspace_stiffness is nan"),
-        (lambda: CartesianImpedance(nullspace_damping=0.2), LimitError, r"allowed is \[0.3, 1\]"),
-        (lambda: CartesianImpedance(additional_force=six(1, 501)), LimitError, r"allowed is \[-500, 500\] N"),
-        (lambda: CartesianImpedance(max_force=six(4, -1)), LimitError, r"allowed is \[0, 1e\+06\] Nm"),
-        (lambda: CartesianImpedance(max_force=[math.inf] * 6), LimitError, r"max_force\[0\] is inf"),
+        (lambda: CartesianImpedance(damping=[True] * 6), ShapeError, "must be 6 numbers"),
+        (lambda: CartesianImpedance(nullspace_stiffness=-1), LimitError, "nullspace_stiffness must .*got -1"),
+        (
+            lambda: CartesianImpedance(nullspace_stiffness=NAN),
+            LimitError,
+            "nullspace_stiffness must .*got nan",
+        ),
+        (lambda: CartesianImpedance(nullspace_damping=0.2), LimitError, r"must be in \[0.3, 1\]"),
+        (lambda: CartesianImpedance(additional_force=six(1, 501)), LimitError, r"must be in \[-500, 500\] N"),
+        (lambda: CartesianImpedance(max_force=six(4, -1)), LimitError, r"must be in \[0, 1e\+06\] Nm"),
+        (lambda: CartesianImpedance(max_force=[math.inf] * 6), LimitError, r"max_force\[0\] must .*got inf"),
         (lambda: CartesianImpedance(max_force_stops=True), CommandRejected, "without a max_force"),
-        (lambda: CartesianImpedance(max_force_stops=1), ShapeError, "True or False is wanted"),
-        (lambda: CartesianImpedance(max_velocity=six(0, 0)), LimitError, r"allowed is \(0, 100\] m/s"),
-        (lambda: CartesianImpedance(max_deviation=six(5, 0)), LimitError, r"allowed is \(0, 100\] rad"),
-        (lambda: CartesianImpedance(max_deviation=0.1), ShapeError, r"max_deviation has shape \(\)"),
-        (lambda: CartesianImpedance(frame=""), ShapeError, "frame is ''; the name of a frame is wanted"),
-        (lambda: CartesianImpedance(frame="x" * 129), ShapeError, "up to 128 octets"),
-        (lambda: SineImpedance(JointImpedance(1.0)), ShapeError, "a CartesianImpedance is wanted"),
-        (lambda: SineImpedance(amplitude=six(0, -1)), LimitError, r"allowed is \[0, 500\] N"),
-        (lambda: SineImpedance(frequency=six(0, 16)), LimitError, r"allowed is \[0, 15\] Hz"),
+        (lambda: CartesianImpedance(max_force_stops=1), ShapeError, "must be True or False"),
+        (lambda: CartesianImpedance(max_velocity=six(0, 0)), LimitError, r"must be in \(0, 100\] m/s"),
+        (lambda: CartesianImpedance(max_deviation=six(5, 0)), LimitError, r"must be in \(0, 100\] rad"),
+        (
+            lambda: CartesianImpedance(max_deviation=0.1),
+            ShapeError,
+            r"max_deviation must have shape .*got \(\)",
+        ),
+        (lambda: CartesianImpedance(frame=""), ShapeError, "frame must be a name of 1 to 128 bytes, got ''"),
+        (lambda: CartesianImpedance(frame="x" * 129), ShapeError, "1 to 128 bytes"),
+        (lambda: SineImpedance(JointImpedance(1.0)), ShapeError, "must be a CartesianImpedance"),
+        (lambda: SineImpedance(amplitude=six(0, -1)), LimitError, r"must be in \[0, 500\] N"),
+        (lambda: SineImpedance(frequency=six(0, 16)), LimitError, r"must be in \[0, 15\] Hz"),
         (
             lambda: SineImpedance(phase=six(3, -0.1)),
             LimitError,
-            r"phase\[3\] is -0.1; allowed is \[0, 6.3\] rad",
+            r"phase\[3\] must be in \[0, 6.3\] rad, got -0.1",
         ),
-        (lambda: SineImpedance(bias=six(3, 501)), LimitError, r"allowed is \[-500, 500\] Nm"),
-        (lambda: SineImpedance(force_limit=six(3, -1)), LimitError, r"force_limit\[3\] is -1"),
-        (lambda: SineImpedance(position_limit=six(3, 101)), LimitError, r"allowed is \[0, 100\] rad"),
-        (lambda: SineImpedance(rise_time=-1.0), LimitError, r"rise_time is -1; allowed is \[0, 1e\+06\] s"),
-        (lambda: SineImpedance(fall_time=NAN), LimitError, "fall_time is nan; allowed"),
-        (lambda: SineImpedance(hold_time="long"), ShapeError, "one number is wanted"),
+        (lambda: SineImpedance(bias=six(3, 501)), LimitError, r"must be in \[-500, 500\] Nm"),
+        (lambda: SineImpedance(force_limit=six(3, -1)), LimitError, r"force_limit\[3\] must .*got -1"),
+        (lambda: SineImpedance(position_limit=six(3, 101)), LimitError, r"must be in \[0, 100\] rad"),
+        (lambda: SineImpedance(rise_time=-1.0), LimitError, r"rise_time must be in \[0, 1e\+06\] s, got -1"),
+        (lambda: SineImpedance(fall_time=NAN), LimitError, "fall_time must .*got nan"),
+        (lambda: SineImpedance(hold_time="long"), ShapeError, "must be a number"),
         (
             lambda: SineImpedance(rise_time=2, fall_time=2, total_time=3),
             CommandRejected,
-            "take 4 s; total_time is 3",
+            "at least .* = 4 s, got 3 s",
         ),
         (lambda: SineImpedance(stay_active=True), CommandRejected, "a pattern without an end"),
-        (lambda: SineImpedance.force(z="down"), ShapeError, "6 numbers are wanted"),
-        (lambda: SineImpedance.force(c=1, stiffness=400), LimitError, r"stiffness\[3\] is 400"),
+        (lambda: SineImpedance.force(z="down"), ShapeError, "must be 6 numbers"),
+        (lambda: SineImpedance.force(c=1, stiffness=400), LimitError, r"stiffness\[3\] must .*got 400"),
         (
             lambda: SineImpedance.sine("w", frequency=1, amplitude=1),
             ShapeError,
-            "direction is 'w'; allowed is one",
+            "direction must be one of .*got 'w'",
         ),
         (
             lambda: SineImpedance.sine(["x"], frequency=1, amplitude=1),
             ShapeError,
-            "allowed is one of x, y, z",
+            "must be one of x, y, z",
         ),
-        (lambda: SineImpedance.sine("x", frequency=NAN, amplitude=1), LimitError, r"frequency\[0\] is nan"),
+        (
+            lambda: SineImpedance.sine("x", frequency=NAN, amplitude=1),
+            LimitError,
+            r"frequency\[0\] must .*got nan",
+        ),
         (lambda: SineImpedance.lissajous("zx", frequency=1, amplitude=1), ShapeError, "one of xy, xz, yz"),
-        (lambda: SineImpedance.lissajous("xy", frequency=16, amplitude=1), LimitError, "frequency is 16"),
+        (
+            lambda: SineImpedance.lissajous("xy", frequency=16, amplitude=1),
+            LimitError,
+            "frequency must .*got 16",
+        ),
         (
             lambda: SineImpedance.spiral("xy", frequency=1, amplitude=1, total_time=0),
             LimitError,
-            r"total_time is 0; allowed is \(0, 1e\+06\] s",
+            r"total_time must be in \(0, 1e\+06\] s, got 0",
         ),
         (
             lambda: SineImpedance.spiral("xy", frequency=1, amplitude=1, total_time=None),
             LimitError,
-            "total_time is not given",
+            "total_time must be a number",
         ),
     ],
 )

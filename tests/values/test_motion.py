@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import pickle
 from collections.abc import Callable
@@ -13,23 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.limits import Blending, CartesianDynamics, JointDynamics
-from heptarm.values.motion import (
-    BASE,
-    Hold,
-    Lin,
-    LinRel,
-    Motion,
-    Ptp,
-    PtpPose,
-    hold,
-    lin,
-    lin_rel,
-    ptp,
-    ptp_home,
-)
-from heptarm.values.pose import Pose, deg
-from heptarm.values.redundancy import Redundancy
+from heptarm.values.frames import BASE
+from heptarm.values.motion.dynamics import Blending, Dynamics
+from heptarm.values.motion.line import Lin, LinRel, lin, lin_rel
+from heptarm.values.motion.motion import Hold, Motion, hold, limited_to
+from heptarm.values.motion.ptp import Ptp, PtpPose, ptp, ptp_home
+from heptarm.values.motion.spline import spl
+from heptarm.values.pose import Pose, Redundancy, deg
 
 Q = deg(0, 30, 0, -90, 0, 60, 0)
 POSE = Pose.xyz_abc(0.5, 0.0, 0.3, *deg(180, 0, 180))
@@ -77,11 +68,10 @@ def test_types() -> None:
 
 def test_what_is_not_given_keeps_the_default() -> None:
     motion = lin(POSE)
-    assert motion.path == CartesianDynamics()
-    assert motion.joints == JointDynamics()
+    assert motion.dynamics == Dynamics()
     assert motion.blending == Blending()
-    assert np.isnan(motion.joints.velocity).all()
-    assert math.isnan(motion.path.velocity)
+    assert np.isnan(motion.dynamics.joint_speed).all()
+    assert math.isnan(motion.dynamics.speed_mps)
     assert motion.near is None
 
 
@@ -94,7 +84,7 @@ def test_arrays_are_copied_and_frozen() -> None:
     with pytest.raises(ValueError, match="read-only"):
         motion.q[0] = 1.0
     with pytest.raises(ValueError, match="read-only"):
-        motion.joints.velocity[0] = 1.0
+        motion.dynamics.joint_speed[0] = 1.0
 
 
 def test_units_of_the_factories() -> None:
@@ -113,14 +103,16 @@ def test_units_of_the_factories() -> None:
         blend_m=0.5,
         blend_rad=0.6,
     )
-    assert motion.path == CartesianDynamics(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    dynamics = motion.dynamics
+    assert (dynamics.speed_mps, dynamics.acceleration_mps2, dynamics.jerk_mps3) == (1.0, 2.0, 3.0)
+    assert (dynamics.speed_radps, dynamics.acceleration_radps2, dynamics.jerk_radps3) == (4.0, 5.0, 6.0)
     assert motion.blending == Blending(0.4, 0.5, 0.6)
-    assert motion.joints.velocity.tolist() == [0.1] * 7
-    assert motion.joints.acceleration.tolist() == [0.2] * 7
-    assert motion.joints.jerk.tolist() == [0.3] * 7
+    assert motion.dynamics.joint_speed.tolist() == [0.1] * 7
+    assert motion.dynamics.joint_acceleration.tolist() == [0.2] * 7
+    assert motion.dynamics.joint_jerk.tolist() == [0.3] * 7
     relative = lin_rel(1.0, 2.0, 3.0, 0.1, 0.2, 0.3, frame="table", moving="gripper", jerk_radps3=7.0)
     assert relative.offset == Pose.xyz_abc(1.0, 2.0, 3.0, 0.1, 0.2, 0.3)
-    assert (relative.frame, relative.moving, relative.path.orientation_jerk) == ("table", "gripper", 7.0)
+    assert (relative.frame, relative.moving, relative.dynamics.jerk_radps3) == ("table", "gripper", 7.0)
 
 
 @given(st.one_of(st.none(), st.floats(0.01, 1.0)), st.floats(0.01, 1.0))
@@ -128,75 +120,110 @@ def test_a_ceiling_only_slows_down(speed: float | None, ceiling: float) -> None:
     joints = (ptp(Q, speed=speed), ptp_home(speed=speed))
     for motion in (*joints, lin(POSE, joint_speed=speed), lin_rel(z=0.1, joint_speed=speed)):
         expected = ceiling if speed is None else min(speed, ceiling)
-        limited = motion.under(ceiling)
+        limited = limited_to(motion, ceiling)
         assert not isinstance(limited, Hold)
         if ceiling < 1.0:
-            assert limited.joints.velocity.tolist() == [expected] * 7
+            assert limited.dynamics.joint_speed.tolist() == [expected] * 7
         assert type(limited) is type(motion)
-    assert hold(1.0).under(ceiling) == hold(1.0)
+    assert limited_to(hold(1.0), ceiling) == hold(1.0)
 
 
 @pytest.mark.parametrize(
     ("make", "error", "text"),
     [
-        (lambda: ptp([1, 2]), ShapeError, r"q has shape \(2,\); \(7,\) is wanted"),
-        (lambda: ptp([[0.0] * 7]), ShapeError, r"q has shape \(1, 7\)"),
-        (lambda: ptp("home"), ShapeError, "7 numbers are wanted"),
-        (lambda: ptp(None), ShapeError, "7 numbers are wanted"),
-        (lambda: ptp([None] * 7), ShapeError, "7 numbers are wanted"),
-        (lambda: ptp([True] * 7), ShapeError, "7 numbers are wanted"),
-        (lambda: ptp([0.0] * 6 + [NAN]), LimitError, r"q\[6\] is nan"),
-        (lambda: ptp([math.inf] + [0.0] * 6), LimitError, r"q\[0\] is inf"),
-        (lambda: ptp(Q, speed=0), LimitError, r"speed\[0\] is 0; allowed is \(0, 1\]"),
-        (lambda: ptp(Q, speed=1.1), LimitError, r"speed\[0\] is 1.1; allowed is \(0, 1\]"),
-        (lambda: ptp(Q, speed=NAN), LimitError, r"speed\[0\] is nan"),
-        (lambda: ptp(Q, speed=[0.1] * 6), ShapeError, r"speed has shape \(6,\)"),
-        (lambda: ptp(Q, acceleration=[0.1] * 6 + [2]), LimitError, r"acceleration\[6\] is 2"),
-        (lambda: ptp(Q, jerk=-1), LimitError, r"jerk\[0\] is -1"),
-        (lambda: ptp(Q, blend_rel=1.5), LimitError, r"blend_rel is 1.5; allowed is \[0, 1\]"),
-        (lambda: ptp(Q, blend_m=-0.1), LimitError, r"blend_m is -0.1; allowed is \[0, 2\] m"),
-        (lambda: ptp(Q, blend_rad="much"), ShapeError, "blend_rad is 'much'; one number is wanted"),
-        (lambda: ptp(Q, near=Q), CommandRejected, "belong to a pose"),
-        (lambda: ptp(Q, redundancy=Redundancy(0.1)), CommandRejected, "belong to a pose"),
-        (lambda: ptp(Q, moving="flange"), CommandRejected, "belong to a pose"),
-        (lambda: ptp(POSE, near=[0.0] * 3), ShapeError, r"near has shape \(3,\)"),
+        (lambda: ptp([1, 2]), ShapeError, r"q must have shape \(7,\), got \(2,\)"),
+        (lambda: ptp([[0.0] * 7]), ShapeError, r"q must have shape .*got \(1, 7\)"),
+        (lambda: ptp("home"), ShapeError, "must be 7 numbers"),
+        (lambda: ptp(None), ShapeError, "must be 7 numbers"),
+        (lambda: ptp([None] * 7), ShapeError, "must be 7 numbers"),
+        (lambda: ptp([True] * 7), ShapeError, "must be 7 numbers"),
+        (lambda: ptp([0.0] * 6 + [NAN]), LimitError, r"q\[6\] must .*got nan"),
+        (lambda: ptp([math.inf] + [0.0] * 6), LimitError, r"q\[0\] must .*got inf"),
+        (lambda: ptp(Q, speed=0), LimitError, r"speed\[0\] must be in \(0, 1\], got 0"),
+        (lambda: ptp(Q, speed=1.1), LimitError, r"speed\[0\] must be in \(0, 1\], got 1.1"),
+        (lambda: ptp(Q, speed=NAN), LimitError, r"speed\[0\] must .*got nan"),
+        (lambda: ptp(Q, speed=[0.1] * 6), ShapeError, r"speed must have shape .*got \(6,\)"),
+        (lambda: ptp(Q, acceleration=[0.1] * 6 + [2]), LimitError, r"acceleration\[6\] must .*got 2"),
+        (lambda: ptp(Q, jerk=-1), LimitError, r"jerk\[0\] must .*got -1"),
+        (lambda: ptp(Q, blend_rel=1.5), LimitError, r"blend_rel must be in \[0, 1\], got 1.5"),
+        (lambda: ptp(Q, blend_m=-0.1), LimitError, r"blend_m must be in \[0, 2\] m, got -0.1"),
+        (lambda: ptp(Q, blend_rad="much"), ShapeError, "blend_rad must be a number, got 'much'"),
+        (lambda: ptp(Q, near=Q), CommandRejected, "near given with joint positions"),
+        (lambda: ptp(Q, redundancy=Redundancy(0.1)), CommandRejected, "leave no choice"),
+        (lambda: ptp(Q, moving="flange"), CommandRejected, "leave no choice"),
+        (lambda: ptp(POSE, near=[0.0] * 3), ShapeError, r"near must have shape .*got \(3,\)"),
         (lambda: ptp(POSE, near=Q, redundancy=Redundancy(0.1)), CommandRejected, "give one of them"),
-        (lambda: ptp(POSE, redundancy=0.3), ShapeError, "a Redundancy is wanted"),
-        (lambda: lin(Q), ShapeError, r"a Pose is wanted .build one"),
-        (lambda: lin(POSE, speed_mps=0), LimitError, r"speed_mps is 0; allowed is \(0, 10\] m/s"),
-        (lambda: lin(POSE, speed_mps=NAN), LimitError, "speed_mps is nan"),
-        (lambda: lin(POSE, speed_mps=math.inf), LimitError, "speed_mps is inf"),
-        (lambda: lin(POSE, speed_mps=True), ShapeError, "one number is wanted"),
-        (lambda: lin(POSE, acceleration_mps2=101), LimitError, "acceleration_mps2 is 101"),
-        (lambda: lin(POSE, jerk_mps3=-1), LimitError, "jerk_mps3 is -1"),
-        (lambda: lin(POSE, speed_radps=21), LimitError, r"speed_radps is 21; allowed is \(0, 20\] rad/s"),
-        (lambda: lin(POSE, acceleration_radps2=201), LimitError, "acceleration_radps2 is 201"),
-        (lambda: lin(POSE, jerk_radps3=2e5), LimitError, "jerk_radps3 is 200000"),
-        (lambda: lin(POSE, moving=""), ShapeError, "moving is ''; the name of a frame is wanted"),
-        (lambda: lin(POSE, moving="x" * 129), ShapeError, "up to 128 octets"),
-        (lambda: lin(POSE, moving=3), ShapeError, "the name of a frame is wanted"),
-        (lambda: lin_rel(z="down"), ShapeError, "6 numbers are wanted"),
-        (lambda: lin_rel(z=NAN), LimitError, r"offset\[2\] is nan"),
-        (lambda: lin_rel(frame=""), ShapeError, "frame is ''"),
-        (lambda: LinRel(Q), ShapeError, "(?s)offset is .* a Pose is wanted"),
-        (lambda: hold(0), LimitError, r"seconds is 0; allowed is \(0, 1e\+06\] s"),
-        (lambda: hold(-1), LimitError, "seconds is -1"),
-        (lambda: hold(NAN), LimitError, "seconds is nan"),
-        (lambda: hold(2e6), LimitError, "seconds is 2e"),
-        (lambda: hold("long"), ShapeError, "one number is wanted"),
-        (lambda: ptp(Q).under(0.0), LimitError, r"speed is 0; allowed is \(0, 1\]"),
-        (lambda: hold().under(2.0), LimitError, "speed is 2"),
-        (lambda: CartesianDynamics(velocity=11.0), LimitError, "velocity is 11"),
-        (lambda: JointDynamics(velocity=Q), LimitError, r"velocity\[0\] is 0"),
-        (lambda: Blending(relative=2.0), LimitError, "relative is 2"),
-        (lambda: Redundancy(math.inf), LimitError, "e1 is inf"),
-        (lambda: Redundancy(status=8), LimitError, "status is 8; allowed is 0 to 7, or -1 for not given"),
-        (lambda: Redundancy(status=-2), LimitError, "status is -2"),
-        (lambda: Redundancy(turn=128), LimitError, "turn is 128"),
-        (lambda: Redundancy(turn=1.5), LimitError, "turn is 1.5"),
+        (lambda: ptp(POSE, redundancy=0.3), ShapeError, "must be a Redundancy"),
+        (lambda: lin(Q), ShapeError, r"(?s)must be a Pose.*build one"),
+        (lambda: lin(POSE, speed_mps=0), LimitError, r"speed_mps must be in \(0, 10\] m/s, got 0"),
+        (lambda: lin(POSE, speed_mps=NAN), LimitError, "speed_mps must .*got nan"),
+        (lambda: lin(POSE, speed_mps=math.inf), LimitError, "speed_mps must .*got inf"),
+        (lambda: lin(POSE, speed_mps=True), ShapeError, "must be a number"),
+        (lambda: lin(POSE, acceleration_mps2=101), LimitError, "acceleration_mps2 must .*got 101"),
+        (lambda: lin(POSE, jerk_mps3=-1), LimitError, "jerk_mps3 must .*got -1"),
+        (lambda: lin(POSE, speed_radps=21), LimitError, r"speed_radps must be in \(0, 20\] rad/s, got 21"),
+        (lambda: lin(POSE, acceleration_radps2=201), LimitError, "acceleration_radps2 must .*got 201"),
+        (lambda: lin(POSE, jerk_radps3=2e5), LimitError, "jerk_radps3 must .*got 200000"),
+        (lambda: lin(POSE, moving=""), ShapeError, "moving must be a name of 1 to 128 bytes, got ''"),
+        (lambda: lin(POSE, moving="x" * 129), ShapeError, "1 to 128 bytes"),
+        (lambda: lin(POSE, moving=3), ShapeError, "must be a name"),
+        (lambda: lin_rel(z="down"), ShapeError, "must be 6 numbers"),
+        (lambda: lin_rel(z=NAN), LimitError, r"offset\[2\] must .*got nan"),
+        (lambda: lin_rel(frame=""), ShapeError, "frame must be a name .*got ''"),
+        (lambda: LinRel(Q), ShapeError, "offset must be a Pose"),
+        (lambda: hold(0), LimitError, r"seconds must be in \(0, 1e\+06\] s, got 0"),
+        (lambda: hold(-1), LimitError, "seconds must .*got -1"),
+        (lambda: hold(NAN), LimitError, "seconds must .*got nan"),
+        (lambda: hold(2e6), LimitError, "seconds must .*got 2e"),
+        (lambda: hold("long"), ShapeError, "must be a number"),
+        (lambda: ptp(Q).limited_to(0.0), LimitError, r"speed must be in \(0, 1\], got 0"),
+        (lambda: limited_to(hold(), 2.0), LimitError, "speed must .*got 2"),
+        (lambda: Dynamics(speed_mps=11.0), LimitError, "speed_mps must .*got 11"),
+        (lambda: Dynamics(joint_speed=Q), LimitError, r"joint_speed\[0\] must .*got 0"),
+        (lambda: Blending(relative=2.0), LimitError, "relative must .*got 2"),
+        (lambda: Redundancy(math.inf), LimitError, "e1 must .*got inf"),
+        (lambda: Redundancy(status=8), LimitError, "status must be 0 to 7, or -1 for not given, got 8"),
+        (lambda: Redundancy(status=-2), LimitError, "status must .*got -2"),
+        (lambda: Redundancy(turn=128), LimitError, "turn must .*got 128"),
+        (lambda: Redundancy(turn=1.5), LimitError, "turn must .*got 1.5"),
     ],
 )
 def test_refuses_with_value_range_and_remedy(
+    make: Callable[[], object], error: type[Exception], text: str
+) -> None:
+    with pytest.raises(error, match=text):
+        make()
+
+DYNAMICS = Dynamics(speed_mps=0.1, joint_speed=0.3)
+
+
+def test_dynamics_are_shared_and_keywords_go_before_them() -> None:
+    assert lin(POSE, dynamics=DYNAMICS) == lin(POSE, speed_mps=0.1, joint_speed=0.3)
+    assert lin(POSE, dynamics=DYNAMICS, speed_mps=0.2).dynamics == Dynamics(speed_mps=0.2, joint_speed=0.3)
+    assert ptp(Q, dynamics=Dynamics(joint_speed=0.4), jerk=0.5).dynamics == Dynamics(
+        joint_speed=0.4, joint_jerk=0.5
+    )
+    assert list(DYNAMICS.given()) == ["speed_mps", "joint_speed"]
+
+
+def test_help_lists_every_keyword() -> None:
+    names = list(inspect.signature(lin).parameters)
+    assert names[:2] == ["pose", "near"] and {"dynamics", "speed_mps", "joint_jerk", "blend_rad"} <= set(names)
+    assert "speed" in inspect.signature(ptp).parameters and "speed_mps" not in inspect.signature(ptp).parameters
+
+
+@pytest.mark.parametrize(
+    ("make", "error", "text"),
+    [
+        (lambda: ptp(Q, dynamics=DYNAMICS), CommandRejected, "dynamics has speed_mps, which ptp does not have"),
+        (lambda: spl(POSE, dynamics=DYNAMICS), CommandRejected, "joint_speed, which spl does not have"),
+        (lambda: lin(POSE, dynamics=0.3), ShapeError, "dynamics must be a Dynamics, got 0.3"),
+        (lambda: lin(POSE, speed=0.3), TypeError, "unexpected keyword argument 'speed'; .*speed_mps"),
+        (lambda: ptp(Q, speed_mps=0.3), TypeError, "unexpected keyword argument 'speed_mps'"),
+        (lambda: Dynamics(speed=0.3), TypeError, "unexpected keyword argument 'speed'"),
+    ],
+)
+def test_limits_that_a_motion_does_not_have_are_refused(
     make: Callable[[], object], error: type[Exception], text: str
 ) -> None:
     with pytest.raises(error, match=text):

@@ -132,15 +132,15 @@ def test_frozen() -> None:
 @pytest.mark.parametrize(
     ("make", "error", "text"),
     [
-        (lambda: Pose.of((1, 2)), ShapeError, r"xyz has shape \(2,\); \(3,\) is wanted"),
-        (lambda: Pose.of((1, 2, 3), (0, 0, 1)), ShapeError, "quat has shape"),
-        (lambda: Pose.of((1, 2, 3), (0, 0, 0, 2)), ShapeError, "norm 2; 1 is wanted .divide it by its norm"),
-        (lambda: Pose.of((1, 2, 3), (0, 0, 0, 0)), ShapeError, "norm 0"),
-        (lambda: Pose.of((1, math.nan, 3)), LimitError, r"xyz\[1\] is nan"),
-        (lambda: Pose.of((1, 2, math.inf)), LimitError, r"xyz\[2\] is inf"),
-        (lambda: Pose.of(("a", "b", "c")), ShapeError, "3 numbers are wanted"),
-        (lambda: Pose.of((1, 2, 3), (0, 0, 0, math.nan)), LimitError, r"quat\[3\] is nan"),
-        (lambda: Pose.from_matrix(np.eye(3)), ShapeError, r"matrix has shape \(3, 3\)"),
+        (lambda: Pose.of((1, 2)), ShapeError, r"xyz must have shape \(3,\), got \(2,\)"),
+        (lambda: Pose.of((1, 2, 3), (0, 0, 1)), ShapeError, "quat must have shape"),
+        (lambda: Pose.of((1, 2, 3), (0, 0, 0, 2)), ShapeError, "norm 1, got 2 .*divide it by its norm"),
+        (lambda: Pose.of((1, 2, 3), (0, 0, 0, 0)), ShapeError, "norm 1, got 0"),
+        (lambda: Pose.of((1, math.nan, 3)), LimitError, r"xyz\[1\] must .*got nan"),
+        (lambda: Pose.of((1, 2, math.inf)), LimitError, r"xyz\[2\] must .*got inf"),
+        (lambda: Pose.of(("a", "b", "c")), ShapeError, "must be 3 numbers"),
+        (lambda: Pose.of((1, 2, 3), (0, 0, 0, math.nan)), LimitError, r"quat\[3\] must .*got nan"),
+        (lambda: Pose.from_matrix(np.eye(3)), ShapeError, r"matrix must have shape .*got \(3, 3\)"),
     ],
 )
 def test_refuses(make: object, error: type[Exception], text: str) -> None:

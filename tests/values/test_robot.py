@@ -24,15 +24,15 @@ def test_table(model: RobotModel) -> None:
 
 def test_check_names_axis_value_and_range() -> None:
     with pytest.raises(
-        LimitError, match=r"A4 is 125.00 deg; the LBR iiwa 14 R820 allows -120 to 120 deg"
+        LimitError, match=r"A4 must be in \[-120, 120\] deg on the LBR iiwa 14 R820, got 125.00 deg"
     ) as e:
         robot("iiwa14").check(deg(0, 0, 0, 125, 0, 0, 0), "items[0].motion.q")
     assert e.value.parameter == "items[0].motion.q[3]"
     assert e.value.code == 50
-    with pytest.raises(LimitError, match="A1 is nan"):
+    with pytest.raises(LimitError, match="A1 must .*got nan"):
         robot("iiwa14").check(np.full(7, np.nan))
 
 
 def test_unknown() -> None:
-    with pytest.raises(CommandRejected, match="no robot 'ur5'; there are iiwa7, iiwa14, med7, med14"):
+    with pytest.raises(CommandRejected, match="robot must be one of iiwa7, iiwa14, med7, med14, got 'ur5'"):
         robot("ur5")

@@ -11,7 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.motion import circ, ellipse, lin, ptp, spl, spline, spline_joints
+from heptarm.values.motion.circle import circ
+from heptarm.values.motion.line import lin
+from heptarm.values.motion.ptp import ptp
+from heptarm.values.motion.spline import ellipse, spl, spline, spline_joints
 from heptarm.values.pose import Pose, deg
 
 A, B, C = Pose.at(0.6, 0.0, 0.4), Pose.at(0.65, 0.05, 0.4), Pose.at(0.6, 0.1, 0.4)
@@ -21,16 +24,18 @@ Q = deg(0, 30, 0, -90, 0, 60, 0)
 def test_a_spline_is_a_value_and_a_pose_alone_is_a_curved_segment() -> None:
     motion = spline([A, spl(B, speed_mps=0.1, orientation="ignore"), lin(C), circ(B, A)], speed_mps=0.2)
     assert motion.segments[0] == spl(A) and motion.segments[1] != spl(B)
-    assert motion == pickle.loads(pickle.dumps(motion)) and hash(motion) == hash(pickle.loads(pickle.dumps(motion)))
-    assert motion.under(0.3).joints.velocity.tolist() == [0.3] * 7
-    assert motion.path.velocity == 0.2 and math.isnan(motion.segments[0].path.velocity)
+    assert motion == pickle.loads(pickle.dumps(motion)) and hash(motion) == hash(
+        pickle.loads(pickle.dumps(motion))
+    )
+    assert motion.limited_to(0.3).dynamics.joint_speed.tolist() == [0.3] * 7
+    assert motion.dynamics.speed_mps == 0.2 and math.isnan(motion.segments[0].dynamics.speed_mps)
 
 
 def test_points_of_a_joint_spline_keep_their_own_speed_under_the_ceiling() -> None:
     motion = spline_joints([Q, ptp(Q + 0.1, speed=0.3), ptp(Q, acceleration=0.2)], speed=0.8)
-    slow = motion.under(0.5)
-    assert [point.joints.velocity[0] for point in slow.points] == [0.5, 0.3, 0.5]
-    assert slow.points[2].joints.acceleration[0] == 0.2 and slow.joints.velocity[0] == 0.5
+    slow = motion.limited_to(0.5)
+    assert [point.dynamics.joint_speed[0] for point in slow.points] == [0.5, 0.3, 0.5]
+    assert slow.points[2].dynamics.joint_acceleration[0] == 0.2 and slow.dynamics.joint_speed[0] == 0.5
     assert motion == pickle.loads(pickle.dumps(motion))
 
 
@@ -49,10 +54,10 @@ def test_the_points_of_an_ellipse_lie_on_it(other: float, angle: float, normal: 
     motion = ellipse(A, other, centre=centre, plane=normal, angle=angle)
     across = np.cross(axis, first) / radius
     for segment in motion.segments:
-        at = segment.pose.xyz - centre  # type: ignore[union-attr]
+        at = segment.target.xyz - centre  # type: ignore[union-attr]
         assert at @ axis == pytest.approx(lever @ axis, abs=1e-9)
         assert (at @ first / radius**2) ** 2 + (at @ across / other) ** 2 == pytest.approx(1.0, abs=1e-9)
-    end = motion.segments[-1].pose.xyz - centre - (lever @ axis) * axis  # type: ignore[union-attr]
+    end = motion.segments[-1].target.xyz - centre - (lever @ axis) * axis  # type: ignore[union-attr]
     assert end == pytest.approx(math.cos(angle) * first + math.sin(angle) * other * across, abs=1e-9)
     assert len(motion.segments) == round(abs(angle) / (2 * math.pi) * 36)
 
@@ -79,7 +84,7 @@ def test_the_points_of_an_ellipse_lie_on_it(other: float, angle: float, normal: 
         (lambda: ellipse(A, 0.0, centre=(0.5, 0, 0.4)), LimitError, "other"),
         (lambda: ellipse(A, 0.1, centre=A.xyz), CommandRejected, "no length"),
         (lambda: ellipse(A, 0.1, centre=(0.5, 0, 0.4), angle=0.0), CommandRejected, "no length"),
-        (lambda: ellipse(A, 0.1, centre=(0.5, 0, 0.4), points=5), LimitError, "12 to 360"),
+        (lambda: ellipse(A, 0.1, centre=(0.5, 0, 0.4), points=5), LimitError, r"\[12, 360\], got 5"),
         (lambda: ellipse(A, 0.1, centre=(0.5, 0, 0.4), plane="zz"), CommandRejected, "zz"),
     ],
 )

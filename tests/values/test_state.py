@@ -8,25 +8,33 @@ import numpy as np
 import pytest
 
 from heptarm.errors import StaleState
-from heptarm.values.pose import Pose
-from heptarm.values.redundancy import Redundancy
+from heptarm.values.pose import Pose, Redundancy
 from heptarm.values.result import Cause, Result
-from heptarm.values.state import Cartesian, Joints, Motion, OperationMode, Safety, State, Torques, Wrench
+from heptarm.values.state import (
+    Cartesian,
+    Groups,
+    Joints,
+    MotionStatus,
+    OperationMode,
+    Safety,
+    State,
+    Torques,
+    Wrench,
+)
 
 SEVEN = np.arange(7.0)
 
 
 def full() -> State:
-    return State(
+    groups = Groups(
         joints=Joints(1_000, SEVEN, SEVEN + 1, SEVEN + 2),
         torques=Torques(2_000, SEVEN + 3, SEVEN + 4, SEVEN + 5),
-        cartesian=Cartesian(3_000, Pose.at(x=0.5), Pose.at(x=0.6), Redundancy(0.1, 2, 10)),
-        external=Wrench(2_500, np.array([1.0, 2, 3]), np.array([4.0, 5, 6])),
-        motion=Motion(2_600, id=7, progress=0.5),
-        status=Safety(500, OperationMode.AUT, ready_to_move=True),
-        sampled=10_000_000,
-        clock=lambda: 12_000_000,
+        pose=Cartesian(3_000, Pose.at(x=0.5), Pose.at(x=0.6), Redundancy(0.1, 2, 10)),
+        wrench=Wrench(2_500, np.array([1.0, 2, 3]), np.array([4.0, 5, 6])),
+        motion=MotionStatus(2_600, id=7, progress=0.5),
+        safety=Safety(500, OperationMode.AUT, ready_to_move=True),
     )
+    return State(groups, sampled=10_000_000, clock=lambda: 12_000_000)
 
 
 def test_short_names_reach_into_the_groups() -> None:

@@ -7,9 +7,9 @@ import pytest
 
 import heptarm as ha
 from heptarm.do import notify, set_output
-from heptarm.values.event import MotionEvent
-from heptarm.values.motion import Motion
-from heptarm.when import force, path
+from heptarm.values.condition.signals import force, path
+from heptarm.values.motion.motion import Motion, limited_to
+from heptarm.values.result import MotionEvent
 
 HERE = ha.Pose.at(0.5, 0.0, 0.4)
 THERE = ha.Pose.at(0.5, 0.1, 0.4)
@@ -33,7 +33,7 @@ def test_every_motion_takes_triggers_and_stays_what_it_was(motion: Motion) -> No
     assert [trigger.action for trigger in two.triggers] == [notify("touch"), set_output("LEDBlue")]
     assert two == motion.trigger(force > 10, notify("touch")).trigger(path.after(0.1), set_output("LEDBlue"))
     assert one not in (motion, two) and hash(one) != hash(two)
-    assert two.under(0.5).triggers == two.triggers
+    assert limited_to(two, 0.5).triggers == two.triggers
 
 
 def test_sixteen_are_enough() -> None:
@@ -45,9 +45,9 @@ def test_sixteen_are_enough() -> None:
 
 
 def test_what_is_no_trigger_is_refused() -> None:
-    with pytest.raises(ha.ShapeError, match="condition is wanted"):
+    with pytest.raises(ha.ShapeError, match="must be a condition"):
         ha.hold(1.0).trigger(5.0, notify())  # type: ignore[arg-type]
-    with pytest.raises(ha.ShapeError, match="action is wanted"):
+    with pytest.raises(ha.ShapeError, match="must be an action"):
         ha.hold(1.0).trigger(force > 10, "notify")  # type: ignore[arg-type]
     with pytest.raises(ha.ShapeError, match="128"):
         notify("x" * 129)
