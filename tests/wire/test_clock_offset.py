@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from heptarm.wire.clock_offset import ClockOffset
+from heptarm.wire.clock_sync import ClockOffset
 
 
 class Cabinet:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from heptarm.wire.transitions import markdown
+from heptarm.wire.states import markdown
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "session.md"
 

@@ -1,4 +1,4 @@
-"""The session machine: every way between states, any split of the octets, and whatever noise comes."""
+"""The session state machine: all transitions, any split of the bytes, and noise."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from heptarm.errors import LocalProtocolError, RemoteProtocolError
 from heptarm.wire.codes import Code
-from heptarm.wire.frames import MAX_WAITING, FrameReader, pack
+from heptarm.wire.frames import MAX_UNREAD, FrameReader, pack
 from heptarm.wire.messages import (
     HEADER,
     MAGIC,
@@ -32,7 +32,7 @@ from heptarm.wire.messages import (
     Subscribe,
 )
 from heptarm.wire.session import Received, Session, Side, StateReceived
-from heptarm.wire.transitions import TRANSITIONS, SessionState, symbol
+from heptarm.wire.states import TRANSITIONS, SessionState, symbol
 from tests.wire.pairs import open_pair, pour, welcome
 
 SYMBOLS = {symbol(kind) for kind in MESSAGES.values()}
@@ -166,7 +166,7 @@ def test_what_a_side_may_not_send() -> None:
 
 
 @pytest.mark.parametrize("kind", ONE_WAY, ids=lambda kind: kind.__name__)
-def test_numbers_become_the_octets_of_the_message_that_they_are(kind: type[OneWay]) -> None:
+def test_numbers_become_the_bytes_of_the_message_that_they_are(kind: type[OneWay]) -> None:
     body = kind.LAYOUT.pack(*range(1, 1 + len(kind.LAYOUT.unpack(bytes(kind.LAYOUT.size)))))
     message, numbers = kind.decode(body), kind.LAYOUT.unpack(body)
     (by_message, _), (by_numbers, cabinet) = open_pair(), open_pair()
@@ -247,7 +247,7 @@ def test_a_state_is_decoded_when_wanted() -> None:
         StateReceived(b"\xff\xff", 0).decode()
 
 
-# ------------------------------------------------------------------------------------ octets
+# ------------------------------------------------------------------------------------ bytes
 
 
 def conversation() -> tuple[bytes, list[object]]:
@@ -278,7 +278,7 @@ DATA, EVENTS = conversation()
 
 
 @given(st.lists(st.integers(0, len(DATA)), max_size=40))
-def test_any_split_of_the_octets_means_the_same(cuts: list[int]) -> None:
+def test_any_split_of_the_bytes_means_the_same(cuts: list[int]) -> None:
     client = asked()
     events: list[object] = []
     edges = [0, *sorted(cuts), len(DATA)]
@@ -288,9 +288,9 @@ def test_any_split_of_the_octets_means_the_same(cuts: list[int]) -> None:
     assert len(EVENTS) == 13
 
 
-def test_one_octet_at_a_time() -> None:
+def test_one_byte_at_a_time() -> None:
     client = asked()
-    assert [event for octet in DATA for event in pour(bytes([octet]), client)] == EVENTS
+    assert [event for byte in DATA for event in pour(bytes([byte]), client)] == EVENTS
 
 
 @given(st.binary(max_size=400))
@@ -327,12 +327,12 @@ def test_well_framed_noise_raises_nothing_but_remote_protocol_errors(
 @given(st.data())
 @settings(max_examples=200)
 def test_mutated_conversations_raise_nothing_but_remote_protocol_errors(data: st.DataObject) -> None:
-    octets = bytearray(DATA)
+    noisy = bytearray(DATA)
     for place, value in data.draw(st.lists(st.tuples(st.integers(0, len(DATA) - 1), st.integers(0, 255)))):
-        octets[place] = value
+        noisy[place] = value
     client = asked()
     try:
-        for event in pour(bytes(octets), client):
+        for event in pour(bytes(noisy), client):
             if isinstance(event, StateReceived):
                 event.decode()
     except RemoteProtocolError:
@@ -346,7 +346,7 @@ def test_a_frame_that_announces_too_much_is_refused_before_it_comes() -> None:
         reader.read()
 
 
-def test_another_protocol_is_refused_at_its_second_octet() -> None:
+def test_another_protocol_is_refused_at_its_second_byte() -> None:
     reader = FrameReader()
     reader.feed(b"GE")
     with pytest.raises(RemoteProtocolError):
@@ -362,12 +362,12 @@ def test_flags_are_reserved() -> None:
 
 def test_memory_is_bounded() -> None:
     reader = FrameReader()
-    reader.feed(bytes(MAX_WAITING))
+    reader.feed(bytes(MAX_UNREAD))
     with pytest.raises(LocalProtocolError):
         reader.feed(b"x")
 
 
-def test_consumed_octets_are_dropped() -> None:
+def test_consumed_bytes_are_dropped() -> None:
     reader = FrameReader()
     frame = pack(Ping.TYPE, bytes(1000), seq=0)
     for _ in range(500):
