@@ -37,7 +37,7 @@ if ! complete; then
 fi
 # Without pip of its own, which Debian keeps in a further package.
 [ -x $venv/bin/python ] || $python -m venv --system-site-packages --without-pip $venv
-.venv/bin/python -m pip --python $venv/bin/python install -q --disable-pip-version-check "numpy>=1.22,<3" "lazy-loader>=0.4" "pytest>=8" "pytest-timeout>=2.3" "hypothesis>=6.100" ||
+.venv/bin/python -m pip --python $venv/bin/python install -q --disable-pip-version-check "numpy>=1.22,<3" "lazy-loader>=0.4" "cloudpickle>=2.2" "pytest>=8" "pytest-timeout>=2.3" "hypothesis>=6.100" ||
     failed "numpy, pytest and hypothesis cannot be installed for $($venv/bin/python -V)"
 site=$($venv/bin/python -c 'import sysconfig; print(sysconfig.get_paths()["purelib"])')
 $venv/bin/python scripts/ros1_interfaces.py "$site" ros1/interfaces/control_msgs ros1/interfaces/tf2_msgs ros1/heptarm_msgs

@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import textwrap
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -110,7 +111,7 @@ def test_an_imported_law_runs_in_the_loop_and_follows_its_parameters(
             _until(client, np.subtract(IPO, 0.02))
 
 
-def test_a_law_of_this_very_function_is_taken_over_by_a_fork() -> None:
+def test_a_law_that_cannot_be_imported_goes_to_the_new_process_by_value() -> None:
     shift = 0.03
 
     def law(state: State, out: Output, params: Params) -> None:
@@ -121,6 +122,18 @@ def test_a_law_of_this_very_function_is_taken_over_by_a_fork() -> None:
         with controller.running():
             controller.active()
             _until(client, np.add(IPO, shift))
+
+
+def test_a_law_that_uses_what_belongs_to_this_process_is_refused() -> None:
+    lock = threading.Lock()
+
+    def law(state: State, out: Output, params: Params) -> None:
+        with lock:
+            out.q += 0.0
+
+    with pytest.raises(CommandRejected, match="cannot be sent to the loop's process.*lock") as error:
+        Client(0, law=law, realtime=False)
+    assert "not arms, locks or files" in error.value.hint
 
 
 def _until(client: Client, goal: np.ndarray) -> None:

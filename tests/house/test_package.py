@@ -31,4 +31,9 @@ def test_version_is_the_same_everywhere() -> None:
 
 def test_java_runtime_and_simulation_are_not_needed_by_the_core() -> None:
     needed = [text for text in importlib.metadata.requires("heptarm") or () if "extra ==" not in text]
-    assert sorted(text.split(">")[0].split("<")[0].strip() for text in needed) == ["cyclopts", "lazy-loader", "numpy"]
+    assert sorted(text.split(">")[0].split("<")[0].strip() for text in needed) == [
+        "cloudpickle",
+        "cyclopts",
+        "lazy-loader",
+        "numpy",
+    ]

@@ -91,6 +91,8 @@ class Client(Reader):
             raise CommandRejected(
                 f"history must be 16 to {1 << 20} states, got {history}", parameter="history", value=history
             )
+        name = process.importable(law)
+        sent = b"" if law is None or name else process.by_value(law)
         values, schema = Params.flat(params or {})
         try:
             wire = None if version is None else Version.of(version).value
@@ -110,12 +112,11 @@ class Client(Reader):
                     "limits": asdict(self._limits),
                     "pose_limits": asdict(pose_limits or PoseLimits()),
                     "policy": _plain(policy or Policy()),
-                    "law": process.importable(law),
+                    "law": name,
                     "params": schema,
                     "size": values.size,
                     "parent": os.getpid(),
                     "realtime": realtime,
-                    "lock": law is None or process.importable(law) is not None,
                     "cpu": cpu,
                 }
             )
@@ -126,7 +127,7 @@ class Client(Reader):
         self._frames: dict[str, list[float]] = {}
         self._closed = False
         try:
-            self._worker = process.start(block.path, law)
+            self._worker = process.Worker(block.path, sent)
             self._wait_for_loop(timeout)
         finally:
             block.unlink()

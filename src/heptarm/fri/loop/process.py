@@ -1,25 +1,27 @@
 """Process of the loop: start, real-time priority, receiving and answering datagrams.
 
-The loop is a new process if the law can be imported, otherwise a fork of the user's process; so the user's process does
-not delay answers.
+The loop is a new process, never a fork: the user's process does not delay its answers, and no lock that one of the
+user's threads holds at that moment can stop it. A law that the new process cannot import is sent to it by value.
 """
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import gc
 import importlib
 import json
-import multiprocessing
 import os
+import pickle
 import signal
+import struct
 import subprocess
 import sys
 import time
-import warnings
 from importlib.machinery import PathFinder
-from typing import Any, Protocol
+from typing import Any
 
+import cloudpickle
 import numpy as np
 
 from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost
@@ -46,15 +48,16 @@ BRAKING = 3.0
 _CHECK_EVERY = 256
 _PR_SET_TIMERSLACK = 29
 _MCL_CURRENT_FUTURE = 3
+#: Size of a law by value, ahead of it.
+_SIZE = struct.Struct("<q")
 
 
-def request_realtime(*, cpu: int | None = None, priority: int = PRIORITY, lock: bool = True) -> list[str]:
+def request_realtime(*, cpu: int | None = None, priority: int = PRIORITY) -> list[str]:
     """Request real-time priority, locked memory, short timer slack and one processor; stop garbage collection.
 
     Args:
         cpu: processor to run on; None for any.
         priority: priority of SCHED_FIFO.
-        lock: whether to lock the memory of the process.
 
     Returns:
         A text for each refused request, with its remedy.
@@ -75,12 +78,12 @@ def request_realtime(*, cpu: int | None = None, priority: int = PRIORITY, lock: 
     if sys.platform == "linux":
         libc = ctypes.CDLL(None, use_errno=True)
         libc.prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
-        if lock and libc.mlockall(_MCL_CURRENT_FUTURE) != 0:
+        if libc.mlockall(_MCL_CURRENT_FUTURE) != 0:
             refused.append(
                 f"memory not locked ({os.strerror(ctypes.get_errno()).lower()}): a page fault may delay an answer; "
                 "allow it with `memlock` in /etc/security/limits.conf"
             )
-    elif lock:
+    else:
         refused.append(f"memory not locked: not supported on {sys.platform}")
     sys.setswitchinterval(2e-4)
     gc.collect()
@@ -93,22 +96,6 @@ def _reason(error: BaseException) -> str:
     if isinstance(error, OSError) and error.strerror:
         return error.strerror.lower()
     return f"{sys.platform} has none"
-
-
-class Worker(Protocol):
-    """Started process of a loop."""
-
-    def is_alive(self) -> bool:
-        """Whether it runs."""
-        ...
-
-    def join(self, seconds: float) -> None:
-        """Wait for its end."""
-        ...
-
-    def kill(self) -> None:
-        """Kill it."""
-        ...
 
 
 def importable(law: Law | None) -> str | None:
@@ -124,33 +111,52 @@ def importable(law: Law | None) -> str | None:
     return f"{module}:{name}" if found is law else None
 
 
-def start(path: str, law: Law | None) -> Worker:
-    """Start a loop on the shared memory at `path`.
+def by_value(law: Law) -> bytes:
+    """Serialise a law that a new process cannot import, with the values that it uses.
 
     Raises:
-        CommandRejected: the law cannot be imported and this system cannot fork.
+        CommandRejected: it uses a value that belongs to this process, such as an arm, a lock or a file.
     """
-    if law is None or importable(law):
-        return _FreshProcess(path)
-    if "fork" not in multiprocessing.get_all_start_methods() or sys.platform == "darwin":
+    module = sys.modules.get(getattr(law, "__module__", None) or "")
+    foreign = (
+        module is not None
+        and module.__name__ != "__main__"
+        and PathFinder.find_spec(module.__name__.partition(".")[0]) is None
+    )
+    try:
+        if not foreign:
+            return bytes(cloudpickle.dumps(law))
+        cloudpickle.register_pickle_by_value(module)
+        try:
+            return bytes(cloudpickle.dumps(law))
+        finally:
+            cloudpickle.unregister_pickle_by_value(module)
+    except Exception as error:  # whatever the objects that it uses raise
         raise CommandRejected(
-            f"the law {getattr(law, '__qualname__', law)!r} cannot be imported by the loop's process",
+            f"the law {getattr(law, '__qualname__', law)!r} cannot be sent to the loop's process: {error}",
             parameter="law",
-            hint="define it at the top level of a module; this system cannot fork a process for it",
-        )
-    return _ForkedProcess(path, law)
+            hint="a law runs in a process of its own: let it use plain values and `params`, not arms, locks or files",
+        ) from error
 
 
-class _FreshProcess:
-    """New interpreter with the module path of this one."""
+class Worker:
+    """Process of a loop: a new interpreter with the module path of this one.
 
-    def __init__(self, path: str) -> None:
+    Args:
+        path: file of the shared memory.
+        law: law by value; empty: the configuration names the law, or there is none.
+    """
+
+    def __init__(self, path: str, law: bytes = b"") -> None:
         folders = os.pathsep.join(entry or os.getcwd() for entry in sys.path)
         self._process = subprocess.Popen(
             [sys.executable, "-m", "heptarm.fri.loop.process", path],
             env={**os.environ, "PYTHONPATH": folders, "OPENBLAS_NUM_THREADS": "1"},
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE,
         )
+        assert self._process.stdin is not None
+        with contextlib.suppress(BrokenPipeError), self._process.stdin as pipe:  # it may have ended already
+            pipe.write(_SIZE.pack(len(law)) + law)
 
     def is_alive(self) -> bool:
         """Whether it runs."""
@@ -167,32 +173,6 @@ class _FreshProcess:
         """Kill it."""
         self._process.kill()
         self._process.wait()
-
-
-class _ForkedProcess:
-    """Fork of this process, for laws that cannot be imported."""
-
-    def __init__(self, path: str, law: Law) -> None:
-        self._process = multiprocessing.get_context("fork").Process(
-            target=main, args=(path, law), daemon=True
-        )
-        # Python 3.12 warns if there are threads; the fork uses none of their locks
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)
-            self._process.start()
-
-    def is_alive(self) -> bool:
-        """Whether it runs."""
-        return self._process.is_alive()
-
-    def join(self, seconds: float) -> None:
-        """Wait for its end."""
-        self._process.join(seconds)
-
-    def kill(self) -> None:
-        """Kill it."""
-        self._process.kill()
-        self._process.join()
 
 
 class Loop:
@@ -350,17 +330,23 @@ def _imported(name: str | None) -> Law | None:
     return law
 
 
+def _received_law() -> Law | None:
+    """Read the law that `Worker` sent by value; None if it sent none."""
+    (size,) = _SIZE.unpack(sys.stdin.buffer.read(_SIZE.size))
+    law: Law | None = pickle.loads(sys.stdin.buffer.read(size)) if size else None
+    return law
+
+
 def _limits(plain: dict[str, Any]) -> Limits:
     made: dict[str, Any] = {name: tuple(v) if isinstance(v, list) else v for name, v in plain.items()}
     return Limits(**made)
 
 
-def main(path: str, law: Law | None = None) -> int:
-    """Run a loop.
+def main(path: str) -> int:
+    """Run a loop, with the law that standard input has by value, or that of the configuration.
 
     Args:
         path: file of the shared memory, with the configuration.
-        law: law of a forked process; a new process imports that of the configuration.
     """
     block = MemoryBlock(path=path)
     header = block.view(0, at.LATENCY)
@@ -374,13 +360,13 @@ def main(path: str, law: Law | None = None) -> int:
     config = json.loads(first.config.read() or "{}")
     header[at.PID] = os.getpid()
     try:
-        loop = Loop(first, config, law=law)
-    except (ConnectFailed, ImportError, AttributeError) as error:
+        loop = Loop(first, config, law=_received_law())
+    except (ConnectFailed, ImportError, AttributeError, pickle.UnpicklingError) as error:
         first.trouble.write(str(error))
         has_port = not isinstance(error, ConnectFailed) or error.parameter != "port"
         header[at.STATUS] = at.Status.FAILED if has_port else at.Status.NO_PORT
         return 1
-    refused = request_realtime(cpu=config["cpu"], lock=config["lock"]) if config["realtime"] else []
+    refused = request_realtime(cpu=config["cpu"]) if config["realtime"] else []
     first.refused.write("\n".join(refused))
     header[at.STATUS] = at.Status.RUNNING
     try:
