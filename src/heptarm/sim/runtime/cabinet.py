@@ -100,7 +100,7 @@ class VirtualCabinet:
         self.operator = SimulatedOperator(self.plant)
         for fault in options.fault:
             self.operator.schedule(fault)
-        self.loop = RealtimeLoop(self.plant.ring, self.tick, speed=options.speed)
+        self.loop = RealtimeLoop(self.plant.shared, self.tick, speed=options.speed)
         jvm.start(options.classpath, foreign=self.is_foreign)
         import jpype
 

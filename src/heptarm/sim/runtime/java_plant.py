@@ -361,7 +361,7 @@ class JavaPlant:
 
 def open_station(plant: Plant, sessions: Sessions) -> Any:
     """Give the plant and its FRI sessions to Java; returns heptarm.doubles.runtime.Station."""
-    memory = jpype.nio.convertToDirectBuffer(plant.ring.memory)
+    memory = jpype.nio.convertToDirectBuffer(plant.shared.memory)
     station = jpype.JClass("heptarm.doubles.runtime.Station").open(memory, JavaPlant(plant, sessions))
     plant.on_wake = station.timers.tick
     plant.on_safety = station.safetyChanged
