@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from heptarm.arm.watchdog import REPLAY
 from heptarm.errors import CommandRejected, LimitError, MotionAborted, ShapeError, StaleState
 from heptarm.values.arrays import Array, Value, within
 from heptarm.values.condition.condition import Condition
@@ -20,8 +21,6 @@ from heptarm.values.robot import RobotModel
 if TYPE_CHECKING:
     from heptarm.arm.arm import Arm
 
-#: Default of the longest gap between two targets [s]: longer than that of `Arm.servo`, since each target is computed.
-WATCHDOG = 0.3
 #: Longest time that the arm may need to settle at the end of a trajectory after its last target [s].
 _SETTLE = 2.0
 #: The arm has settled when no joint deviates more than this [rad].
@@ -55,7 +54,7 @@ def replay(
     pace: float = 1.0,
     approach: float = 0.2,
     rate: float = 100.0,
-    watchdog: float = WATCHDOG,
+    watchdog: float | None = None,
     mode: Mode | None = None,
     until: Condition | None = None,
     on_progress: Callable[[float], None] | None = None,
@@ -70,7 +69,8 @@ def replay(
         pace: by servo: factor on the taught speed; by spline: fraction of each axis' maximum, (0, 1].
         approach: speed of the motion to its start, a fraction of each axis' maximum in (0, 1].
         rate: targets per second [Hz].
-        watchdog: by servo: longest gap between two targets; a longer one stops the arm [s].
+        watchdog: by servo: longest gap between two targets; a longer one stops the arm [s]; None: five periods, at
+            least 0.3 s.
         mode: control mode; None: that of `using`, otherwise position.
         until: break condition that ends it.
         on_progress: called with the completed fraction, [0, 1], repeatedly once the start is reached.
@@ -90,6 +90,8 @@ def replay(
         within(pace, "pace", 0.0, 1.0, above=True)
     elif within(pace, "pace", 0.0, 100.0, above=True):
         _check_speed(trajectory, pace, arm.robot.dq_max * arm.speed)
+        period = 1.0 / within(rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
+        watchdog = REPLAY.time(watchdog, period=period)
     if float(np.abs(arm.wait_for_rest().q - trajectory.q[0]).max()) > _AT_START:
         arm.move(ptp(trajectory.q[0]), speed=approach)
     run = _Run(arm, trajectory, pace, mode, until, on_progress)
@@ -124,7 +126,7 @@ class _Run:
         deviation = max((_nearest(self.trajectory, q)[0] for q in seen), default=0.0)
         return Replay(handle.wait(), deviation)
 
-    def by_servo(self, rate: float, watchdog: float) -> Replay:
+    def by_servo(self, rate: float, watchdog: float | None) -> Replay:
         """Follow it by a stream of targets."""
         trajectory, per_second = self.trajectory, self.pace * self.arm.pace
         seen: list[tuple[float, Array]] = []

@@ -2718,6 +2718,7 @@ class TakeControl:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "any"
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"watchdog": (0.1, 10.0)}
 
     watchdog: float = 0.5
     on_lost: OnLost = OnLost.STOP
@@ -2805,6 +2806,7 @@ class Subscribe:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "any"
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"rate": (0.0, 1000.0)}
 
     groups: Groups
     rate: float
@@ -3079,6 +3081,7 @@ class SetOverride:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"value": (0.0, 1.0)}
 
     value: float
 
@@ -3591,6 +3594,7 @@ class ServoOpen:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"velocity": (0.0, 1.0), "acceleration": (0.0, 1.0), "min_trajectory_time": (0.001, 1.0), "goal_timeout": (0.1, 3600.0), "speed_timeout": (0.001, 10.0), "watchdog": (0.005, 2.0)}
 
     engine: ServoEngine = ServoEngine.SMART
     frame: str = ""
@@ -3684,6 +3688,7 @@ class ServoJoints:
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
     LAYOUT: ClassVar[Struct] = _ServoJoints_0
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"watchdog": (0.005, 2.0)}
 
     servo: int
     watchdog: float
@@ -3735,6 +3740,7 @@ class ServoJointsVelocity:
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
     LAYOUT: ClassVar[Struct] = _ServoJointsVelocity_0
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"watchdog": (0.005, 2.0)}
 
     servo: int
     watchdog: float
@@ -3789,6 +3795,7 @@ class ServoPose:
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
     LAYOUT: ClassVar[Struct] = _ServoPose_0
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"watchdog": (0.005, 2.0)}
 
     servo: int
     watchdog: float
@@ -4000,6 +4007,7 @@ class FriOpen:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"period": (0.001, 0.1), "timeout": (0.1, 60.0)}
 
     host: str
     port: int = 30200

@@ -19,6 +19,7 @@ from heptarm.arm.link.link import Link
 from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.arm.link.state_stream import GROUPS, StateFeed, States, StateSample, groups_of
 from heptarm.arm.translate.state import read_firing, read_result, read_robot, read_signals, read_state
+from heptarm.arm.watchdog import CONNECTION
 from heptarm.errors import (
     CommandRejected,
     ConnectionLost,
@@ -40,8 +41,6 @@ from heptarm.wire.messages import Message
 
 _log = logging.getLogger("heptarm.arm")
 
-#: Silence after which the cabinet counts a controller as lost, unless the client chooses another [s].
-WATCHDOG: float = wire.TakeControl().watchdog
 #: Time for the connection and for the answer to a request, unless the client chooses another [s].
 TIMEOUT = 5.0
 #: States per second, unless the client chooses another rate [Hz].
@@ -68,7 +67,7 @@ class Options:
     rate: float = STATE_RATE
     groups: tuple[str, ...] = GROUPS
     finishes: bool = False
-    watchdog: float = WATCHDOG
+    watchdog: float = CONNECTION.default
 
 
 #: FRI sessions whose last change is kept.
