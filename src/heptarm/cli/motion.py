@@ -187,7 +187,7 @@ def teach(
             how = "it is compliant now" if free else "hold the enabling switch of the hand guiding device"
             print(f"guide the arm: {how}")
         motion = hold(limit) if free else hand_guide()
-        whole = arm.teach(motion, mode=mode, timeout=limit / min(arm.pace, 1.0) + 1.0)
+        whole = arm.teach(motion, mode=mode, timeout=limit / min(arm.real_time_factor, 1.0) + 1.0)
     trajectory = whole.trimmed().thinned(tolerance=tolerance)
     file = trajectory.save(out)
     if access.as_json:
@@ -214,7 +214,7 @@ def replay(
         Literal["servo", "spline"],
         Parameter(help="With the recorded timing, or as one smooth spline motion of the cabinet."),
     ] = "servo",
-    pace: Annotated[
+    speed_scaling: Annotated[
         float,
         Parameter(help="By servo: factor on the recorded speed; by spline: fraction of the full speed."),
     ] = 0.5,
@@ -228,7 +228,7 @@ def replay(
     with connect(access.target) as arm:
         if not (arm.is_virtual or access.yes or confirm(f"Move the real {arm.robot.title} along {file}?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
-        done = arm.replay(trajectory, by=by, pace=pace)
+        done = arm.replay(trajectory, by=by, speed_scaling=speed_scaling)
     if access.as_json:
         emit({"cause": done.result.cause.value, "deviation_rad": done.deviation, "lag_s": done.lag})
     else:
