@@ -301,9 +301,7 @@ public final class Arm implements EventBus.Listener {
 
     /** Measured joint positions [rad]. */
     public double[] joints() {
-        double[] q = new double[7];
-        service.robot.sensors.readJoints(q, new double[7]);
-        return q;
+        return service.reader.joints().q;
     }
 
     /** Torques [Nm]. */

@@ -2,6 +2,12 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.List;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
+
 /** Motions that are commanded together; what is set on the batch holds for those of them that say nothing else. */
 public class MotionBatch extends RobotMotion<MotionBatch> {
     private final List<RobotMotion<?>> motions;
@@ -13,8 +19,13 @@ public class MotionBatch extends RobotMotion<MotionBatch> {
         this.motions = List.of(motions);
     }
 
-    /** For the simulation. */
-    public List<RobotMotion<?>> motions() {
+    @Override
+    public List<RobotMotion<?>> parts() {
         return motions;
+    }
+
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.kind = MotionKind.BATCH;
     }
 }
