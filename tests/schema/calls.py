@@ -15,7 +15,8 @@ from typing import Any
 import heptarm as ha
 from heptarm import Arm, Tool
 from heptarm.do import notify, set_output
-from heptarm.values.condition.signals import Force, force, io, path, torque
+from heptarm.values.condition.force import Force, force, torque
+from heptarm.values.condition.signals import io, path
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.motion.hand_guiding import hand_guide

@@ -7,7 +7,8 @@ import pytest
 
 import heptarm as ha
 from heptarm.do import notify, set_output
-from heptarm.values.condition.signals import force, path
+from heptarm.values.condition.force import force
+from heptarm.values.condition.signals import path
 from heptarm.values.motion.motion import Motion, limited_to
 from heptarm.values.result import MotionEvent
 

@@ -8,7 +8,8 @@ from math import isfinite
 from heptarm.arm.translate.conditions import condition_message
 from heptarm.errors import CommandRejected, HeptarmError, LimitError
 from heptarm.values.arrays import scalar, within
-from heptarm.values.condition.condition import Condition, PathReached, SignalOutside
+from heptarm.values.condition.condition import Condition
+from heptarm.values.condition.signals import PathReached, SignalOutside
 from heptarm.values.condition.trigger import Action, SetOutput, triggers_of
 from heptarm.values.io import Signal, SignalValue, find_signal
 from heptarm.values.motion.motion import Hold, Motion
