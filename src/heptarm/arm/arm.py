@@ -363,7 +363,7 @@ class Arm:
             check_timeout(timeout)
         self._connection.check_may_wait("arm.move()")
         self._connection.check_no_block("arm.move()")
-        if timeout is None and program.is_endless(motions):
+        if timeout is None and program.is_endless(motions, self._connection.robot):
             raise ShapeError(
                 "this program ends only when it is cancelled, so that move() would never return",
                 parameter="timeout",
