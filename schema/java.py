@@ -228,8 +228,8 @@ def _union(spec: Spec, union: Union) -> str:
     name, members = union.name, union.members
     lines = [BANNER, f"/** {union.doc} */", f"public abstract class {name} {{"]
     for one in _common(spec, union).values():
-        missing, value = ('""', "empty") if one.type.kind == "str" else ("Double.NaN", "NaN")
-        lines += [f"    /** The field of this name; {value} for a node without one. */"]
+        missing = {"str": '""', "struct": "null"}.get(one.type.kind, "Double.NaN")
+        lines += [f"    /** The field of this name; {missing} where there is none. */"]
         lines += [f"    public {java_type(one.type)} {one.name}() {{", f"        return {missing};", "    }", ""]
     lines += ["    public abstract int tag();", "", "    public abstract void write(Encoder out);", ""]
     lines += ["    public abstract void validate(String path) throws Violation;", ""]

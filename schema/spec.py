@@ -91,7 +91,7 @@ class Union:
     name: str
     doc: str
     members: list[tuple[int, str]]
-    #: Fields that some members have; in Java the union has a method for each, which returns "" or NaN for the others.
+    #: Fields that some members have; in Java the union has a method for each, which returns "", NaN or null for the others.
     common: tuple[str, ...] = ()
 
 

@@ -342,7 +342,6 @@ class JointImpedance:
 
     #: [Nm/rad]
     stiffness: tuple[float, ...]
-    #: Damping ratios
     damping: tuple[float, ...]
 
     def _write(self, out: list[bytes]) -> None:
@@ -366,21 +365,18 @@ class CartesianImpedance:
 
     #: [N/m, Nm/rad]
     stiffness: tuple[float, ...]
-    #: Damping ratios
     damping: tuple[float, ...]
     #: [Nm/rad]
     nullspace_stiffness: float
-    #: Damping ratio
     nullspace_damping: float
     #: [N, Nm]
     additional_force: tuple[float, ...]
-    #: NaN: unlimited [N, Nm]
+    #: NaN: off [N, Nm]
     max_force: tuple[float, ...] = (nan,) * 6
-    #: Whether reaching max_force ends the motion
     max_force_stops: bool = False
-    #: NaN: unlimited [m/s, rad/s]
+    #: exceeding it stops; NaN: off [m/s, rad/s]
     max_velocity: tuple[float, ...] = (nan,) * 6
-    #: NaN: unlimited [m, rad]
+    #: exceeding it stops; NaN: off [m, rad]
     max_deviation: tuple[float, ...] = (nan,) * 6
     #: Quaternion of the directions in the base; none: axes of the motion frame
     axes: tuple[float, ...] | None = None
@@ -428,19 +424,19 @@ class SineImpedance:
     phase: tuple[float, ...]
     #: [N, Nm]
     bias: tuple[float, ...]
-    #: NaN: unlimited [N, Nm]
+    #: [N, Nm]
     force_limit: tuple[float, ...] = (nan,) * 6
-    #: NaN: unlimited [m, rad]
+    #: [m, rad]
     position_limit: tuple[float, ...] = (nan,) * 6
-    #: NaN: not given [s]
+    #: [s]
     total_time: float = nan
     #: [s]
-    rise_time: float
-    #: NaN: not given [s]
+    rise_time: float = 0.0
+    #: [s]
     hold_time: float = nan
     #: [s]
-    fall_time: float
-    #: Whether the motion waits for the end of the pattern
+    fall_time: float = 0.0
+    #: hold on until the pattern has finished
     stay_active: bool = False
 
     def _write(self, out: list[bytes]) -> None:
@@ -821,24 +817,24 @@ _ServoTiming_0 = Struct(">ddd")
 class ServoTiming:
     """Timing of a servo motion."""
 
-    #: Shortest trajectory to a target [s]
-    minimum_time: float = 0.02
-    #: The motion ends this long after its target was reached [s]
-    goal_timeout: float = 30.0
-    #: How long the velocity of a passed target is kept [s]
+    #: shortest trajectory to a target [s]
+    min_trajectory_time: float = 0.02
+    #: the motion ends this long after its target was reached [s]
+    goal_timeout: float = 300.0
+    #: of the smart engine: how long a target's velocity is kept after the target was passed [s]
     speed_timeout: float = 0.1
 
     def _write(self, out: list[bytes]) -> None:
-        out.append(_ServoTiming_0.pack(self.minimum_time, self.goal_timeout, self.speed_timeout))
+        out.append(_ServoTiming_0.pack(self.min_trajectory_time, self.goal_timeout, self.speed_timeout))
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[ServoTiming, int]:
         v = codec.unpack(_ServoTiming_0, data, pos)
         pos += _ServoTiming_0.size
-        minimum_time = v[0]
+        min_trajectory_time = v[0]
         goal_timeout = v[1]
         speed_timeout = v[2]
-        return cls(minimum_time=minimum_time, goal_timeout=goal_timeout, speed_timeout=speed_timeout), pos
+        return cls(min_trajectory_time=min_trajectory_time, goal_timeout=goal_timeout, speed_timeout=speed_timeout), pos
 
 _StraightLimits_0 = Struct(">6d6d")
 

@@ -877,6 +877,35 @@ class HandGuide:
         codec.check(self.cartesian_velocity, path + "cartesian_velocity", 0.0, 10.0, True, True)
 
 
+_ServoTiming_0 = Struct(">ddd")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoTiming:
+    """Timing of a servo motion."""
+
+    min_trajectory_time: float = 0.02
+    goal_timeout: float = 300.0
+    speed_timeout: float = 0.1
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_ServoTiming_0.pack(self.min_trajectory_time, self.goal_timeout, self.speed_timeout))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[ServoTiming, int]:
+        v = codec.unpack(_ServoTiming_0, data, pos)
+        pos += _ServoTiming_0.size
+        min_trajectory_time = v[0]
+        goal_timeout = v[1]
+        speed_timeout = v[2]
+        return cls(min_trajectory_time=min_trajectory_time, goal_timeout=goal_timeout, speed_timeout=speed_timeout), pos
+
+    def _check(self, path: str) -> None:
+        codec.check(self.min_trajectory_time, path + "min_trajectory_time", 0.001, 1.0, False, False)
+        codec.check(self.goal_timeout, path + "goal_timeout", 0.1, 3600.0, False, False)
+        codec.check(self.speed_timeout, path + "speed_timeout", 0.001, 10.0, False, False)
+
+
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -3580,7 +3609,7 @@ class ProcessData:
 
 _ServoOpen_0 = Struct(">B")
 _ServoOpen_1 = Struct(">dd")
-_ServoOpen_2 = Struct(">dddd")
+_ServoOpen_2 = Struct(">d")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -3598,9 +3627,7 @@ class ServoOpen:
     velocity: float = 0.2
     acceleration: float = 0.2
     linear: CartesianDynamics = CartesianDynamics()
-    min_trajectory_time: float = 0.02
-    goal_timeout: float = 300.0
-    speed_timeout: float = 0.1
+    timing: ServoTiming = ServoTiming()
     watchdog: float = 0.2
     until: Condition = Condition()
 
@@ -3614,7 +3641,8 @@ class ServoOpen:
             _write_Mode(self.mode, out)
         out.append(_ServoOpen_1.pack(self.velocity, self.acceleration))
         self.linear._write(out)
-        out.append(_ServoOpen_2.pack(self.min_trajectory_time, self.goal_timeout, self.speed_timeout, self.watchdog))
+        self.timing._write(out)
+        out.append(_ServoOpen_2.pack(self.watchdog))
         self.until._write(out)
 
     @classmethod
@@ -3632,14 +3660,12 @@ class ServoOpen:
         velocity = v[0]
         acceleration = v[1]
         linear, pos = CartesianDynamics._read(data, pos)
+        timing, pos = ServoTiming._read(data, pos)
         v = codec.unpack(_ServoOpen_2, data, pos)
         pos += _ServoOpen_2.size
-        min_trajectory_time = v[0]
-        goal_timeout = v[1]
-        speed_timeout = v[2]
-        watchdog = v[3]
+        watchdog = v[0]
         until, pos = Condition._read(data, pos)
-        return cls(engine=engine, frame=frame, mode=mode, velocity=velocity, acceleration=acceleration, linear=linear, min_trajectory_time=min_trajectory_time, goal_timeout=goal_timeout, speed_timeout=speed_timeout, watchdog=watchdog, until=until), pos
+        return cls(engine=engine, frame=frame, mode=mode, velocity=velocity, acceleration=acceleration, linear=linear, timing=timing, watchdog=watchdog, until=until), pos
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.frame.encode()), path + "frame", 0, 128)
@@ -3648,9 +3674,7 @@ class ServoOpen:
         codec.check(self.velocity, path + "velocity", 0.0, 1.0, True, False)
         codec.check(self.acceleration, path + "acceleration", 0.0, 1.0, True, False)
         self.linear._check(path + "linear.")
-        codec.check(self.min_trajectory_time, path + "min_trajectory_time", 0.001, 1.0, False, False)
-        codec.check(self.goal_timeout, path + "goal_timeout", 0.1, 3600.0, False, False)
-        codec.check(self.speed_timeout, path + "speed_timeout", 0.001, 10.0, False, False)
+        self.timing._check(path + "timing.")
         codec.check(self.watchdog, path + "watchdog", 0.005, 2.0, False, False)
         self.until._check(path + "until.")
 

@@ -3,17 +3,17 @@ package heptarm.wire;
 
 /** Node of a condition in postfix order. */
 public abstract class ConditionNode {
-    /** The field of this name; empty for a node without one. */
+    /** The field of this name; "" where there is none. */
     public String frame() {
         return "";
     }
 
-    /** The field of this name; NaN for a node without one. */
+    /** The field of this name; Double.NaN where there is none. */
     public double low() {
         return Double.NaN;
     }
 
-    /** The field of this name; NaN for a node without one. */
+    /** The field of this name; Double.NaN where there is none. */
     public double high() {
         return Double.NaN;
     }

@@ -13,8 +13,14 @@ import heptarm.doubles.seam.ServoTiming;
 
 /** A motion that follows destinations given while it runs; {@code T} is its own type, so that setters chain. */
 public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<T> {
+    private static final double GOAL_TIMEOUT = 30.0;
+
     private final ServoTiming timing = new ServoTiming();
     private ServoRuntime runtime;
+
+    protected ServoMotion() {
+        timing.goalTimeout = GOAL_TIMEOUT;
+    }
 
     /** Whether a servo motion under impedance control may begin now: at rest, nothing pushes, not singular, the load data right. */
     public static boolean validateForImpedanceMode(PhysicalObject object) {
@@ -26,7 +32,7 @@ public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<
     }
 
     public T setMinimumTrajectoryExecutionTime(double seconds) {
-        timing.minimumTime = positive("minimumTrajectoryExecutionTime", seconds);
+        timing.minTrajectoryTime = positive("minimumTrajectoryExecutionTime", seconds);
         return self();
     }
 
