@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.values.condition.signals import force, path
+from heptarm.values.condition.force import force
+from heptarm.values.condition.signals import path
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.wire import messages as wire
