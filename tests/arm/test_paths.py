@@ -31,13 +31,21 @@ def carried_out(arm: Arm, motion: object) -> tuple[ha.Result, Array]:
     return handle.wait(timeout=30.0), np.array(places)
 
 
+def passes(places: Array, point: Array) -> float:
+    """How near the way through places, shape (n, 3), comes to a point [m]."""
+    begin, step = places[:-1], np.diff(places, axis=0)
+    length = np.maximum((step**2).sum(axis=1), 1e-18)
+    fraction = np.clip(((point - begin) * step).sum(axis=1) / length, 0.0, 1.0)
+    return float(np.linalg.norm(begin + fraction[:, None] * step - point, axis=1).min())
+
+
 def test_an_arc_and_its_orientation(arm: Arm) -> None:
     start = arm.wait_for_rest().pose
     centre = start.xyz + [0, 0.08, 0]
     result, places = carried_out(arm, ha.arc(start, 2.0, centre=centre, speed_mps=0.3))
     assert result.arrived
     radii = np.linalg.norm(places - centre, axis=1)
-    assert len(places) > 30 and np.abs(radii - 0.08).max() < 0.5e-3
+    assert len(places) > 10 and np.abs(radii - 0.08).max() < 0.5e-3
     end = arm.wait_for_rest().pose
     assert end.angle_to(start) < 1e-3
     back = ha.arc(end, -2.0, centre=centre, reference="path", orientation="constant", speed_mps=0.3)
@@ -58,9 +66,11 @@ def test_a_blended_program_does_not_stop_and_tells_of_every_motion(arm: Arm) -> 
     speeds, shares = [], []
     last = None
     for state in states:
-        if last is not None and state.stamp > last.stamp:
-            speeds.append(state.pose.distance_to(last.pose) / (state.stamp - last.stamp) * 1e9)
-        last = state
+        pose = state.groups.pose
+        assert pose is not None
+        if last is not None and pose.stamp > last.stamp:
+            speeds.append(state.pose.distance_to(last_pose) / (pose.stamp - last.stamp) * 1e9)
+        last, last_pose = pose, state.pose
         shares.append(handle.progress)
         if handle.done:
             break
@@ -94,8 +104,8 @@ def test_a_spline_passes_through_its_points(arm: Arm) -> None:
     knots = [moved(start, 0.03, 0.05, 0.0), moved(start, 0.0, 0.1, 0.03), start]
     result, places = carried_out(arm, ha.spline(knots, speed_mps=0.15))
     assert result.arrived and arm.wait_for_rest().pose.distance_to(start) < 5e-4
-    for knot in knots:  # between two states the arm goes some millimetres
-        assert np.linalg.norm(places - knot.xyz, axis=1).min() < 4e-3
+    for knot in knots:
+        assert passes(places, knot.xyz) < 2e-3
     around = ha.ellipse(start, 0.04, centre=start.xyz + [0, 0.07, 0], speed_mps=0.3)
     assert arm.move(around).arrived and arm.wait_for_rest().pose.distance_to(start) < 5e-4
     through = [HOME + deg(10, 5, 0, 10, 0, 0, 20), HOME + deg(20, 0, 5, 0, 0, 10, 0), HOME]

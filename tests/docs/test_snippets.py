@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.retry import answers_late, retry
+from tests.retry import busy, retry
 
 ROOT = Path(__file__).resolve().parents[2]
 BLOCK = re.compile(r"^( *)```(?:python|\{code-block\} python)([^\n]*)\n(.*?)^\1```", re.S | re.M)
@@ -71,7 +71,7 @@ def test_snippets_run(page: Path, tmp_path: Path) -> None:
             check=False,
         )
 
-    done = retry(run_page, answers_late)
+    done = retry(run_page, busy)
     assert done.returncode == 0, f"{_id(page)}:\n{done.stdout}\n{done.stderr}"
 
 

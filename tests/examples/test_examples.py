@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.retry import answers_late, retry
+from tests.retry import busy, retry
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 
@@ -28,6 +28,6 @@ def test_example(example: Path, cabinet) -> None:
             check=False,
         )
 
-    done = retry(run, answers_late)
+    done = retry(run, busy)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() and "Traceback" not in done.stderr
