@@ -12,7 +12,7 @@ from hypothesis import settings
 if TYPE_CHECKING:
     from heptarm import Arm
 
-pytest_plugins = ["tests.processes", "tests.retry"]
+pytest_plugins = ["tests.processes", "tests.hangs", "tests.retry"]
 
 _LATE = ("slow", "browser")
 
