@@ -8,7 +8,10 @@ import pytest
 import heptarm as ha
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.sine import SineImpedance
+from tests.simulators import FASTER
 
+#: Of the shared virtual cabinet.
+SPEED = FASTER
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
 SOFT = (500.0, 1000.0, 2000.0, 200.0, 200.0, 200.0)
 

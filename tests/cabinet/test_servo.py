@@ -100,7 +100,9 @@ def test_a_target_that_came_while_the_cabinet_stood_still_counts(make: Callable[
         peer.send(target(servo, 0.3))
         reached(peer, 0.3)
         peer.send(target(servo, 0.3, watchdog=0.5))
-        peer.ask(wire.Subscribe(groups=wire.Groups.JOINTS, rate=0.0))  # its answer shows that the target is there
+        peer.ask(
+            wire.Subscribe(groups=wire.Groups.JOINTS, rate=0.0)
+        )  # its answer shows that the target is there
         cabinet.process.send_signal(signal.SIGSTOP)
         time.sleep(0.7)
         peer.send(target(servo, 0.4))

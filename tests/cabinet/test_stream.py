@@ -62,7 +62,9 @@ def test_a_client_that_does_not_read_is_closed_and_holds_up_nobody(make: Callabl
             assert isinstance(quick.ask(wire.Stop()), wire.Accepted)
             rounds += 1
             time.sleep(0.05)
-        assert rounds > 3  # the one that does not read is closed after two seconds; the other is answered meanwhile
+        assert (
+            rounds > 3
+        )  # the one that does not read is closed after two seconds; the other is answered meanwhile
         before = len(quick.all(wire.State))
         quick.wait(lambda *_: len(quick.all(wire.State)) - before > 100)
         stamps = [state.joints.stamp for state in quick.all(wire.State) if state.joints is not None]

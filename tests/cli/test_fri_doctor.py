@@ -32,7 +32,7 @@ def verdicts(*arguments: str, fails: bool = False) -> dict[str, dict[str, Any]]:
 
 
 def test_a_cabinet_with_fri_is_looked_at_without_moving_anything(cabinet: RunningCabinet) -> None:
-    found = verdicts("--target", cabinet.target, "--fri-period", "10", "--seconds", "4")
+    found = verdicts("--target", cabinet.target, "--fri-period", "10", "--seconds", "2")
     assert found["FRI command"]["how"] == "ok"
     assert "position, torque, wrench; not offered: pose; signals" in found["FRI command"]["found"]
     assert "FRI 1.14-1.16, every 10 ms" in found["FRI messages"]["found"]
@@ -44,7 +44,7 @@ def test_a_cabinet_with_fri_is_looked_at_without_moving_anything(cabinet: Runnin
 def test_somebody_elses_application_is_listened_to(tmp_path: Path) -> None:
     port, picture = free_port(), tmp_path / "fri.png"
     with controller(port, "--fri-period", "10", version="2.5"):
-        found = verdicts("--listen", "--fri-port", str(port), "--seconds", "4")
+        found = verdicts("--listen", "--fri-port", str(port), "--seconds", "2")
         assert "FRI 2.5, every 10 ms" in found["FRI messages"]["found"]
         assert found["FRI command"]["found"].endswith("command: POSITION")
         wrong = verdicts(
@@ -65,7 +65,7 @@ def test_somebody_elses_application_is_listened_to(tmp_path: Path) -> None:
 def test_an_application_that_starts_no_overlay_is_told_of() -> None:
     port = free_port()
     with controller(port, "--fri-period", "10", "--fri-command", "monitor"):
-        found = verdicts("--listen", "--fri-port", str(port), "--seconds", "3")
+        found = verdicts("--listen", "--fri-port", str(port), "--seconds", "2")
     assert "nothing can be commanded" in found["FRI command"]["found"]
     assert "FRIJointOverlay" in found["FRI command"]["remedy"]
 

@@ -144,7 +144,8 @@ class Client(Reader):
                 self._worker.kill()
                 printed = self._worker.printed()
                 raise ConnectFailed(
-                    f"the loop's process did not start within {timeout:g} s" + (f": {printed}" if printed else "")
+                    f"the loop's process did not start within {timeout:g} s"
+                    + (f": {printed}" if printed else "")
                 )
             time.sleep(2e-3)
         if (status := self._header[at.STATUS]) in (at.Status.FAILED, at.Status.NO_PORT):

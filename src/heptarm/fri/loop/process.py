@@ -171,7 +171,9 @@ class Worker:
             for line in pipe:
                 text = line.decode(errors="replace")
                 self._printed.append(text.rstrip())
-                with contextlib.suppress(OSError, ValueError, AttributeError):  # there may be none, or a closed one
+                with contextlib.suppress(
+                    OSError, ValueError, AttributeError
+                ):  # there may be none, or a closed one
                     sys.stderr.write(text)
 
     def printed(self) -> str:
