@@ -69,8 +69,8 @@ def test_a_blended_program_does_not_stop_and_tells_of_every_motion(arm: Arm) -> 
         pose = state.groups.pose
         assert pose is not None
         if last is not None and pose.stamp > last.stamp:
-            way = np.linalg.norm(np.subtract(pose.xyz, last.xyz))
-            speeds.append(float(way) / (pose.stamp - last.stamp) * 1e9)
+            way = pose.pose.distance_to(last.pose)
+            speeds.append(way / (pose.stamp - last.stamp) * 1e9)
         last = pose
         shares.append(handle.progress)
         if handle.done:
