@@ -3,6 +3,7 @@ package heptarm.core.api;
 import java.util.HashMap;
 import java.util.Map;
 
+import heptarm.core.Clock;
 import heptarm.core.Clocks;
 import heptarm.core.CommandRejected;
 import heptarm.core.EventBus;
@@ -85,6 +86,10 @@ public final class Arm implements EventBus.Listener {
         if (isOwner) {
             service.close();
         }
+    }
+
+    Clock clock() {
+        return service.clock;
     }
 
     // --------------------------------------------------------------------------------------------- motions
