@@ -331,6 +331,13 @@ class JavaPlant:
         self._plant.set_load_data(Body(given.mass, np.array(given.centre), inertia=np.array(given.inertia)))
 
 
+def java_memory() -> dict[str, int]:
+    """Used bytes of the heap, and number of threads of Java."""
+    factory = jpype.JClass("java.lang.management.ManagementFactory")
+    heap = factory.getMemoryMXBean().getHeapMemoryUsage()
+    return {"java_heap": int(heap.getUsed()), "java_threads": int(factory.getThreadMXBean().getThreadCount())}
+
+
 #: Methods whose errors concern their argument; those of the others concern the state of the plant.
 _ARGUMENT_ERRORS = ("setAttachedLoad",)
 
