@@ -177,9 +177,9 @@ class VirtualCabinet:
     def write_stats(self) -> None:
         """Write statistics of the realtime loop and of memory to the file of the option `stats`."""
         if self.options.stats is not None:
-            objects = gc.get_objects()
+            java, objects = self._java_memory(), gc.get_objects()
             counts = {"objects": len(objects), "types": sum(isinstance(one, type) for one in objects)}
-            text = json.dumps(asdict(self.loop.statistics) | {"memory": counts | self._java_memory()})
+            text = json.dumps(asdict(self.loop.statistics) | {"memory": counts | java})
             partial = self.options.stats.with_suffix(".part")
             partial.write_text(text, encoding="utf-8")
             partial.replace(self.options.stats)
