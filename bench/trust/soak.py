@@ -1,20 +1,12 @@
-"""A controller that never rests, observers that come and go, faults at random: nothing may grow, nothing may be lost.
-
-    python -m bench.trust.soak --minutes 60 --seed 1 --out build/soak
-
-Writes one JSON line for each round to OUT/soak.jsonl and a plot to OUT/soak.png, prints the verdict, and ends with 0 if
-nothing grew and nothing was lost.
-"""
+"""A controller that never rests, observers that come and go, faults at random: nothing may grow or get lost."""
 
 from __future__ import annotations
 
-import argparse
 import gc
 import json
 import os
 import random
 import socket
-import sys
 import threading
 import time
 from collections import Counter
@@ -422,20 +414,3 @@ def run() -> Iterator[Figure]:
         yield Figure(f"soak_{name}", value, "MB/min", limit=SLOPE, detail=detail)
     yield Figure("soak_lost", len(verdict.lost), "count", limit=0, detail=detail)
     yield Figure("soak_grown", len(verdict.grown), "count", limit=0, detail=detail)
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m bench.trust.soak", description=__doc__)
-    parser.add_argument("--minutes", type=float, default=3.0)
-    parser.add_argument("--seed", type=int, default=1, help="of every choice")
-    parser.add_argument(
-        "--out", type=Path, default=Path("build/soak"), help="folder of the samples and the plot"
-    )
-    options = parser.parse_args()
-    verdict = soak(60.0 * options.minutes, seed=options.seed, folder=options.out)
-    print(json.dumps(summary(verdict), indent=1))
-    return 0 if verdict.good else 1
-
-
-if __name__ == "__main__":
-    sys.exit(main())
