@@ -70,7 +70,7 @@ class Cabinet:
         """The loop's statistics so far."""
         self._stats.unlink(missing_ok=True)
         self.process.send_signal(signal.SIGUSR1)
-        deadline = time.monotonic() + 5.0
+        deadline = time.monotonic() + 30.0
         while not self._stats.exists() and time.monotonic() < deadline:
             time.sleep(0.01)
         return dict(json.loads(self._stats.read_text()))

@@ -194,11 +194,11 @@ def compare(states: int, *, busy: int, seconds: float, hampered: bool = True) ->
 
 
 def _states(cabinet: Cabinet, count: int, busy: int, seconds: float, hampered: bool) -> list[ha.State]:
-    with ha.connect(cabinet.target, state_rate=1000, watchdog=30.0, timeout=60.0) as arm:
+    with ha.connect(cabinet.target, state_rate=1000, watchdog=10.0, timeout=60.0) as arm:
         there = ha.ptp(ha.deg(60, 40, 10, -70, 20, 60, 30), speed=0.6)
         back = ha.ptp(ha.deg(-60, 20, -10, -100, -20, 50, -30), speed=0.6)
         arm.move(back)
-        arm.start([there, back] * 2000)
+        arm.start([there, back] * 400)
         arm.wait_until(lambda state: float(np.abs(state.dq).max()) > 0.1)
         if hampered:
             hamper(cabinet.process.pid)

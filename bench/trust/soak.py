@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import json
+import math
 import os
 import random
 import socket
@@ -89,6 +90,7 @@ class Verdict:
         seconds: how long it took.
         done: what happened, and how often.
         lost: what was lost or did not end as it should.
+        late: the same while more processes wanted to run than there are processors: that may be their fault.
         slopes: of the memory after the warm-up [MB/min].
         grown: counts that are larger after the last round than during the warm-up.
         samples: one for each round.
@@ -97,6 +99,7 @@ class Verdict:
     seconds: float = 0.0
     done: Counter[str] = field(default_factory=Counter)
     lost: list[str] = field(default_factory=list)
+    late: list[str] = field(default_factory=list)
     slopes: dict[str, float] = field(default_factory=dict)
     grown: dict[str, tuple[int, int]] = field(default_factory=dict)
     samples: list[Sample] = field(default_factory=list)
@@ -147,8 +150,8 @@ class Soak:
                 self._round(arm)
                 verdict.samples.append(self._settled(time.monotonic() - began))
                 self._write(verdict.samples[-1])
-                if not arm.in_control:
-                    verdict.lost.append("control of the arm")
+                if not arm.connected:
+                    verdict.lost.append("the connection")
                     break
         verdict.seconds = round(time.monotonic() - began, 1)
         verdict.judge()
@@ -175,13 +178,28 @@ class Soak:
         for act in acts:
             if observers and self._random.random() < 0.5:
                 observers.pop().start()
-            try:
-                act(arm)
-                self.verdict.done[act.__name__] += 1
-            except (ha.HeptarmError, RuntimeError, AssertionError) as error:
-                self.verdict.lost.append(f"{act.__name__}: {type(error).__name__}: {error}"[:300])
-                self._recover(arm)
+            self._carry_out(act.__name__, act, arm)
+
+    def _carry_out(self, name: str, act: Callable[[ha.Arm], None], arm: ha.Arm) -> None:
+        try:
+            act(arm)
+            self._look(arm)
+            self.verdict.done[name] += 1
+        except (ha.HeptarmError, RuntimeError, AssertionError) as error:
+            self._fail(f"{name}: {type(error).__name__}: {error}")
+            if name != "recovery":
+                self._carry_out("recovery", self._recover, arm)
+
+    def _fail(self, text: str) -> None:
+        is_busy = os.getloadavg()[0] > len(os.sched_getaffinity(0))
+        (self.verdict.late if is_busy else self.verdict.lost).append(text[:300])
+
+    def _look(self, arm: ha.Arm) -> None:
+        """Note the age of the newest state."""
+        try:
             self._ages.append(1e3 * arm.state.age)
+        except ha.StaleState:
+            self._fail("state: older than a second")
 
     def motions(self, arm: ha.Arm) -> None:
         """Single and blended motions, and one with a condition."""
@@ -216,7 +234,7 @@ class Soak:
         with arm.servo("joint", rate=100, engine=engine, watchdog=2.0) as stream:  # type: ignore[arg-type]
             while stream.tick() and stream.t < 1.5:
                 stream.set(stream.start.q + 0.1 * np.sin(2 * np.pi * stream.t / 1.5) * np.eye(7)[6])
-                self._ages.append(1e3 * arm.state.age)
+                self._look(arm)
 
     def straight_servo(self, arm: ha.Arm) -> None:
         """Streams of poses, by the joints and on straight lines."""
@@ -261,7 +279,7 @@ class Soak:
     def _recover(self, arm: ha.Arm) -> None:
         left = arm.recover(timeout=PATIENCE)
         if not left.done:
-            self.verdict.lost.append(f"recovery: {left}")
+            raise RuntimeError(str(left))
         arm.wait_for_rest(timeout=PATIENCE)
         arm.move(ha.ptp(HOME, speed=0.5))
 
@@ -286,7 +304,7 @@ class Soak:
                     raise RuntimeError("no state arrived")
             self.verdict.done["observer"] += 1
         except (ha.HeptarmError, RuntimeError) as error:
-            self.verdict.lost.append(f"observer: {type(error).__name__}: {error}"[:300])
+            self._fail(f"observer: {type(error).__name__}: {error}")
 
     # ----------------------------------------------------------------------------------------------- measuring
 
@@ -317,8 +335,8 @@ class Soak:
             _count(os.getpid(), "task"),
             _count(pid, "fd"),
             _count(os.getpid(), "fd"),
-            round(float(np.median(ages)), 2),
-            round(float(ages.max()), 2),
+            round(float(np.median(ages)), 2) if len(ages) else math.nan,
+            round(float(ages.max()), 2) if len(ages) else math.nan,
             os.getloadavg()[0],
         )
 
@@ -400,6 +418,7 @@ def summary(verdict: Verdict) -> dict[str, Any]:
         "slopes_mb_per_min": verdict.slopes,
         "grown": verdict.grown,
         "lost": verdict.lost[:20],
+        "late": [len(verdict.late), *verdict.late[:20]],
         "done": dict(verdict.done),
         "first_last": ends,
     }
