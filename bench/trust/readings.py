@@ -103,6 +103,8 @@ class Comparison:
                     self.contradictions[what] += 1
                 self.oldest = max(self.oldest, 1e-6 * (groups.motion.stamp - group.stamp))
             joints = groups.joints
+            if state.stamp != groups.pose.stamp:  # whoever takes the difference of poses uses it
+                self.contradictions["stamp of the state"] += 1
             if before is not None:
                 self.gaps += joints.stamp - before.stamp > 5 * TICK_NS
                 self.contradictions["dq"] += not self._is_velocity(before, joints, speeds, first)
@@ -110,9 +112,9 @@ class Comparison:
         self.states += len(states)
         self.contradictions += Counter()  # without zeros
 
-    def _is_velocity(self, before, now, speeds: np.ndarray, first: int) -> bool:  # type: ignore[no-untyped-def]
+    def _is_velocity(self, before, now, speeds: np.ndarray, origin: int) -> bool:  # type: ignore[no-untyped-def]
         """One tick after another state it follows from the filter; otherwise it is between speeds that there were."""
-        row, ticks = (now.stamp - first) // TICK_NS, (now.stamp - before.stamp) // TICK_NS
+        row, ticks = (now.stamp - origin) // TICK_NS, (now.stamp - before.stamp) // TICK_NS
         if ticks == 1:
             self.steps += 1
             gain = 1.0 - np.exp(-1e-9 * TICK_NS / FILTER)
@@ -121,7 +123,8 @@ class Comparison:
         if ticks <= 0:
             return ticks == 0 and np.array_equal(now.dq, before.dq)
         since = speeds[max(0, row - ticks) : row + 1]
-        low, high = np.minimum(since.min(axis=0), before.dq), np.maximum(since.max(axis=0), before.dq)
+        first = np.zeros(7) if ticks > 1000 else before.dq  # the filter begins again after a second
+        low, high = np.minimum(since.min(axis=0), first), np.maximum(since.max(axis=0), first)
         return bool(((now.dq >= low - 1e-6) & (now.dq <= high + 1e-6)).all())
 
     @staticmethod
