@@ -84,7 +84,10 @@ class SimulatorOptions:
     )
     stats: Path | None = field(
         default=None,
-        metadata=_about("file for the statistics of the realtime loop, at the end and on SIGUSR1"),
+        metadata=_about("file for statistics of the realtime loop and of memory, at the end and on SIGUSR1"),
+    )
+    trace: Path | None = field(
+        default=None, metadata=_about("file for the state of the plant after each tick (0.5 MB/s)")
     )
     parent_pipe: bool = field(
         default=False,
