@@ -30,6 +30,7 @@ COMMANDS = {
     "install-cabinet": "install_cabinet:install_cabinet",
 }
 MOVES = {"ptp": "motion:move_ptp", "lin": "motion:move_lin", "lin_rel": "motion:move_lin_rel"}
+KEYS = {"new": "key:new", "set": "key:store", "list": "key:show", "forget": "key:forget"}
 LEARNING = {"train": "rl:train", "eval": "rl:evaluate", "deploy": "rl:deploy"}
 
 app = App(
@@ -48,6 +49,7 @@ def _add(group: App, commands: dict[str, str]) -> App:
 _ASKS_FOR_HELP = len(sys.argv) == 1 or bool({"-h", "--help"} & set(sys.argv))
 _add(app, COMMANDS)
 app.command(_add(App(name="move", help="Move the arm and wait until it is at rest."), MOVES))
+app.command(_add(App(name="key", help="Make, store and list the pre-shared keys of cabinets."), KEYS))
 app.command(_add(App(name="rl", help="Train, evaluate and deploy a policy that reaches targets."), LEARNING))
 
 

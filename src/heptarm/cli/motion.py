@@ -10,10 +10,10 @@ from typing import Annotated, Literal
 import numpy as np
 from cyclopts import Parameter
 
-from heptarm.arm.connect import connect
 from heptarm.arm.motion.servo import ServoStats
 from heptarm.arm.translate.motions import items
 from heptarm.cli.options import (
+    NO_TARGET,
     Degrees,
     DryRun,
     Json,
@@ -47,7 +47,7 @@ def move_ptp(
     speed: Speed = 0.1,
     yes: Yes = False,
     dry_run: DryRun = False,
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Point to point, to seven joint positions [rad]."""
@@ -68,7 +68,7 @@ def move_lin(
     speed: Speed = 0.1,
     yes: Yes = False,
     dry_run: DryRun = False,
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Straight line to a pose in the base frame: x y z [m], a b c about z y x [rad]."""
@@ -89,7 +89,7 @@ def move_lin_rel(
     speed: Speed = 0.1,
     yes: Yes = False,
     dry_run: DryRun = False,
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Straight line by an offset [m], [rad]."""
@@ -101,15 +101,13 @@ def _angles(values: tuple[float, ...], *, degrees: bool) -> list[float]:
     return [float(v) for v in (np.radians(values) if degrees else values)]
 
 
-def _move(
-    motion: Motion, *, target: str | None, speed: float, yes: bool, dry_run: bool, as_json: bool
-) -> int:
+def _move(motion: Motion, *, target: Target, speed: float, yes: bool, dry_run: bool, as_json: bool) -> int:
     """Carry out a motion; return the exit code.
 
     Raises:
         HeptarmError: refused, or ended under way.
     """
-    with connect(target, control=not dry_run) as arm:
+    with target.connect(control=not dry_run) as arm:
         items((motion,), arm.robot, speed)  # a motion outside the limits is refused here, before any question
         if dry_run:
             text = f"{motion} at {speed:.0%} speed is within the limits of the {arm.robot.title}; nothing was moved"
@@ -141,7 +139,7 @@ def servo(
     speed: Speed = 0.3,
     engine: Annotated[Literal["smart", "direct"], Parameter(help="Servo motion of the cabinet.")] = "smart",
     yes: Yes = False,
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Swing an axis with a stream of targets and report the stream's quality."""
@@ -149,7 +147,7 @@ def servo(
     turn = radians(within(amplitude, "amplitude", 0.0, 45.0, unit="deg"))
     hertz = within(frequency, "frequency", 0.0, 5.0, above=True, unit="Hz")
     seconds = within(duration, "duration", 0.0, 86400.0, above=True, unit="s")
-    with connect(target) as arm:
+    with target.connect() as arm:
         if not (arm.is_virtual or yes or confirm(f"Swing A{index + 1} of the real {arm.robot.title}?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
         direction, lag = np.eye(7)[index], 0.0
@@ -193,13 +191,13 @@ def teach(
     seconds: Annotated[float, Parameter(help="Time limit [s].")] = 60.0,
     tolerance: Annotated[float, Parameter(help="Largest deviation of the reduced trajectory [rad].")] = 2e-3,
     yes: Yes = False,
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Record a trajectory while a person guides the arm by hand."""
     limit = within(seconds, "seconds", 0.0, 86400.0, above=True, unit="s")
     mode = compliance(free, frame="base") if free else None
-    with connect(target) as arm:
+    with target.connect() as arm:
         asked = free and not (arm.is_virtual or yes)
         if asked and not confirm(
             f"The real {arm.robot.title} becomes compliant for {limit:g} s. Does a person hold it?"
@@ -241,7 +239,7 @@ def replay(
         Parameter(help="By servo: factor on the recorded speed; by spline: fraction of the full speed."),
     ] = 0.5,
     yes: Yes = False,
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Move to the start of a recorded trajectory and replay it."""
@@ -249,7 +247,7 @@ def replay(
         trajectory = Trajectory.load(file)
     except OSError as error:
         raise CommandRejected(f"{file}: {error.strerror}", parameter="file", value=str(file)) from error
-    with connect(target) as arm:
+    with target.connect() as arm:
         if not (arm.is_virtual or yes or confirm(f"Move the real {arm.robot.title} along {file}?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
         done = arm.replay(trajectory, by=by, pace=pace)
@@ -261,9 +259,9 @@ def replay(
     return 0
 
 
-def stop(*, target: Target = None, as_json: Json = False) -> int:
+def stop(*, target: Target = NO_TARGET, as_json: Json = False) -> int:
     """Stop the arm; needs no control."""
-    with connect(target, control=False) as arm:
+    with target.connect(control=False) as arm:
         arm.stop()
         arm.wait_for_rest()
     emit({"stopped": True}) if as_json else print("the arm is at rest")
@@ -273,11 +271,11 @@ def stop(*, target: Target = None, as_json: Json = False) -> int:
 def recover(
     *,
     timeout: Annotated[float, Parameter(help="How long to wait for a person to do the rest [s].")] = 0.0,
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Make the robot ready again after a stop; exit code 1 if a person has to do the rest, which is printed."""
-    with connect(target) as arm:
+    with target.connect() as arm:
         recovery = arm.recover(timeout=timeout)
         if as_json:
             emit({"done": recovery.done, "did": list(recovery.did), "remaining": list(recovery.remaining)})

@@ -23,6 +23,8 @@ from heptarm.errors import CommandRejected
 VARIABLE = "HEPTARM_KEY"
 #: Least strength of a key [bits]; see `strength`.
 MIN_BITS = 80.0
+#: Least number of different characters in a key.
+MIN_DIFFERENT = 8
 
 #: Letters and digits of a generated key; those that look alike (0 o, 1 l) are left out, since a person types them.
 _ALPHABET = "abcdefghijkmnpqrstuvwxyz23456789"
@@ -63,10 +65,10 @@ def check_key(key: str, source: str) -> str:
             parameter="key",
             hint="make one with `heptarm key new`",
         )
-    if strength(key) < MIN_BITS:
+    if strength(key) < MIN_BITS or len(set(key)) < MIN_DIFFERENT:
         raise CommandRejected(
-            f"the key of {source} must have at least {MIN_BITS:.0f} bits, got {strength(key):.0f} "
-            f"({len(key)} characters, {len(set(key))} of them different)",
+            f"the key of {source} must have at least {MIN_BITS:.0f} bits and {MIN_DIFFERENT} different characters, got "
+            f"{strength(key):.0f} bits ({len(key)} characters, {len(set(key))} of them different)",
             parameter="key",
             allowed=f"at least {MIN_BITS:.0f} bits, such as 20 characters with 16 different ones",
             hint="make one with `heptarm key new`",
@@ -123,13 +125,18 @@ def write_key_file(file: Path, key: str, *, replace: bool = False) -> None:
         file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         if file.exists() and not replace:
             raise CommandRejected(
-                f"the key file {file} exists", parameter="key_file", value=str(file), hint="replace it with --replace"
+                f"the key file {file} exists",
+                parameter="key_file",
+                value=str(file),
+                hint="replace it with --replace",
             )
         # a new file takes the place of the old one at once, and is never readable by others
         part = file.with_name(f".{file.name}.{os.getpid()}")
         with contextlib.suppress(FileNotFoundError):
             part.unlink()
-        with os.fdopen(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8") as opened:
+        with os.fdopen(
+            os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="utf-8"
+        ) as opened:
             opened.write(f"{key}\n")
         part.replace(file)
     except OSError as error:
@@ -161,6 +168,11 @@ class StoredKey:
     host: str
     port: int
     file: Path
+
+    @property
+    def target(self) -> str:
+        """The target as text."""
+        return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
 
     @property
     def trouble(self) -> str:
@@ -207,7 +219,9 @@ def find_key(
             file can be read by other users.
     """
     if key is not None and key_file is not None:
-        raise CommandRejected("key and key_file cannot be combined", parameter="key_file", hint="give one of them")
+        raise CommandRejected(
+            "key and key_file cannot be combined", parameter="key_file", hint="give one of them"
+        )
     if key is not None:
         return check_key(key, "the argument `key`") if key else None
     if key_file is not None:

@@ -267,7 +267,8 @@ class Link:
                 raise ConnectFailed(
                     f"the cabinet at {self.peer} asks for a pre-shared key, none was given",
                     code=int(Code.WRONG_KEY),
-                    hint='use connect(..., key="...") with the key in the process data of the cabinet\'s project',
+                    hint="give it as a file (--key-file, connect(..., key_file=...)), in HEPTARM_KEY, or store it: "
+                    f"heptarm key set --target {self.peer}",
                 )
             self._send(self._session.proof())
         elif isinstance(message, Refusal):
