@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import os
 import re
 import socket
@@ -194,6 +195,39 @@ def test_a_private_simulator_takes_the_key_and_no_other_process_sees_it(key_file
             ha.connect(f"127.0.0.1:{port}", control=False, timeout=30.0)
         with ha.connect(f"127.0.0.1:{port}", key=KEY, control=False, timeout=30.0) as observer:
             assert observer.controller == arm.controller
+
+
+def test_a_cabinet_that_is_open_to_all_says_so_on_the_smartpad_and_in_doctor(
+    tmp_path: Path, key_file: Path
+) -> None:
+    risk = "any program in the network can move"
+    with (tmp_path / "log").open("w") as log, sim("--host", "0.0.0.0", "--verbose", stderr=log) as ready:
+        target = f"sim://127.0.0.1:{ready['port']}"
+        assert verdict(target)["how"] == "note" and risk in verdict(target)["found"]
+    assert risk in (tmp_path / "log").read_text()
+    with (
+        (tmp_path / "log").open("w") as log,
+        sim("--host", "0.0.0.0", "--verbose", "--key-file", str(key_file), stderr=log) as ready,
+    ):
+        target = f"sim://127.0.0.1:{ready['port']}"
+        assert verdict(target, "--key-file", str(key_file))["how"] == "ok"
+    assert "listens on" in (tmp_path / "log").read_text() and risk not in (tmp_path / "log").read_text()
+
+
+def verdict(target: str, *more: str) -> dict[str, str]:
+    """What `heptarm doctor` finds about the protection of a cabinet."""
+    done = run("doctor", "--target", target, "--json", *more)
+    (found,) = (one for one in map(json.loads, done.stdout.splitlines()) if one["what"] == "protection")
+    return found
+
+
+def test_the_application_refuses_a_weak_key_of_its_process_data(tmp_path: Path) -> None:
+    project = tmp_path / "RoboticsAPI.data.xml"
+    text = (ROOT / "cabinet/project/RoboticsAPI.data.xml").read_text(encoding="utf-8")
+    project.write_text(re.sub(r'(id="heptarm.key" [^>]* value=)""', r'\1"hunter2"', text), encoding="utf-8")
+    done = run("sim", "--port", "0", "--project", str(project))
+    assert done.returncode == 1 and "got 20 bits" in done.stderr and "heptarm key new" in done.stderr
+    assert "hunter2" not in done.stderr
 
 
 # ------------------------------------------------------------------------------------ files and strength

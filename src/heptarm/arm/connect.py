@@ -14,6 +14,7 @@ from heptarm.arm.link.connection import STATE_RATE, TIMEOUT, WATCHDOG, Connectio
 from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.arm.link.state_stream import GROUPS
 from heptarm.arm.link.target import parse_target, target_from_env
+from heptarm.arm.translate.text import printable
 from heptarm.errors import ShapeError
 from heptarm.io import tcp
 from heptarm.io.clock import RealClock
@@ -35,7 +36,8 @@ def _default_name() -> str:
     """Name of a client: user, host and process, and from the second client of this process on its number."""
     number = next(_unnamed)
     name = f"{os.environ.get('USER', 'python')}@{socket.gethostname()}:{os.getpid()}"
-    return name if number == 1 else f"{name}#{number}"
+    name = printable(name) if number == 1 else f"{printable(name)}#{number}"
+    return name.encode()[-_MAX_NAME:].decode(errors="ignore")
 
 
 def connect(
@@ -90,6 +92,10 @@ def connect(
             parameter="name",
             value=name,
             allowed=f"at most {_MAX_NAME} bytes",
+        )
+    if name is not None and name != printable(name):
+        raise ShapeError(
+            f"name must have printable characters only, got {name!a}", code=3, parameter="name", value=name
         )
     chosen = parse_target(target_from_env() if target is None else target)
     found = find_key(key=key, key_file=key_file, host=chosen.host, port=chosen.port)

@@ -22,6 +22,7 @@ from heptarm.arm.arm import Arm
 from heptarm.arm.fri.diagnosis import cause, silence, strangers
 from heptarm.arm.fri.settings import PORTS
 from heptarm.arm.link.target import parse_target
+from heptarm.arm.translate.text import printable
 from heptarm.cli.options import (
     FRI,
     NO_TARGET,
@@ -46,6 +47,8 @@ _OLD_MS = 20.0
 #: A larger fraction of lost messages or answers is reported.
 _LOST_FRACTION = 0.001
 _LONGEST = 3600.0
+#: Addresses that mean every interface.
+_ALL = ("0.0.0.0", "::")
 _KINDS = ("position", "torque", "wrench", "pose")
 _VERSION = (
     "leave --fri-version (version= in a program) out: heptarm takes it from the first message; a client that is built "
@@ -223,9 +226,39 @@ def _target(target: Target, text: str) -> Iterator[CheckResult]:
             "ok",
             f"{arm.robot.title}{' (virtual)' if arm.is_virtual else ''}, cabinet application {arm.software}",
         )
+        yield _protection(arm, keyed=target.find_key() is not None)
         yield _round_trip(arm)
         yield _age(arm)
         yield _safety(arm)
+
+
+def _protection(arm: Arm, *, keyed: bool) -> CheckResult:
+    if keyed:
+        return CheckResult(
+            "protection",
+            "ok",
+            "both sides have proved that they know the key",
+        )
+    address, allowed = _setting(arm, "heptarm.bind", "0.0.0.0"), _setting(arm, "heptarm.allow", "").strip()
+    if allowed:
+        return CheckResult(
+            "protection", "ok", f"without a key; only these addresses may connect: {printable(allowed)}"
+        )
+    if address in _ALL:
+        return CheckResult(
+            "protection",
+            "note",
+            "any program in the network can move the robot: neither a key nor an allow-list is set",
+            "make a key with `heptarm key new --target ADDRESS` and set it in the process data heptarm.key",
+        )
+    return CheckResult("protection", "ok", f"without a key; the cabinet listens on {printable(address)} only")
+
+
+def _setting(arm: Arm, name: str, default: str) -> str:
+    try:
+        return arm.pad.process_data(name)
+    except CommandRejected:  # the project does not have it
+        return default
 
 
 def _timed(call: Callable[[], object]) -> float:

@@ -58,9 +58,11 @@ def main() -> None:
     try:
         code = app()
     except HeptarmError as error:
+        from heptarm.arm.translate.text import printable
+
         if os.environ.get("HEPTARM_DEBUG"):
             raise
-        print(f"heptarm: {error}", file=sys.stderr)
+        print(f"heptarm: {printable(str(error), lines=True)}", file=sys.stderr)
         sys.exit(1)
     except KeyboardInterrupt:
         sys.exit(130)

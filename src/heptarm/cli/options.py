@@ -72,6 +72,14 @@ class Target:
             timeout=TIMEOUT if timeout is None else timeout,
         )
 
+    def find_key(self) -> str | None:
+        """Find the key that `connect` uses; None: there is none."""
+        from heptarm.arm.link.target import parse_target, target_from_env
+        from heptarm.io import keys
+
+        parsed = parse_target(target_from_env() if self.text is None else self.text)
+        return keys.find_key(key_file=self.key_file, host=parsed.host, port=parsed.port)
+
 
 #: No target was given on the command line.
 NO_TARGET = Target()

@@ -15,6 +15,7 @@ from types import FrameType
 from typing import Any
 
 from heptarm.arm.translate.errors import farewell, refusal, rejection
+from heptarm.arm.translate.text import printable_message
 from heptarm.errors import ConnectFailed, ConnectionLost, HeptarmError, RemoteProtocolError, Timeout
 from heptarm.io.clock import Clock
 from heptarm.io.transport import Transport
@@ -444,7 +445,7 @@ class Link:
             raise
 
     def _dispatch(self, event: Received, now: int) -> None:
-        message = event.message
+        message = printable_message(event.message)
         kind = message.KIND
         if kind == "answer":
             pending = self._pending.pop(event.request, None)

@@ -8,6 +8,7 @@ import javax.crypto.Mac;
 import javax.crypto.spec.SecretKeySpec;
 
 import heptarm.core.CommandRejected;
+import heptarm.core.PrintableText;
 import heptarm.wire.Challenge;
 import heptarm.wire.Code;
 import heptarm.wire.Encoder;
@@ -94,7 +95,8 @@ final class Handshake {
 
     private void greet(Hello message) throws CommandRejected {
         hello = message;
-        name = message.name.length() == 0 ? "a client" : message.name;
+        String shown = PrintableText.of(message.name);
+        name = shown.length() == 0 ? "a client" : shown;
         if (message.major != Protocol.MAJOR) {
             throw new CommandRejected(Code.WRONG_VERSION, versions(message.major + "." + message.minor));
         }
