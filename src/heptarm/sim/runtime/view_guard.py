@@ -1,8 +1,8 @@
 """Who may see the view: a browser that was given the URL with its token.
 
 The view listens on a port of this machine. Any web page that a browser on this machine shows could connect to it. The
-guard looks at every request before viser does: its Host must be the view's own (against DNS rebinding), its Origin too if
-it has one (against other pages), and it must bring the token, in the URL or in the cookie that the first page sets.
+guard looks at every request before viser does: its Host must be the view's own (against DNS rebinding), its Origin too
+if it has one (against other pages), and it must bring the token, in the URL or in the cookie that the first page sets.
 """
 
 from __future__ import annotations
