@@ -34,7 +34,12 @@ class SimulatorOptions:
             "simulated seconds per second; 0: as fast as possible", in_target=True, allowed=(0.01, 100.0)
         ),
     )
-    key: str = field(default="", metadata=_about("pre-shared key that clients must know"))
+    key_file: Path | None = field(
+        default=None,
+        metadata=_about(
+            "file with the pre-shared key that clients must know; default: the environment variable HEPTARM_KEY"
+        ),
+    )
     application: str = field(
         default="", metadata=_about("class of another application; the process ends with it")
     )

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 from heptarm.fri.protocol.version import Version
+from heptarm.io.keys import find_key
 from heptarm.sim.fri.sessions import Sessions
 from heptarm.sim.plant.payload import parse_payload
 from heptarm.sim.plant.plant import Plant
@@ -73,14 +74,14 @@ def process_data(options: SimulatorOptions) -> dict[str, project.Value]:
     """Process data of the project, overridden by the command line; a value keeps its type in the project.
 
     Raises:
-        ValueError: a value does not fit its type, or the file is not a project file.
+        ValueError: a value does not fit its type, the file is not a project file, or the key cannot be used.
     """
     data: dict[str, project.Value] = {"heptarm.max_rate": 1000.0, "heptarm.key": ""}
     if options.project is not None:
         data |= project.read_process_data(options.project)
     data |= {"heptarm.bind": options.host, "heptarm.port": options.port}
-    if options.key:
-        data["heptarm.key"] = options.key
+    if key := find_key(key_file=options.key_file):
+        data["heptarm.key"] = key
     for pair in options.data:
         name, equals, text = pair.partition("=")
         if not equals:
@@ -271,7 +272,7 @@ def main(argv: list[str] | None = None) -> int:
             parse_payload(options.payload)
         if options.project is not None:
             project.read_project(options.project)
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError) as error:  # a CommandRejected is a ValueError
         print(json.dumps({"ready": False, "error": str(error)}), flush=True)
         return 2
     with batch_scheduled():

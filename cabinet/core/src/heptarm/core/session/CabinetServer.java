@@ -63,6 +63,9 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
         });
         log.info("heptarm " + ServerSettings.VERSION + " listens on " + settings.bind + ":" + socket.getLocalPort()
                 + ", protocol " + Protocol.MAJOR + "." + Protocol.MINOR);
+        if (settings.isOpenToAll()) {
+            log.warn("any program in the network can move this robot: set the process data heptarm.key or heptarm.allow");
+        }
         return socket.getLocalPort();
     }
 

@@ -4,6 +4,7 @@ import java.security.MessageDigest;
 import java.security.SecureRandom;
 
 import heptarm.core.CommandRejected;
+import heptarm.core.PrintableText;
 import heptarm.core.key.FrameTag;
 import heptarm.core.key.KeyExchange;
 import heptarm.wire.Challenge;
@@ -98,7 +99,8 @@ final class Handshake {
 
     private void greet(Hello message) throws CommandRejected {
         hello = message;
-        name = message.name.length() == 0 ? "a client" : message.name;
+        String shown = PrintableText.of(message.name);
+        name = shown.length() == 0 ? "a client" : shown;
         if (message.major != Protocol.MAJOR) {
             throw new CommandRejected(Code.WRONG_VERSION, versions(message.major + "." + message.minor));
         }
