@@ -128,6 +128,41 @@ def sim(
         tuple[str, ...],
         Parameter(group=FRI, help="Name of a frame that the client is asked for; may be repeated."),
     ] = (),
+    fri_mode: Annotated[
+        Literal["", "position", "joint-impedance", "cartesian-impedance"],
+        Parameter(
+            group=FRI,
+            help="Control mode under the overlay. Default: position; joint-impedance for torques, "
+            "cartesian-impedance for wrenches.",
+        ),
+    ] = "",
+    fri_stiffness: Annotated[
+        str,
+        Parameter(
+            group=FRI,
+            help="Of joint-impedance: one number or seven [Nm/rad], default 200. Of cartesian-impedance: along and "
+            "about the axes, as 2000,200, or six numbers [N/m, Nm/rad], default 2000,200.",
+        ),
+    ] = "",
+    fri_start: Annotated[
+        str, Parameter(group=FRI, help="A1,...,A7 at the start [deg]. Default: 0,30,0,-90,0,60,0.")
+    ] = "",
+    fri_force: Annotated[
+        str,
+        Parameter(
+            group=FRI,
+            help="FX,FY,FZ on the flange from the start, base axes [N]; --fault 'push 0 0 -20 2@5' pushes for 2 s "
+            "after 5 s.",
+        ),
+    ] = "",
+    fri_network: Annotated[
+        tuple[str, ...],
+        Parameter(
+            group=FRI,
+            help="Fault of the network in both directions, as loss=0.01, delay=0.002 or jitter=0.001: loss, duplicate, "
+            "corrupt, reorder and burst are probabilities, delay, jitter and burst_time [s]; may be repeated.",
+        ),
+    ] = (),
     as_json: Json = False,
 ) -> int:
     """Run a virtual cabinet until Ctrl-C; with --fri, a bare FRI controller; with --app, your own application."""
@@ -146,6 +181,11 @@ def sim(
             "--fri-port": (fri_port, None),
             "--fri-io": (fri_io, ()),
             "--fri-frame": (fri_frame, ()),
+            "--fri-mode": (fri_mode, ""),
+            "--fri-stiffness": (fri_stiffness, ""),
+            "--fri-start": (fri_start, ""),
+            "--fri-force": (fri_force, ""),
+            "--fri-network": (fri_network, ()),
         }
         _refuse_beside_app({name for name, (value, default) in defaults.items() if value != default})
         return _application(
@@ -168,7 +208,15 @@ def sim(
     if fri is not None:
         from heptarm.cli import fri_sim
 
-        return fri_sim.run(
+        own = {"--view": view, "--key": bool(key), "--project": project is not None}
+        for name, present in own.items():
+            if present:
+                raise CommandRejected(
+                    f"{name} cannot be used with --fri: there is no cabinet application",
+                    parameter=name.lstrip("-"),
+                    hint=f"leave out {name} or --fri",
+                )
+        options = fri_sim.FriControllerOptions(
             version=fri,
             model=model,
             command=fri_command,
@@ -178,10 +226,16 @@ def sim(
             port=fri_port,
             signals=fri_io,
             frames=fri_frame,
+            mode=fri_mode,
+            stiffness=fri_stiffness,
+            start=fri_start,
+            force=fri_force,
+            network=fri_network,
+            faults=fault,
+            payload=payload,
             speed=speed,
-            verbose=verbose,
-            as_json=as_json,
         )
+        return fri_sim.run(options, verbose=verbose, as_json=as_json)
     return _cabinet(
         model=model,
         host=host,

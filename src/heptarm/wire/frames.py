@@ -89,7 +89,9 @@ class FrameReader:
         if len(buffer) < body:
             # refuse a wrong magic at once: a peer of another protocol may never send a complete header
             if len(buffer) >= start + 2 and int.from_bytes(buffer[start : start + 2], "big") != MAGIC:
-                raise _bad(f"a frame must begin with {MAGIC:04x}, got {bytes(buffer[start : start + 2]).hex()}")
+                raise _bad(
+                    f"a frame must begin with {MAGIC:04x}, got {bytes(buffer[start : start + 2]).hex()}"
+                )
             return None
         magic, version, flags, type_, length, seq, request, time = HEADER.unpack_from(buffer, start)
         if magic != MAGIC:

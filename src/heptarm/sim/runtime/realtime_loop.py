@@ -131,6 +131,14 @@ class RealtimeLoop:
         gc.collect()
         gc.freeze()
         gc.disable()
+        try:
+            self._loop()
+        finally:
+            # otherwise the plant outlives its modules, and the bindings of its libraries report leaks
+            gc.enable()
+            gc.unfreeze()
+
+    def _loop(self) -> None:
         self._ring.reals[HeaderWords.RATE] = self._speed
         now_ns, period, header = time.monotonic_ns, self._period, self._ring.header
         spin = min(SPIN_NS, int(SPIN_FRACTION * period))
