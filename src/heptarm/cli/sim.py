@@ -26,6 +26,13 @@ from heptarm.values.simulator_options import SimulatorOptions
 
 _APP = Group("Your own application")
 
+#: The error of Java for an address that this machine does not have.
+_NOT_HERE = "Cannot assign requested address"
+_NOT_HERE_HINT = (
+    "the application uses an address that this machine does not have: replace it with --map ADDRESS=127.0.0.1, "
+    "or give it to this machine: sudo ip address add ADDRESS/32 dev lo"
+)
+
 
 def sim(
     *,
@@ -96,6 +103,15 @@ def sim(
             help="File of such buttons, one per line; # begins a comment. They come before --answer.",
         ),
     ] = None,
+    addresses: Annotated[
+        tuple[str, ...],
+        Parameter(
+            name="--map",
+            group=_APP,
+            help="OLD=NEW: replace an address of the lab in string literals of the sources, in process data and in FRI "
+            "sessions, as in 172.31.1.25=127.0.0.1; may be repeated.",
+        ),
+    ] = (),
     fri: Annotated[
         str | None,
         Parameter(
@@ -193,6 +209,7 @@ def sim(
             main=app_class,
             data=app_data,
             answers=(*_read_answers(answers), *answer),
+            addresses=addresses,
             model=model,
             speed=speed,
             faults=fault,
@@ -201,7 +218,13 @@ def sim(
             verbose=verbose,
             as_json=as_json,
         )
-    given = {"--app-class": app_class, "--app-data": app_data, "--answer": answer, "--answers": answers}
+    given = {
+        "--app-class": app_class,
+        "--app-data": app_data,
+        "--answer": answer,
+        "--answers": answers,
+        "--map": addresses,
+    }
     for name, value in given.items():
         if value:
             raise CommandRejected(f"{name} needs --app", parameter=name.lstrip("-"), hint="add --app FOLDER")
@@ -373,6 +396,7 @@ def _application(
     main: str,
     data: tuple[str, ...],
     answers: tuple[int, ...],
+    addresses: tuple[str, ...],
     model: str,
     speed: float,
     faults: tuple[str, ...],
@@ -386,8 +410,13 @@ def _application(
     Raises:
         HeptarmError: it does not compile, there is no such application, or an option is illegal.
     """
-    from heptarm.sim.runtime.application import compile_application
+    from heptarm.sim.runtime.addresses import AddressMap
+    from heptarm.sim.runtime.application import compile_application, unused_addresses
 
+    try:
+        mapped = AddressMap.of(addresses)
+    except ValueError as error:
+        raise CommandRejected(str(error), parameter="map") from None
     if any(button < 0 for button in answers):
         raise CommandRejected(
             f"--answer must be the number of a button, from 0, got {min(answers)}",
@@ -396,17 +425,25 @@ def _application(
         )
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with TemporaryDirectory(prefix="heptarm-") as out:
-        application = compile_application(folder, Path(out), main=main)
-        for reason in application.left_out:
-            print(f"heptarm: {reason}", file=sys.stderr, flush=True)
+        application = compile_application(folder, Path(out), main=main, addresses=mapped)
+        data_file = project or application.project
+        notes = [*application.left_out]
+        for address in unused_addresses(folder, data_file, mapped):
+            notes.append(
+                f"--map: {address} is in no string of the sources and in no process data; where it comes from "
+                f"elsewhere, give it to this machine: sudo ip address add {address}/32 dev lo"
+            )
+        for note in notes:
+            print(f"heptarm: {note}", file=sys.stderr, flush=True)
         options = SimulatorOptions(
             model=model,
             speed=speed,
             application=application.main,
             background=application.background,
             classpath=(out, *map(str, application.jars)),
-            project=project or application.project,
+            project=data_file,
             data=data,
+            map=addresses,
             answer=answers,
             fault=faults,
             payload=payload,
@@ -435,6 +472,8 @@ def _application(
             emit({"application": application.main, "ended": not failure, "error": failure})
         elif failure:
             print(f"heptarm: {application.main} ended with an error: {failure}", file=sys.stderr)
+            if _NOT_HERE in failure:
+                print(f"heptarm: {_NOT_HERE_HINT}", file=sys.stderr)
         return 1 if failure or cabinet.returncode else 0
 
 
