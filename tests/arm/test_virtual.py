@@ -317,11 +317,11 @@ def test_a_lost_controller_may_let_its_motion_finish(cabinet: RunningCabinet, tm
 
 
 def test_the_key_opens_the_cabinet() -> None:
-    cabinet = PrivateCabinet.start(Target(model="iiwa7", options=(("key", "sesame"),)))
+    cabinet = PrivateCabinet.start(Target(model="med7", options=(("key", "sesame"),)))
     target = f"{cabinet.host}:{cabinet.port}"
     try:
         with ha.connect(target, key="sesame", timeout=30.0) as arm:
-            assert arm.robot.name == "iiwa7"
+            assert arm.robot.name == "med7"
         with pytest.raises(ha.ConnectFailed, match="key is wrong"):
             ha.connect(target, key="barley", timeout=30.0)
         with pytest.raises(ha.ConnectFailed, match="asks for a pre-shared key"):

@@ -36,7 +36,7 @@ _NOT_HERE_HINT = (
 
 def sim(
     *,
-    model: Annotated[Literal["iiwa7", "iiwa14"], Parameter(help="Robot.")] = "iiwa14",
+    model: Annotated[Literal["iiwa7", "iiwa14", "med7", "med14"], Parameter(help="Robot.")] = "iiwa14",
     host: Annotated[str, Parameter(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, Parameter(help="Port; 0 takes a free one.")] = 30001,
     speed: Annotated[float, Parameter(help="Simulated seconds per second.")] = 1.0,

@@ -119,7 +119,7 @@ class Plant:
     """A simulated robot.
 
     Args:
-        model: "iiwa7" or "iiwa14".
+        model: "iiwa7", "iiwa14", "med7" or "med14".
         q: joint positions at the start, shape (7,) [rad].
         boxes: fixed boxes around it.
     """
