@@ -11,7 +11,7 @@ import mujoco
 
 from heptarm.values.robot import robot
 
-_MODELS = Path(__file__).parents[1] / "models"
+MODELS = Path(__file__).parents[1] / "models"
 _NUMBERS = 6
 #: Contact type of the world's shapes, as the floor's.
 _MEETS_ARM = 2
@@ -55,7 +55,7 @@ def specification(model: str) -> mujoco.MjSpec:
 
     The Med robots have the shapes of the iiwa ones, and the masses of their own links.
     """
-    spec = mujoco.MjSpec.from_file(str(_MODELS / f"{model.replace('med', 'iiwa')}.xml"))
+    spec = mujoco.MjSpec.from_file(str(MODELS / f"{model.replace('med', 'iiwa')}.xml"))
     if model.startswith("med"):
         links = robot(model).links
         for index in range(7):
