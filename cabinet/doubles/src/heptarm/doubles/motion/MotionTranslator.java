@@ -91,7 +91,7 @@ public final class MotionTranslator {
     /** Motions of a batch, segments of a spline; none of others. */
     static List<? extends RobotMotion<?>> parts(IMotion motion) {
         if (motion instanceof MotionBatch) {
-            return ((MotionBatch) motion).motions();
+            return ((MotionBatch) motion).getMotions();
         }
         if (motion instanceof Spline) {
             return ((Spline) motion).segments();

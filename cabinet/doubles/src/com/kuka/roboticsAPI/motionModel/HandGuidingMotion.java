@@ -82,6 +82,11 @@ public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
         return this;
     }
 
+    /** The older name of {@link #setJointVelocityLimit}. */
+    public HandGuidingMotion setAxisSpeedLimit(double radiansPerSecond) {
+        return setJointVelocityLimit(radiansPerSecond);
+    }
+
     /** The older name of {@link #setJointLimitsMax}. */
     public HandGuidingMotion setAxisLimitsMax(double... radians) {
         return setJointLimitsMax(radians);

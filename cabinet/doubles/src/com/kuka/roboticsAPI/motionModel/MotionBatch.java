@@ -13,8 +13,7 @@ public class MotionBatch extends RobotMotion<MotionBatch> {
         this.motions = List.of(motions);
     }
 
-    /** For the simulation. */
-    public List<RobotMotion<?>> motions() {
+    public List<RobotMotion<?>> getMotions() {
         return motions;
     }
 }
