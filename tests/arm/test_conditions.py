@@ -9,7 +9,8 @@ import pytest
 
 import heptarm as ha
 from heptarm.arm.translate.conditions import condition_message
-from heptarm.values.condition.signals import force, io, path, torque
+from heptarm.values.condition.force import force, torque
+from heptarm.values.condition.signals import io, path
 from heptarm.values.io import Signal, find_signal
 from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.wire import messages as wire

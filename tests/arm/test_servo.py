@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.values.condition.signals import force
+from heptarm.values.condition.force import force
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.mode.mode import Position
 from tests.conftest import RunningCabinet

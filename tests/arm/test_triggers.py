@@ -11,7 +11,8 @@ import heptarm as ha
 from heptarm.arm.translate.triggers import trigger_messages
 from heptarm.do import notify, set_output
 from heptarm.model.kinematics import forward
-from heptarm.values.condition.signals import force, io, path
+from heptarm.values.condition.force import force
+from heptarm.values.condition.signals import io, path
 from heptarm.values.io import Signal
 from heptarm.values.motion.motion import Motion
 from heptarm.values.robot import robot

@@ -238,7 +238,7 @@ def test_the_straight_engine_follows_poses_and_no_joints(cabinet: FakeCabinet) -
         (LINE | {"linear": wire.CartesianDynamics(jerk=10.0)}, "linear.jerk"),
         (LINE | {"linear": wire.CartesianDynamics(orientation_jerk=10.0)}, "linear.orientation_jerk"),
         ({"linear": wire.CartesianDynamics(velocity=0.1)}, "linear"),
-        (LINE | {"speed_timeout": 0.5}, "speed_timeout"),
+        (LINE | {"timing": wire.ServoTiming(speed_timeout=0.5)}, "timing.speed_timeout"),
     ],
 )
 def test_limits_that_an_engine_does_not_heed_are_refused(

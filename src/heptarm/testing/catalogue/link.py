@@ -36,7 +36,7 @@ def clock(arm: Arm) -> None:
     """The two clocks are compared: the age of a state is known, though nobody has set a clock."""
     ages = [state.age for state in arm.states(duration=0.3)]
     # a busy machine makes states older; a wrong difference of the clocks shows in all of them
-    below(float(np.abs(ages).min()), 0.05 * max(arm.pace, 1.0), "smallest age of a state", unit="s")
+    below(float(np.abs(ages).min()), 0.05 * max(arm.real_time_factor, 1.0), "smallest age of a state", unit="s")
 
 
 @scenario(line=10, rows="O6 O7 O8 O10", risk=Risk.FAULT, virtual=True, space=0.5, needs=("ptp",))
