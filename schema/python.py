@@ -219,6 +219,15 @@ def fields(spec: Spec, chosen: list[Field]) -> list[str]:
     return [f"    {one.name}: {annotation(one.type)}{default(spec, one)}" for one in chosen]
 
 
+def _ranges(chosen: list[Field]) -> list[str]:
+    """Ranges of numbers, for those who check a value before they send it."""
+    found = {one.name: (one.low, one.high) for one in chosen if one.type.name == "f64" and one.ranged}
+    if not found:
+        return []
+    pairs = ", ".join(f'"{name}": ({_number(low)}, {_number(high)})' for name, (low, high) in found.items())
+    return [f"    RANGES: ClassVar[dict[str, tuple[float, float]]] = {{{pairs}}}"]
+
+
 def _methods(name: str, body: Body, fields: list[Field]) -> list[str]:
     lines = ["", "    def _write(self, out: list[bytes]) -> None:"]
     lines += [f"        {line}" for line in body.write] or ["        pass"]
@@ -352,6 +361,7 @@ def messages(spec: Spec) -> str:
             if not body.is_run:
                 raise ValueError(f"{message.name}: a one-way message is one run of numbers")
             lines += [f"    LAYOUT: ClassVar[Struct] = _{message.name}_0"]
+        lines += _ranges(message.fields)
         lines += [""]
         if message.groups:
             lines += _state(message)

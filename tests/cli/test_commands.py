@@ -6,6 +6,8 @@ import itertools
 import json
 import math
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -34,6 +36,23 @@ def test_help_names_every_command() -> None:
         "demo",
     ):
         assert command in text
+
+
+def test_help_imports_no_command() -> None:
+    listing = (
+        "import sys\n"
+        "sys.argv = ['heptarm', '--help']\n"
+        "from heptarm.cli import main\n"
+        "try:\n    main.main()\nexcept SystemExit:\n    pass\n"
+        "names = [place.split(':')[0] for place in main.COMMANDS.values()]\n"
+        "loaded = [one for one in (*names, 'numpy') if {one, f'heptarm.cli.{one}'} & set(sys.modules)]\n"
+        "print('imported:', loaded)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", listing], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert "imported: []" in done.stdout
+    assert "Record a trajectory while a person guides the arm by hand." in done.stdout  # the summary of teach
 
 
 def test_sim_can_be_connected_to_and_ends_on_ctrl_c() -> None:

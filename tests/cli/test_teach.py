@@ -14,7 +14,7 @@ def test_taught_and_replayed(tmp_path: Path) -> None:
         target = ("--target", ready["target"])
         (taught,) = objects("teach", str(file), "--free", "xyz", "--seconds", "3", *target)
         assert taught["recorded"] > taught["points"] >= 2 and file.exists()
-        (done,) = objects("replay", str(file), "--by", "spline", "--pace", "0.3", *target)
+        (done,) = objects("replay", str(file), "--by", "spline", "--speed-scaling", "0.3", *target)
         assert done["cause"] == "finished" and done["deviation_rad"] < 0.2
         refused = run("replay", str(tmp_path / "none.npz"), *target)
         assert refused.returncode == 1 and "none.npz" in refused.stderr

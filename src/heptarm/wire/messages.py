@@ -42,7 +42,7 @@ class When(enum.IntEnum):
 
 
 class OnLost(enum.IntEnum):
-    """What a lost controller means for a program."""
+    """What happens to a program when its controller is lost."""
 
     STOP = 0
     FINISH = 1
@@ -112,7 +112,7 @@ class Plane(enum.IntEnum):
 
 
 class PathReference(enum.IntEnum):
-    """What a point on the path is counted from."""
+    """Reference of a point on the path."""
 
     START = 0
     DESTINATION = 1
@@ -181,7 +181,7 @@ class KeyLed(enum.IntEnum):
 
 
 class Severity(enum.IntEnum):
-    """Weight of a message."""
+    """Severity of a message."""
 
     INFO = 0
     WARNING = 1
@@ -349,7 +349,7 @@ _Blending_0 = Struct(">ddd")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blending:
-    """Where the motion may begin to turn into its follower; 0: exact stop."""
+    """Where the motion may start to blend into the next one; 0: exact stop."""
 
     relative: float = 0.0
     distance: float = 0.0
@@ -433,7 +433,7 @@ class Ptp:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PtpHome:
-    """Point to point in joint space, to the home position that the cabinet's project has; all zeros if it has none."""
+    """Point to point in joint space, to the home position of the cabinet's project; all zeros without one."""
 
     dynamics: JointDynamics = JointDynamics()
     blending: Blending = Blending()
@@ -529,7 +529,7 @@ class Lin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinRel:
-    """Straight line relative to where the motion frame is when the motion starts."""
+    """Straight line relative to the pose of the motion frame at the start."""
 
     offset: Pose
     reference: str = ""
@@ -1554,7 +1554,7 @@ def _read_Action(data: bytes, pos: int) -> tuple[Action, int]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trigger:
-    """Does something, without stopping, when a condition fires."""
+    """Executes an action when a condition fires; the motion continues."""
 
     condition: Condition = Condition()
     action: Action
@@ -1653,7 +1653,7 @@ def _read_Mode(data: bytes, pos: int) -> tuple[Mode, int]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Item:
-    """One motion of a program with all that belongs to it."""
+    """A motion of a program with its control mode, break condition and triggers."""
 
     motion: Motion
     frame: str = ""
@@ -2718,6 +2718,7 @@ class TakeControl:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "any"
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"watchdog": (0.1, 10.0)}
 
     watchdog: float = 0.5
     on_lost: OnLost = OnLost.STOP
@@ -2805,6 +2806,7 @@ class Subscribe:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "any"
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"rate": (0.0, 1000.0)}
 
     groups: Groups
     rate: float
@@ -3079,6 +3081,7 @@ class SetOverride:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"value": (0.0, 1.0)}
 
     value: float
 
@@ -3117,7 +3120,7 @@ class SetOverride:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recover:
-    """Does what software may do to make the robot ready again; rejected with the operator's steps otherwise."""
+    """Makes the robot ready again as far as software may; otherwise rejected with the steps for the operator."""
 
     TYPE: ClassVar[int] = 42
     KIND: ClassVar[str] = "request"
@@ -3157,7 +3160,7 @@ class Recover:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DefineTool:
-    """Defines or redefines a tool; one that is attached stays so. Refused while anything runs or waits."""
+    """Defines or redefines a tool; an attached tool stays attached. Refused while any motion runs or is queued."""
 
     TYPE: ClassVar[int] = 48
     KIND: ClassVar[str] = "request"
@@ -3199,7 +3202,7 @@ class DefineTool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttachTool:
-    """Attaches a tool to the flange in place of another; an empty name detaches. A workpiece goes with its tool. Refused while anything runs or waits."""
+    """Attaches a tool to the flange instead of the current one; an empty name only detaches. A workpiece is detached with its tool. Refused while any motion runs or is queued."""
 
     TYPE: ClassVar[int] = 49
     KIND: ClassVar[str] = "request"
@@ -3246,7 +3249,7 @@ _AttachLoad_0 = Struct(">B")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttachLoad:
-    """Attaches a workpiece to the motion frame of the tool, or detaches it. Refused while anything runs or waits."""
+    """Attaches a workpiece to the motion frame of the tool, or detaches it. Refused while any motion runs or is queued."""
 
     TYPE: ClassVar[int] = 50
     KIND: ClassVar[str] = "request"
@@ -3591,6 +3594,7 @@ class ServoOpen:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"velocity": (0.0, 1.0), "acceleration": (0.0, 1.0), "min_trajectory_time": (0.001, 1.0), "goal_timeout": (0.1, 3600.0), "speed_timeout": (0.001, 10.0), "watchdog": (0.005, 2.0)}
 
     engine: ServoEngine = ServoEngine.SMART
     frame: str = ""
@@ -3684,6 +3688,7 @@ class ServoJoints:
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
     LAYOUT: ClassVar[Struct] = _ServoJoints_0
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"watchdog": (0.005, 2.0)}
 
     servo: int
     watchdog: float
@@ -3735,6 +3740,7 @@ class ServoJointsVelocity:
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
     LAYOUT: ClassVar[Struct] = _ServoJointsVelocity_0
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"watchdog": (0.005, 2.0)}
 
     servo: int
     watchdog: float
@@ -3789,6 +3795,7 @@ class ServoPose:
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
     LAYOUT: ClassVar[Struct] = _ServoPose_0
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"watchdog": (0.005, 2.0)}
 
     servo: int
     watchdog: float
@@ -4000,6 +4007,7 @@ class FriOpen:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"period": (0.001, 0.1), "timeout": (0.1, 60.0)}
 
     host: str
     port: int = 30200

@@ -52,9 +52,9 @@ class PlantArm:
         return self.plant.robot
 
     @property
-    def ring(self) -> SharedState:
+    def shared(self) -> SharedState:
         """The plant's shared memory."""
-        return self.plant.ring
+        return self.plant.shared
 
     def reading(self) -> Reading:
         """The state after the last tick."""
@@ -184,7 +184,7 @@ class Sessions:
         Raises:
             HeptarmError: an illegal configuration, a port in use, an address that does not resolve.
         """
-        image = self._plant.ring.signals
+        image = self._plant.shared.signals
         configuration = SessionConfiguration(
             self._version,
             period_ms=period_ms,

@@ -102,7 +102,7 @@ class VirtualCabinet:
         self.operator = SimulatedOperator(self.plant)
         for fault in options.fault:
             self.operator.schedule(fault)
-        self.loop = RealtimeLoop(self.plant.ring, self.tick, speed=options.speed)
+        self.loop = RealtimeLoop(self.plant.shared, self.tick, speed=options.speed)
         jvm.start(options.classpath, foreign=self.is_foreign)
         import jpype
 
@@ -110,7 +110,7 @@ class VirtualCabinet:
         if not options.verbose and not self.is_foreign:
             jpype.JClass("java.util.logging.LogManager").getLogManager().reset()
         self._java_memory = java_plant.java_memory
-        self._trace = None if options.trace is None else Trace(self.plant.ring, options.trace)
+        self._trace = None if options.trace is None else Trace(self.plant.shared, options.trace)
         self._station = java_plant.open_station(self.plant, self.sessions)
         for name, value in data.items():
             self._station.setProcessData(name, java_plant.boxed(value))

@@ -357,7 +357,7 @@ def _carry_out(calls: Any, plant: JavaPlant) -> None:
 
 def open_station(plant: Plant, sessions: Sessions) -> Any:
     """Give the plant and its FRI sessions to Java; returns heptarm.doubles.runtime.Station."""
-    memory = jpype.nio.convertToDirectBuffer(plant.ring.memory)
+    memory = jpype.nio.convertToDirectBuffer(plant.shared.memory)
     calls, given = jpype.JClass("heptarm.doubles.plant.PlantCalls")(), JavaPlant(plant, sessions)
     for number in range(_CALLS_AT_ONCE):
         name = f"plant-calls-{number}"

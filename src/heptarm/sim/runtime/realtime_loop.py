@@ -96,7 +96,7 @@ class RealtimeLoop:
     """Call `tick` once per millisecond of plant time.
 
     Args:
-        ring: shared state; its anchor word is the wall time of plant time zero, for Java.
+        shared: shared state; its anchor word is the wall time of plant time zero, for Java.
         tick: one tick.
         speed: plant seconds per second; 0: as fast as possible.
 
@@ -105,8 +105,8 @@ class RealtimeLoop:
             answer each of them, else 0; may be set at any time.
     """
 
-    def __init__(self, ring: SharedState, tick: Callable[[], None], *, speed: float = 1.0) -> None:
-        self._ring = ring
+    def __init__(self, shared: SharedState, tick: Callable[[], None], *, speed: float = 1.0) -> None:
+        self._shared = shared
         self._tick = tick
         self._period = int(TICK_NS / speed) if speed > 0 else 0
         self._speed = speed
@@ -138,8 +138,8 @@ class RealtimeLoop:
         gc.collect()
         gc.freeze()
         gc.disable()
-        self._ring.reals[HeaderWords.RATE] = self._speed
-        now_ns, period, header = time.monotonic_ns, self._period, self._ring.header
+        self._shared.reals[HeaderWords.RATE] = self._speed
+        now_ns, period, header = time.monotonic_ns, self._period, self._shared.header
         spin = min(SPIN_NS, int(SPIN_FRACTION * period))
         done = int(header[HeaderWords.NEWEST])  # ticks of plant time that have passed before the loop
         due = now_ns() + period

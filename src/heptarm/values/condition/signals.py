@@ -85,22 +85,28 @@ class Force:
         return Force(frame, tolerance)
 
     def __gt__(self, threshold: float) -> Condition:
-        return ForceAbove(threshold, self.frame, self.tolerance)
+        return ForceAbove(threshold, frame=self.frame, tolerance=self.tolerance)
 
     def __lt__(self, threshold: float) -> Condition:
-        return ~ForceAbove(threshold, self.frame, self.tolerance)
+        return ~ForceAbove(threshold, frame=self.frame, tolerance=self.tolerance)
 
     def along(self, axis: str) -> Component:
         """Its component along an axis, with sign."""
-        return Component(lambda low, high: ForceOutside(axis, low, high, self.frame, self.tolerance), FORCE)
+        return Component(
+            lambda low, high: ForceOutside(axis, low, high, frame=self.frame, tolerance=self.tolerance), FORCE
+        )
 
     def normal(self, axis: str) -> Magnitude:
         """Its magnitude along an axis, in either direction."""
-        return Magnitude(lambda threshold: NormalForceAbove(axis, threshold, self.frame, self.tolerance))
+        return Magnitude(
+            lambda threshold: NormalForceAbove(axis, threshold, frame=self.frame, tolerance=self.tolerance)
+        )
 
     def shear(self, axis: str) -> Magnitude:
         """Its magnitude across an axis."""
-        return Magnitude(lambda threshold: ShearForceAbove(axis, threshold, self.frame, self.tolerance))
+        return Magnitude(
+            lambda threshold: ShearForceAbove(axis, threshold, frame=self.frame, tolerance=self.tolerance)
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,7 +131,10 @@ class Torque:
 
     def about(self, axis: str) -> Component:
         """Its component about an axis of the frame."""
-        return Component(lambda low, high: TorqueOutside(axis, low, high, self.frame, self.tolerance), TORQUE)
+        return Component(
+            lambda low, high: TorqueOutside(axis, low, high, frame=self.frame, tolerance=self.tolerance),
+            TORQUE,
+        )
 
 
 class IoSignals:

@@ -25,7 +25,7 @@ public final class Welcome extends Message {
     public final double max_rate;
     /** both sides send something at least this often [s] */
     public final double heartbeat;
-    /** who controls; empty: nobody */
+    /** name of the client in control; empty: none */
     public final String controller;
     public final byte[] mac;
 

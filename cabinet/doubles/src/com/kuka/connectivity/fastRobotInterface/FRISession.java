@@ -12,7 +12,7 @@ import heptarm.doubles.plant.FriChannel;
 import heptarm.doubles.runtime.ApplicationServices;
 import heptarm.doubles.runtime.Station;
 
-/** An FRI session; it opens when it is made. */
+/** An FRI session, opened by its constructor. */
 public class FRISession implements FriChannel {
     private static final double MILLI = 1e3;
 
@@ -27,7 +27,7 @@ public class FRISession implements FriChannel {
         number = station.plant.friOpen(configuration.settings(), this);
     }
 
-    /** Waits until the client answers well enough for an overlay. */
+    /** Waits until the quality of the connection suffices for an overlay. */
     public void await(long time, TimeUnit unit) throws TimeoutException {
         long deadline = System.nanoTime() + unit.toNanos(time);
         try {
@@ -87,7 +87,7 @@ public class FRISession implements FriChannel {
         }
     }
 
-    /** An exception in one listener of the application must not keep the others from being called. */
+    /** An exception in one listener of the application must not prevent calls of the others. */
     private static void tell(IFRISessionListener listener, FRIChannelInformation now, boolean other) {
         try {
             if (other) {

@@ -8,7 +8,7 @@ import heptarm.doubles.motion.WrenchCondition;
 import heptarm.doubles.seam.Condition;
 import heptarm.doubles.seam.ForceOutside;
 
-/** A component of the external force lies outside a band [N]. */
+/** A component of the external force is outside a band [N]. */
 public class ForceComponentCondition extends WrenchCondition {
     private final CoordinateAxis axis;
     private final double[] band;

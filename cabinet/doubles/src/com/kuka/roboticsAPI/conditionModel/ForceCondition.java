@@ -10,7 +10,7 @@ import heptarm.doubles.seam.ForceAbove;
 import heptarm.doubles.seam.NormalForceAbove;
 import heptarm.doubles.seam.ShearForceAbove;
 
-/** The external force, all of it or its part along or across an axis, is above a threshold [N]. */
+/** The magnitude of the external force, or of its part along or across an axis, is above a threshold [N]. */
 public final class ForceCondition extends WrenchCondition {
     /** Which part of the force. */
     private enum Part { SPATIAL, NORMAL, SHEAR }

@@ -6,7 +6,7 @@ import com.kuka.roboticsAPI.controllerModel.sunrise.brakeTest.BrakeTestResult;
 import heptarm.doubles.motion.MotionContainer;
 import heptarm.doubles.runtime.Station;
 
-/** Loads the brake of an axis, from 0, with a torque [Nm]. The simulated arm holds still meanwhile; its brakes hold what the axis can exert. */
+/** Loads the brake of an axis, from 0, with a torque [Nm]. The simulated arm rests; its brakes hold the axis' maximum torque. */
 public class BrakeTest extends RobotMotion<BrakeTest> {
     private static final double SECONDS = 1.0;
 
@@ -15,17 +15,17 @@ public class BrakeTest extends RobotMotion<BrakeTest> {
 
     public BrakeTest(int axis, double torque) {
         if (axis < 0 || axis > 6) {
-            throw new IllegalArgumentException("axis " + axis + "; there are 0 to 6");
+            throw new IllegalArgumentException("axis must be 0 to 6, got " + axis);
         }
         this.axis = axis;
         this.torque = notNegative("torque", torque);
     }
 
-    /** What the test that has run found. */
+    /** Result of the finished test. */
     public static BrakeTestResult evaluateResult(IMotionContainer container) {
         IMotion motion = ((MotionContainer) container).getLastExecutedMotion();
         if (!(motion instanceof BrakeTest)) {
-            throw new IllegalArgumentException("this was no brake test but " + container.getCommand());
+            throw new IllegalArgumentException("the motion must be a brake test, got " + container.getCommand());
         }
         BrakeTest test = (BrakeTest) motion;
         double most = Station.current().description.tauMax[test.axis];
@@ -34,7 +34,7 @@ public class BrakeTest extends RobotMotion<BrakeTest> {
         return new BrakeTestResult(test.axis, state, test.torque, most);
     }
 
-    /** How long it lasts [s]; for the simulation. */
+    /** Duration [s]; for the simulation. */
     public double seconds() {
         return SECONDS;
     }

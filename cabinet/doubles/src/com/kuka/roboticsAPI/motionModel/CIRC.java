@@ -16,7 +16,7 @@ public class CIRC extends SplineMotionCP<CIRC> {
         return destination;
     }
 
-    /** A point on the way; for the simulation. */
+    /** The auxiliary point; for the simulation. */
     public AbstractFrame auxiliary() {
         return auxiliary;
     }

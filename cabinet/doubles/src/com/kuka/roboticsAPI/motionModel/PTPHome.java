@@ -1,5 +1,5 @@
 package com.kuka.roboticsAPI.motionModel;
 
-/** Point to point, to the home position of the robot that it is commanded to. */
+/** Point to point, to the home position of the commanded robot. */
 public class PTPHome extends SplineMotionJP<PTPHome> {
 }

@@ -2,13 +2,13 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.List;
 
-/** A spline block in space: segments that are gone through without a halt. */
+/** A Cartesian spline block: segments without a stop between them. */
 public class Spline extends SplineMotionCP<Spline> {
     private final List<SplineMotionCP<?>> segments;
 
     public Spline(SplineMotionCP<?>... segments) {
         if (segments.length == 0) {
-            throw new IllegalArgumentException("a spline has at least one segment");
+            throw new IllegalArgumentException("a spline must have at least one segment");
         }
         this.segments = List.of(segments);
     }

@@ -3,7 +3,7 @@ package com.kuka.connectivity.motionModel.directServo;
 import com.kuka.connectivity.motionModel.smartServo.ServoMotionJP;
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
 
-/** Goes straight for each destination; they have to be close and smooth. */
+/** Moves directly to each destination; destinations must be close and smooth. */
 public class DirectServo extends ServoMotionJP<DirectServo> {
     private final JointPosition start;
 

@@ -2,7 +2,7 @@ package com.kuka.connectivity.motionModel.smartServo;
 
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
 
-/** Plans a limited trajectory to each destination, far or near; begins at a position that has to be the present one. */
+/** Plans a limited trajectory to each destination, far or near. The start position must be the current one. */
 public class SmartServo extends ServoMotionJP<SmartServo> {
     private final JointPosition start;
 

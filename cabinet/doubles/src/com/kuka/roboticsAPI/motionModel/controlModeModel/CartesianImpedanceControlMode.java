@@ -8,12 +8,12 @@ import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.CartDOF;
 
 /**
- * A spring and a damper between the moved frame and its set-point, and one that keeps the elbow. Directions in the order
+ * A spring and a damper between the motion frame and its set-point, and in the null space. Directions in the order
  * x y z a b c; [N/m], [Nm/rad], [N], [Nm], [mm], [rad].
  */
 public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
     static final int DIRECTIONS = 6;
-    /** A limit of this size counts as none. */
+    /** A limit of this size or above is no limit. */
     static final double OFF = 1e6;
     private static final double STIFFEST = 5000.0;
     private static final double STIFFEST_ROTATION = 300.0;
@@ -47,7 +47,7 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
         referenceSystem = other.referenceSystem;
     }
 
-    /** Sets parameters of some directions. */
+    /** Selects the directions whose parameters are set. */
     public static class CartImpBuilder {
         final int[] chosen;
         private final CartesianImpedanceControlMode mode;
@@ -152,7 +152,7 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
         return this;
     }
 
-    /** The control exerts no larger force [N, Nm]; with the flag, reaching it ends the motion. */
+    /** Limit of the force of the controller [N, Nm]; with the flag, reaching it ends the motion. */
     public CartesianImpedanceControlMode setMaxControlForce(double x, double y, double z, double a, double b, double c,
             boolean addStopCondition) {
         maxControlForce = limits("maxControlForce", true, x, y, z, a, b, c);
@@ -168,7 +168,7 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
         return this;
     }
 
-    /** The frame whose axes the directions are; without one those of the moved frame. */
+    /** Frame of the directions; default: the motion frame. */
     public CartesianImpedanceControlMode setReferenceSystem(AbstractFrame frame) {
         referenceSystem = frame;
         return this;
@@ -211,7 +211,7 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
         return additionalControlForce.clone();
     }
 
-    /** The frame of the axes, null: the moved one; for the simulation. */
+    /** Frame of the directions, null: the motion frame; for the simulation. */
     public AbstractFrame referenceSystem() {
         return referenceSystem;
     }
