@@ -64,7 +64,7 @@ public final class StateReader {
         clock.hold(clock.nanos());
         try {
             return new State((groups & Groups.JOINTS) != 0 ? joints(clock.stamp()) : null,
-                    (groups & Groups.TORQUES) != 0 ? torques(clock.stamp()) : null,
+                    (groups & Groups.TORQUES) != 0 ? sensors.readTorques(clock.stamp()) : null,
                     (groups & Groups.POSE) != 0 ? sensors.readPose(clock.stamp()) : null,
                     (groups & Groups.WRENCH) != 0 ? sensors.readWrench(clock.stamp()) : null, null, null, null, null);
         } finally {
@@ -73,30 +73,22 @@ public final class StateReader {
     }
 
     private JointState joints(long stamp) {
-        double[] q = new double[JOINTS];
-        double[] commanded = new double[JOINTS];
-        sensors.readJoints(q, commanded);
+        JointState read = sensors.readJoints(stamp);
         JointState sampled = newest;
-        double[] unknown = new double[JOINTS];
-        Arrays.fill(unknown, Double.NaN);
-        return new JointState(stamp, q, commanded, sampled == null ? unknown : sampled.dq);
-    }
-
-    TorqueState torques(long stamp) {
-        double[] measured = new double[JOINTS];
-        double[] external = new double[JOINTS];
-        double[] commanded = new double[JOINTS];
-        sensors.readTorques(measured, external, commanded);
-        return new TorqueState(stamp, measured, external, commanded);
+        if (sampled == null) {
+            Arrays.fill(read.dq, Double.NaN);
+        } else {
+            System.arraycopy(sampled.dq, 0, read.dq, 0, JOINTS);
+        }
+        return read;
     }
 
     /** A sample for the velocity filter, a low-pass filtered difference: the cabinet provides none. One thread only. */
     JointState sampleJoints(long stamp) {
-        double[] q = new double[JOINTS];
-        double[] commanded = new double[JOINTS];
-        sensors.readJoints(q, commanded);
+        JointState read = sensors.readJoints(stamp);
+        double[] q = read.q;
+        double[] dq = read.dq;
         double dt = (stamp - lastStamp) * 1e-9;
-        double[] dq = new double[JOINTS];
         if (lastStamp == 0 || dt > 1.0) {
             Arrays.fill(velocity, 0.0);
             Arrays.fill(dq, lastStamp == 0 ? Double.NaN : 0.0);
@@ -111,7 +103,7 @@ public final class StateReader {
         }
         System.arraycopy(q, 0, last, 0, JOINTS);
         lastStamp = stamp;
-        newest = new JointState(stamp, q, commanded, dq);
-        return newest;
+        newest = read;
+        return read;
     }
 }
