@@ -16,10 +16,10 @@ import heptarm.wire.Code;
  */
 final class Places implements Watchdog.Check {
     private static final int OBSERVERS = 100;
-    private static final int GUESTS = 32;
+    private static final int GUESTS = 100;
     private static final long GUEST_NS = 2000000000L;
     /** With more clients than this, those that are ending included, a guest goes without a Goodbye. */
-    private static final int CROWD = 2 * OBSERVERS;
+    private static final int CROWD = 2 * (OBSERVERS + GUESTS);
 
     final List<ClientConnection> clients = new CopyOnWriteArrayList<ClientConnection>();
     /** Guests, and the machine's time from which on they are guests [ns]. */
