@@ -89,7 +89,7 @@ MULTIPROCESSING = """
 
     if __name__ == "__main__":
         arm = ha.connect("sim://iiwa14")
-        target = f"sim://127.0.0.1:{arm._connection.cabinet.port}"
+        target = f"sim://127.0.0.1:{arm.connection.cabinet.port}"
         arm.move(HOME)
         for method in ("fork", "spawn"):
             context = multiprocessing.get_context(method)
