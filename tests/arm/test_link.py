@@ -71,10 +71,10 @@ def test_silence_is_noticed() -> None:
 def test_heartbeats_go_both_ways() -> None:
     peer = Peer(heartbeat=0.2)
     with peer.arm(rate=0.0) as arm:
-        count = arm._connection.link.offset.count  # type: ignore[union-attr]
+        count = arm.connection.link.offset.count  # type: ignore[union-attr]
         peer.tell(wire.Ping(sent=77))
         deadline = time.monotonic() + 20.0
-        while arm._connection.link.offset.count < count + 5 or wire.Pong not in {type(m) for m in peer.seen}:  # type: ignore[union-attr]
+        while arm.connection.link.offset.count < count + 5 or wire.Pong not in {type(m) for m in peer.seen}:  # type: ignore[union-attr]
             assert time.monotonic() < deadline
             time.sleep(0.01)
         with pytest.raises(ha.StaleState):
