@@ -1,4 +1,4 @@
-"""Figures: what heptarm promises, measured. `python -m bench` prints them.
+"""Benchmarks: measure the figures that heptarm states. `python -m bench` prints them.
 
 Each folder is a group of benchmarks: `protocol`, `state`, `servo`, `motion`, `safety`, `simulator`, `fri`, `ros`, `rl`.
 `measure` holds what they share: the figure record, blocks under a placement, the store. `results` holds stored runs and

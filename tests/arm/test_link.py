@@ -1,4 +1,4 @@
-"""The arm's link to a scripted cabinet in memory: how it is lost, kept and used by many."""
+"""The arm's link to a scripted cabinet in memory: loss, heartbeat and use by several threads."""
 
 from __future__ import annotations
 

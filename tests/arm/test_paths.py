@@ -1,4 +1,4 @@
-"""Arcs, splines and blended programs through the whole stack, measured on the states that come back."""
+"""Arcs, splines and blended programs through the whole stack, measured on the pushed states."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def moved(pose: Pose, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Pose:
 
 
 def carried_out(arm: Arm, motion: object) -> tuple[ha.Result, Array]:
-    """Result and the flange's places meanwhile, shape (n, 3)."""
-    states: States = arm.states()  # from before the beginning
+    """The result, and the positions of the flange during the motion, shape (n, 3) [m]."""
+    states: States = arm.states()  # from before the start
     handle = arm.start(motion)  # type: ignore[arg-type]
     places = []
     for state in states:
@@ -94,7 +94,7 @@ def test_a_spline_passes_through_its_points(arm: Arm) -> None:
     knots = [moved(start, 0.03, 0.05, 0.0), moved(start, 0.0, 0.1, 0.03), start]
     result, places = carried_out(arm, ha.spline(knots, speed_mps=0.15))
     assert result.arrived and arm.wait_for_rest().pose.distance_to(start) < 5e-4
-    for knot in knots:  # between two states the arm goes some millimetres
+    for knot in knots:  # between two states the arm moves some millimetres
         assert np.linalg.norm(places - knot.xyz, axis=1).min() < 4e-3
     around = ha.ellipse(start, 0.04, centre=start.xyz + [0, 0.07, 0], speed_mps=0.3)
     assert arm.move(around).arrived and arm.wait_for_rest().pose.distance_to(start) < 5e-4

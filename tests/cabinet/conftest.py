@@ -1,4 +1,4 @@
-"""One fake cabinet for all tests that leave it as they found it, and a maker for those that need their own."""
+"""One fake cabinet for all tests that restore its state, and a factory for those that need their own."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Maker = Callable[..., FakeCabinet]
 
 @pytest.fixture(scope="session")
 def shared_cabinet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeCabinet]:
-    # a busy machine may hold up a test for seconds: whoever tests silence makes a cabinet of its own
+    # a busy machine may delay a test for seconds: tests of silence use a cabinet of their own
     with FakeCabinet(log=tmp_path_factory.mktemp("fake") / "log", heartbeat=2.0) as cabinet:
         yield cabinet
 

@@ -26,7 +26,7 @@ def along(probe: Probe, z: float, **more: Any) -> Any:
 
 
 def push(stage: Stage, sent: Sent, way: float) -> None:
-    """Push until a joint has turned so far [rad]."""
+    """Push until a joint has turned by this angle [rad]."""
     before = until(lambda: sent.told, "no feedback")[-1].position
     stage.do("push 0 6 6 300")
     until(lambda: np.abs(np.subtract(sent.told[-1].position, before)).max() > way, "the arm is not guided")

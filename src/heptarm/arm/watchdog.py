@@ -1,6 +1,6 @@
 """Watchdogs: after which silence the cabinet stops the arm.
 
-All defaults are in this table. Ranges, and the defaults that the cabinet has, too, come from the schema of the protocol.
+All defaults are in this table. Ranges, and defaults that the cabinet has, too, come from the schema of the protocol.
 """
 
 from __future__ import annotations
