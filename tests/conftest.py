@@ -16,7 +16,7 @@ pytest_plugins = ["tests.processes", "tests.retry"]
 
 _LATE = ("slow", "browser")
 
-# no timing assertions, least of all on a machine that does other things as well
+# no timing assertions, above all on a busy machine
 settings.register_profile("heptarm", deadline=None)
 settings.load_profile("heptarm")
 
@@ -43,7 +43,7 @@ class RunningCabinet:
 
     @property
     def target(self) -> str:
-        """What to connect to."""
+        """The target to connect to."""
         return f"sim://{self.host}:{self.port}"
 
 
@@ -72,5 +72,5 @@ def arm(cabinet: RunningCabinet) -> Iterator[Arm]:
 
 @pytest.fixture
 def private_target() -> str:
-    """A target that starts a virtual cabinet of one's own, five times as fast as time."""
+    """A target that starts a private virtual cabinet, five times as fast as real time."""
     return "sim://iiwa14?speed=5"

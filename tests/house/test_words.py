@@ -1,7 +1,7 @@
-"""One word for one idea, and the field's: words that heptarm does not use, with those that it uses instead.
+"""One word for one idea, the field's word: words that heptarm does not use, and their replacements.
 
 Identifiers are read word by word, so `max_octets` and `OctetReader` are found as well as prose. A word that also has a
-plain meaning is found in its other meanings only; `but` names these.
+common plain meaning is allowed in that meaning; `but` describes it.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ RULES = (
     Rule(r"\b(?:class|interface|enum|record) Desk\b", "ApplicationServices", exact=True),
     Rule(r"\b(?:class|interface|enum|record) \w*Insight\b", "SimulatorProbe", exact=True),
 )
-#: Any of the words: most lines have none.
+#: Any of the words: a quick check, since most lines have none.
 _ANY = re.compile("|".join(rule.word for rule in RULES), re.I)
 _INSIDE = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|_")
 

@@ -32,7 +32,7 @@ from heptarm.ros.trajectory.trajectory import KinematicState
 from tests.conformance.client import ReceivedFeedback, ReceivedResult, SentGoal
 from tests.conformance.stage import ROOT, Stage
 
-#: A busy machine may need long for what is quick [s].
+#: Time limit of quick operations on a busy machine [s].
 PATIENCE = 120.0
 #: And its watchdogs must not bark at that.
 PATIENT = {"watchdog": 5.0, "servo__watchdog": 1.0, "constraints__goal_time": 20.0}
@@ -50,7 +50,7 @@ def sources() -> dict[str, str]:
 
 
 def until(what: Callable[[], Any], why: str, timeout: float = PATIENCE) -> Any:
-    """Wait until something is true; returns it."""
+    """Wait until a value is true; return it."""
     deadline = time.monotonic() + timeout
     while time.monotonic() < deadline:
         if value := what():

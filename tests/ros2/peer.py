@@ -58,7 +58,7 @@ OUTCOMES = {
 
 
 def until(what: Callable[[], Any], why: str, timeout: float = PATIENCE) -> Any:
-    """Wait until something is true; returns it."""
+    """Wait until a value is true; return it."""
     deadline = time.monotonic() + timeout
     while time.monotonic() < deadline:
         if value := what():
