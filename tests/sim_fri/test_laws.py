@@ -1,4 +1,4 @@
-"""Laws through the client's whole loop on the simulated arm: sine, torques alone, force on a table, invalid commands."""
+"""Laws through the client's whole loop on the simulated arm: sine, torques, force on a table, invalid commands."""
 
 from __future__ import annotations
 
