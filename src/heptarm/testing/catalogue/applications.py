@@ -104,7 +104,7 @@ def _sim(name: str, source: str) -> str:
 
 @scenario(line=13, risk=Risk.STILL, virtual=True)
 def foreign(arm: Arm) -> None:
-    """Somebody else's Sunrise application is compiled and run as it is, with its own process data."""
+    """A Sunrise application of other people compiles and runs unchanged, with its own process data."""
     said = _sim("Nod", _FOREIGN)
     holds("lifted by 40 mm" in said, "it measured its line: 40 mm")
     holds("reported 2 times" in said, "it read its process data")
@@ -112,7 +112,7 @@ def foreign(arm: Arm) -> None:
 
 @scenario(line=12, risk=Risk.STILL, virtual=True)
 def own(arm: Arm) -> None:
-    """An application on heptarm's core, without any network: motions, their results, a refusal."""
+    """An application on heptarm's core, without a network: motions, results, a refusal."""
     said = _sim("Own", _OWN)
     holds("FINISHED, lifted by 50 mm" in said, "its line was 50 mm long")
     holds("A2 must be in" in said, "what cannot be done was refused by name")
