@@ -97,7 +97,7 @@ def follow(client: Client, watch: Watch, execution: str) -> dict[str, Any]:
     sent = client.send(TrajectoryGoal(client.joints, points, start))
     ended = client.result(sent)
     assert ended.outcome is GoalOutcome.SUCCEEDED, ended
-    time.sleep(0.1)  # the last states are on their way
+    time.sleep(0.1)  # the last states are in transit
     stamps, places = watch.track
     times = stamps - start
     fine = np.arange(-0.02, 0.02005, 0.0001)
@@ -140,7 +140,7 @@ def compare(states: Watch, bare: Watch, processes: Sequence[int]) -> dict[str, A
                 pin(os.getpid(), placement.near)
                 for process in processes:
                     pin(process, placement.far)
-                time.sleep(0.2)  # what was on its way while threads changed places
+                time.sleep(0.2)  # messages in transit while the threads change
                 states.restart()
                 bare.restart()
                 with Noise(measured=tuple(processes)) as noise:
