@@ -340,6 +340,8 @@ def messages(spec: Spec) -> str:
             f"class {name}:",
         ]
         lines += [f'    """{_doc(struct.doc)}"""', ""]
+        if ranges := _ranges(struct.fields):
+            lines += [*ranges, ""]
         lines += fields(spec, struct.fields) + _methods(name, body, struct.fields) + [""]
     for message in spec.messages.values():
         body = Body(spec, message.name, message.fields)

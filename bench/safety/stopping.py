@@ -76,7 +76,7 @@ def _stop_guided(kind: str, how: str, random: np.random.Generator) -> tuple[floa
         fastest = float(np.abs(plant.snapshot.dq).max())
         allowed = braking(fastest, 0.0, float(robot.ddq_max.min()), float(robot.dddq_max.min())) + SETTLING
         return _rest(plant, how), allowed
-    plant.submit(Order(1, "straight", straight=QUICK))
+    plant.submit(Order(1, "straight", straight_limits=QUICK))
     plant.tick()
     here = _tip(plant)
     plant.shared.post(1, Pose.of(here.xyz + random.uniform(-DISTANCE, DISTANCE, 3), here.quat).array)

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.values.condition.signals import force, path
+from heptarm.values.condition.force import force
+from heptarm.values.condition.signals import path
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.wire import messages as wire
@@ -23,7 +24,7 @@ HOME = ha.deg(0, 35, 0, -80, 0, 65, 0)
 @pytest.fixture(scope="module")
 def table() -> Iterator[ha.Arm]:
     """An arm above a table."""
-    target = f"sim://iiwa14?box=0.6,0,{TABLE / 2},0.4,0.6,{TABLE}"
+    target = f"sim://iiwa14?speed=2&box=0.6,0,{TABLE / 2},0.4,0.6,{TABLE}"
     with ha.connect(target, watchdog=10.0, timeout=20.0) as arm:
         yield arm
 

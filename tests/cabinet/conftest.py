@@ -16,8 +16,7 @@ Maker = Callable[..., FakeCabinet]
 
 @pytest.fixture(scope="session")
 def shared_cabinet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeCabinet]:
-    # a busy machine may delay a test for seconds: tests of silence use a cabinet of their own
-    with FakeCabinet(log=tmp_path_factory.mktemp("fake") / "log", heartbeat=2.0) as cabinet:
+    with FakeCabinet(log=tmp_path_factory.mktemp("fake") / "log") as cabinet:
         yield cabinet
 
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.planning.command import Order
 from heptarm.sim.plant.plant import Plant
+from heptarm.sim.seam import ServoTiming
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import JointImpedance
 from tests.sim.driving import READY, Ear, ready
@@ -115,14 +116,14 @@ def test_a_passing_velocity_is_kept_for_a_moment_then_the_arm_rests() -> None:
 
 
 def test_a_target_that_stays_ends_the_motion_after_its_timeout() -> None:
-    plant, ear = serving(goal_timeout=0.3)
+    plant, ear = serving(servo_timing=ServoTiming(goal_timeout=0.3))
     plant.shared.post(7, HERE + 0.05)
     to_rest(plant)
     assert ear.causes == ["started", "done"]
 
 
 def test_a_velocity_that_leads_out_of_the_limits_stops_the_arm() -> None:
-    plant, ear = serving(speed_timeout=1.0)
+    plant, ear = serving(servo_timing=ServoTiming(speed_timeout=1.0))
     edge = HERE.copy()
     edge[6] = plant.robot.q_max[6] - 0.01
     plant.shared.post(7, edge, np.array([0, 0, 0, 0, 0, 0, 1.0]))

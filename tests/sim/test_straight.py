@@ -8,7 +8,7 @@ import pytest
 from heptarm.model.kinematics import forward
 from heptarm.sim.planning.command import Order
 from heptarm.sim.plant.plant import Plant
-from heptarm.sim.seam import StraightLimits
+from heptarm.sim.seam import ServoTiming, StraightLimits
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from tests.sim.driving import READY, Ear, numbers, ready
@@ -103,7 +103,7 @@ def test_a_target_across_the_way_bends_it_without_a_halt() -> None:
 
 
 def test_cancelling_brakes_on_the_line_within_what_a_motion_may() -> None:
-    plant, ear, start = serving(straight=StraightLimits(velocity=(0.5,) * 6, acceleration=(0.4,) * 6))
+    plant, ear, start = serving(straight_limits=StraightLimits(velocity=(0.5,) * 6, acceleration=(0.4,) * 6))
     goal = start.xyz + [0.0, 0.3, 0.1]
     plant.shared.post(7, Pose.of(goal, start.quat).array)
     places(plant, 900)
@@ -119,7 +119,7 @@ def test_cancelling_brakes_on_the_line_within_what_a_motion_may() -> None:
 
 
 def test_at_its_target_it_times_out() -> None:
-    plant, ear, start = serving(goal_timeout=0.3)
+    plant, ear, start = serving(servo_timing=ServoTiming(goal_timeout=0.3))
     plant.shared.post(7, Pose.of(start.xyz + [0, 0, 0.02], start.quat).array)
     while not plant.idle:
         plant.tick()
@@ -144,7 +144,7 @@ def test_a_line_that_slowly_ends_at_the_reach_of_the_arm_is_an_error_too() -> No
         Order(
             7,
             "straight",
-            straight=StraightLimits(velocity=(1e-4,) * 6, acceleration=(1.0,) * 6),
+            straight_limits=StraightLimits(velocity=(1e-4,) * 6, acceleration=(1.0,) * 6),
             listener=ear,
         )
     )

@@ -15,9 +15,6 @@ from heptarm.values.condition.condition import (
     Condition,
     Inverted,
     OneOf,
-    PathReached,
-    SignalIs,
-    SignalOutside,
     check_condition,
     condition_nodes,
 )
@@ -28,8 +25,10 @@ from heptarm.values.condition.force import (
     NormalForceAbove,
     ShearForceAbove,
     TorqueOutside,
+    force,
+    torque,
 )
-from heptarm.values.condition.signals import force, io, path, torque
+from heptarm.values.condition.signals import PathReached, SignalIs, SignalOutside, io, path
 
 TOUCH = force.along("z") > 15
 HIT = abs(torque[3]) > 8

@@ -7,9 +7,22 @@ from typing import Annotated
 
 from cyclopts import Group, Parameter
 
+from heptarm.errors import CommandRejected
+from heptarm.values.robot import ROBOTS, robot
+
 COMMON = Group("Common options")
 FRI = Group("FRI")
 
+
+def _check_model(_: object, name: str) -> None:
+    """Refuse a robot that heptarm does not know, in the way that cyclopts reports."""
+    try:
+        robot(name)
+    except CommandRejected as error:
+        raise ValueError(error.text) from None
+
+
+Model = Annotated[str, Parameter(validator=_check_model, help=f"Robot: {', '.join(ROBOTS)}.")]
 Target = Annotated[
     str | None,
     Parameter(

@@ -18,6 +18,7 @@ from cyclopts import Group, Parameter
 from heptarm.cli.options import (
     FRI,
     Json,
+    Model,
 )
 from heptarm.cli.output import emit, is_silent, lines
 from heptarm.errors import CommandRejected, ConnectFailed
@@ -29,7 +30,7 @@ _APP = Group("Your own application")
 
 def sim(
     *,
-    model: Annotated[Literal["iiwa7", "iiwa14"], Parameter(help="Robot.")] = "iiwa14",
+    model: Model = "iiwa14",
     host: Annotated[str, Parameter(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, Parameter(help="Port; 0 takes a free one.")] = 30001,
     speed: Annotated[float, Parameter(help="Simulated seconds per second of real time.")] = 1.0,

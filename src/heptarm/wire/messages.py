@@ -255,6 +255,8 @@ _Redundancy_0 = Struct(">dii")
 class Redundancy:
     """KUKA's redundancy of an LBR pose."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"e1": (-1000.0, 1000.0)}
+
     e1: float
     status: int
     turn: int
@@ -284,6 +286,8 @@ _JointDynamics_0 = Struct(">7d7d7d")
 class JointDynamics:
     """Fractions of each axis' maximum; NaN keeps the cabinet's default (1)."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"velocity": (0.0, 1.0), "acceleration": (0.0, 1.0), "jerk": (0.0, 1.0)}
+
     velocity: tuple[float, ...] = (nan,) * 7
     acceleration: tuple[float, ...] = (nan,) * 7
     jerk: tuple[float, ...] = (nan,) * 7
@@ -312,6 +316,8 @@ _CartesianDynamics_0 = Struct(">dddddd")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CartesianDynamics:
     """Limits along a Cartesian path; NaN keeps the cabinet's default."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"velocity": (0.0, 10.0), "acceleration": (0.0, 100.0), "jerk": (0.0, 10000.0), "orientation_velocity": (0.0, 20.0), "orientation_acceleration": (0.0, 200.0), "orientation_jerk": (0.0, 20000.0)}
 
     velocity: float = nan
     acceleration: float = nan
@@ -350,6 +356,8 @@ _Blending_0 = Struct(">ddd")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blending:
     """Where the motion may start to blend into the next one; 0: exact stop."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"relative": (0.0, 1.0), "distance": (0.0, 2.0), "orientation": (0.0, 6.3)}
 
     relative: float = 0.0
     distance: float = 0.0
@@ -825,6 +833,8 @@ _Hold_0 = Struct(">d")
 class Hold:
     """Holds the position (under the item's control mode)."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"duration": (0.0, 1000000.0)}
+
     duration: float
 
     def _write(self, out: list[bytes]) -> None:
@@ -847,6 +857,8 @@ _HandGuide_0 = Struct(">7d7dddBB")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HandGuide:
     """Hand guiding while the enabling switch of the hand guiding device is held; ends when it is released."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"joint_velocity": (0.0, 10.0), "cartesian_velocity": (0.0, 10.0)}
 
     q_min: tuple[float, ...] = (nan,) * 7
     q_max: tuple[float, ...] = (nan,) * 7
@@ -877,6 +889,37 @@ class HandGuide:
         codec.check(self.cartesian_velocity, path + "cartesian_velocity", 0.0, 10.0, True, True)
 
 
+_ServoTiming_0 = Struct(">ddd")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoTiming:
+    """Timing of a servo motion."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"min_trajectory_time": (0.001, 1.0), "goal_timeout": (0.1, 3600.0), "speed_timeout": (0.001, 10.0)}
+
+    min_trajectory_time: float = 0.02
+    goal_timeout: float = 300.0
+    speed_timeout: float = 0.1
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_ServoTiming_0.pack(self.min_trajectory_time, self.goal_timeout, self.speed_timeout))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[ServoTiming, int]:
+        v = codec.unpack(_ServoTiming_0, data, pos)
+        pos += _ServoTiming_0.size
+        min_trajectory_time = v[0]
+        goal_timeout = v[1]
+        speed_timeout = v[2]
+        return cls(min_trajectory_time=min_trajectory_time, goal_timeout=goal_timeout, speed_timeout=speed_timeout), pos
+
+    def _check(self, path: str) -> None:
+        codec.check(self.min_trajectory_time, path + "min_trajectory_time", 0.001, 1.0, False, False)
+        codec.check(self.goal_timeout, path + "goal_timeout", 0.1, 3600.0, False, False)
+        codec.check(self.speed_timeout, path + "speed_timeout", 0.001, 10.0, False, False)
+
+
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -901,6 +944,8 @@ _JointImpedance_0 = Struct(">7d7d")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointImpedance:
     """Spring and damper in every joint."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"stiffness": (0.0, 5000.0), "damping": (0.0, 1.0)}
 
     stiffness: tuple[float, ...]
     damping: tuple[float, ...]
@@ -927,6 +972,8 @@ _CartesianImpedance_0 = Struct(">6d6ddd6d6dB6d6d")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CartesianImpedance:
     """Spring and damper at the motion frame; order x y z, then about x y z."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"stiffness": (0.0, 5000.0), "damping": (0.1, 1.0), "nullspace_stiffness": (0.0, 5000.0), "nullspace_damping": (0.3, 1.0), "additional_force": (-500.0, 500.0), "max_force": (0.0, 1000000.0), "max_velocity": (0.0, 100.0), "max_deviation": (0.0, 100.0)}
 
     stiffness: tuple[float, ...]
     damping: tuple[float, ...]
@@ -977,6 +1024,8 @@ _SineImpedance_0 = Struct(">6d6d6d6d6d6dddddB")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SineImpedance:
     """Cartesian impedance with an overlaid force pattern per direction."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"amplitude": (0.0, 500.0), "frequency": (0.0, 15.0), "phase": (0.0, 6.3), "bias": (-500.0, 500.0), "force_limit": (0.0, 1000000.0), "position_limit": (0.0, 100.0), "total_time": (0.0, 1000000.0), "rise_time": (0.0, 1000000.0), "hold_time": (0.0, 1000000.0), "fall_time": (0.0, 1000000.0)}
 
     base: CartesianImpedance
     amplitude: tuple[float, ...]
@@ -1034,6 +1083,8 @@ _SpiralPattern_0 = Struct(">Bdddd")
 class SpiralPattern:
     """Spiral force pattern in a plane."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"frequency": (0.0, 15.0), "amplitude": (0.0, 500.0), "stiffness": (0.0, 5000.0), "total_time": (0.0, 1000000.0)}
+
     plane: Plane
     frequency: float
     amplitude: float
@@ -1068,6 +1119,8 @@ _ForceAbove_0 = Struct(">dd")
 class ForceAbove:
     """Magnitude of the external force above a threshold."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"threshold": (0.0, 1000.0), "tolerance": (0.0, 1000.0)}
+
     frame: str = ""
     threshold: float
     tolerance: float = nan
@@ -1097,6 +1150,8 @@ _NormalForceAbove_0 = Struct(">Bdd")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NormalForceAbove:
     """Force along an axis above a threshold."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"threshold": (0.0, 1000.0), "tolerance": (0.0, 1000.0)}
 
     frame: str = ""
     axis: Axis
@@ -1130,6 +1185,8 @@ _ShearForceAbove_0 = Struct(">Bdd")
 class ShearForceAbove:
     """Force across an axis above a threshold."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"threshold": (0.0, 1000.0), "tolerance": (0.0, 1000.0)}
+
     frame: str = ""
     axis: Axis
     threshold: float
@@ -1161,6 +1218,8 @@ _ForceOutside_0 = Struct(">Bddd")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceOutside:
     """Component of the force outside a band."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"low": (-1000.0, 1000.0), "high": (-1000.0, 1000.0), "tolerance": (0.0, 1000.0)}
 
     frame: str = ""
     axis: Axis
@@ -1197,6 +1256,8 @@ _TorqueOutside_0 = Struct(">Bddd")
 class TorqueOutside:
     """Component of the Cartesian torque outside a band."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"low": (-1000.0, 1000.0), "high": (-1000.0, 1000.0), "tolerance": (0.0, 1000.0)}
+
     frame: str = ""
     axis: Axis
     low: float
@@ -1231,6 +1292,8 @@ _JointTorqueOutside_0 = Struct(">Bdd")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointTorqueOutside:
     """External torque of a joint outside a band."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"low": (-500.0, 500.0), "high": (-500.0, 500.0)}
 
     joint: int
     low: float
@@ -1316,6 +1379,8 @@ _PathReached_0 = Struct(">Bdd")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathReached:
     """A point on the path, by distance and by time."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"distance": (-100.0, 100.0), "delay": (-1000.0, 1000.0)}
 
     reference: PathReference
     distance: float
@@ -1771,6 +1836,8 @@ _ToolInfo_0 = Struct(">d3d6d")
 class ToolInfo:
     """A tool or a workpiece."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"mass": (0.0, 50.0), "com": (-2.0, 2.0)}
+
     name: str
     mass: float
     com: tuple[float, ...]
@@ -1986,6 +2053,8 @@ _MotionState_0 = Struct(">qIHHddd")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionState:
     """Running motion."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"progress": (0.0, 1.0), "override": (0.0, 1.0)}
 
     stamp: int
     motion: int
@@ -3583,7 +3652,7 @@ class ProcessData:
 
 _ServoOpen_0 = Struct(">B")
 _ServoOpen_1 = Struct(">dd")
-_ServoOpen_2 = Struct(">dddd")
+_ServoOpen_2 = Struct(">d")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -3594,7 +3663,7 @@ class ServoOpen:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
-    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"velocity": (0.0, 1.0), "acceleration": (0.0, 1.0), "min_trajectory_time": (0.001, 1.0), "goal_timeout": (0.1, 3600.0), "speed_timeout": (0.001, 10.0), "watchdog": (0.005, 2.0)}
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"velocity": (0.0, 1.0), "acceleration": (0.0, 1.0), "watchdog": (0.005, 2.0)}
 
     engine: ServoEngine = ServoEngine.SMART
     frame: str = ""
@@ -3602,9 +3671,7 @@ class ServoOpen:
     velocity: float = 0.2
     acceleration: float = 0.2
     linear: CartesianDynamics = CartesianDynamics()
-    min_trajectory_time: float = 0.02
-    goal_timeout: float = 300.0
-    speed_timeout: float = 0.1
+    timing: ServoTiming = ServoTiming()
     watchdog: float = 0.2
     until: Condition = Condition()
 
@@ -3618,7 +3685,8 @@ class ServoOpen:
             _write_Mode(self.mode, out)
         out.append(_ServoOpen_1.pack(self.velocity, self.acceleration))
         self.linear._write(out)
-        out.append(_ServoOpen_2.pack(self.min_trajectory_time, self.goal_timeout, self.speed_timeout, self.watchdog))
+        self.timing._write(out)
+        out.append(_ServoOpen_2.pack(self.watchdog))
         self.until._write(out)
 
     @classmethod
@@ -3636,14 +3704,12 @@ class ServoOpen:
         velocity = v[0]
         acceleration = v[1]
         linear, pos = CartesianDynamics._read(data, pos)
+        timing, pos = ServoTiming._read(data, pos)
         v = codec.unpack(_ServoOpen_2, data, pos)
         pos += _ServoOpen_2.size
-        min_trajectory_time = v[0]
-        goal_timeout = v[1]
-        speed_timeout = v[2]
-        watchdog = v[3]
+        watchdog = v[0]
         until, pos = Condition._read(data, pos)
-        return cls(engine=engine, frame=frame, mode=mode, velocity=velocity, acceleration=acceleration, linear=linear, min_trajectory_time=min_trajectory_time, goal_timeout=goal_timeout, speed_timeout=speed_timeout, watchdog=watchdog, until=until), pos
+        return cls(engine=engine, frame=frame, mode=mode, velocity=velocity, acceleration=acceleration, linear=linear, timing=timing, watchdog=watchdog, until=until), pos
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.frame.encode()), path + "frame", 0, 128)
@@ -3652,9 +3718,7 @@ class ServoOpen:
         codec.check(self.velocity, path + "velocity", 0.0, 1.0, True, False)
         codec.check(self.acceleration, path + "acceleration", 0.0, 1.0, True, False)
         self.linear._check(path + "linear.")
-        codec.check(self.min_trajectory_time, path + "min_trajectory_time", 0.001, 1.0, False, False)
-        codec.check(self.goal_timeout, path + "goal_timeout", 0.1, 3600.0, False, False)
-        codec.check(self.speed_timeout, path + "speed_timeout", 0.001, 10.0, False, False)
+        self.timing._check(path + "timing.")
         codec.check(self.watchdog, path + "watchdog", 0.005, 2.0, False, False)
         self.until._check(path + "until.")
 

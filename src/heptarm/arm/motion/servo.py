@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, replace
 from math import nan
 from operator import le
-from typing import Literal, TypedDict
+from typing import Any, Literal, TypedDict, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -27,10 +28,12 @@ from heptarm.values.result import Result
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
 
+_Method = TypeVar("_Method", bound=Callable[..., Any])
+
 KINDS = ("joint", "pose", "lin")
 ENGINES = {"smart": wire.ServoEngine.SMART, "direct": wire.ServoEngine.DIRECT}
 #: The protocol's defaults and ranges; `schema/protocol.toml` is their one place.
-_DEFAULT, _RANGES = wire.ServoOpen(), wire.ServoOpen.RANGES
+_DEFAULT, _RANGES = wire.ServoOpen(), wire.ServoTiming.RANGES
 #: Added to the period for the default of min_trajectory_time, so that the next target comes before its end [s].
 _OVERLAP = 0.005
 #: Limits along and about each axis of the base for straight lines: default, largest value, unit.
@@ -64,11 +67,33 @@ class ServoKeywords(TypedDict, total=False):
 
 @dataclass(frozen=True, slots=True)
 class ServoRequest:
-    """A checked request for a servo motion; `Arm.servo` documents its fields.
+    """A checked request for a servo motion: its keywords, as `documented` lists them in `Arm.servo`.
 
     Attributes:
-        period: time between two ticks [s].
-        watchdog_time: longest gap between two targets [s].
+        kind: what the targets are: "joint", "pose" or "lin".
+        rate: ticks of the loop per second [Hz]; 100.
+        watchdog: longest gap between two targets; a longer one stops the arm [s], 0.005 to 2; None: five
+            periods, at least 0.2 s.
+        engine: of joints and poses: "smart" plans a limited trajectory to each target; "direct" moves straight
+            to it, for targets that are close and smooth.
+        mode: control mode; None: that of `using`, otherwise position. Its parameters can change while the arm
+            follows.
+        speed: of joints and poses: ceiling, a fraction of each axis' maximum in (0, 1]; None: 0.2. The lower
+            one of this and `arm.speed` applies.
+        acceleration: likewise, of the acceleration and the jerk.
+        speed_mps: of "lin": largest speed along each axis of the base [m/s], up to 10; None: 0.25. `arm.speed`
+            scales it, since the joints' own limits are not checked.
+        acceleration_mps2: likewise [m/s²], up to 100; None: 1. Not scaled.
+        speed_radps: largest angular velocity about each axis of the base [rad/s], up to 20; None: 0.5. Scaled.
+        acceleration_radps2: likewise [rad/s²], up to 200; None: 2. Not scaled.
+        min_trajectory_time: shortest trajectory to a target [s]; None: a period and 5 ms.
+        goal_timeout: time at its target without another one after which the cabinet's servo motion ends [s];
+            300. The next target begins a new one.
+        speed_timeout: of joints with the engine "smart": how long the arm keeps the velocity of a target after
+            passing it, before it brakes [s], 0.001 to 10; None: 0.1.
+        moving: motion frame: "tool" (of the attached tool, or the flange), "flange" or the name of a frame.
+        until: break condition; the cabinet's application checks it up to 250 times a second, as fast as its
+            robot answers. See `move`.
 
     Raises:
         ShapeError: no such kind or engine.
@@ -89,7 +114,7 @@ class ServoRequest:
     speed_radps: float | None = None
     acceleration_radps2: float | None = None
     min_trajectory_time: float | None = None
-    goal_timeout: float = _DEFAULT.goal_timeout
+    goal_timeout: float = _DEFAULT.timing.goal_timeout
     speed_timeout: float | None = None
     moving: str = TOOL
     until: Condition | None = None
@@ -134,15 +159,17 @@ class ServoRequest:
         shortest = self.min_trajectory_time
         if shortest is None:
             shortest = float(np.clip(self.period + _OVERLAP, *_RANGES["min_trajectory_time"]))
-        kept = _DEFAULT.speed_timeout if self.speed_timeout is None else self.speed_timeout
+        given = {
+            "min_trajectory_time": shortest,
+            "goal_timeout": self.goal_timeout,
+            "speed_timeout": _DEFAULT.timing.speed_timeout if self.speed_timeout is None else self.speed_timeout,
+        }
         message = wire.ServoOpen(
             frame="" if self.moving == TOOL else self.moving,
             mode=mode_message(self.mode),
-            min_trajectory_time=within(
-                shortest, "min_trajectory_time", *_RANGES["min_trajectory_time"], unit="s"
+            timing=wire.ServoTiming(
+                **{name: within(value, name, *_RANGES[name], unit="s") for name, value in given.items()}
             ),
-            goal_timeout=within(self.goal_timeout, "goal_timeout", *_RANGES["goal_timeout"], unit="s"),
-            speed_timeout=within(kept, "speed_timeout", *_RANGES["speed_timeout"], unit="s"),
             watchdog=FIRST_TARGET.default,
         )
         if self.kind == "lin":
@@ -206,6 +233,15 @@ class ServoRequest:
                 parameter="speed_timeout",
                 hint="leave it out",
             )
+
+
+def documented(method: _Method) -> _Method:
+    """Decorator: list the keywords of a servo motion in the docstring of a method after "as follows."."""
+    listed = (ServoRequest.__doc__ or "").partition("        rate:")[1:]
+    lines = "".join(listed).partition("\n\n")[0].splitlines()
+    text = "\n".join(f"    {line}" for line in lines)
+    method.__doc__ = (method.__doc__ or "").replace("as follows.", f"as follows.\n{text}", 1)
+    return method
 
 
 #: Longest wait for the start, and for rest at the end [s].

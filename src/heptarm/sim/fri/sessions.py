@@ -60,12 +60,8 @@ class PlantArm:
         """The state after the last tick."""
         state, safety = self.plant.snapshot, self.plant.safety
         return Reading(
-            tuple(state.q.tolist()),
-            tuple(state.q_cmd.tolist()),
-            tuple(self.plant.interpolated.tolist()),
-            tau=tuple(state.tau.tolist()),
-            tau_cmd=tuple(state.tau_cmd.tolist()),
-            tau_ext=tuple(state.tau_ext.tolist()),
+            **{name: tuple(getattr(state, name).tolist()) for name in m.MONITORED},
+            q_ipo=tuple(self.plant.interpolated.tolist()),
             wrench=tuple(state.wrench.tolist()),
             safety=m.Safety.STOP_1
             if safety.stop_requested

@@ -7,7 +7,7 @@ in the calling thread. They come as the bytes that `heptarm.sim.seam` decodes.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from enum import IntEnum
 from functools import partial
 from math import isnan
@@ -114,6 +114,14 @@ def _word(value: IntEnum | None, default: IntEnum) -> str:
     return (default if value is None else value).name.lower()
 
 
+#: Fields of an order that are those of the message from Java, besides the ones that `order_of` converts.
+_SAME = tuple(
+    name
+    for name in (one.name for one in fields(Order))
+    if name in seam.MotionOrder.__slots__ and name not in ("kind", "redundancy", "blending", "parts", "mode")
+)
+
+
 def order_of(one: seam.MotionOrder, java: Any = None) -> Order:
     """The order of a motion.
 
@@ -121,29 +129,17 @@ def order_of(one: seam.MotionOrder, java: Any = None) -> Order:
         one: as Java describes it.
         java: its listener; None for a part of another motion, which has the listener and conditions of the whole.
     """
-    joints, path, blending, timing = (
-        one.joint_dynamics,
-        one.cartesian_dynamics,
-        one.blending,
-        one.servo_timing,
-    )
+    joints, path, blending = one.joint_dynamics, one.cartesian_dynamics, one.blending
     relative, distance, angle = _filled((blending.relative, blending.distance, blending.angle), 0.0)
     listener = None if java is None else JavaListener(java)
     mode, axes = mode_of(one.mode)
     return Order(
-        one.id,
-        one.kind.name.lower(),
-        joints=one.joints,
-        pose=one.pose,
-        via=one.via,
+        kind=one.kind.name.lower(),
         orientation=Orientation(
             _word(one.orientation_type, seam.OrientationType.VARIABLE),
             _word(one.orientation_reference, seam.OrientationReference.BASE),
         ),
         redundancy=(one.redundancy.e1, one.redundancy.status, one.redundancy.turn),
-        tcp=one.tcp,
-        offset=one.offset,
-        reference=one.reference,
         joint_velocity=_filled(joints.velocity, 1.0),
         joint_acceleration=_filled(joints.acceleration, 1.0),
         joint_jerk=_filled(joints.jerk, 1.0),
@@ -156,16 +152,12 @@ def order_of(one: seam.MotionOrder, java: Any = None) -> Order:
         blending=(relative, distance, angle),
         parts=tuple(order_of(part) for part in one.parts),
         guide=None if one.hand_guiding is None else HandGuide(**_keywords(one.hand_guiding)),
-        duration=one.duration,
         mode=mode,
         axes=axes,
-        minimum_time=timing.minimum_time,
-        goal_timeout=timing.goal_timeout,
-        speed_timeout=timing.speed_timeout,
-        straight=one.straight_limits,
         listener=listener,
         watches=() if java is None else _watches(one, java.fired),
         part_listener=listener,
+        **{name: getattr(one, name) for name in _SAME},
     )
 
 

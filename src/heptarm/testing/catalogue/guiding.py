@@ -81,7 +81,7 @@ def touched(arm: Arm) -> None:
 @scenario(line=8, rows="H12 H13", risk=Risk.CONTACT, operator=True, space=0.1, needs=("ptp",))
 def taps(arm: Arm) -> None:
     """A tap interrupts a motion, two more resume it."""
-    from heptarm.values.condition.signals import force
+    from heptarm.values.condition.force import force
 
     target = ptp(HOME + deg(0, 0, 0, 0, 0, 0, 60), speed=0.2)
     handle = arm.start(target, until=force > 15)

@@ -1,7 +1,15 @@
-"""Conditions on the external forces and torques."""
+"""Conditions on the external forces and torques, and the names that users compare to make them.
+
+::
+
+    from heptarm.when import force, torque
+
+    (force.along("z") > 15) | (abs(torque[3]) > 8)
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import isnan, nan
 from typing import ClassVar
@@ -170,3 +178,117 @@ class JointTorqueOutside(Condition):
 
     def __str__(self) -> str:
         return f"external torque of A{self.joint + 1} {band_text(self.low, self.high, JOINT, 'Nm')}"
+
+
+# ------------------------------------------------------------------------------------------------ expressions
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Magnitude:
+    """A number that is never negative: `> threshold` makes a condition."""
+
+    _above: Callable[[float], Condition]
+
+    def __gt__(self, threshold: float) -> Condition:
+        return self._above(threshold)
+
+    def __lt__(self, threshold: float) -> Condition:
+        return ~self._above(threshold)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Component:
+    """A number with a sign: `>`, `<`, `abs(...) >`, `outside` and `inside` make conditions."""
+
+    _band: Callable[[float, float], Condition]
+    _limit: float
+
+    def __gt__(self, bound: float) -> Condition:
+        return self._band(-self._limit, bound)
+
+    def __lt__(self, bound: float) -> Condition:
+        return self._band(bound, self._limit)
+
+    def __abs__(self) -> Magnitude:
+        return Magnitude(lambda bound: self._band(-bound, bound))
+
+    def outside(self, low: float, high: float) -> Condition:
+        """It is outside [low, high]."""
+        return self._band(low, high)
+
+    def inside(self, low: float, high: float) -> Condition:
+        """It is inside [low, high]."""
+        return ~self._band(low, high)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Force:
+    """External force that the cabinet estimates at the motion frame [N]; `> threshold` compares its magnitude.
+
+    Attributes:
+        frame: the frame whose axes count: "tool" (the motion frame), "flange" or "base".
+        tolerance: largest inaccuracy of the estimate that is accepted [N]; NaN: any. A worse estimate, as near a
+            singularity, counts as above the threshold.
+    """
+
+    frame: str = TOOL
+    tolerance: float = nan
+
+    def __call__(self, *, frame: str = TOOL, tolerance: float = nan) -> Force:
+        """The same force with other axes, or with a tolerance."""
+        return Force(frame, tolerance)
+
+    def __gt__(self, threshold: float) -> Condition:
+        return ForceAbove(threshold, frame=self.frame, tolerance=self.tolerance)
+
+    def __lt__(self, threshold: float) -> Condition:
+        return ~ForceAbove(threshold, frame=self.frame, tolerance=self.tolerance)
+
+    def along(self, axis: str) -> Component:
+        """Its component along an axis, with sign."""
+        return Component(
+            lambda low, high: ForceOutside(axis, low, high, frame=self.frame, tolerance=self.tolerance), FORCE
+        )
+
+    def normal(self, axis: str) -> Magnitude:
+        """Its magnitude along an axis, in either direction."""
+        return Magnitude(
+            lambda threshold: NormalForceAbove(axis, threshold, frame=self.frame, tolerance=self.tolerance)
+        )
+
+    def shear(self, axis: str) -> Magnitude:
+        """Its magnitude across an axis."""
+        return Magnitude(
+            lambda threshold: ShearForceAbove(axis, threshold, frame=self.frame, tolerance=self.tolerance)
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Torque:
+    """The external torque: `torque[3]` that of joint A4, `torque.about("z")` a component at the motion frame [Nm].
+
+    Attributes:
+        frame: the frame whose axes `about` refers to; see `Force`.
+        tolerance: see `Force`; for `about` [Nm].
+    """
+
+    frame: str = TOOL
+    tolerance: float = nan
+
+    def __call__(self, *, frame: str = TOOL, tolerance: float = nan) -> Torque:
+        """The same torque with other axes, or with a tolerance."""
+        return Torque(frame, tolerance)
+
+    def __getitem__(self, joint: int) -> Component:
+        """External torque of a joint, 0 for A1 to 6 for A7."""
+        return Component(lambda low, high: JointTorqueOutside(joint, low, high), JOINT)
+
+    def about(self, axis: str) -> Component:
+        """Its component about an axis of the frame."""
+        return Component(
+            lambda low, high: TorqueOutside(axis, low, high, frame=self.frame, tolerance=self.tolerance), TORQUE
+        )
+
+
+force = Force()
+torque = Torque()

@@ -25,6 +25,16 @@ public final class LinRel extends Motion {
         return 4;
     }
 
+    @Override
+    public Blending blending() {
+        return blending;
+    }
+
+    @Override
+    public Orientation orientation() {
+        return orientation;
+    }
+
     public void write(Encoder out) {
         offset.write(out);
         out.putStr(reference);

@@ -15,6 +15,11 @@ public final class PtpHome extends Motion {
         return 10;
     }
 
+    @Override
+    public Blending blending() {
+        return blending;
+    }
+
     public void write(Encoder out) {
         dynamics.write(out);
         blending.write(out);

@@ -59,12 +59,12 @@ public final class MotionReporter {
     /** A program has ended; {@code moved}: it had reached the robot. */
     void finished(Program program, boolean moved) {
         double[] q = new double[JOINTS];
-        double[] commanded = new double[JOINTS];
         double residual = moved ? 0.0 : Double.NaN;
         try {
-            sensors.readJoints(q, commanded);
+            JointState joints = sensors.readJoints(clock.nanos());
+            q = joints.q;
             for (int i = 0; moved && i < JOINTS; i++) {
-                residual = Math.max(residual, Math.abs(q[i] - commanded[i]));
+                residual = Math.max(residual, Math.abs(q[i] - joints.q_cmd[i]));
             }
         } catch (RuntimeException e) {
             log.error("reading the joints at the end of motion " + program.id, e);

@@ -47,7 +47,7 @@ public final class RobotService {
         executor = new MotionExecutor(robot.motion, new ConditionWatcher(robot.sensors, robot.signals, clock, log), reporter,
                 new TriggerActions(signals, reporter, clock), safety, clock, log);
         safety.add(executor);
-        monitors = new FriMonitors(robot.motion, reporter, log);
+        monitors = new FriMonitors(robot.motion, reporter, clock, log);
         authority = new ControlAuthority(robot.motion, executor, monitors, safety, events, log);
         sampler = new StateSampler(robot, reader, executor, signals, tools, clock, log);
         commands = new CommandHandler(robot, executor, monitors, safety, tools, new ProgramChecks(robot, tools, signals),

@@ -29,19 +29,17 @@ public final class StateReader {
 
     /** The current joints, with the newest known velocity. Any thread. */
     public JointState joints() {
-        double[] q = new double[JOINTS];
-        double[] commanded = new double[JOINTS];
-        long now = clock.nanos();
-        sensors.readJoints(q, commanded);
+        JointState read = sensors.readJoints(clock.nanos());
         JointState sampled = newest;
-        double[] unknown = new double[JOINTS];
-        Arrays.fill(unknown, Double.NaN);
-        return new JointState(now, q, commanded, sampled == null ? unknown : sampled.dq);
+        if (sampled != null) {
+            System.arraycopy(sampled.dq, 0, read.dq, 0, JOINTS);
+        }
+        return read;
     }
 
     /** The current torques. Any thread. */
     public TorqueState torques() {
-        return torques(clock.nanos());
+        return sensors.readTorques(clock.nanos());
     }
 
     /** The current pose of the motion frame. Any thread. */
@@ -54,21 +52,12 @@ public final class StateReader {
         return sensors.readWrench(clock.nanos());
     }
 
-    TorqueState torques(long stamp) {
-        double[] measured = new double[JOINTS];
-        double[] external = new double[JOINTS];
-        double[] commanded = new double[JOINTS];
-        sensors.readTorques(measured, external, commanded);
-        return new TorqueState(stamp, measured, external, commanded);
-    }
-
     /** A sample for the velocity filter, a low-pass filtered difference: the cabinet provides none. One thread only. */
     JointState sampleJoints(long stamp) {
-        double[] q = new double[JOINTS];
-        double[] commanded = new double[JOINTS];
-        sensors.readJoints(q, commanded);
+        JointState read = sensors.readJoints(stamp);
+        double[] q = read.q;
+        double[] dq = read.dq;
         double dt = (stamp - lastStamp) * 1e-9;
-        double[] dq = new double[JOINTS];
         if (lastStamp == 0 || dt > 1.0) {
             Arrays.fill(velocity, 0.0);
             Arrays.fill(dq, lastStamp == 0 ? Double.NaN : 0.0);
@@ -83,7 +72,7 @@ public final class StateReader {
         }
         System.arraycopy(q, 0, last, 0, JOINTS);
         lastStamp = stamp;
-        newest = new JointState(stamp, q, commanded, dq);
-        return newest;
+        newest = read;
+        return read;
     }
 }

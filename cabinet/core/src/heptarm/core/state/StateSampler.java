@@ -199,7 +199,7 @@ public final class StateSampler {
             end(jointsBudget);
         }
         if (begin(torquesBudget, groups, now)) {
-            torques = reader.torques(torquesBudget.stamp);
+            torques = robot.sensors.readTorques(torquesBudget.stamp);
             end(torquesBudget);
         }
         if (begin(poseBudget, groups, now)) {

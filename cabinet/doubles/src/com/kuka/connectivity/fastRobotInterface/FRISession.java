@@ -8,6 +8,8 @@ import java.util.concurrent.TimeoutException;
 import com.kuka.connectivity.fastRobotInterface.FRIChannelInformation.FRIConnectionQuality;
 import com.kuka.connectivity.fastRobotInterface.FRIChannelInformation.FRISessionState;
 
+import heptarm.core.Clock;
+import heptarm.core.Clocks;
 import heptarm.doubles.plant.FriChannel;
 import heptarm.doubles.runtime.ApplicationServices;
 import heptarm.doubles.runtime.Station;
@@ -29,17 +31,16 @@ public class FRISession implements FriChannel {
 
     /** Waits until the quality of the connection suffices for an overlay. */
     public void await(long time, TimeUnit unit) throws TimeoutException {
-        long deadline = System.nanoTime() + unit.toNanos(time);
+        Clock clock = station.clock();
+        long deadline = clock.nanos() + unit.toNanos(time);
         try {
             synchronized (this) {
                 while (information.getFRISessionState() == FRISessionState.IDLE
                         || information.getFRISessionState() == FRISessionState.MONITORING_WAIT) {
-                    long left = deadline - System.nanoTime();
-                    if (left <= 0 || closed) {
+                    if (closed || !Clocks.await(this, clock, deadline)) {
                         throw new TimeoutException("no FRI client answered well enough within " + time + " " + unit + ": "
                                 + information);
                     }
-                    TimeUnit.NANOSECONDS.timedWait(this, left);
                 }
             }
         } catch (InterruptedException e) {

@@ -2,8 +2,13 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.Arrays;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
 import heptarm.doubles.seam.AtLimit;
 import heptarm.doubles.seam.HandGuiding;
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
 import heptarm.doubles.seam.OutsideLimit;
 
 /** Hand guiding while the enabling switch of the hand guiding device is held; ends when it is released. */
@@ -102,8 +107,8 @@ public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
         return setJointLimitViolationFreezesAll(all);
     }
 
-    /** The limits as the plant takes them; for the simulation. */
-    public HandGuiding settings() {
+    /** The limits in the plant's terms. */
+    private HandGuiding settings() {
         HandGuiding settings = new HandGuiding();
         for (int i = 0; i < AXES; i++) {
             if (enabled[i] && !(lowest[i] < highest[i])) {
@@ -118,5 +123,11 @@ public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
         settings.atLimit = freezes ? AtLimit.ALL : AtLimit.AXIS;
         settings.outside = pulls ? OutsideLimit.PULL : OutsideLimit.FREE;
         return settings;
+    }
+
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.kind = MotionKind.GUIDE;
+        order.handGuiding = settings();
     }
 }

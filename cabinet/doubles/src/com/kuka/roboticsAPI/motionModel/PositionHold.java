@@ -2,10 +2,16 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.concurrent.TimeUnit;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
+
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
 
 /** Holds the position for a time; -1: until cancelled. */
 public class PositionHold extends RobotMotion<PositionHold> {
+    /** NaN: until cancelled [s]. */
     private final double seconds;
 
     public PositionHold(IMotionControlMode mode, long duration, TimeUnit unit) {
@@ -16,8 +22,9 @@ public class PositionHold extends RobotMotion<PositionHold> {
         setMode(mode);
     }
 
-    /** Duration [s]; NaN: until cancelled; for the simulation. */
-    public double seconds() {
-        return seconds;
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.kind = MotionKind.HOLD;
+        order.duration = seconds;
     }
 }

@@ -2,6 +2,12 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.List;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
+
 /** A Cartesian spline block: segments without a stop between them. */
 public class Spline extends SplineMotionCP<Spline> {
     private final List<SplineMotionCP<?>> segments;
@@ -13,8 +19,13 @@ public class Spline extends SplineMotionCP<Spline> {
         this.segments = List.of(segments);
     }
 
-    /** For the simulation. */
-    public List<SplineMotionCP<?>> segments() {
+    @Override
+    public List<SplineMotionCP<?>> parts() {
         return segments;
+    }
+
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.kind = MotionKind.SPLINE;
     }
 }

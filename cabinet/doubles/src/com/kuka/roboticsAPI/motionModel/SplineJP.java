@@ -2,6 +2,12 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.List;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
+
 /** A spline block in joint space. */
 public class SplineJP extends SplineMotionJP<SplineJP> {
     private final List<SplineMotionJP<?>> segments;
@@ -13,8 +19,13 @@ public class SplineJP extends SplineMotionJP<SplineJP> {
         this.segments = List.of(segments);
     }
 
-    /** For the simulation. */
-    public List<SplineMotionJP<?>> segments() {
+    @Override
+    public List<SplineMotionJP<?>> parts() {
         return segments;
+    }
+
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.kind = MotionKind.SPLINE_JOINTS;
     }
 }

@@ -2,6 +2,11 @@ package com.kuka.connectivity.motionModel.directServo;
 
 import com.kuka.connectivity.motionModel.smartServo.ServoMotionJP;
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
 
 /** Moves directly to each destination; destinations must be close and smooth. */
 public class DirectServo extends ServoMotionJP<DirectServo> {
@@ -23,5 +28,11 @@ public class DirectServo extends ServoMotionJP<DirectServo> {
 
     public JointPosition getStart() {
         return new JointPosition(start);
+    }
+
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        super.describe(order, motionFrame, robot);
+        order.kind = MotionKind.DIRECT;
     }
 }

@@ -3,16 +3,24 @@ package com.kuka.connectivity.motionModel.smartServo;
 import java.util.concurrent.TimeUnit;
 
 import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 
 import heptarm.doubles.motion.ServoRuntime;
+import heptarm.doubles.seam.MotionOrder;
 import heptarm.doubles.seam.ServoTiming;
 
 /** A motion that follows destinations given while it runs; {@code T} is its own type, so that setters chain. */
 public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<T> {
+    private static final double GOAL_TIMEOUT = 30.0;
+
     private final ServoTiming timing = new ServoTiming();
     private ServoRuntime runtime;
+
+    protected ServoMotion() {
+        timing.goalTimeout = GOAL_TIMEOUT;
+    }
 
     /** Whether a servo motion in impedance control may start now: at rest, without contact, not singular, with correct load data. */
     public static boolean validateForImpedanceMode(PhysicalObject object) {
@@ -24,7 +32,7 @@ public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<
     }
 
     public T setMinimumTrajectoryExecutionTime(double seconds) {
-        timing.minimumTime = positive("minimumTrajectoryExecutionTime", seconds);
+        timing.minTrajectoryTime = positive("minimumTrajectoryExecutionTime", seconds);
         return self();
     }
 
@@ -78,9 +86,9 @@ public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<
         return accepted;
     }
 
-    /** For the simulation. */
-    public ServoTiming timing() {
-        return timing;
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.servoTiming = timing;
     }
 
     /** The cabinet has accepted the motion; for the simulation. */

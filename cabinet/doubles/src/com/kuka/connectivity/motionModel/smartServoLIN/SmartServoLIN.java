@@ -1,8 +1,13 @@
 package com.kuka.connectivity.motionModel.smartServoLIN;
 
 import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
+import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
 import heptarm.doubles.seam.StraightLimits;
 
 /** Follows destinations on straight lines. The start frame must be the current pose of the motion frame. */
@@ -82,13 +87,11 @@ public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
         return start;
     }
 
-    /** For the simulation. */
-    public StraightLimits limits() {
-        return limits;
-    }
-
-    /** For the simulation; null: the world. */
-    public AbstractFrame reference() {
-        return reference;
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        super.describe(order, motionFrame, robot);
+        order.kind = MotionKind.STRAIGHT;
+        order.straightLimits = limits;
+        order.reference = MotionTranslator.axes(reference);
     }
 }

@@ -4,8 +4,15 @@ import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.List;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.CartDOF;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.motion.ControlModeTranslator;
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.CartesianImpedance;
+import heptarm.doubles.seam.ImpedanceMode;
 
 /**
  * A spring and a damper between the motion frame and its set-point, and in the null space. Directions in the order
@@ -17,6 +24,8 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
     static final double OFF = 1e6;
     private static final double STIFFEST = 5000.0;
     private static final double STIFFEST_ROTATION = 300.0;
+    /** Largest stiffness that the plant takes [Nm/rad]. */
+    private static final double PLANT_NULL_SPACE_STIFFNESS = 5000.0;
     private static final double LEAST_DAMPING = 0.1;
     private static final double LEAST_NULL_SPACE_DAMPING = 0.3;
 
@@ -206,14 +215,27 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
         return nullSpaceDamping;
     }
 
-    /** For the simulation. */
-    public double[] additionalForces() {
-        return additionalControlForce.clone();
+    @Override
+    public ImpedanceMode forPlant(ObjectFrame motionFrame, LBR robot) {
+        return spring(motionFrame, robot);
     }
 
-    /** Frame of the directions, null: the motion frame; for the simulation. */
-    public AbstractFrame referenceSystem() {
-        return referenceSystem;
+    /** Spring and damper in the plant's terms. */
+    final CartesianImpedance spring(ObjectFrame motionFrame, LBR robot) {
+        CartesianImpedance spring = new CartesianImpedance();
+        spring.stiffness = ControlModeTranslator.directions(stiffness);
+        spring.damping = ControlModeTranslator.directions(damping);
+        spring.nullspaceStiffness = Math.min(nullSpaceStiffness, PLANT_NULL_SPACE_STIFFNESS);
+        spring.nullspaceDamping = nullSpaceDamping;
+        spring.additionalForce = ControlModeTranslator.directions(additionalControlForce);
+        spring.maxForce = ControlModeTranslator.forceLimits(maxControlForce);
+        spring.maxForceStops = stopsAtMaxControlForce;
+        spring.maxVelocity = ControlModeTranslator.motionLimits(maxCartesianVelocity);
+        spring.maxDeviation = ControlModeTranslator.motionLimits(maxPathDeviation);
+        if (referenceSystem != null && referenceSystem != motionFrame) {
+            spring.axes = MotionTranslator.axes(referenceSystem, robot.getRootFrame());
+        }
+        return spring;
     }
 
     @Override

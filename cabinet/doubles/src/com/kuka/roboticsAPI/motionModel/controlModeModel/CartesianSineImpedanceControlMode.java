@@ -1,9 +1,12 @@
 package com.kuka.roboticsAPI.motionModel.controlModeModel;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.CartDOF;
 import com.kuka.roboticsAPI.geometricModel.CartPlane;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
 import heptarm.doubles.motion.ControlModeTranslator;
+import heptarm.doubles.seam.ImpedanceMode;
 import heptarm.doubles.seam.SineImpedance;
 
 /** Cartesian impedance with an overlaid force: in each direction a constant and a sine, with rise and fall times. */
@@ -173,9 +176,10 @@ public class CartesianSineImpedanceControlMode extends CartesianImpedanceControl
         return this;
     }
 
-    /** The pattern as the plant takes it, without its base; for the simulation. */
-    public SineImpedance pattern() {
+    @Override
+    public ImpedanceMode forPlant(ObjectFrame motionFrame, LBR robot) {
         SineImpedance pattern = new SineImpedance();
+        pattern.base = spring(motionFrame, robot);
         pattern.amplitude = ControlModeTranslator.directions(amplitude);
         pattern.frequency = ControlModeTranslator.directions(frequency);
         double[] phase = new double[DIRECTIONS];

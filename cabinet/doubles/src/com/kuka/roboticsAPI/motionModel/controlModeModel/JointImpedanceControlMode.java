@@ -2,6 +2,12 @@ package com.kuka.roboticsAPI.motionModel.controlModeModel;
 
 import java.util.Arrays;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.seam.ImpedanceMode;
+import heptarm.doubles.seam.JointImpedance;
+
 /** A spring [Nm/rad] and a damper (damping ratio) in every joint. */
 public class JointImpedanceControlMode extends AbstractMotionControlMode {
     private static final double STIFFNESS = 1000.0;
@@ -69,6 +75,14 @@ public class JointImpedanceControlMode extends AbstractMotionControlMode {
 
     public double[] getDamping() {
         return damping.clone();
+    }
+
+    @Override
+    public ImpedanceMode forPlant(ObjectFrame motionFrame, LBR robot) {
+        JointImpedance joints = new JointImpedance();
+        joints.stiffness = stiffness.clone();
+        joints.damping = damping.clone();
+        return joints;
     }
 
     @Override

@@ -1,5 +1,10 @@
 package com.kuka.roboticsAPI.motionModel.controlModeModel;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.seam.ImpedanceMode;
+
 /** Stiff position control. */
 public class PositionControlMode extends AbstractMotionControlMode {
     public PositionControlMode() {
@@ -8,6 +13,11 @@ public class PositionControlMode extends AbstractMotionControlMode {
 
     /** The meaning of the flag is not known; it has no effect here. */
     public PositionControlMode(boolean flag) {
+    }
+
+    @Override
+    public ImpedanceMode forPlant(ObjectFrame motionFrame, LBR robot) {
+        return null;
     }
 
     @Override
