@@ -258,7 +258,7 @@ def test_frames_that_nothing_has_are_refused_on_both_sides(
     bare: Arm, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fresh(bare)
-    with pytest.raises(CommandRejected, match="there are: flange, tool") as here:
+    with pytest.raises(CommandRejected, match="must be one of flange, tool") as here:
         bare.move(UNKNOWN[name]())
     monkeypatch.setattr(bare._tooling, "check", lambda _motions, _mode: None)
     with pytest.raises(CommandRejected) as there:

@@ -25,7 +25,7 @@ def test_a_tool_has_a_body_and_frames_of_which_the_tcp_is_the_first() -> None:
     assert tool.frame_names == ("tcp", "pad")
     assert tool.tcp == TIP
     assert tool.frame("pad").x == 0.02
-    with pytest.raises(CommandRejected, match="there are: tcp, pad") as refused:
+    with pytest.raises(CommandRejected, match="must be one of tcp, pad") as refused:
         tool.frame("tip")
     assert refused.value.code == 42
 

@@ -58,7 +58,9 @@ class DeploySettings:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.latency <= 0.5:
-            raise LimitError(f"latency is {self.latency}; allowed is [0, 0.5] s", code=2, parameter="latency")
+            raise LimitError(
+                f"latency must be in [0, 0.5] s, got {self.latency} s", code=2, parameter="latency"
+            )
 
 
 @dataclass(frozen=True, slots=True)

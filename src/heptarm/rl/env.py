@@ -75,12 +75,10 @@ class ReachEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is n
     ) -> None:
         if engine not in ENGINES:
             raise CommandRejected(
-                f"engine is {engine!r}; there are {', '.join(map(repr, ENGINES))}", parameter="engine"
+                f"engine must be one of {', '.join(map(repr, ENGINES))}, got {engine!r}", parameter="engine"
             )
         if render_mode is not None:
-            raise CommandRejected(
-                f"render_mode is {render_mode!r}; only None is known", parameter="render_mode"
-            )
+            raise CommandRejected(f"render_mode must be None, got {render_mode!r}", parameter="render_mode")
         self.render_mode = None
         self.task = task or ReachTask(robot, action=action, feature=feature)
         self._space = observation_space(self.task)

@@ -53,7 +53,7 @@ def evaluate(
     """
     known = policy.task if isinstance(policy, Policy) else task
     if known is None:
-        raise CommandRejected("a function does not say what its task is", parameter="task")
+        raise CommandRejected("task must be given with a function, which has none", parameter="task")
     task = task or known
     if isinstance(targets, int):
         if targets < 1:

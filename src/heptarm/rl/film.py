@@ -34,7 +34,7 @@ def film(report: EpisodeReport, path: str | os.PathLike[str], *, episodes: int =
     """
     target = Path(path)
     if target.suffix not in (".gif", ".png"):
-        raise CommandRejected(f"{target.name!r} ends neither in .gif nor in .png", parameter="path")
+        raise CommandRejected(f"path must end in .gif or .png, got {target.name!r}", parameter="path")
     for name, value in (("episodes", episodes), ("every", every)):
         if value < 1:
             raise LimitError(f"{name} must be at least 1, got {value}", code=2, parameter=name)

@@ -30,7 +30,7 @@ class Follower:
         self._pilot = Pilot(policy, self.guard)
         self._joints = tuple(joints)
         if len(set(self._joints)) != 7:
-            raise ShapeError(f"{list(joints)} are not seven different joints", parameter="joints")
+            raise ShapeError(f"joints must be seven different names, got {list(joints)}", parameter="joints")
         self._q = self._dq = np.full(7, nan)
         self._seen = -np.inf
         self._target: Array | None = None

@@ -40,10 +40,16 @@ class PolicyGuard:
 
     def __post_init__(self) -> None:
         if not all(a < b for a, b in zip(self.low, self.high, strict=True)):
-            raise LimitError(f"the box from {self.low} to {self.high} has no volume", code=2, parameter="low")
+            raise LimitError(
+                f"low must be below high so that the box has a volume, got {self.low} and {self.high} m",
+                code=2,
+                parameter="low",
+            )
         for name in ("speed", "stale"):
             if not getattr(self, name) > 0:
-                raise LimitError(f"{name} is {getattr(self, name)}; it is positive", code=2, parameter=name)
+                raise LimitError(
+                    f"{name} must be positive, got {getattr(self, name)}", code=2, parameter=name
+                )
 
     def check(self, target: Array) -> Array:
         """A target, base frame, shape (3,) [m], if it is inside the box.

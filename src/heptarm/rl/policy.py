@@ -53,16 +53,16 @@ class Policy:
         width = task.observation_size
         if self.mean.shape != (width,) or self.std.shape != (width,) or not (self.std > 0).all():
             raise ShapeError(
-                f"mean and std have shapes {self.mean.shape} and {self.std.shape}; ({width},) is wanted"
+                f"mean and std must have shape ({width},), std above 0; got {self.mean.shape} and {self.std.shape}"
             )
         for index, (w, b) in enumerate(self.layers):
             if w.ndim != 2 or w.shape[0] != width or b.shape != (w.shape[1],):
                 raise ShapeError(
-                    f"layer {index} has shapes {w.shape} and {b.shape}; {width} inputs are wanted"
+                    f"layer {index} must have {width} inputs, got weights {w.shape} and biases {b.shape}"
                 )
             width = w.shape[1]
         if width != task.action_size:
-            raise ShapeError(f"the network has {width} outputs; this task has {task.action_size} actions")
+            raise ShapeError(f"the network must have {task.action_size} outputs, got {width}")
         # clipped in units of the observations, scaled by the first layer: two passes fewer over the numbers
         mean64, std64 = self.mean.astype(np.float64), self.std.astype(np.float64)
         self._low, self._high = _weights(mean64 - CLIP * std64), _weights(mean64 + CLIP * std64)
@@ -102,7 +102,9 @@ class Policy:
         """
         target = Path(path)
         if target.suffix != ".npz":
-            raise CommandRejected(f"{target.name!r} does not end in .npz", parameter="path", value=str(path))
+            raise CommandRejected(
+                f"path must end in .npz, got {target.name!r}", parameter="path", value=str(path)
+            )
         about = {"format": _FORMAT, "task": self.task.as_dict(), "facts": self.facts}
         arrays: dict[str, Any] = {"about": np.array(json.dumps(about)), "mean": self.mean, "std": self.std}
         for index, (w, b) in enumerate(self.layers):
@@ -125,7 +127,9 @@ class Policy:
                 entries = {name: file[name] for name in file.files}
             about = json.loads(str(entries["about"]))
             if about["format"] != _FORMAT:
-                raise HeptarmError(f"{path} has format {about['format']}; this heptarm reads {_FORMAT}")
+                raise HeptarmError(
+                    f"{path} must have format {_FORMAT} for this heptarm, got format {about['format']}"
+                )
             count = sum(name.startswith("w") for name in entries)
             layers = [(entries[f"w{index}"], entries[f"b{index}"]) for index in range(count)]
             return cls(

@@ -50,7 +50,7 @@ class EpisodeReport:
         ):
             raise ShapeError(
                 f"distances {self.distances.shape}, targets {self.targets.shape}, paths {self.paths.shape} and "
-                f"joints {self.joints.shape} do not belong together"
+                f"joints {self.joints.shape} do not belong to the same episodes"
             )
 
     @property
@@ -153,7 +153,7 @@ class EpisodeReport:
                 joints=self.joints,
             )
         else:
-            raise CommandRejected(f"{target.name!r} ends neither in .json nor in .npz", parameter="path")
+            raise CommandRejected(f"path must end in .json or .npz, got {target.name!r}", parameter="path")
         return target
 
     @classmethod

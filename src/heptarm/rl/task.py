@@ -70,7 +70,7 @@ class ReachTask:
         for name, choices in (("action", ACTIONS), ("feature", ("", "kinematic"))):
             if getattr(self, name) not in choices:
                 raise CommandRejected(
-                    f"{name} is {getattr(self, name)!r}; there are {', '.join(map(repr, choices))}",
+                    f"{name} must be one of {', '.join(map(repr, choices))}, got {getattr(self, name)!r}",
                     parameter=name,
                     value=getattr(self, name),
                 )
@@ -78,12 +78,12 @@ class ReachTask:
             object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
             if len(getattr(self, name)) != length:
                 raise ShapeError(
-                    f"{name} is {getattr(self, name)}; {length} numbers are wanted", parameter=name
+                    f"{name} must have {length} numbers, got {getattr(self, name)}", parameter=name
                 )
         for name in ("rate", "steps", "radius", "joint_step", "cartesian_step", "leash"):
             if not 0 < getattr(self, name) < float("inf"):
                 raise LimitError(
-                    f"{name} is {getattr(self, name)}; a positive number is wanted",
+                    f"{name} must be a positive number, got {getattr(self, name)}",
                     code=2,
                     parameter=name,
                     value=getattr(self, name),
@@ -173,7 +173,9 @@ class ReachTask:
         if self.action == "joint":
             wanted = command + self.joint_step * bounded
         elif held is None:
-            raise ShapeError("a Cartesian action needs the rotation that is held", parameter="held")
+            raise ShapeError(
+                "held must be the rotation of the flange for a Cartesian action, got None", parameter="held"
+            )
         else:
             wanted = kinematics.step_towards(model, command, self.cartesian_step * bounded, held)
             # a Cartesian step may not turn a joint faster than a joint action could twice over
@@ -208,7 +210,7 @@ class ReachTask:
         unknown = set(entries) - {field.name for field in fields(cls)}
         if unknown:
             raise CommandRejected(
-                f"the task has no {', '.join(sorted(unknown))}",
+                f"unknown entries of the task: {', '.join(sorted(unknown))}",
                 hint="the file may be of a newer heptarm",
             )
         given: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entries.items()}

@@ -155,7 +155,7 @@ class BatchReach:
                     f"{name} must be at least 1, got {value}", code=2, parameter=name, value=value
                 )
         if starts not in ("staggered", "together"):
-            raise CommandRejected(f"starts is {starts!r}; 'staggered' or 'together' is wanted", value=starts)
+            raise CommandRejected(f"starts must be 'staggered' or 'together', got {starts!r}", value=starts)
         self.task, self.envs, self.randomisation = task, envs, randomisation
         self._random = np.random.default_rng(seed)
         self.engine = engine(task, envs=envs, threads=threads)
@@ -202,7 +202,7 @@ class BatchReach:
             given = np.asarray(targets, dtype=np.float64)
             if given.shape != (self.envs, 3) or not np.isfinite(given).all():
                 raise ShapeError(
-                    f"targets has shape {given.shape}; {(self.envs, 3)}, all finite, is wanted",
+                    f"targets must have shape {(self.envs, 3)} and be finite, got shape {given.shape}",
                     parameter="targets",
                 )
             self.target[:] = given
@@ -239,7 +239,7 @@ class BatchReach:
         given = np.asarray(action, dtype=np.float64)
         if given.shape != (self.envs, task.action_size) or not np.isfinite(given).all():
             raise ShapeError(
-                f"action has shape {given.shape}; {(self.envs, task.action_size)}, all finite, is wanted",
+                f"action must have shape {(self.envs, task.action_size)} and be finite, got shape {given.shape}",
                 parameter="action",
             )
         self.command = task.advance(self.command, engine.q, given, self.held)
@@ -289,7 +289,9 @@ class BatchReach:
             ShapeError: it was of another number of arms.
         """
         if np.shape(entries["target"]) != self.target.shape:
-            raise ShapeError(f"the saved simulation has {len(entries['target'])} arms, this one {self.envs}")
+            raise ShapeError(
+                f"the saved simulation must have {self.envs} arms, got {len(entries['target'])} arms"
+            )
         self.target[:], self.age[:] = entries["target"], entries["age"]
         self.command = np.array(entries["command"])
         self._latency[:], self._late[:] = entries["latency"], entries["late"]

@@ -53,7 +53,7 @@ class Randomisation:
             low, high = getattr(self, name)
             if not least <= low <= high <= most:
                 raise LimitError(
-                    f"{name} is ({low}, {high}); two numbers in [{least:g}, {most:g}] are wanted, the lower first",
+                    f"{name} must be two ascending numbers in [{least:g}, {most:g}], got ({low}, {high})",
                     code=2,
                     parameter=name,
                     value=(low, high),
@@ -61,13 +61,13 @@ class Randomisation:
                 )
         if isfinite(self.stiffness[0]) != isfinite(self.stiffness[1]):
             raise LimitError(
-                f"stiffness is {self.stiffness}; either both ends are finite, or none",
+                f"stiffness must have two finite ends or none, got {self.stiffness}",
                 code=2,
                 parameter="stiffness",
             )
         if not 0.0 <= self.velocity_noise < 1.0:
             raise LimitError(
-                f"velocity_noise is {self.velocity_noise}; allowed is [0, 1)",
+                f"velocity_noise must be in [0, 1), got {self.velocity_noise}",
                 code=2,
                 parameter="velocity_noise",
                 value=self.velocity_noise,
@@ -120,5 +120,7 @@ def level(name: str) -> Randomisation:
         return LEVELS[name]
     except KeyError:
         raise CommandRejected(
-            f"no randomisation {name!r}; there are {', '.join(LEVELS)}", parameter="randomisation", value=name
+            f"randomisation must be one of {', '.join(LEVELS)}, got {name!r}",
+            parameter="randomisation",
+            value=name,
         ) from None

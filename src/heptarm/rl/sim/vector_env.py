@@ -78,7 +78,7 @@ class VectorReach(VecEnv):  # type: ignore[misc]  # stable_baselines3 is not loo
         Raises:
             CommandRejected: always.
         """
-        raise CommandRejected(f"there is no {method_name} of single arms", parameter=method_name)
+        raise CommandRejected(f"{method_name} of single arms cannot be called", parameter=method_name)
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """Nothing is wrapped."""

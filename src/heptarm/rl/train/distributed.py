@@ -103,7 +103,7 @@ def _number(name: str, otherwise: int) -> int:
     try:
         return int(text) if text else otherwise
     except ValueError:
-        raise LimitError(f"{name} is {text!r}; a number is wanted", parameter=name, value=text) from None
+        raise LimitError(f"{name} must be a number, got {text!r}", parameter=name, value=text) from None
 
 
 def _device(name: str) -> torch.device:
@@ -111,10 +111,10 @@ def _device(name: str) -> torch.device:
     if kind == "cpu" and not index:
         return torch.device("cpu")
     if kind != "cuda" or (index and not index.isdigit()):
-        raise CommandRejected(f"device is {name!r}; 'cpu', 'cuda' or 'cuda:0' is wanted", value=name)
+        raise CommandRejected(f"device must be 'cpu', 'cuda' or 'cuda:N', got {name!r}", value=name)
     if not torch.cuda.is_available():
         raise CommandRejected(
-            f"device is {name!r}, but torch finds no GPU here",
+            f"device {name!r} is not available: torch finds no GPU on this machine",
             parameter="device",
             value=name,
             hint="use device='cpu', or install a torch built for CUDA",

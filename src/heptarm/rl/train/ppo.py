@@ -85,7 +85,7 @@ class PpoSettings:
     def _want(self, name: str, fine: bool, wanted: str) -> None:
         if not fine:
             raise LimitError(
-                f"{name} is {getattr(self, name)}; wanted: {wanted}",
+                f"{name} must be {wanted}, got {getattr(self, name)}",
                 code=2,
                 parameter=name,
                 value=getattr(self, name),

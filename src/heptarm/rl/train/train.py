@@ -317,7 +317,7 @@ def train(
     """
     path = Path(out) if out is not None else Path(resume) if resume is not None else None
     if path is not None and path.suffix != ".npz":
-        raise CommandRejected(f"{path.name!r} does not end in .npz", parameter="out", value=str(path))
+        raise CommandRejected(f"out must end in .npz, got {path.name!r}", parameter="out", value=str(path))
     if checkpoint < 1:
         raise LimitError(f"checkpoint must be at least 1, got {checkpoint}", code=2, parameter="checkpoint")
     torch.set_num_threads(1)  # more threads only fight with the simulation's
