@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import math
 import os
 import signal
 import socket
+import struct
+import sys
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -246,6 +250,25 @@ def test_a_port_that_is_taken_is_named_with_the_remedy(arm: ha.Arm) -> None:
             arm.fri("monitor", port=port),
         ):
             pass
+
+
+def udp_addresses(pid: int) -> set[str]:
+    """Own addresses of the UDP sockets of a process."""
+    inodes = set()
+    for one in Path(f"/proc/{pid}/fd").iterdir():
+        with contextlib.suppress(OSError):
+            inodes.add(os.readlink(one))
+    rows = [line.split() for line in Path("/proc/net/udp").read_text().splitlines()[1:]]
+    found = [row[1].partition(":")[0] for row in rows if f"socket:[{row[9]}]" in inodes]
+    return {socket.inet_ntoa(struct.pack("=I", int(address, 16))) for address in found}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux")
+def test_both_sides_use_the_interface_of_their_peer_only(arm: ha.Arm, cabinet: RunningCabinet) -> None:
+    with arm.fri("monitor", period_ms=2) as rt:
+        assert rt.next() is not None
+        assert udp_addresses(rt.client._worker._process.pid) == {"127.0.0.1"}
+        assert udp_addresses(cabinet.pid) == {"127.0.0.1"}
 
 
 @pytest.mark.parametrize("kind", ["position", "monitor"])

@@ -316,15 +316,17 @@ def test_a_lost_controller_may_let_its_motion_finish(cabinet: RunningCabinet, tm
 
 # ------------------------------------------------------------------------------------- the key
 
+KEY = "k7fh-9tqa-x2mn-p4cw-8r3e-vd6y-s5gj"
+
 
 def test_the_key_opens_the_cabinet() -> None:
-    cabinet = PrivateCabinet.start(Target(model="iiwa7", options=(("key", "sesame"),)))
+    cabinet = PrivateCabinet.start(Target(model="iiwa7"), key=KEY)
     target = f"{cabinet.host}:{cabinet.port}"
     try:
-        with ha.connect(target, key="sesame", timeout=30.0) as arm:
+        with ha.connect(target, key=KEY, timeout=30.0) as arm:
             assert arm.robot.name == "iiwa7"
         with pytest.raises(ha.ConnectFailed, match="key is wrong"):
-            ha.connect(target, key="barley", timeout=30.0)
+            ha.connect(target, key=KEY[::-1], timeout=30.0)
         with pytest.raises(ha.ConnectFailed, match="asks for a pre-shared key"):
             ha.connect(target, timeout=30.0)
     finally:

@@ -359,7 +359,7 @@ def test_a_typed_line_answers_a_dialog_that_says_what_to_type(asking: Path) -> N
         ("--view-port", "8081"),
         ("--host", "0.0.0.0"),
         ("--port", "0"),
-        ("--key", "secret"),
+        ("--key-file", "cell.key"),
         ("--fri", "1.15"),
         ("--fri-io", "G.S<bool"),
     ],

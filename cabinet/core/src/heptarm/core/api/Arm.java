@@ -323,10 +323,10 @@ public final class Arm implements EventBus.Listener {
     /** External wrench in the axes of another frame: "" (the motion frame), "flange", or a frame's name. */
     public WrenchState wrench(String axes) throws CommandRejected {
         service.tools.checkReference(axes, "axes");
-        return service.robot.sensors.readWrench(axes, service.clock.nanos());
+        return service.reader.wrench(axes);
     }
 
     public SafetyState safety() {
-        return service.robot.safety.read(service.clock.nanos());
+        return service.safety.read();
     }
 }
