@@ -19,12 +19,12 @@ Weights = npt.NDArray[np.float32]
 #: Scaled observations are clipped to this.
 CLIP = 5.0
 _FORMAT = 1
-#: Where the policies are that come with heptarm.
+#: Folder of the policies that are part of heptarm.
 SHIPPED = Path(__file__).parent / "policies"
 
 
 class Policy:
-    """Decides actions of a task.
+    """Computes the actions of a task.
 
     Args:
         task: the task it was trained for.
@@ -34,7 +34,7 @@ class Policy:
         facts: how it came about: seed, environment steps, randomisation, versions.
 
     Raises:
-        ShapeError: layers that do not fit together or to the task.
+        ShapeError: the layers do not fit each other or the task.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Policy:
         return x
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write to a `.npz` file; returns its path. A reader never sees half a file.
+        """Write to a `.npz` file atomically; return its path.
 
         Raises:
             CommandRejected: the name does not end in `.npz`.
@@ -117,7 +117,7 @@ class Policy:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Policy:
-        """Read a file of `save`.
+        """Read a file written by `save`.
 
         Raises:
             HeptarmError: the file does not exist, or is not a policy.
@@ -152,7 +152,7 @@ class Policy:
 
 
 def shipped(*, feature: bool = False) -> Policy:
-    """The policy that comes with heptarm, for an iiwa 14: `heptarm rl train --seed 0` made it.
+    """The policy that is part of heptarm, for an iiwa 14, trained by `heptarm rl train --seed 0`.
 
     Args:
         feature: the one that also sees the way to the target (`--feature`).

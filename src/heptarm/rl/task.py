@@ -1,6 +1,6 @@
-"""The task: bring the flange to a point. Every number of it, and what the policy sees and does.
+"""The reach task: move the flange to a point. All its numbers, its observations and its actions.
 
-Training, the Gymnasium environment and deployment all call these functions, so that a policy meets the same
+Training, the Gymnasium environment and deployment all call these functions, so that a policy has the same
 observation, the same integration of its actions and the same success radius everywhere. State, action and
 reward are those of the libiiwa paper: s = [q, dq, target], a = joint step, r = -distance.
 """
@@ -19,7 +19,7 @@ from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel, robot
 
 ACTIONS = ("joint", "cartesian")
-#: Scales of the kinematic feature [m]: the way to the target, coarse, and clipped when near.
+#: Scales of the kinematic feature [m]: the vector to the target, coarse, and clipped near the target.
 COARSE = 0.2
 FINE = 0.02
 
@@ -46,8 +46,8 @@ class ReachTask:
         leash: farthest that commanded joints may be from the measured ones [rad].
 
     Raises:
-        CommandRejected: no such robot, action or feature.
-        LimitError: a number that makes no task.
+        CommandRejected: unknown robot, action or feature.
+        LimitError: a number outside its range.
     """
 
     robot: str = "iiwa14"
@@ -99,12 +99,12 @@ class ReachTask:
 
     @property
     def observation_size(self) -> int:
-        """Numbers that the policy sees."""
+        """Size of an observation."""
         return 23 if self.feature else 17
 
     @property
     def action_size(self) -> int:
-        """Numbers that it decides."""
+        """Size of an action."""
         return 7 if self.action == "joint" else 3
 
     # ------------------------------------------------------------------------------ drawing episodes
@@ -114,7 +114,7 @@ class ReachTask:
         return np.asarray(self.home) + random.uniform(-self.spread, self.spread, (count, 7))
 
     def targets(self, random: np.random.Generator, count: int) -> Array:
-        """Targets from the box, base frame, shape (count, 3) [m]."""
+        """Random targets in the box, base frame, shape (count, 3) [m]."""
         half = np.asarray(self.size) / 2
         return np.asarray(self.centre) + random.uniform(-half, half, (count, 3))
 
@@ -125,11 +125,11 @@ class ReachTask:
         return kinematics.tip(self.model, q)
 
     def hold(self, q: Array) -> Array:
-        """The rotation that a Cartesian episode keeps: the one it begins with; (..., 7) to (..., 3, 3)."""
+        """The rotation that a Cartesian episode keeps, that of its start; (..., 7) to (..., 3, 3)."""
         return kinematics.rotation(self.model, q)
 
     def observe(self, q: Array, dq: Array, target: Array) -> Array:
-        """What the policy sees.
+        """The observation.
 
         Args:
             q: measured joint positions, shape (..., 7) [rad].
@@ -152,9 +152,9 @@ class ReachTask:
         return result
 
     def advance(self, command: Array, q: Array, action: Array, held: Array | None = None) -> Array:
-        """The next commanded joints: the action is added to the last command, not to what was measured.
+        """The next commanded joint positions: the action is added to the last command, not to the measured positions.
 
-        A command that has run away from the arm (a stopped or pushed robot) is kept on a leash.
+        The distance of the command from the arm (of a stopped or pushed robot) is limited.
 
         Args:
             command: the last commanded joints, shape (..., 7) [rad].
@@ -185,13 +185,13 @@ class ReachTask:
         return result
 
     def distance(self, tip: Array, target: Array) -> Array:
-        """From the flange to the target, shapes (..., 3) to (...,) [m]."""
+        """Distance from the flange to the target, shapes (..., 3) to (...,) [m]."""
         offset = tip - target
         result: Array = np.sqrt((offset * offset).sum(axis=-1))
         return result
 
     def reward(self, distance: Array) -> Array:
-        """Of one decision: the negative distance after it, and nothing else."""
+        """Reward of one decision: the negative distance after it."""
         return -distance
 
     # ------------------------------------------------------------------------------ in files

@@ -1,7 +1,7 @@
-"""Several workers that train one policy: each simulates its own arms, all average what they learn.
+"""Several workers that train one policy: each simulates its own arms, all average their gradients.
 
 `torchrun` (or anything that sets RANK, WORLD_SIZE, MASTER_ADDR and MASTER_PORT) starts the workers, on one machine
-or on many; a single process is a team of one and needs none of it. Gloo carries the tensors between CPUs, NCCL
+or several; a single process needs none of it. Gloo transfers the tensors between CPUs, NCCL
 between GPUs.
 """
 
@@ -18,12 +18,12 @@ from torch import Tensor, nn
 
 from heptarm.errors import CommandRejected, LimitError
 
-#: How long a worker waits for the others [s].
+#: Longest wait of a worker for the others [s].
 PATIENCE = 120.0
 
 
 class Team:
-    """The workers of a training, seen from one of them.
+    """The workers of a training, from the view of one of them.
 
     Attributes:
         rank: number of this one; 0 writes the files.
@@ -36,7 +36,7 @@ class Team:
 
     @property
     def is_first(self) -> bool:
-        """This worker reports and writes."""
+        """Whether this worker reports and writes files."""
         return self.rank == 0
 
     def mean(self, values: Tensor) -> Tensor:
@@ -64,14 +64,14 @@ class Team:
 
 @contextmanager
 def team(device: str) -> Iterator[Team]:
-    """The team that the environment describes; left together.
+    """The team that the environment variables describe; all workers leave it together.
 
     Args:
         device: "cpu", "cuda" (each worker of a machine takes its own GPU) or "cuda:1".
 
     Raises:
-        CommandRejected: no such device here.
-        LimitError: RANK and WORLD_SIZE do not go together.
+        CommandRejected: the device is not available.
+        LimitError: RANK and WORLD_SIZE contradict each other.
     """
     size, rank = _number("WORLD_SIZE", 1), _number("RANK", 0)
     if not 0 <= rank < size:

@@ -1,4 +1,4 @@
-"""Scenarios: programs in the cabinet itself, in Java; they need a Java compiler and simulators of their own."""
+"""Scenarios: Java programs on the cabinet; they need a Java compiler and separate simulators."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from heptarm.testing.measure import Unfit, holds
 from heptarm.testing.scenario import Risk, scenario
 
 _PATIENCE = 120.0
-#: An application as a Sunrise programmer writes it, knowing nothing of heptarm.
+#: A Sunrise application that does not use heptarm.
 _FOREIGN = """
 package lab;
 
@@ -42,7 +42,7 @@ public class Nod extends RoboticsAPIApplication {
     }
 }
 """
-#: One on heptarm's core: SI units, results with causes, refusals with names; no network.
+#: An application on heptarm's core: SI units, results with causes, refusals with parameters; no network.
 _OWN = """
 package lab;
 
@@ -84,10 +84,10 @@ _PROJECT = """
 
 
 def _sim(name: str, source: str) -> str:
-    """Compile and run an application in a simulator of its own; what it logged.
+    """Compile and run an application in a separate simulator; return its log.
 
     Raises:
-        Unfit: there is no Java compiler here.
+        Unfit: no Java compiler is installed.
     """
     if shutil.which("javac") is None:
         raise Unfit("there is no javac here")

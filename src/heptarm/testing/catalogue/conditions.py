@@ -1,4 +1,4 @@
-"""Scenarios: what ends a motion before its end, looked at by the cabinet."""
+"""Scenarios: break conditions, monitored by the cabinet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenarios: people and things that the arm touches."""
+"""Scenarios: contacts with people and objects."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scenarios: guiding, tapping and teaching the arm; intended contacts and collisions."""
+"""Scenarios: hand guiding, taps and teaching; intended contacts and collisions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LONG = 120.0
 
 
 def _guide(arm: Arm, push: tuple[float, float, float], offset: float) -> None:
-    """Push until a joint has turned so far [rad]."""
+    """Push until a joint has turned by this angle [rad]."""
     before = arm.state.q
     arm.operator.push(push, duration=_LONG)
     arm.wait_until(lambda s: np.abs(s.q - before).max() > offset, timeout=60.0)

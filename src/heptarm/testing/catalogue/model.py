@@ -1,4 +1,4 @@
-"""Scenarios: the model on this side against what the robot measures."""
+"""Scenarios: the client's model compared with the measurements of the robot."""
 
 from __future__ import annotations
 

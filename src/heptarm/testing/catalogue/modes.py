@@ -1,4 +1,4 @@
-"""Scenarios: how the arm holds on to its set-points."""
+"""Scenarios: control modes."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ _LONG = 60.0
 
 
 def held(arm: Arm, mode: Mode) -> MotionHandle:
-    """A hold under a control mode that is in force."""
+    """A running hold in a control mode."""
     handle = arm.start(hold(_LONG), mode=mode)
     arm.wait_until(lambda s: handle.started or handle.done, timeout=20.0)
     return handle
 
 
 def let_go(arm: Arm, handle: MotionHandle) -> None:
-    """End a hold; raises what ended it before."""
+    """End a hold; raise the error that ended it earlier."""
     handle.cancel()
     handle.wait()
     arm.wait_for_rest()
 
 
 def bent(arm: Arm, seconds: float = 0.3) -> Array:
-    """How far the flange is off its set-point, base axes, the mean of so many cabinet seconds, shape (3,) [m]."""
+    """Mean deviation of the flange from its set-point over some cabinet seconds, base axes, shape (3,) [m]."""
     return np.asarray(np.mean([s.pose.xyz - s.pose_cmd.xyz for s in watch(arm, seconds)], axis=0))
 
 
 def settled(arm: Arm, *, seconds: float = 0.3) -> None:
-    """Wait until no joint has moved for so many cabinet seconds."""
+    """Wait until no joint has moved for some cabinet seconds."""
     quiet = arm.state.stamp
 
     def rests(state: State) -> bool:
@@ -199,7 +199,7 @@ def online(arm: Arm) -> None:
         start = servo.start.q
 
         def follow(wanted: float, by: float) -> float:
-            """Follow until the flange is where it should be, or 10 s have passed; where it is then."""
+            """Follow until the flange has arrived, or 10 s have passed; return its position."""
             first = arm.state.stamp
             offset = np.inf
             while servo.tick() and abs(offset - wanted) > by and arm.state.stamp < first + 10e9:
@@ -235,7 +235,7 @@ def validation(arm: Arm) -> None:
         holds("load" in error.text, error.text)
     arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
     arm.wait_until(lambda s: np.abs(s.tau_ext).max() < 1.0, timeout=20.0)
-    settled(arm)  # let go, the arm rings: it is slow at every turn, and rests only later
+    settled(arm)  # after the release the arm oscillates: it is slow at every turning point, and rests only later
     with arm.servo("joint", mode=JointImpedance(500.0), watchdog=2.0) as servo:
         servo.tick()
         servo.set(servo.start.q)

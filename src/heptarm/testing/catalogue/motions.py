@@ -15,7 +15,7 @@ from heptarm.values.motion.motion import hold
 from heptarm.values.motion.ptp import ptp, ptp_home
 from heptarm.values.pose import Pose, Redundancy, deg
 
-#: How exactly a motion ends [m], [rad].
+#: Accuracy at the end of a motion [m], [rad].
 _PLACE, _ANGLE = 5e-4, 2e-3
 #: KUKA's transport position.
 TRANSPORT: Array = deg(0, 25, 0, 90, 0, 0, 0)
@@ -99,7 +99,7 @@ def relative(arm: Arm) -> None:
 
 
 def near_pose(arm: Arm, wanted: Pose, what: str) -> None:
-    """The arm rests, and its motion frame is at a pose."""
+    """Check that the arm is at rest with its motion frame at a pose."""
     pose = arm.wait_for_rest().pose
     near(pose.xyz, wanted.xyz, _PLACE, f"place, {what}", unit="m")
     near(pose.angle_to(wanted), 0.0, _ANGLE, f"orientation, {what}, is off by", unit="rad")

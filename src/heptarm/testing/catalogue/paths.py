@@ -15,7 +15,7 @@ from heptarm.values.motion.line import lin
 from heptarm.values.motion.spline import ellipse, spl, spline, spline_joints
 from heptarm.values.pose import Pose, deg
 
-#: How far a path may be from its geometry [m].
+#: Tolerance of a path [m].
 _TRUE = 5e-4
 
 

@@ -1,4 +1,4 @@
-"""Scenarios: forces that are laid over an impedance."""
+"""Scenarios: forces superimposed on impedance control."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NEEDS = ("sine_impedance",)
 
 
 def _offsets(states: tuple[State, ...]) -> Array:
-    """How far the flange was off its set-point, base axes, shape (n, 3) [m]."""
+    """Deviation of the flange from its set-point, base axes, shape (n, 3) [m]."""
     return np.array([s.pose.xyz - s.pose_cmd.xyz for s in states])
 
 
