@@ -66,7 +66,7 @@ def round_trip() -> Iterator[Figure]:
 
 
 def _times(call: Callable[[], object], count: int, pause: float) -> list[float]:
-    """How long each call takes [s]."""
+    """Duration of each call [s]."""
     times = []
     for _ in range(count):
         if pause:

@@ -1,4 +1,4 @@
-"""The arm's link to a scripted cabinet in memory: how it is lost, kept and used by many."""
+"""The arm's link to a scripted cabinet in memory: loss, heartbeat and use by several threads."""
 
 from __future__ import annotations
 
@@ -122,20 +122,20 @@ def test_requests_from_many_threads(peer: Peer) -> None:
 def test_an_answer_that_does_not_come(peer: Peer) -> None:
     peer.expect(wire.SetOverride)
     with peer.arm() as arm:
-        patient = arm._connection.options
-        arm._connection.options = replace(patient, timeout=0.2)
+        patient = arm.connection.options
+        arm.connection.options = replace(patient, timeout=0.2)
         with pytest.raises(ha.Timeout, match="SetOverride"):
             arm.set_override(0.5)
-        arm._connection.options = patient
+        arm.connection.options = patient
 
 
 def test_a_stop_that_is_not_answered_goes_another_way(peer: Peer) -> None:
     peer.expect(wire.Stop)
     with peer.arm() as arm:
-        patient = arm._connection.options
-        arm._connection.options = replace(patient, timeout=0.5)
+        patient = arm.connection.options
+        arm.connection.options = replace(patient, timeout=0.5)
         arm.stop()
-        arm._connection.options = patient
+        arm.connection.options = patient
     assert any(isinstance(message, wire.Halt) for message in peer.seen)
 
 

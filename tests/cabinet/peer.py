@@ -1,4 +1,4 @@
-"""A client made of a socket and frames: it can say what a real client never would."""
+"""A client made of a socket and frames: it can send what a real client never would."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Busy(Exception):
 
 
 class Peer:
-    """One connection. Everything that comes is kept in `seen`, with the frame that brought it."""
+    """One connection. `seen` keeps every message with its frame."""
 
     def __init__(self, port: int, *, hello: bool = True, name: str = "peer", key: str = "") -> None:
         self._port = port
@@ -80,7 +80,7 @@ class Peer:
         return self.answer(self._request)
 
     def take_control(self, *, watchdog: float = 10.0) -> None:
-        """Takes control; waits for it if the cabinet has not yet seen that the controller before has gone."""
+        """Takes control; waits if the cabinet has not yet noticed that the previous controller is gone."""
         deadline = time.monotonic() + 30.0
         while not isinstance(answer := self.ask(wire.TakeControl(watchdog=watchdog)), wire.Accepted):
             assert answer.code == Code.CONTROL_TAKEN and time.monotonic() < deadline, answer
@@ -99,7 +99,7 @@ class Peer:
     def wait_for(
         self, kind: type[M], where: Callable[[M], bool] = lambda _: True, timeout: float = 30.0
     ) -> M:
-        """The first message of a kind, also one that has come already."""
+        """The first message of a kind, also one received earlier."""
         found: M = self.wait(lambda _, message: isinstance(message, kind) and where(message), timeout=timeout)
         return found
 
@@ -116,7 +116,7 @@ class Peer:
         return [message for _, message in self.seen if isinstance(message, kind)]
 
     def read_for(self, seconds: float, *, silent: bool = False) -> None:
-        """Reads whatever comes for a while; says something now and then unless it is to be silent."""
+        """Reads all messages for a while; sends something now and then unless it is to be silent."""
         deadline = time.monotonic() + seconds
         spoke = 0.0
         while (left := deadline - time.monotonic()) > 0:

@@ -1,4 +1,4 @@
-"""The octet stream: any split or merge is legal, and a client that does not read holds up nobody."""
+"""The byte stream: any split or merge is legal, and a client that does not read delays no other."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_a_client_that_does_not_read_is_closed_and_holds_up_nobody(make: Callabl
 
 
 def test_requests_without_reading_the_answers_end_that_client_only(make: Callable[..., FakeCabinet]) -> None:
-    cabinet = make(heartbeat=10.0)  # the other one has nothing to say meanwhile
+    cabinet = make(heartbeat=10.0)  # the other client sends nothing meanwhile
     with Peer(cabinet.port) as rude, Peer(cabinet.port) as other:
         burst = b"".join(rude.pack(wire.Stop(), 1 + k) for k in range(1000))
         rude.socket.settimeout(10)
