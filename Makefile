@@ -2,7 +2,7 @@
 PY := .venv/bin/python
 STAMPS := build/stamps
 
-.PHONY: setup cabinet demo test test-ros test-ros2 test-ros1 test-long conformance lint check bench figures lock docs wheel clean help
+.PHONY: setup cabinet demo test test-ros test-ros2 test-ros1 test-long conformance lint check bench soak figures lock docs wheel clean help
 
 setup: $(STAMPS)/venv cabinet  ## virtual environment, package, compiled cabinet
 
@@ -76,6 +76,11 @@ conformance: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## every case of conformance a
 
 bench: setup  ## figures as JSON lines; GROUP=fri or ONLY=name selects, LIST=1 lists them, STORE=1 stores the run
 	@$(PY) -m bench $(if $(GROUP),--group $(GROUP)) $(if $(ONLY),--only $(ONLY)) $(if $(LIST),--list) $(if $(STORE),--store)
+
+MINUTES ?= 3
+
+soak: setup  ## everything at once on a virtual cabinet for MINUTES=3: what grows, what is lost; in build/soak
+	$(PY) -m bench.trust --minutes $(MINUTES)
 
 figures: $(STAMPS)/venv  ## docs/explanation/figures.md, from the newest stored run
 	$(PY) scripts/figures_page.py

@@ -322,9 +322,10 @@ def test_a_stop_from_another_thread_ends_the_loop(arm: ha.Arm) -> None:
 
 @patient
 def test_a_loop_that_is_killed_loses_the_quality_and_the_next_one_works(arm: ha.Arm) -> None:
+    # on a port of its own: the cabinet goes on sending to it, also if another test took it meanwhile
     with (
         pytest.raises(ha.QualityLost, match="quality is (POOR|FAIR).*process has ended"),
-        arm.fri("position", period_ms=LONG, law=swing, params={"amplitude": 0.05}) as rt,
+        arm.fri("position", period_ms=LONG, port=0, law=swing, params={"amplitude": 0.05}) as rt,
     ):
         os.kill(int(rt.client._header[at.PID]), signal.SIGKILL)
         assert not rt.wait(30.0)

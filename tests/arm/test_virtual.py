@@ -320,11 +320,11 @@ KEY = "k7fh-9tqa-x2mn-p4cw-8r3e-vd6y-s5gj"
 
 
 def test_the_key_opens_the_cabinet() -> None:
-    cabinet = PrivateCabinet.start(Target(model="iiwa7"), key=KEY)
+    cabinet = PrivateCabinet.start(Target(model="med7"), key=KEY)
     target = f"{cabinet.host}:{cabinet.port}"
     try:
         with ha.connect(target, key=KEY, timeout=30.0) as arm:
-            assert arm.robot.name == "iiwa7"
+            assert arm.robot.name == "med7"
         with pytest.raises(ha.ConnectFailed, match="key is wrong"):
             ha.connect(target, key=KEY[::-1], timeout=30.0)
         with pytest.raises(ha.ConnectFailed, match="asks for a pre-shared key"):

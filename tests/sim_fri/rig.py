@@ -167,7 +167,7 @@ class Rig:
     def waiting(self, overlay: MotionOverlay | None = None) -> Rig:
         self.ready()
         self.controller.start(overlay or MotionOverlay())
-        return self
+        return self.until(State.COMMANDING_WAIT)
 
     def active(self, overlay: MotionOverlay | None = None) -> Rig:
         return self.waiting(overlay).until(State.COMMANDING_ACTIVE)

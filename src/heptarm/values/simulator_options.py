@@ -79,6 +79,14 @@ class SimulatorOptions:
     data: tuple[str, ...] = field(
         default=(), metadata=_about("process data; may be repeated", metavar="NAME=VALUE")
     )
+    map: tuple[str, ...] = field(
+        default=(),
+        metadata=_about(
+            "address of the lab's network and the one that takes its place in process data and FRI sessions; may be "
+            "repeated",
+            metavar="ADDRESS=ADDRESS",
+        ),
+    )
     fault: tuple[str, ...] = field(
         default=(),
         metadata=_about(

@@ -30,6 +30,7 @@ from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.shared_state import Trace
 from heptarm.sim.plant.world import Box
 from heptarm.sim.runtime import project
+from heptarm.sim.runtime.addresses import AddressMap
 from heptarm.sim.runtime.operator import SimulatedOperator, timed
 from heptarm.sim.runtime.realtime_loop import ANSWER_GAP, RealtimeLoop, batch_scheduled
 from heptarm.values.simulator_options import SimulatorOptions, flag
@@ -78,7 +79,9 @@ def process_data(options: SimulatorOptions) -> dict[str, project.Value]:
     """
     data: dict[str, project.Value] = {"heptarm.max_rate": 1000.0, "heptarm.key": ""}
     if options.project is not None:
-        data |= project.read_process_data(options.project)
+        addresses = AddressMap.of(options.map)
+        for name, value in project.read_process_data(options.project).items():
+            data[name] = addresses.apply(value) if isinstance(value, str) else value
     data |= {"heptarm.bind": options.host, "heptarm.port": options.port}
     if key := find_key(key_file=options.key_file):
         data["heptarm.key"] = key
@@ -99,7 +102,12 @@ class VirtualCabinet:
 
         self.options = options
         self.plant = Plant(options.model, boxes=[Box.of(text) for text in options.box])
-        self.sessions = Sessions(self.plant, version=Version.of(options.fri_version), speed=options.speed)
+        self.sessions = Sessions(
+            self.plant,
+            version=Version.of(options.fri_version),
+            speed=options.speed,
+            address=AddressMap.of(options.map).apply,
+        )
         self.operator = SimulatedOperator(self.plant)
         for fault in options.fault:
             self.operator.schedule(fault)

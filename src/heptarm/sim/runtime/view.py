@@ -18,7 +18,7 @@ import mujoco
 import numpy as np
 
 from heptarm.errors import require
-from heptarm.sim.plant.world import MODELS
+from heptarm.sim.plant.world import compiled
 from heptarm.sim.runtime.view_guard import ViewGuard
 from heptarm.values.arrays import Array
 
@@ -31,11 +31,11 @@ class Scene:
 
     Args:
         server: a viser server.
-        model: "iiwa7" or "iiwa14".
+        model: "iiwa7", "iiwa14", "med7" or "med14".
     """
 
     def __init__(self, server: Any, model: str) -> None:
-        self._model = mujoco.MjModel.from_xml_path(str(MODELS / f"{model.replace('med', 'iiwa')}.xml"))
+        self._model = compiled(model)
         self._data = mujoco.MjData(self._model)
         self._handles = [
             (index, self._shape(server, index))
