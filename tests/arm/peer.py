@@ -207,5 +207,7 @@ class Peer:
             client.rate = message.rate
         elif isinstance(message, wire.TakeControl | wire.ReleaseControl | wire.Stop):
             client.say(wire.Accepted(id=0), request)
+        elif isinstance(message, wire.Halt):
+            client.say(wire.Halted())
         elif not isinstance(message, wire.Goodbye):
             self.problems.append(f"nobody expected {message}")

@@ -18,7 +18,7 @@ PROGRAM = """
     handle = arm.start(ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.2))
     arm.wait_until(lambda s: abs(s.dq).max() > 0.1)
     try:
-        print(arm._connection.cabinet.pid if arm._connection.cabinet else "moving", flush=True)
+        print(arm.connection.cabinet.pid if arm.connection.cabinet else "moving", flush=True)
         handle.wait()
         print("arrived", flush=True)
     except KeyboardInterrupt:

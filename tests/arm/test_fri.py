@@ -190,7 +190,7 @@ def test_what_does_not_go_together_is_refused_here_as_it_is_there(
         mode=mode_message(mode),  # type: ignore[arg-type]
     )
     with pytest.raises(ha.CommandRejected) as there:
-        arm._connection.request(message)
+        arm.connection.request(message)
     assert here.value.code == there.value.code == code
     assert type(here.value) is type(there.value) and here.value.hint
 

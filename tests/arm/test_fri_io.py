@@ -108,7 +108,7 @@ def test_what_cannot_be_carried_is_refused_here_and_there(
             host="127.0.0.1", period=0.01, command=wire.FriCommandMode.MONITOR, io=tuple(names)
         )
         with pytest.raises(ha.CommandRejected, match=words) as error:
-            arm._connection.request(message)
+            arm.connection.request(message)
         assert error.value.code == code
 
 

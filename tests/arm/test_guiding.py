@@ -103,7 +103,7 @@ def test_what_makes_no_sense_is_refused(arm: ha.Arm) -> None:
         arm.start(ha.hand_guide(q_max=[9.0] + [np.nan] * 6))
     low = wire.HandGuide(q_min=(-9.0,) * 7)  # bypassing the checks of the client
     with pytest.raises(ha.LimitError, match="joint limit of hand guiding must be in"):
-        arm._connection.request(wire.Run(items=(wire.Item(motion=low),)))
+        arm.connection.request(wire.Run(items=(wire.Item(motion=low),)))
 
 
 def test_led_precisely_along_one_axis(arm: ha.Arm) -> None:

@@ -108,7 +108,7 @@ def test_keys_of_the_smartpad(arm: ha.Arm) -> None:
     with pytest.raises(ha.CommandRejected, match="disabled"):
         arm.operator.press_key(2)
     arm.pad.set_key(2, "next part", led="green")
-    listeners = arm._connection.events.key_listeners
+    listeners = arm.connection.events.key_listeners
 
     def press() -> None:
         arm.wait_until(lambda state: len(listeners) == 2, timeout=20.0)  # a call waits for it

@@ -217,7 +217,7 @@ def test_stop_after_motion_lets_it_finish(safe: Arm) -> None:
 
 def test_an_observer_stops_what_another_controls(safe: Arm) -> None:
     handle = under_way(safe, safe.start(FAR))
-    host = safe._connection.cabinet
+    host = safe.connection.cabinet
     assert host is not None
     with ha.connect(f"sim://{host.host}:{host.port}", control=False) as other:
         other.stop("fast")
@@ -243,7 +243,7 @@ def test_a_fault_that_is_none_is_refused() -> None:
 def test_recover_reconnects(cabinet: RunningCabinet) -> None:
     arm = ha.connect(cabinet.target, watchdog=5.0)
     try:
-        arm._connection.link._transport.close()
+        arm.connection.link.cut()
         deadline = time.monotonic() + 30.0
         while arm.connected and time.monotonic() < deadline:
             time.sleep(0.02)

@@ -10,6 +10,7 @@ import pytest
 
 import heptarm as ha
 from heptarm import Arm, Tool, Workpiece
+from heptarm.arm.devices.tools import Tooling
 from heptarm.errors import CommandRejected, ModeConflict
 from heptarm.model import dynamics
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
@@ -260,7 +261,7 @@ def test_frames_that_nothing_has_are_refused_on_both_sides(
     fresh(bare)
     with pytest.raises(CommandRejected, match="must be one of flange, tool") as here:
         bare.move(UNKNOWN[name]())
-    monkeypatch.setattr(bare._tooling, "check", lambda _motions, _mode: None)
+    monkeypatch.setattr(Tooling, "check", lambda _self, _motions, _mode: None)
     with pytest.raises(CommandRejected) as there:
         bare.move(UNKNOWN[name]())
     assert here.value.code == there.value.code == Code.UNKNOWN_NAME

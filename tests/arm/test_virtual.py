@@ -153,7 +153,7 @@ def test_the_second_controller_hears_who_controls(arm: Arm, cabinet: RunningCabi
 
 def test_an_observer_sees_and_stops_but_does_not_move(arm: Arm, cabinet: RunningCabinet) -> None:
     with ha.connect(cabinet.target, control=False, name="observer") as observer:
-        assert observer.controller == arm._connection.options.name and not observer.in_control
+        assert observer.controller == arm.connection.options.name and not observer.in_control
         with pytest.raises(ha.NotInControl, match=str(os.getpid())):
             observer.move(ptp(HOME))
         handle = arm.start(FAR)
@@ -172,7 +172,7 @@ def test_two_clients_of_one_process_are_told_apart(arm: Arm, cabinet: RunningCab
     with ha.connect(cabinet.target, control=False) as observer:
         with pytest.raises(ha.NotInControl) as refused:
             observer.move(ptp(HOME))
-        mine, other = arm._connection.options.name, observer._connection.options.name
+        mine, other = arm.connection.options.name, observer.connection.options.name
         assert mine != other and refused.value.text.startswith(f"{mine} controls the robot, not {other}")
     with (
         ha.connect(cabinet.target, control=False, name=mine) as twin,

@@ -189,7 +189,7 @@ def commands_of_this_user() -> str:
 
 def test_a_private_simulator_takes_the_key_and_no_other_process_sees_it(key_file: Path) -> None:
     with ha.connect("sim://iiwa7", key_file=key_file, timeout=30.0) as arm:
-        port = arm._connection.cabinet.port
+        port = arm.connection.cabinet.port
         assert KEY not in commands_of_this_user()
         with pytest.raises(ha.ConnectFailed, match="asks for a pre-shared key"):
             ha.connect(f"127.0.0.1:{port}", control=False, timeout=30.0)

@@ -44,7 +44,7 @@ def lost(arm: Arm) -> None:
     """When the connection breaks during a motion, the arm stops, both sides report it, and the client reconnects."""
     handle = arm.start(ptp(HOME + deg(50, 0, 0, 0, 0, 0, 0), speed=0.1))
     arm.wait_until(lambda s: abs(s.q[0] - HOME[0]) > 0.02, timeout=20.0)
-    arm._connection.link._transport.close()
+    arm.connection.link.cut()
     try:
         handle.wait(timeout=20.0)
         holds(False, "the motion ends with an error")

@@ -118,7 +118,7 @@ def observer(arm: Arm) -> None:
     from heptarm.arm.connect import connect
     from heptarm.errors import NotInControl
 
-    host = arm._connection.link.peer
+    host = arm.connection.link.peer
     with connect(host, control=False, name="scenario-observer", timeout=20.0) as other:
         try:
             other.move(ptp(HOME))

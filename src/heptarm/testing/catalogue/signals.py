@@ -82,7 +82,7 @@ def keys(arm: Arm) -> None:
     heard: list[tuple[int, bool]] = []
     end = arm.pad.on_key(lambda slot, down: heard.append((slot, down)))
     arm.pad.set_key(2, "next part", led="green")
-    listeners = arm._connection.events.key_listeners
+    listeners = arm.connection.events.key_listeners
 
     def press() -> None:
         arm.wait_until(lambda _: len(listeners) == 2, timeout=_PATIENCE)  # somebody waits for it
