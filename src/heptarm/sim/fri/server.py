@@ -247,7 +247,7 @@ def _resolved(client: Address) -> Address:
 
 
 def _towards(client: Address) -> str:
-    """Own address from which the client is reached; empty, which means all, while the network has no connection to it."""
+    """Own address towards the client; empty, which means all, while no interface reaches it."""
     try:
         return own_address(client[0])
     except ConnectFailed:
