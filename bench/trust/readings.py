@@ -28,7 +28,7 @@ STATES = int(os.environ.get("BENCH_STATES", "1000000" if os.environ.get("LONG") 
 ROUND = 100_000
 #: Time constant of the cabinet's filter of the velocity [s].
 FILTER = 0.01
-#: Positions pass through millimetres and rotation matrices.
+#: Positions pass millimetres and rotation matrices through the plant.
 ROUNDING = 1e-9
 
 _BURNER = """
