@@ -57,7 +57,7 @@ def _stop(kind: str, how: str, random: np.random.Generator) -> tuple[float, floa
     plant.submit(order)
     plant.tick()
     if order.is_servo:
-        plant.ring.post(order.id, np.array(READY) + random.uniform(-REACH, REACH, 7))
+        plant.shared.post(order.id, np.array(READY) + random.uniform(-REACH, REACH, 7))
     plant.step(int(random.integers(1, 700)))
     allowed = stopping_time(plant, how) + SETTLING
     return _rest(plant, how), allowed
@@ -79,7 +79,7 @@ def _stop_guided(kind: str, how: str, random: np.random.Generator) -> tuple[floa
     plant.submit(Order(1, "straight", straight_limits=QUICK))
     plant.tick()
     here = _tip(plant)
-    plant.ring.post(1, Pose.of(here.xyz + random.uniform(-DISTANCE, DISTANCE, 3), here.quat).array)
+    plant.shared.post(1, Pose.of(here.xyz + random.uniform(-DISTANCE, DISTANCE, 3), here.quat).array)
     plant.step(int(random.integers(3, 700)))
     if how != "path":
         allowed = stopping_time(plant, how)

@@ -78,7 +78,7 @@ def test_a_session_of_kind_pose_takes_poses_and_nothing_else() -> None:
         timeout=10.0,
     )
     keep = Policy(Missing.HOLD)
-    request = FriRequest("pose", message, lambda: Client(0, realtime=False, policy=keep), has_law=False)
+    request = FriRequest("pose", message, lambda _: Client(0, realtime=False, policy=keep), has_law=False)
     with Fri(cast(Any, Cabinet()), request) as rt:
         goal = ha.Pose.at(0.0, 0.0, 0.01) @ rt.start.pose
         with pytest.raises(ha.ModeConflict, match=r'q is not commanded .* "pose"') as refused:

@@ -18,6 +18,7 @@ from heptarm.values.motion.motion import Motion
 from heptarm.values.robot import robot
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
+from tests.simulators import FASTER
 
 WORLD = "MediaFlange.UserButton<bool MediaFlange.LEDBlue>bool Cell.Part<u8 Cell.Level>analog12[-10,10]"
 PROJECT = f"""<persistence><processDataContainer>
@@ -33,7 +34,7 @@ SLOWLY = ha.lin_rel(y=0.1, frame="base", speed_mps=0.01)
 def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ha.Arm]:
     project = tmp_path_factory.mktemp("project") / "RoboticsAPI.data.xml"
     project.write_text(PROJECT)
-    with ha.connect(f"sim://iiwa14?project={project}", watchdog=10.0, timeout=20.0) as arm:
+    with ha.connect(f"sim://iiwa14?speed={FASTER:g}&project={project}", watchdog=10.0, timeout=20.0) as arm:
         yield arm
 
 

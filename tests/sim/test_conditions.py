@@ -205,7 +205,7 @@ def test_a_servo_motion_breaks_too() -> None:
     order, heard = broken({"kind": "servo"}, WrenchAbove(frame=OWN, components=ALL, threshold=5.0))
     plant.submit(order)
     plant.step(5)
-    plant.ring.post(1, np.array(READY) + 0.2)
+    plant.shared.post(1, np.array(READY) + 0.2)
     plant.step(200)
     plant.apply_wrench((0.0, 0.0, 8.0))
     run(plant)
@@ -245,10 +245,10 @@ def test_signals_are_conditions() -> None:
     )
     plant.submit(order)
     plant.step(10)
-    plant.ring.signals[3] = 1.0
+    plant.shared.signals[3] = 1.0
     plant.step(10)
     assert heard == ["started"]
-    plant.ring.signals[4] = 2.0
+    plant.shared.signals[4] = 2.0
     run(plant)
     assert heard == ["started", "fired", "condition"]
 

@@ -40,7 +40,7 @@ class Arm:
         self.loads: list[tuple[Array | None, Array | None]] = []
         self.mode: Mode | None = None
         self.holds = 0
-        self.ring = SharedState()
+        self.shared = SharedState()
 
     def reading(self) -> Reading:
         q, ipo = tuple(self.q.tolist()), tuple(self.q_ipo.tolist())
@@ -53,7 +53,7 @@ class Arm:
         self.action = action
 
     def tick(self) -> None:
-        self.ring.header[HeaderWords.NEWEST] += 1
+        self.shared.header[HeaderWords.NEWEST] += 1
         if self.action is not None:
             self.q = self.action.q
             self.loads.append((self.action.tau, self.action.wrench))
@@ -167,7 +167,7 @@ class Rig:
     def waiting(self, overlay: MotionOverlay | None = None) -> Rig:
         self.ready()
         self.controller.start(overlay or MotionOverlay())
-        return self
+        return self.until(State.COMMANDING_WAIT)
 
     def active(self, overlay: MotionOverlay | None = None) -> Rig:
         return self.waiting(overlay).until(State.COMMANDING_ACTIVE)

@@ -317,7 +317,7 @@ def test_it_offers_an_overlay_as_soon_as_the_client_answers_well() -> None:
 
 @pytest.mark.parametrize(
     ("command", "mode"),
-    [("torque", JointImpedance(0.0)), ("wrench", CartesianImpedance((0.0,) * 6)), ("pose", Position())],
+    [("torque", JointImpedance(200.0)), ("wrench", CartesianImpedance()), ("pose", Position())],
 )
 def test_a_command_mode_brings_its_usual_control_mode(command: str, mode: object) -> None:
     arm = Arm()

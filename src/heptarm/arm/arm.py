@@ -211,9 +211,9 @@ class Arm:
         return self._connection.welcome.cabinet
 
     @property
-    def pace(self) -> float:
-        """Seconds of the robot's time per second of ours: 1 on a robot, N on a simulator that runs N times faster."""
-        return self._connection.pace
+    def real_time_factor(self) -> float:
+        """Seconds of the robot's clock per second of this computer's: N for a simulator N times as fast."""
+        return self._connection.real_time_factor
 
     @property
     def operator(self) -> Operator:

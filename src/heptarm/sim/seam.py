@@ -436,7 +436,7 @@ class SineImpedance:
     hold_time: float = nan
     #: [s]
     fall_time: float = 0.0
-    #: hold on until the pattern has finished
+    #: the motion ends only after the pattern has finished
     stay_active: bool = False
 
     def _write(self, out: list[bytes]) -> None:

@@ -34,7 +34,12 @@ class SimulatorOptions:
             "simulated seconds per second; 0: as fast as possible", in_target=True, allowed=(0.01, 100.0)
         ),
     )
-    key: str = field(default="", metadata=_about("pre-shared key that clients must know"))
+    key_file: Path | None = field(
+        default=None,
+        metadata=_about(
+            "file with the pre-shared key that clients must know; default: the environment variable HEPTARM_KEY"
+        ),
+    )
     application: str = field(
         default="", metadata=_about("class of another application; the process ends with it")
     )
@@ -74,6 +79,14 @@ class SimulatorOptions:
     data: tuple[str, ...] = field(
         default=(), metadata=_about("process data; may be repeated", metavar="NAME=VALUE")
     )
+    map: tuple[str, ...] = field(
+        default=(),
+        metadata=_about(
+            "address of the lab's network and the one that takes its place in process data and FRI sessions; may be "
+            "repeated",
+            metavar="ADDRESS=ADDRESS",
+        ),
+    )
     fault: tuple[str, ...] = field(
         default=(),
         metadata=_about(
@@ -84,7 +97,10 @@ class SimulatorOptions:
     )
     stats: Path | None = field(
         default=None,
-        metadata=_about("file for the statistics of the realtime loop, at the end and on SIGUSR1"),
+        metadata=_about("file for statistics of the realtime loop and of memory, at the end and on SIGUSR1"),
+    )
+    trace: Path | None = field(
+        default=None, metadata=_about("file for the state of the plant after each tick (0.5 MB/s)")
     )
     parent_pipe: bool = field(
         default=False,

@@ -129,7 +129,11 @@ def _limit(connection: Connection, motions: tuple[Motion, ...], ceiling: float) 
     """Time after which waiting for them makes no sense [s], with what is before them in the queue."""
     newest = connection.newest()
     override = newest.motion.override if newest is not None and newest.motion is not None else 1.0
-    own = longest(motions, connection.robot, ceiling) / max(override, 0.01) / min(connection.pace, 1.0)
+    own = (
+        longest(motions, connection.robot, ceiling)
+        / max(override, 0.01)
+        / min(connection.real_time_factor, 1.0)
+    )
     total = own + connection.events.pending()
     return total if total < _DAY else _DAY
 

@@ -16,7 +16,8 @@ import numpy.typing as npt
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.handle import Block, BreakRule, MotionHandle
 from heptarm.arm.translate.modes import mode_message
-from heptarm.errors import CommandRejected, HeptarmError, LimitError, LocalProtocolError, ShapeError, Timeout
+from heptarm.arm.watchdog import FIRST_TARGET, TARGETS
+from heptarm.errors import CommandRejected, HeptarmError, LocalProtocolError, ShapeError, Timeout
 from heptarm.io.tcp import WarmUpConnection
 from heptarm.values.arrays import Array, array, within
 from heptarm.values.condition.condition import Condition
@@ -31,14 +32,8 @@ _Method = TypeVar("_Method", bound=Callable[..., Any])
 
 KINDS = ("joint", "pose", "lin")
 ENGINES = {"smart": wire.ServoEngine.SMART, "direct": wire.ServoEngine.DIRECT}
-#: The protocol's defaults; `schema/protocol.toml` is their one place.
-_DEFAULT = wire.ServoOpen()
-#: The default watchdog is this many periods long, but at least this long [s].
-_WATCHDOG_PERIODS, _MIN_DEFAULT_WATCHDOG = 5.0, _DEFAULT.watchdog
-#: Range of the watchdog [s].
-_MIN_WATCHDOG, _MAX_WATCHDOG = 0.005, 2.0
-#: Longest time until the first target [s].
-_FIRST_TARGET = 2.0
+#: The protocol's defaults and ranges; `schema/protocol.toml` is their one place.
+_DEFAULT, _RANGES = wire.ServoOpen(), wire.ServoTiming.RANGES
 #: Added to the period for the default of min_trajectory_time, so that the next target comes before its end [s].
 _OVERLAP = 0.005
 #: Limits along and about each axis of the base for straight lines: default, largest value, unit.
@@ -48,11 +43,6 @@ _LINE_LIMITS = {
     "speed_radps": (0.5, 20.0, "rad/s"),
     "acceleration_radps2": (2.0, 200.0, "rad/s²"),
 }
-
-
-def default_watchdog(period: float) -> float:
-    """Default servo watchdog for a period [s]: max(5 periods, 0.2 s), at most 2 s."""
-    return min(max(_WATCHDOG_PERIODS * period, _MIN_DEFAULT_WATCHDOG), _MAX_WATCHDOG)
 
 
 class ServoKeywords(TypedDict, total=False):
@@ -145,16 +135,7 @@ class ServoRequest:
             )
         self._refuse_foreign_limits()
         within(self.rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
-        within(self.watchdog, "watchdog", _MIN_WATCHDOG, _MAX_WATCHDOG, unit="s")
-        if self.watchdog_time < self.period:
-            raise LimitError(
-                f"watchdog must not be shorter than the period of {self.period:g} s, got {self.watchdog_time:g} s",
-                code=2,
-                parameter="watchdog",
-                value=self.watchdog_time,
-                allowed=f"[{self.period:g}, {_MAX_WATCHDOG:g}] s",
-                hint="give a longer watchdog or a higher rate",
-            )
+        TARGETS.time(self.watchdog, period=self.period)
 
     @property
     def period(self) -> float:
@@ -164,7 +145,7 @@ class ServoRequest:
     @property
     def watchdog_time(self) -> float:
         """Longest gap between two targets [s]."""
-        return default_watchdog(self.period) if self.watchdog is None else self.watchdog
+        return TARGETS.time(self.watchdog, period=self.period)
 
     def message(self, ceiling: float) -> wire.ServoOpen:
         """The message that opens the servo motion, without its break condition.
@@ -177,17 +158,19 @@ class ServoRequest:
         """
         shortest = self.min_trajectory_time
         if shortest is None:
-            shortest = min(max(self.period + _OVERLAP, 0.001), 1.0)
-        kept = _DEFAULT.timing.speed_timeout if self.speed_timeout is None else self.speed_timeout
+            shortest = float(np.clip(self.period + _OVERLAP, *_RANGES["min_trajectory_time"]))
+        given = {
+            "min_trajectory_time": shortest,
+            "goal_timeout": self.goal_timeout,
+            "speed_timeout": _DEFAULT.timing.speed_timeout if self.speed_timeout is None else self.speed_timeout,
+        }
         message = wire.ServoOpen(
             frame="" if self.moving == TOOL else self.moving,
             mode=mode_message(self.mode),
             timing=wire.ServoTiming(
-                min_trajectory_time=within(shortest, "min_trajectory_time", 0.001, 1.0, unit="s"),
-                goal_timeout=within(self.goal_timeout, "goal_timeout", 0.1, 3600.0, unit="s"),
-                speed_timeout=within(kept, "speed_timeout", 0.001, 10.0, unit="s"),
+                **{name: within(value, name, *_RANGES[name], unit="s") for name, value in given.items()}
             ),
-            watchdog=_FIRST_TARGET,
+            watchdog=FIRST_TARGET.default,
         )
         if self.kind == "lin":
             return replace(

@@ -26,15 +26,17 @@ def round_trip(arm: Arm) -> None:
         arm.set_override(1.0)
         times.append(time.perf_counter() - began)
     median, late = np.percentile(times, [50, 99])
-    note(f"99 of 100 within {late * 1e3:.2f} ms")
-    below(float(median), 0.02, "median of 100 round trips", unit="s")  # Nagle's delay alone would be 0.04
+    note(f"median {median * 1e3:.2f} ms, 99 of 100 within {late * 1e3:.2f} ms")
+    # Nagle's delay alone would be 0.04 s each time; a busy machine is slow only now and then
+    below(min(times), 0.02, "fastest of 100 round trips", unit="s")
 
 
 @scenario(line=9, rows="O9 G21", risk=Risk.STILL)
 def clock(arm: Arm) -> None:
     """The two clocks are compared: the age of a state is known, though nobody has set a clock."""
     ages = [state.age for state in arm.states(duration=0.3)]
-    below(abs(float(np.median(ages))), 0.05 * max(arm.pace, 1.0), "median age of the states", unit="s")
+    # a busy machine makes states older; a wrong difference of the clocks shows in all of them
+    below(float(np.abs(ages).min()), 0.05 * max(arm.real_time_factor, 1.0), "smallest age of a state", unit="s")
 
 
 @scenario(line=10, rows="O6 O7 O8 O10", risk=Risk.FAULT, virtual=True, space=0.5, needs=("ptp",))

@@ -72,8 +72,9 @@ def jacobian(arm: Arm) -> None:
     recording = record(arm, ptp(HOME + deg(12, 4, -6, 5, 6, 8, 10), speed=0.25))
     middle = len(recording.states) // 2
     a, b = recording.states[middle - _GAP], recording.states[middle + _GAP]
-    seconds = (b.stamp - a.stamp) * 1e-9
-    q, dq = (a.q_cmd + b.q_cmd) / 2, (b.q_cmd - a.q_cmd) / seconds
+    seconds = float(recording.t_pose[middle + _GAP] - recording.t_pose[middle - _GAP])
+    q = (a.q_cmd + b.q_cmd) / 2
+    dq = (b.q_cmd - a.q_cmd) / float(recording.t[middle + _GAP] - recording.t[middle - _GAP])
     matrix = model.jacobian(arm.robot, q)
     velocity = (b.pose_cmd.xyz - a.pose_cmd.xyz) / seconds
     above(float(np.linalg.norm(velocity)), 0.005, "speed of the flange", unit="m/s")
@@ -108,7 +109,7 @@ def dynamics(arm: Arm) -> None:
     worst, largest = 0.0, 0.0
     for k in middle:
         a, here, b = recording.states[k - _GAP], recording.states[k], recording.states[k + _GAP]
-        half = (b.stamp - a.stamp) * 0.5e-9
+        half = 0.5 * float(recording.t[k + _GAP] - recording.t[k - _GAP])
         dq = (b.q_cmd - a.q_cmd) / (2 * half)
         ddq = (b.q_cmd - 2 * here.q_cmd + a.q_cmd) / half**2
         made = model.inverse_dynamics(arm.robot, here.q, dq, ddq)

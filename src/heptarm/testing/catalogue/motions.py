@@ -190,7 +190,7 @@ def path_speeds(arm: Arm) -> None:
         arm, lin_rel(y=0.08, frame="base", speed_mps=0.07, acceleration_mps2=0.2, jerk_mps3=50.0)
     )
     near(float(recording.speeds.max()), 0.07, 0.003, "top speed", unit="m/s")
-    rates = np.diff(recording.speeds[::3]) / np.diff(recording.t[:-1][::3])
+    rates = np.diff(recording.speeds[::3]) / np.diff(recording.t_pose[:-1][::3])
     near(float(np.abs(rates).max()), 0.2, 0.03, "largest acceleration", unit="m/s²")
     gentle = record(arm, lin_rel(y=-0.08, frame="base", speed_mps=0.07, acceleration_mps2=0.2, jerk_mps3=0.5))
     above(gentle.result.duration, recording.result.duration + 0.2, "with a small jerk it takes", unit="s")

@@ -46,7 +46,7 @@ def circle(arm: Arm) -> None:
     recording = record(arm, circ(via, end, speed_mps=0.1))
     radii = np.linalg.norm(recording.xyz - centre, axis=1)
     near(radii, np.full(len(radii), 0.06), _TRUE, "radii", unit="m")
-    below(_misses(recording.t, recording.xyz, via.xyz), _TRUE, "it passes the point at", unit="m")
+    below(_misses(recording.t_pose, recording.xyz, via.xyz), _TRUE, "it passes the point at", unit="m")
     near_pose(arm, end, "at the end")
     half = recording.states[int(np.argmin(np.linalg.norm(recording.xyz - via.xyz, axis=1)))].pose
     near(half.angle_to(start), np.radians(10), 0.03, "halfway it has turned half", unit="rad")
@@ -98,7 +98,9 @@ def splines(arm: Arm) -> None:
     path = spline([knots[0], spl(knots[1]), lin(knots[2]), circ(far, end)], speed_mps=0.08)
     recording = record(arm, path)
     for place, knot in enumerate((*knots, far, end)):
-        below(_misses(recording.t, recording.xyz, knot.xyz), _TRUE, f"it misses point {place} by", unit="m")
+        below(
+            _misses(recording.t_pose, recording.xyz, knot.xyz), _TRUE, f"it misses point {place} by", unit="m"
+        )
     near_pose(arm, end, "at the end")
     moving = recording.speeds[
         np.flatnonzero(recording.speeds > 0.04)[0] : np.flatnonzero(recording.speeds > 0.04)[-1]
@@ -136,7 +138,7 @@ def ellipses(arm: Arm) -> None:
         near(ones, np.ones(len(ones)), 0.04, f"equation of the ellipse, {plane}")
         near(lever @ normal, np.zeros(len(lever)), _TRUE, f"offset out of {plane}", unit="m")
         if plane == "xy":
-            below(_misses(recording.t, recording.xyz, start.xyz), _TRUE, "closed within", unit="m")
+            below(_misses(recording.t_pose, recording.xyz, start.xyz), _TRUE, "closed within", unit="m")
             ramp = recording.speeds[:3]
             below(float(ramp.min()), 0.075, "it begins slowly", unit="m/s")
         else:

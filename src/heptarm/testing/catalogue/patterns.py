@@ -25,7 +25,8 @@ def _offsets(states: tuple[State, ...]) -> Array:
 
 
 def _times(states: tuple[State, ...]) -> Array:
-    return np.array([(s.stamp - states[0].stamp) * 1e-9 for s in states])
+    stamps = [s.groups.pose.stamp for s in states if s.groups.pose is not None]
+    return np.array([(stamp - stamps[0]) * 1e-9 for stamp in stamps])
 
 
 def _fit(t: Array, x: Array, frequency: float) -> tuple[float, float]:

@@ -10,8 +10,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import isnan, nan
+from typing import ClassVar
 
 from heptarm.errors import LimitError, ShapeError
 from heptarm.values.arrays import within
@@ -24,134 +25,130 @@ FORCE, TORQUE, JOINT = 1000.0, 1000.0, 500.0
 _AXES = ("x", "y", "z")
 
 
-def _check_estimate(axis: str | None, frame: str, tolerance: float, unit: str) -> None:
-    if axis is not None and axis not in _AXES:
-        raise ShapeError(f"axis must be 'x', 'y' or 'z', got {axis!r}", parameter="axis", value=axis)
-    check_name(frame, "frame")
-    if not (isinstance(tolerance, float) and isnan(tolerance)):
-        within(tolerance, "tolerance", 0.0, FORCE, above=True, unit=unit)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Estimated(Condition):
+    """Base of conditions on the cabinet's estimate of the external force and torque.
+
+    Attributes:
+        frame: where it is measured and in whose axes; see `heptarm.when.force`.
+        tolerance: largest inaccuracy of the estimate that is accepted [N], of a torque [Nm]; NaN: any.
+    """
+
+    UNIT: ClassVar[str] = "N"
+
+    frame: str = field(default=TOOL, kw_only=True)
+    tolerance: float = field(default=nan, kw_only=True)
+
+    def __post_init__(self) -> None:
+        self._check()
+        check_name(self.frame, "frame")
+        if not (isinstance(self.tolerance, float) and isnan(self.tolerance)):
+            within(self.tolerance, "tolerance", 0.0, FORCE, above=True, unit=self.UNIT)
+
+    def _check(self) -> None:
+        """Check the fields of the subclass."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ForceAbove(Condition):
+class ForceAbove(_Estimated):
     """The external force's magnitude is above a threshold.
 
     Attributes:
         threshold: [N], up to 1000.
-        frame: where it is measured and in whose axes; see `heptarm.when.force`.
-        tolerance: largest inaccuracy of the estimate that is accepted [N]; NaN: any.
     """
 
     threshold: float
-    frame: str = TOOL
-    tolerance: float = nan
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         within(self.threshold, "threshold", 0.0, FORCE, unit="N")
-        _check_estimate(None, self.frame, self.tolerance, "N")
 
     def __str__(self) -> str:
         return f"force > {self.threshold:g} N"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NormalForceAbove(Condition):
-    """The external force along an axis, in either direction, is above a threshold; see `ForceAbove`.
+class _AxisAbove(_Estimated):
+    """Base of thresholds for a part of the external force.
 
     Attributes:
         axis: "x", "y" or "z" of the frame.
-        threshold: [N].
-        frame: see `ForceAbove`.
-        tolerance: see `ForceAbove`.
+        threshold: [N], up to 1000.
     """
+
+    PART: ClassVar[str]
 
     axis: str
     threshold: float
-    frame: str = TOOL
-    tolerance: float = nan
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         within(self.threshold, "threshold", 0.0, FORCE, unit="N")
-        _check_estimate(self.axis, self.frame, self.tolerance, "N")
+        _check_axis(self.axis)
 
     def __str__(self) -> str:
-        return f"force normal to {self.axis} of {self.frame} > {self.threshold:g} N"
+        return f"force {self.PART} {self.axis} of {self.frame} > {self.threshold:g} N"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ShearForceAbove(Condition):
-    """The external force across an axis is above a threshold; see `NormalForceAbove`.
+class NormalForceAbove(_AxisAbove):
+    """The external force along an axis, in either direction, is above a threshold."""
 
-    Attributes:
-        axis: "x", "y" or "z" of the frame.
-        threshold: [N].
-        frame: see `ForceAbove`.
-        tolerance: see `ForceAbove`.
-    """
-
-    axis: str
-    threshold: float
-    frame: str = TOOL
-    tolerance: float = nan
-
-    def __post_init__(self) -> None:
-        within(self.threshold, "threshold", 0.0, FORCE, unit="N")
-        _check_estimate(self.axis, self.frame, self.tolerance, "N")
-
-    def __str__(self) -> str:
-        return f"force across {self.axis} of {self.frame} > {self.threshold:g} N"
+    PART: ClassVar[str] = "normal to"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ForceOutside(Condition):
-    """A component of the external force is outside a band.
+class ShearForceAbove(_AxisAbove):
+    """The external force across an axis is above a threshold."""
+
+    PART: ClassVar[str] = "across"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _AxisOutside(_Estimated):
+    """Base of bands for a component of the external force or torque.
 
     Attributes:
         axis: "x", "y" or "z" of the frame.
-        low: [N], from -1000.
-        high: [N], to 1000.
-        frame: see `ForceAbove`.
-        tolerance: see `ForceAbove`.
+        low: [N] or [Nm], from -1000.
+        high: [N] or [Nm], to 1000.
     """
+
+    COMPONENT: ClassVar[str]
+    LIMIT: ClassVar[float]
 
     axis: str
     low: float
     high: float
-    frame: str = TOOL
-    tolerance: float = nan
 
-    def __post_init__(self) -> None:
-        check_band(self.low, self.high, FORCE, "N")
-        _check_estimate(self.axis, self.frame, self.tolerance, "N")
+    def _check(self) -> None:
+        check_band(self.low, self.high, self.LIMIT, self.UNIT)
+        _check_axis(self.axis)
 
     def __str__(self) -> str:
-        return f"force along {self.axis} of {self.frame} {band_text(self.low, self.high, FORCE, 'N')}"
+        band = band_text(self.low, self.high, self.LIMIT, self.UNIT)
+        return f"{self.COMPONENT} {self.axis} of {self.frame} {band}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TorqueOutside(Condition):
-    """A component of the external torque at the motion frame is outside a band.
+class ForceOutside(_AxisOutside):
+    """A component of the external force is outside a band [N]."""
 
-    Attributes:
-        axis: "x", "y" or "z" of the frame.
-        low: [Nm], from -1000.
-        high: [Nm], to 1000.
-        frame: see `ForceAbove`.
-        tolerance: see `ForceAbove` [Nm].
-    """
+    COMPONENT: ClassVar[str] = "force along"
+    LIMIT: ClassVar[float] = FORCE
 
-    axis: str
-    low: float
-    high: float
-    frame: str = TOOL
-    tolerance: float = nan
 
-    def __post_init__(self) -> None:
-        check_band(self.low, self.high, TORQUE, "Nm")
-        _check_estimate(self.axis, self.frame, self.tolerance, "Nm")
+@dataclass(frozen=True, slots=True, eq=False)
+class TorqueOutside(_AxisOutside):
+    """A component of the external torque at the motion frame is outside a band [Nm]."""
 
-    def __str__(self) -> str:
-        return f"torque about {self.axis} of {self.frame} {band_text(self.low, self.high, TORQUE, 'Nm')}"
+    COMPONENT: ClassVar[str] = "torque about"
+    LIMIT: ClassVar[float] = TORQUE
+    UNIT: ClassVar[str] = "Nm"
+
+
+def _check_axis(axis: str) -> None:
+    if axis not in _AXES:
+        raise ShapeError(f"axis must be 'x', 'y' or 'z', got {axis!r}", parameter="axis", value=axis)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -242,22 +239,28 @@ class Force:
         return Force(frame, tolerance)
 
     def __gt__(self, threshold: float) -> Condition:
-        return ForceAbove(threshold, self.frame, self.tolerance)
+        return ForceAbove(threshold, frame=self.frame, tolerance=self.tolerance)
 
     def __lt__(self, threshold: float) -> Condition:
-        return ~ForceAbove(threshold, self.frame, self.tolerance)
+        return ~ForceAbove(threshold, frame=self.frame, tolerance=self.tolerance)
 
     def along(self, axis: str) -> Component:
         """Its component along an axis, with sign."""
-        return Component(lambda low, high: ForceOutside(axis, low, high, self.frame, self.tolerance), FORCE)
+        return Component(
+            lambda low, high: ForceOutside(axis, low, high, frame=self.frame, tolerance=self.tolerance), FORCE
+        )
 
     def normal(self, axis: str) -> Magnitude:
         """Its magnitude along an axis, in either direction."""
-        return Magnitude(lambda threshold: NormalForceAbove(axis, threshold, self.frame, self.tolerance))
+        return Magnitude(
+            lambda threshold: NormalForceAbove(axis, threshold, frame=self.frame, tolerance=self.tolerance)
+        )
 
     def shear(self, axis: str) -> Magnitude:
         """Its magnitude across an axis."""
-        return Magnitude(lambda threshold: ShearForceAbove(axis, threshold, self.frame, self.tolerance))
+        return Magnitude(
+            lambda threshold: ShearForceAbove(axis, threshold, frame=self.frame, tolerance=self.tolerance)
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -282,7 +285,9 @@ class Torque:
 
     def about(self, axis: str) -> Component:
         """Its component about an axis of the frame."""
-        return Component(lambda low, high: TorqueOutside(axis, low, high, self.frame, self.tolerance), TORQUE)
+        return Component(
+            lambda low, high: TorqueOutside(axis, low, high, frame=self.frame, tolerance=self.tolerance), TORQUE
+        )
 
 
 force = Force()

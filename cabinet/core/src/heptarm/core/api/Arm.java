@@ -3,6 +3,7 @@ package heptarm.core.api;
 import java.util.HashMap;
 import java.util.Map;
 
+import heptarm.core.Clock;
 import heptarm.core.Clocks;
 import heptarm.core.CommandRejected;
 import heptarm.core.EventBus;
@@ -85,6 +86,10 @@ public final class Arm implements EventBus.Listener {
         if (isOwner) {
             service.close();
         }
+    }
+
+    Clock clock() {
+        return service.clock;
     }
 
     // --------------------------------------------------------------------------------------------- motions
@@ -318,10 +323,10 @@ public final class Arm implements EventBus.Listener {
     /** External wrench in the axes of another frame: "" (the motion frame), "flange", or a frame's name. */
     public WrenchState wrench(String axes) throws CommandRejected {
         service.tools.checkReference(axes, "axes");
-        return service.robot.sensors.readWrench(axes, service.clock.nanos());
+        return service.reader.wrench(axes);
     }
 
     public SafetyState safety() {
-        return service.robot.safety.read(service.clock.nanos());
+        return service.safety.read();
     }
 }

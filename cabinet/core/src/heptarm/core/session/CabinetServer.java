@@ -63,6 +63,9 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
         });
         log.info("heptarm " + ServerSettings.VERSION + " listens on " + settings.bind + ":" + socket.getLocalPort()
                 + ", protocol " + Protocol.MAJOR + "." + Protocol.MINOR);
+        if (settings.isOpenToAll()) {
+            log.warn("any program in the network can move this robot: set the process data heptarm.key or heptarm.allow");
+        }
         return socket.getLocalPort();
     }
 
@@ -144,12 +147,17 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
 
     public void closed(ClientConnection client, String why) {
         clients.remove(client);
-        ending(client, why);
+        ending(client, 0, why);
     }
 
-    public void ending(ClientConnection client, String why) {
+    public void ending(ClientConnection client, int code, String why) {
         service.sampler.unsubscribe(client);
-        if (service.authority.isController(client)) {
+        if (!service.authority.isController(client)) {
+            return;
+        }
+        if (code == Code.FORGED_FRAME || code == Code.BAD_FRAME) {
+            service.authority.distrust(client, why);
+        } else {
             service.authority.lost(client, why);
         }
     }

@@ -7,11 +7,11 @@ import com.kuka.roboticsAPI.controllerModel.Controller;
 
 import heptarm.doubles.runtime.Station;
 
-/** Cabinets and devices of the project: here one of each. */
+/** Cabinets and devices of the project; here one of each. */
 public class RoboticsAPIContext {
     private final Station station;
 
-    /** Made by the simulation. */
+    /** Created by the simulation. */
     public RoboticsAPIContext(Station station) {
         this.station = station;
     }
@@ -22,6 +22,12 @@ public class RoboticsAPIContext {
 
     public Controller getDefaultController() {
         return station.controller;
+    }
+
+    /** Not simulated: the project's data are read before the application starts, and never written. */
+    public <T> T getEngine(Class<T> type) {
+        throw new UnsupportedOperationException("the virtual cabinet has no " + type.getName()
+                + "; it reads the project's data.xml once and does not change it");
     }
 
     /** The device of a type. */

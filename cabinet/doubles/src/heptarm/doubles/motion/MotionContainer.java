@@ -14,15 +14,20 @@ import com.kuka.roboticsAPI.commandModel.IControllerCommand;
 import com.kuka.roboticsAPI.conditionModel.ICallbackAction;
 import com.kuka.roboticsAPI.conditionModel.ICondition;
 import com.kuka.roboticsAPI.conditionModel.ITriggerAction;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.deviceModel.PositionInformation;
 import com.kuka.roboticsAPI.executionModel.CommandInvalidException;
 import com.kuka.roboticsAPI.executionModel.ExecutionState;
 import com.kuka.roboticsAPI.executionModel.IFiredConditionInfo;
+import com.kuka.roboticsAPI.executionModel.IFiredTriggerInfo;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
 import com.kuka.roboticsAPI.motionModel.MotionBatch;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 
+import heptarm.core.Clock;
+import heptarm.core.Clocks;
 import heptarm.doubles.plant.MotionListener;
 import heptarm.doubles.runtime.ApplicationServices;
 import heptarm.doubles.runtime.Station;
@@ -270,14 +275,13 @@ public final class MotionContainer implements IMotionContainer, MotionListener {
 
     @Override
     public synchronized void await(long time, TimeUnit unit) throws TimeoutException {
-        long deadline = System.nanoTime() + unit.toNanos(time);
+        Clock clock = station.clock();
+        long deadline = clock.nanos() + unit.toNanos(time);
         try {
             while (!isFinished()) {
-                long left = deadline - System.nanoTime();
-                if (left <= 0) {
+                if (!Clocks.await(this, clock, deadline)) {
                     throw new TimeoutException("the motion did not end within " + time + " " + unit);
                 }
-                TimeUnit.NANOSECONDS.timedWait(this, left);
             }
         } catch (InterruptedException e) {
             Thread.currentThread().interrupt();
@@ -310,7 +314,20 @@ public final class MotionContainer implements IMotionContainer, MotionListener {
         if (!breaks) {
             ITriggerAction action = watched.action(index);
             if (action instanceof ICallbackAction) {
-                dispatch(() -> ((ICallbackAction) action).onTriggerFired(() -> this));
+                LBR robot = Station.current().robot;
+                PositionInformation there = new PositionInformation(robot.getCurrentCartesianPosition(robot.getFlange()),
+                        robot.getCommandedCartesianPosition(robot.getFlange()));
+                dispatch(() -> ((ICallbackAction) action).onTriggerFired(new IFiredTriggerInfo() {
+                    @Override
+                    public IMotionContainer getMotionContainer() {
+                        return MotionContainer.this;
+                    }
+
+                    @Override
+                    public PositionInformation getPositionInformation() {
+                        return there;
+                    }
+                }));
             }
         }
     }

@@ -26,7 +26,7 @@ public final class SineImpedance extends ImpedanceMode {
     public double holdTime = Double.NaN;
     /** [s] */
     public double fallTime = 0.0;
-    /** hold on until the pattern has finished */
+    /** the motion ends only after the pattern has finished */
     public boolean stayActive = false;
 
     @Override

@@ -6,24 +6,30 @@ import heptarm.doubles.plant.ConditionListener;
 import heptarm.doubles.runtime.Station;
 import heptarm.doubles.seam.Condition;
 
-/** Watches a condition, whether a motion runs or not. Made by an ObserverManager. */
+/** Monitors a condition, also without a motion. Created by an ObserverManager. */
 public class ConditionObserver {
-    /** Hears of every edge. */
+    /** Called on every edge. */
     interface Hearer {
         void edge(ConditionObserver observer, Date time, boolean value);
     }
 
     private final Station station;
+    private final ICondition observed;
     private final Condition condition;
     private final boolean onEnable;
     private final Hearer hearer;
     private long watch;
 
-    ConditionObserver(Station station, Condition condition, boolean onEnable, Hearer hearer) {
+    ConditionObserver(Station station, ICondition observed, Condition condition, boolean onEnable, Hearer hearer) {
         this.station = station;
+        this.observed = observed;
         this.condition = condition;
         this.onEnable = onEnable;
         this.hearer = hearer;
+    }
+
+    public ICondition getCondition() {
+        return observed;
     }
 
     public synchronized void enable() {

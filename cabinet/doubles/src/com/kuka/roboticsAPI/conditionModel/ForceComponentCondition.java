@@ -7,7 +7,7 @@ import com.kuka.roboticsAPI.geometricModel.math.CoordinateAxis;
 import heptarm.doubles.motion.WrenchCondition;
 import heptarm.doubles.seam.Condition;
 
-/** A component of the external force lies outside a band [N]. */
+/** A component of the external force is outside a band [N]. */
 public class ForceComponentCondition extends WrenchCondition {
     private final CoordinateAxis axis;
     private final double[] band;

@@ -7,7 +7,7 @@ import com.kuka.roboticsAPI.geometricModel.math.CoordinateAxis;
 import heptarm.doubles.motion.WrenchCondition;
 import heptarm.doubles.seam.Condition;
 
-/** The external force, all of it or its part along or across an axis, is above a threshold [N]. */
+/** The magnitude of the external force, or of its part along or across an axis, is above a threshold [N]. */
 public final class ForceCondition extends WrenchCondition {
     /** Which part of the force. */
     private enum Part { SPATIAL, NORMAL, SHEAR }

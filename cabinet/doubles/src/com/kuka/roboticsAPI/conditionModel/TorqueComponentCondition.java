@@ -7,7 +7,7 @@ import com.kuka.roboticsAPI.geometricModel.math.CoordinateAxis;
 import heptarm.doubles.motion.WrenchCondition;
 import heptarm.doubles.seam.Condition;
 
-/** A component of the external torque lies outside a band [Nm]. */
+/** A component of the external torque is outside a band [Nm]. */
 public class TorqueComponentCondition extends WrenchCondition {
     private final CoordinateAxis axis;
     private final double[] band;

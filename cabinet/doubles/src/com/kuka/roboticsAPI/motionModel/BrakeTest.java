@@ -10,7 +10,7 @@ import heptarm.doubles.runtime.Station;
 import heptarm.doubles.seam.MotionKind;
 import heptarm.doubles.seam.MotionOrder;
 
-/** Loads the brake of an axis, from 0, with a torque [Nm]. The simulated arm holds still meanwhile; its brakes hold what the axis can exert. */
+/** Loads the brake of an axis, from 0, with a torque [Nm]. The simulated arm rests; its brakes hold the axis' maximum torque. */
 public class BrakeTest extends RobotMotion<BrakeTest> {
     private static final double SECONDS = 1.0;
 
@@ -19,17 +19,17 @@ public class BrakeTest extends RobotMotion<BrakeTest> {
 
     public BrakeTest(int axis, double torque) {
         if (axis < 0 || axis > 6) {
-            throw new IllegalArgumentException("axis " + axis + "; there are 0 to 6");
+            throw new IllegalArgumentException("axis must be 0 to 6, got " + axis);
         }
         this.axis = axis;
         this.torque = notNegative("torque", torque);
     }
 
-    /** What the test that has run found. */
+    /** Result of the finished test. */
     public static BrakeTestResult evaluateResult(IMotionContainer container) {
         IMotion motion = ((MotionContainer) container).getLastExecutedMotion();
         if (!(motion instanceof BrakeTest)) {
-            throw new IllegalArgumentException("this was no brake test but " + container.getCommand());
+            throw new IllegalArgumentException("the motion must be a brake test, got " + container.getCommand());
         }
         BrakeTest test = (BrakeTest) motion;
         double most = Station.current().description.tauMax[test.axis];

@@ -8,15 +8,19 @@ import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import heptarm.doubles.seam.MotionKind;
 import heptarm.doubles.seam.MotionOrder;
 
-/** Motions that are commanded together; what is set on the batch holds for those of them that say nothing else. */
+/** Motions commanded together; settings of the batch apply to those motions that have none of their own. */
 public class MotionBatch extends RobotMotion<MotionBatch> {
     private final List<RobotMotion<?>> motions;
 
     public MotionBatch(RobotMotion<?>... motions) {
         if (motions.length == 0) {
-            throw new IllegalArgumentException("a batch has at least one motion");
+            throw new IllegalArgumentException("a batch must have at least one motion");
         }
         this.motions = List.of(motions);
+    }
+
+    public List<RobotMotion<?>> getMotions() {
+        return motions;
     }
 
     @Override

@@ -9,7 +9,7 @@ import heptarm.doubles.motion.MotionTranslator;
 import heptarm.doubles.seam.MotionKind;
 import heptarm.doubles.seam.MotionOrder;
 
-/** Point to point, to the home position of the robot that it is commanded to. */
+/** Point to point, to the home position of the commanded robot. */
 public class PTPHome extends SplineMotionJP<PTPHome> {
     @Override
     public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {

@@ -10,7 +10,7 @@ import heptarm.doubles.motion.MotionTranslator;
 import heptarm.doubles.seam.MotionKind;
 import heptarm.doubles.seam.MotionOrder;
 
-/** Straight line from where the moved frame is when the motion begins. */
+/** Straight line relative to the pose of the motion frame at the start. */
 public class RelativeLIN extends SplineMotionCP<RelativeLIN> {
     private final Transformation offset;
     private final AbstractFrame reference;
@@ -24,7 +24,7 @@ public class RelativeLIN extends SplineMotionCP<RelativeLIN> {
         return offset;
     }
 
-    /** Whose axes the offset is given in; null: the moved frame's. */
+    /** Frame whose axes the offset refers to; null: the motion frame. */
     public AbstractFrame getReference() {
         return reference;
     }

@@ -8,13 +8,13 @@ import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import heptarm.doubles.seam.MotionKind;
 import heptarm.doubles.seam.MotionOrder;
 
-/** A spline block in space: segments that are gone through without a halt. */
+/** A Cartesian spline block: segments without a stop between them. */
 public class Spline extends SplineMotionCP<Spline> {
     private final List<SplineMotionCP<?>> segments;
 
     public Spline(SplineMotionCP<?>... segments) {
         if (segments.length == 0) {
-            throw new IllegalArgumentException("a spline has at least one segment");
+            throw new IllegalArgumentException("a spline must have at least one segment");
         }
         this.segments = List.of(segments);
     }

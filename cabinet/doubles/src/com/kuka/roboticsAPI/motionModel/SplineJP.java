@@ -14,7 +14,7 @@ public class SplineJP extends SplineMotionJP<SplineJP> {
 
     public SplineJP(SplineMotionJP<?>... segments) {
         if (segments.length == 0) {
-            throw new IllegalArgumentException("a spline has at least one segment");
+            throw new IllegalArgumentException("a spline must have at least one segment");
         }
         this.segments = List.of(segments);
     }

@@ -8,7 +8,7 @@ import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import heptarm.doubles.seam.MotionKind;
 import heptarm.doubles.seam.MotionOrder;
 
-/** Goes straight for each destination; they have to be close and smooth. */
+/** Moves directly to each destination; destinations must be close and smooth. */
 public class DirectServo extends ServoMotionJP<DirectServo> {
     private final JointPosition start;
 

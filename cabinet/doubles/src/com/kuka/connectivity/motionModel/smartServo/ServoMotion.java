@@ -22,7 +22,7 @@ public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<
         timing.goalTimeout = GOAL_TIMEOUT;
     }
 
-    /** Whether a servo motion under impedance control may begin now: at rest, nothing pushes, not singular, the load data right. */
+    /** Whether a servo motion in impedance control may start now: at rest, without contact, not singular, with correct load data. */
     public static boolean validateForImpedanceMode(PhysicalObject object) {
         LBR robot = object.carrier();
         if (robot == null) {
@@ -50,23 +50,23 @@ public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<
         return self();
     }
 
-    /** A larger acceleration than the robot's own is not simulated. */
+    /** Has no effect: the simulation does not exceed the robot's own acceleration. */
     public T overrideJointAcceleration(double factor) {
         positive("factor", factor);
         return self();
     }
 
-    /** The trace is a file for KUKA's service. */
+    /** Has no effect: the trace is a file for KUKA's service. */
     public T useTrace(boolean on) {
         return self();
     }
 
-    /** The running motion; waits until it has begun. */
+    /** The running motion; waits until it has started. */
     public IServoRuntime getRuntime() {
         return getRuntime(true);
     }
 
-    /** The running motion; with {@code waitForActivation} it waits until it has begun. */
+    /** The running motion; with {@code waitForActivation} waits until it has started. */
     public IServoRuntime getRuntime(boolean waitForActivation) {
         return running(waitForActivation);
     }
@@ -78,7 +78,7 @@ public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<
             accepted = runtime;
         }
         if (accepted == null) {
-            throw new IllegalStateException("the servo motion was not commanded yet; call moveAsync first");
+            throw new IllegalStateException("the servo motion is not commanded: call moveAsync first");
         }
         if (waitForActivation) {
             accepted.awaitActivation();

@@ -7,7 +7,7 @@ import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import heptarm.doubles.seam.MotionKind;
 import heptarm.doubles.seam.MotionOrder;
 
-/** Plans a limited trajectory to each destination, far or near; begins at a position that has to be the present one. */
+/** Plans a limited trajectory to each destination, far or near. The start position must be the current one. */
 public class SmartServo extends ServoMotionJP<SmartServo> {
     private final JointPosition start;
 

@@ -15,22 +15,23 @@ import heptarm.doubles.seam.CartesianImpedance;
 import heptarm.doubles.seam.ImpedanceMode;
 
 /**
- * A spring and a damper between the moved frame and its set-point, and one that keeps the elbow. Directions in the order
+ * A spring and a damper between the motion frame and its set-point, and in the null space. Directions in the order
  * x y z a b c; [N/m], [Nm/rad], [N], [Nm], [mm], [rad].
  */
 public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
     static final int DIRECTIONS = 6;
-    /** A limit of this size counts as none. */
+    /** A limit of this size or above is no limit. */
     static final double OFF = 1e6;
     private static final double STIFFEST = 5000.0;
     private static final double STIFFEST_ROTATION = 300.0;
     /** Largest stiffness that the plant takes [Nm/rad]. */
     private static final double PLANT_NULL_SPACE_STIFFNESS = 5000.0;
+    private static final double DEFAULT_DAMPING = 0.7;
     private static final double LEAST_DAMPING = 0.1;
     private static final double LEAST_NULL_SPACE_DAMPING = 0.3;
 
     private final double[] stiffness = {2000, 2000, 2000, 200, 200, 200};
-    private final double[] damping = filled(0.7);
+    private final double[] damping = filled(DEFAULT_DAMPING);
     private final double[] additionalControlForce = new double[DIRECTIONS];
     private double[] maxControlForce = filled(OFF);
     private double[] maxCartesianVelocity = filled(OFF);
@@ -56,7 +57,7 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
         referenceSystem = other.referenceSystem;
     }
 
-    /** Sets parameters of some directions. */
+    /** Selects the directions whose parameters are set. */
     public static class CartImpBuilder {
         final int[] chosen;
         private final CartesianImpedanceControlMode mode;
@@ -161,7 +162,7 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
         return this;
     }
 
-    /** The control exerts no larger force [N, Nm]; with the flag, reaching it ends the motion. */
+    /** Limit of the force of the controller [N, Nm]; with the flag, reaching it ends the motion. */
     public CartesianImpedanceControlMode setMaxControlForce(double x, double y, double z, double a, double b, double c,
             boolean addStopCondition) {
         maxControlForce = limits("maxControlForce", true, x, y, z, a, b, c);
@@ -177,7 +178,7 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
         return this;
     }
 
-    /** The frame whose axes the directions are; without one those of the moved frame. */
+    /** Frame of the directions; default: the motion frame. */
     public CartesianImpedanceControlMode setReferenceSystem(AbstractFrame frame) {
         referenceSystem = frame;
         return this;
@@ -189,6 +190,16 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
 
     public double[] getDamping() {
         return damping.clone();
+    }
+
+    /** Not simulated: the unit and the effect are not documented. */
+    public CartesianImpedanceControlMode setMaxJointSpeed(double... speeds) {
+        throw new UnsupportedOperationException("the virtual cabinet has no largest joint speed of Cartesian impedance");
+    }
+
+    public CartesianImpedanceControlMode setDampingToDefaultValue() {
+        Arrays.fill(damping, DEFAULT_DAMPING);
+        return this;
     }
 
     public double[] getMaxPathDeviation() {

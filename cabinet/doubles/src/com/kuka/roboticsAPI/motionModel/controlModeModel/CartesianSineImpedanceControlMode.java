@@ -9,7 +9,7 @@ import heptarm.doubles.motion.ControlModeTranslator;
 import heptarm.doubles.seam.ImpedanceMode;
 import heptarm.doubles.seam.SineImpedance;
 
-/** Cartesian impedance with a force laid over it: a constant part and a sine in each direction, risen and fallen. */
+/** Cartesian impedance with an overlaid force: in each direction a constant and a sine, with rise and fall times. */
 public class CartesianSineImpedanceControlMode extends CartesianImpedanceControlMode {
     private static final double FASTEST = 15.0;
     private static final double LISSAJOUS_RATIO = 0.4;
@@ -43,7 +43,7 @@ public class CartesianSineImpedanceControlMode extends CartesianImpedanceControl
         stayActive = other.stayActive;
     }
 
-    /** Sets parameters of some directions. */
+    /** Selects the directions whose parameters are set. */
     public static class CartSineImpBuilder extends CartImpBuilder {
         private final CartesianSineImpedanceControlMode mode;
 
@@ -129,7 +129,7 @@ public class CartesianSineImpedanceControlMode extends CartesianImpedanceControl
         return mode;
     }
 
-    /** Outwards for half of the time, then back. */
+    /** Outwards for half of the time, then inwards. */
     public static CartesianSineImpedanceControlMode createSpiralPattern(CartPlane plane, double frequency, double amplitude,
             double stiffness, double totalTime) {
         CartesianSineImpedanceControlMode mode = new CartesianSineImpedanceControlMode();
@@ -149,7 +149,7 @@ public class CartesianSineImpedanceControlMode extends CartesianImpedanceControl
 
     // ------------------------------------------------------------------------------ times
 
-    /** The force is gone after this time in any case [s]. */
+    /** The force ends after this time at the latest [s]. */
     public CartesianSineImpedanceControlMode setTotalTime(double seconds) {
         totalTime = notNegative("totalTime", seconds);
         return this;
@@ -170,7 +170,20 @@ public class CartesianSineImpedanceControlMode extends CartesianImpedanceControl
         return this;
     }
 
-    /** The motion does not end before the pattern has. */
+    public double getRiseTime() {
+        return riseTime;
+    }
+
+    /** NaN: for ever. */
+    public double getHoldTime() {
+        return holdTime;
+    }
+
+    public double getFallTime() {
+        return fallTime;
+    }
+
+    /** The motion does not end before the pattern. */
     public CartesianSineImpedanceControlMode setStayActiveUntilPatternFinished(boolean stay) {
         stayActive = stay;
         return this;

@@ -11,7 +11,7 @@ public class PositionControlMode extends AbstractMotionControlMode {
         this(true);
     }
 
-    /** What the flag means is not known; both are the same here. */
+    /** The meaning of the flag is not known; it has no effect here. */
     public PositionControlMode(boolean flag) {
     }
 

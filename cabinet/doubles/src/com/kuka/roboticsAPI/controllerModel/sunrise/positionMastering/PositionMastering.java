@@ -10,10 +10,15 @@ public class PositionMastering {
         this.robot = robot;
     }
 
-    /** Of an axis, from 0. */
+    /** With a tool; mastering does not depend on it here. */
+    public MasteringInfo getMasteringInfo(String tool) {
+        return new MasteringInfo(this);
+    }
+
+    /** Of an axis, counted from 0. */
     public boolean isAxisMastered(int axis) {
         if (axis < 0 || axis >= robot.getJointCount()) {
-            throw new IllegalArgumentException("axis " + axis + "; there are 0 to " + (robot.getJointCount() - 1));
+            throw new IllegalArgumentException("axis must be 0 to " + (robot.getJointCount() - 1) + ", got " + axis);
         }
         return robot.isMastered();
     }
