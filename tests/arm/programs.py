@@ -30,7 +30,7 @@ PROGRAM = """
 def script(
     tmp_path: Path, target: str, on_disconnect: str = "stop", *, watchdog: float = 10.0
 ) -> tuple[subprocess.Popen[str], str]:
-    """A program of its own in the middle of a motion, and what it said."""
+    """A separate program in the middle of a motion, and its output."""
     file = tmp_path / "program.py"
     file.write_text(textwrap.dedent(PROGRAM))
     command = [sys.executable, str(file), target, on_disconnect, str(watchdog)]

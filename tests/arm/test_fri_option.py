@@ -1,4 +1,4 @@
-"""A cabinet without the options for FRI and hand guiding: everything else works, and they are refused in words."""
+"""A cabinet without the options for FRI and hand guiding refuses them with a text; everything else works."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Private simulators: they come and go with their arm."""
+"""Private simulators start and end with their arm."""
 
 from __future__ import annotations
 

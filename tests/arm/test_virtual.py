@@ -254,7 +254,7 @@ def test_leaving_the_block_leaves_the_arm_at_rest(cabinet: RunningCabinet) -> No
 def test_ctrl_c_stops_the_arm(cabinet: RunningCabinet, tmp_path: Path) -> None:
     process, said = script(tmp_path, cabinet.target)
     assert said == "moving"
-    time.sleep(0.2)  # it has said so, now it waits
+    time.sleep(0.2)  # it has printed so, now it waits
     process.send_signal(signal.SIGINT)
     out, errors = end(process)
     assert "interrupted" in out, (out, errors)
@@ -284,7 +284,7 @@ def test_a_killed_controller_is_stopped_and_replaced(cabinet: RunningCabinet, tm
             assert said == "moving"
             assert observer.controller == "script"
             process.kill()
-            # its watchdog time is longer: the end of the connection says it
+            # its watchdog time is longer: the end of the connection shows the loss
             observer.wait_until(lambda s: np.abs(s.dq).max() < 0.01 and not s.motion.active, timeout=8.0)
             end(process)
             observer.wait_until(lambda s: observer.controller == "", timeout=20.0)

@@ -58,7 +58,7 @@ def _servo(**settings: Any) -> Callable[[Arm, Any], object]:
 
 
 def _within(call: Callable[[Any, Any], object], kind: str = "joint") -> Callable[[Arm, Any], object]:
-    """Does something with the servo motion that runs."""
+    """Uses the running servo motion."""
 
     def do(arm: Arm, value: Any) -> object:
         with arm.servo(kind, watchdog=2.0) as servo:
