@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from tests.interrupts import ctrl_c_interrupts
+from tests.retry import retry, silent
 
 HEPTARM = [sys.executable, "-m", "heptarm.cli.main"]
 
@@ -19,8 +20,12 @@ HEPTARM = [sys.executable, "-m", "heptarm.cli.main"]
 def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """One command, to its end."""
     variables = {name: value for name, value in os.environ.items() if name != "HEPTARM_TARGET"} | environment
-    return subprocess.run(
-        [*HEPTARM, *arguments], capture_output=True, text=True, timeout=120, env=variables, check=False
+    command = [*HEPTARM, *arguments]
+    return retry(
+        lambda: subprocess.run(
+            command, capture_output=True, text=True, timeout=120, env=variables, check=False
+        ),
+        silent,
     )
 
 
