@@ -416,7 +416,7 @@ def _messages(spec: Spec) -> str:
 def _protocol(spec: Spec) -> str:
     p = spec.protocol
     lines = [BANNER, "/** Constants of the protocol. */", "public final class Protocol {"]
-    for name in ("major", "minor", "port", "magic", "max_body"):
+    for name in ("major", "minor", "port", "magic", "max_body", "nonce", "tag"):
         lines += [f"    public static final int {name.upper()} = {p[name]};"]
     return "\n".join(
         [*lines, "    public static final int HEADER = 26;", "", "    private Protocol() {", "    }", "}", ""]

@@ -309,6 +309,8 @@ def messages(spec: Spec) -> str:
         f"MINOR = {p['minor']}",
         f"PORT = {p['port']}",
         f"MAGIC = {p['magic']:#06x}",
+        f"NONCE = {p['nonce']}",
+        f"TAG = {p['tag']}",
     ]
     layout = "".join(PRIMITIVES[one["type"]] for one in spec.header)
     lines += [f"MAX_BODY = {p['max_body']}", f'HEADER = Struct(">{layout}")', '_MASK = Struct(">H")', ""]

@@ -17,10 +17,12 @@ from heptarm.wire.codec import DecodeError
 inf = float("inf")
 nan = float("nan")
 
-MAJOR = 1
+MAJOR = 2
 MINOR = 0
 PORT = 30001
 MAGIC = 0x4837
+NONCE = 32
+TAG = 16
 MAX_BODY = 1048576
 HEADER = Struct(">HBBHIIIq")
 _MASK = Struct(">H")
@@ -2223,7 +2225,7 @@ class Hello:
     minor: int
     name: str = ""
     version: str = ""
-    nonce: bytes = b""
+    nonce: bytes
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Hello_0.pack(self.major, self.minor))
@@ -2245,7 +2247,7 @@ class Hello:
     def _check(self, path: str) -> None:
         codec.check_length(len(self.name.encode()), path + "name", 0, 64)
         codec.check_length(len(self.version.encode()), path + "version", 0, 32)
-        codec.check_length(len(self.nonce), path + "nonce", 0, 32)
+        codec.check_length(len(self.nonce), path + "nonce", 32, 32)
 
     def encode(self) -> bytes:
         """The body."""
@@ -2276,7 +2278,7 @@ class Challenge:
     SOURCE: ClassVar[str] = "cabinet"
     ROLE: ClassVar[str] = "any"
 
-    nonce: bytes = b""
+    nonce: bytes
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_bytes(self.nonce))
@@ -2287,7 +2289,7 @@ class Challenge:
         return cls(nonce=nonce), pos
 
     def _check(self, path: str) -> None:
-        codec.check_length(len(self.nonce), path + "nonce", 0, 32)
+        codec.check_length(len(self.nonce), path + "nonce", 32, 32)
 
     def encode(self) -> bytes:
         """The body."""
@@ -2311,14 +2313,14 @@ class Challenge:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proof:
-    """HMAC-SHA-256 with the key over the cabinet's nonce, then the client's."""
+    """The client proves that it knows the key; see [the key](#the-key)."""
 
     TYPE: ClassVar[int] = 3
     KIND: ClassVar[str] = "handshake"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "any"
 
-    mac: bytes = b""
+    mac: bytes
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_bytes(self.mac))
@@ -2329,7 +2331,7 @@ class Proof:
         return cls(mac=mac), pos
 
     def _check(self, path: str) -> None:
-        codec.check_length(len(self.mac), path + "mac", 0, 32)
+        codec.check_length(len(self.mac), path + "mac", 32, 32)
 
     def encode(self) -> bytes:
         """The body."""
@@ -2356,7 +2358,7 @@ _Welcome_2 = Struct(">Hdd")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Welcome:
-    """The session is open. With a key set, the mac proves the cabinet to the client: over the client's nonce, then the cabinet's."""
+    """The session is open. With a key set, its mac proves the cabinet to the client; see [the key](#the-key)."""
 
     TYPE: ClassVar[int] = 4
     KIND: ClassVar[str] = "handshake"
@@ -2667,6 +2669,91 @@ class Goodbye:
         """Read one body, all of it."""
         value, pos = cls._read(data, 0)
         codec.end(data, pos, "Goodbye")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
+_Halt_0 = Struct(">B")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Halt:
+    """Stops all motions, as the first and only frame of a connection: it needs no session, no place among the clients and no key."""
+
+    TYPE: ClassVar[int] = 9
+    KIND: ClassVar[str] = "handshake"
+    SOURCE: ClassVar[str] = "client"
+    ROLE: ClassVar[str] = "any"
+
+    kind: StopKind = StopKind.PATH
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_Halt_0.pack(self.kind))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Halt, int]:
+        v = codec.unpack(_Halt_0, data, pos)
+        pos += _Halt_0.size
+        kind = codec.read_enum(StopKind, v[0])
+        return cls(kind=kind), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> Halt:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "Halt")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Halted:
+    """The stop was commanded; the connection closes."""
+
+    TYPE: ClassVar[int] = 10
+    KIND: ClassVar[str] = "handshake"
+    SOURCE: ClassVar[str] = "cabinet"
+    ROLE: ClassVar[str] = "any"
+
+
+    def _write(self, out: list[bytes]) -> None:
+        pass
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Halted, int]:
+        return cls(), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> Halted:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "Halted")
         return value
 
     def validate(self) -> None:
@@ -4918,7 +5005,7 @@ class State:
         self._check("")
 
 
-Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Accepted | Rejected | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
+Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
 OneWay: TypeAlias = ServoJoints | ServoJointsVelocity | ServoPose
 
 #: Message classes by id.
@@ -4931,6 +5018,8 @@ MESSAGES: dict[int, type[Message]] = {
     6: Ping,
     7: Pong,
     8: Goodbye,
+    9: Halt,
+    10: Halted,
     16: Accepted,
     17: Rejected,
     32: TakeControl,

@@ -19,7 +19,7 @@ _QUESTIONS = 100
 
 @scenario(line=9, rows="O1 O3 O11", risk=Risk.STILL)
 def round_trip(arm: Arm) -> None:
-    """A request is answered at once; how fast is measured."""
+    """Round-trip time of a request."""
     times = []
     for _ in range(_QUESTIONS):
         began = time.perf_counter()
@@ -33,7 +33,7 @@ def round_trip(arm: Arm) -> None:
 
 @scenario(line=9, rows="O9 G21", risk=Risk.STILL)
 def clock(arm: Arm) -> None:
-    """The two clocks are compared: the age of a state is known, though nobody has set a clock."""
+    """The age of a state is known without synchronised clocks: the session compares the two clocks."""
     ages = [state.age for state in arm.states(duration=0.3)]
     # a busy machine makes states older; a wrong difference of the clocks shows in all of them
     below(float(np.abs(ages).min()), 0.05 * max(arm.real_time_factor, 1.0), "smallest age of a state", unit="s")
@@ -41,10 +41,10 @@ def clock(arm: Arm) -> None:
 
 @scenario(line=10, rows="O6 O7 O8 O10", risk=Risk.FAULT, virtual=True, space=0.5, needs=("ptp",))
 def lost(arm: Arm) -> None:
-    """When the connection breaks during a motion, the arm comes to rest, both sides report it, and it is made again."""
+    """When the connection breaks during a motion, the arm stops, both sides report it, and the client reconnects."""
     handle = arm.start(ptp(HOME + deg(50, 0, 0, 0, 0, 0, 0), speed=0.1))
     arm.wait_until(lambda s: abs(s.q[0] - HOME[0]) > 0.02, timeout=20.0)
-    arm._connection.link._transport.close()
+    arm.connection.link.cut()
     try:
         handle.wait(timeout=20.0)
         holds(False, "the motion ends with an error")
