@@ -28,6 +28,7 @@ from heptarm.fri.loop.telemetry import Reader
 from heptarm.fri.loop.user_api import Params
 from heptarm.fri.protocol.version import Version
 from heptarm.io.shared import MemoryBlock
+from heptarm.io.udp import ALL_INTERFACES, own_address
 from heptarm.values.arrays import array, scalar
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
@@ -44,7 +45,7 @@ class Client(Reader):
 
     Args:
         port: UDP port to bind.
-        host: address to bind; "0.0.0.0" for all.
+        host: own address to bind; "0.0.0.0" for all. None: the one that routes to `remote`; all without a remote.
         remote: address of the controller; None accepts any.
         version: FRI release such as "1.15"; None recognises it from the first datagram.
         model: robot, for the limits.
@@ -72,7 +73,7 @@ class Client(Reader):
         self,
         port: int = PORT,
         *,
-        host: str = "0.0.0.0",
+        host: str | None = None,
         remote: str | None = None,
         version: str | None = None,
         model: str | RobotModel = "iiwa14",
@@ -106,7 +107,7 @@ class Client(Reader):
             json.dumps(
                 {
                     "port": port,
-                    "host": host,
+                    "host": _own(remote) if host is None else host,
                     "remote": remote,
                     "version": wire,
                     "limits": asdict(self._limits),
@@ -299,6 +300,11 @@ def _seven(pose: Pose | npt.ArrayLike) -> npt.NDArray[np.float64]:
     if not np.isnan(values[3:]).any():
         Pose.of((0.0, 0.0, 0.0), values[3:])  # raises the error about its norm
     return values
+
+
+def _own(remote: str | None) -> str:
+    """Address to bind: datagrams of the controller arrive there."""
+    return ALL_INTERFACES if remote is None else own_address(remote)
 
 
 def _plain(policy: Policy) -> dict[str, Any]:
