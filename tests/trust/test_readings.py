@@ -12,14 +12,14 @@ LONG = bool(os.environ.get("LONG"))
 
 
 @pytest.mark.parametrize(
-    ("states", "seconds", "hampered"), [(10_000, 20.0, False), (1_000, 10.0, True)], ids=["busy", "late"]
+    ("states", "seconds", "hampered"), [(10_000, 12.0, False), (1_000, 6.0, True)], ids=["busy", "late"]
 )
 def test_states_of_an_overloaded_cabinet_agree_with_the_record_of_the_plant(
     states: int, seconds: float, hampered: bool
 ) -> None:
     """As many states as this machine manages; a million of them are a figure of `make bench GROUP=trust`."""
     if LONG:
-        states, seconds = 10 * states, 20 * seconds
+        states, seconds = 10 * states, 30 * seconds
     found = compare(states, busy=2, seconds=seconds, hampered=hampered)
     assert found.contradictions == {}
     assert found.states > 20
