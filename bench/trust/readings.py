@@ -29,7 +29,7 @@ STATES = int(os.environ.get("BENCH_STATES", "1000000" if os.environ.get("LONG") 
 ROUND = 100_000
 #: Time constant of the cabinet's filter of the velocity [s].
 FILTER = 0.01
-#: Positions pass millimetres and rotation matrices on their way.
+#: Poses are converted to millimetres and rotation matrices, and back.
 ROUNDING = 1e-9
 
 _BURNER = """
