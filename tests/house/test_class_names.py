@@ -27,8 +27,6 @@ TOLD_APART: dict[str, str] = {
     "Plant": "the interface in Java is implemented by the plant in Python",
     "MotionListener": "the interface in Java is called through the one in Python",
     "SharedState": "the two sides of one memory, written by Python and read by Java",
-    "FrameTag": "the tag of a frame, computed in both languages",
-    "KeyExchange": "the proofs and keys of a handshake, computed in both languages",
     "Violation": "a field outside the schema's range, in the codecs of both languages",
     "IoDirection": "FRI's own enumeration beside the protocol's; heptarm.fri.protocol tells them apart",
     "IoType": "FRI's own enumeration beside the protocol's; heptarm.fri.protocol tells them apart",
