@@ -238,6 +238,15 @@ class JointGuard:
         self.is_started = False
 
     @property
+    def sent(self) -> tuple[list[float], ...]:
+        """Copies of what was sent last and of its motion; assign them to go back to that cycle."""
+        return (self.q[:], self.v[:], self.a[:], self.r[:], self.tau[:], self.wrench[:])
+
+    @sent.setter
+    def sent(self, kept: tuple[list[float], ...]) -> None:
+        self.q, self.v, self.a, self.r, self.tau, self.wrench = (one[:] for one in kept)
+
+    @property
     def is_still(self) -> bool:
         """Whether every axis is at rest."""
         return not any(self.v) and not any(self.a)

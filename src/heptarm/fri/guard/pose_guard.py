@@ -21,6 +21,7 @@ from heptarm.fri.guard.joint_guard import PLANNED, ROUNDING
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
+_Motion = tuple[Vector, Quaternion, tuple[Vector, Quaternion], Vector, Vector, float, float, float]
 
 #: Parts of a pose that are limited separately, as the report names them.
 PARTS = ("flange", "rotation", "elbow")
@@ -207,6 +208,15 @@ class PoseGuard:
     def sent(self) -> tuple[float, ...]:
         """Pose sent last, shape (7,)."""
         return (*self.xyz, *self.quat)
+
+    @property
+    def motion(self) -> _Motion:
+        """What was sent last and its motion; assign it to go back to that cycle."""
+        return (self.xyz, self.quat, self.goal, self.v, self.w, self.e1, self.u, self._e1_goal)
+
+    @motion.setter
+    def motion(self, kept: _Motion) -> None:
+        self.xyz, self.quat, self.goal, self.v, self.w, self.e1, self.u, self._e1_goal = kept
 
     @property
     def is_still(self) -> bool:

@@ -86,7 +86,8 @@ class Client(Reader):
         cpu: int | None = None,
         timeout: float = 30.0,
     ) -> None:
-        self._limits = limits or Limits.of(robot(model) if isinstance(model, str) else model)
+        arm = robot(model) if isinstance(model, str) else model
+        self._limits = limits or Limits.of(arm)
         if not 16 <= history <= 1 << 20:
             raise CommandRejected(
                 f"history must be 16 to {1 << 20} states, got {history}", parameter="history", value=history
@@ -110,6 +111,7 @@ class Client(Reader):
                     "remote": remote,
                     "version": wire,
                     "limits": asdict(self._limits),
+                    "positions": (arm.q_min.tolist(), arm.q_max.tolist()),
                     "pose_limits": asdict(pose_limits or PoseLimits()),
                     "policy": _plain(policy or Policy()),
                     "law": name,
@@ -151,6 +153,14 @@ class Client(Reader):
     def is_running(self) -> bool:
         """Whether the loop's process runs, or the client was closed."""
         return self._closed or self._worker.is_alive()
+
+    @property
+    def trouble(self) -> str:
+        """Why there is no session, or why the loop has ended, as text; empty if there is a session."""
+        if self._closed or self._worker.is_alive():
+            return super().trouble
+        failed = self._header[at.STATUS] == at.Status.FAILED
+        return (super().trouble if failed else "") or self._worker.ending
 
     # ---------------------------------------------------------------------------------------------- commands
 
@@ -262,7 +272,7 @@ class Client(Reader):
             raise ConnectionLost("the FRI client is closed")
         super()._check()
         if not self._worker.is_alive():
-            raise ConnectionLost("the FRI loop has ended: its process has ended")
+            raise ConnectionLost(f"the FRI loop has ended: {self.trouble}")
 
     def close(self, *, timeout: float = 5.0) -> None:
         """Brake the arm to a stop and end the loop. Closing twice is allowed."""

@@ -370,6 +370,4 @@ class Reader:
             ConnectionLost: the loop has ended.
         """
         if self._header[at.STATUS] in (at.Status.ENDED, at.Status.FAILED):
-            raise ConnectionLost(
-                f"the FRI loop has ended: {self._layout.trouble.read() or 'its process has ended'}"
-            )
+            raise ConnectionLost(f"the FRI loop has ended: {self.trouble or 'its process has ended'}")

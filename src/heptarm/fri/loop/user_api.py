@@ -29,6 +29,7 @@ from heptarm.fri.protocol.messages import (
     SessionState,
 )
 from heptarm.fri.session.statistics import Counters, Histogram
+from heptarm.values.arrays import scalar
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
 from heptarm.values.pose import Pose
 
@@ -156,6 +157,14 @@ class Outputs:
         self.written[full] = number
 
 
+def _vector(value: npt.ArrayLike, size: int, name: str) -> Floats:
+    """A vector that a law assigns; the guard handles entries that are not finite."""
+    result: Floats = np.asarray(value, dtype=np.float64)
+    if result.shape != (size,):
+        raise ShapeError(f"{name} must have shape ({size},), got {result.shape}", parameter=name, value=value)
+    return result
+
+
 class Output:
     """Command of a law; reset before every call.
 
@@ -169,15 +178,42 @@ class Output:
         io: outputs of the cabinet, `out.io["LEDBlue"] = True`; others keep their values.
     """
 
-    __slots__ = ("_pose", "e1", "io", "q", "tau", "wrench")
+    __slots__ = ("_e1", "_pose", "_q", "_tau", "_wrench", "io")
 
     def __init__(self, outputs: Outputs | None = None) -> None:
         self.io = Outputs() if outputs is None else outputs
-        self.e1 = math.nan
-        self.q: Floats = np.zeros(7)
-        self.tau: Floats = np.zeros(7)
-        self.wrench: Floats = np.zeros(6)
+        self._e1 = math.nan
+        self._q: Floats = np.zeros(7)
+        self._tau: Floats = np.zeros(7)
+        self._wrench: Floats = np.zeros(6)
         self._pose: Floats = np.full(7, np.nan)
+
+    @property
+    def q(self) -> Floats:
+        """Target position, shape (7,) [rad]."""
+        return self._q
+
+    @q.setter
+    def q(self, value: npt.ArrayLike) -> None:
+        self._q[:] = _vector(value, 7, "out.q")
+
+    @property
+    def tau(self) -> Floats:
+        """Target torques, shape (7,) [Nm]."""
+        return self._tau
+
+    @tau.setter
+    def tau(self, value: npt.ArrayLike) -> None:
+        self._tau[:] = _vector(value, 7, "out.tau")
+
+    @property
+    def wrench(self) -> Floats:
+        """Target wrench, shape (6,) [N, Nm]."""
+        return self._wrench
+
+    @wrench.setter
+    def wrench(self, value: npt.ArrayLike) -> None:
+        self._wrench[:] = _vector(value, 6, "out.wrench")
 
     @property
     def pose(self) -> Floats:
@@ -186,13 +222,24 @@ class Output:
 
     @pose.setter
     def pose(self, value: Pose | npt.ArrayLike) -> None:
-        self._pose[:] = value.array if isinstance(value, Pose) else value
+        self._pose[:] = value.array if isinstance(value, Pose) else _vector(value, 7, "out.pose")
+
+    @property
+    def e1(self) -> float:
+        """Target redundancy angle of the pose [rad]."""
+        return self._e1
+
+    @e1.setter
+    def e1(self, value: float) -> None:
+        self._e1 = value if isinstance(value, float) else scalar(value, "out.e1")
 
     @classmethod
     def on(cls, q: Any, tau: Any, wrench: Any) -> Output:
         """Make an output on existing memory."""
         made = cls()
-        made.q, made.tau, made.wrench = (np.frombuffer(part, dtype=np.float64) for part in (q, tau, wrench))
+        made._q, made._tau, made._wrench = (
+            np.frombuffer(part, dtype=np.float64) for part in (q, tau, wrench)
+        )
         return made
 
 

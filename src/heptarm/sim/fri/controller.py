@@ -25,6 +25,7 @@ from heptarm.errors import ModeConflict, Unreachable
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.codec import decode_command
 from heptarm.fri.protocol.protobuf import MalformedMessage
+from heptarm.fri.protocol.version import Version
 from heptarm.sim.control.laws import Superposition
 from heptarm.sim.fri import cartesian
 from heptarm.sim.fri.io import SessionIo
@@ -76,6 +77,21 @@ class DatagramCounts:
     taken: int = 0
     stale: int = 0
     refused: int = 0
+
+
+def _likely_cause(trouble: str, datagram: bytes, version: Version) -> str:
+    """What to add to the trouble with an answer that another version could read; otherwise empty."""
+    if "speaks FRI" in trouble:
+        return ""
+    for other in (Version.V1_15, Version.V2_5, Version.V2_7):
+        if other is version:
+            continue
+        try:
+            decode_command(datagram, other)
+        except MalformedMessage:
+            continue
+        return f"; likely cause: the client speaks FRI {other.value}, this cabinet FRI {version.value}"
+    return ""
 
 
 class Controller:
@@ -192,7 +208,7 @@ class Controller:
         try:
             command = decode_command(datagram, self.configuration.version)
         except MalformedMessage as error:
-            self._refuse(error.text)
+            self._refuse(error.text + _likely_cause(error.text, datagram, self.configuration.version))
             return
         age = (self._next - 1 - command.header.reflected) & _WORD
         number = self._next - 1 - age
