@@ -17,7 +17,7 @@ from heptarm.arm.motion.handle import Block, BreakRule, MotionHandle
 from heptarm.arm.translate.modes import mode_message
 from heptarm.errors import CommandRejected, HeptarmError, LimitError, LocalProtocolError, ShapeError, Timeout
 from heptarm.io.tcp import WarmUpConnection
-from heptarm.values.arrays import Array, array, within
+from heptarm.values.arrays import Array, array, optional, within
 from heptarm.values.condition.condition import Condition
 from heptarm.values.frames import TOOL, check_name
 from heptarm.values.mode.mode import Mode
@@ -120,7 +120,7 @@ class ServoRequest:
             )
         self._refuse_foreign_limits()
         within(self.rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
-        within(self.watchdog, "watchdog", _MIN_WATCHDOG, _MAX_WATCHDOG, unit="s")
+        optional(self.watchdog, "watchdog", _MIN_WATCHDOG, _MAX_WATCHDOG, unit="s")
         if self.watchdog_time < self.period:
             raise LimitError(
                 f"watchdog must not be shorter than the period of {self.period:g} s, got {self.watchdog_time:g} s",

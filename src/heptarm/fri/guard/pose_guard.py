@@ -16,8 +16,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from heptarm.errors import LimitError
-from heptarm.fri.guard.joint_guard import PLANNED, ROUNDING
+from heptarm.fri.guard.joint_guard import PLANNED, ROUNDING, positive
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -83,13 +82,7 @@ class PoseLimits:
 
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
-            value = getattr(self, name)
-            if not value > 0.0:
-                raise LimitError(
-                    f"{name} must be positive, got {value:g} {_LIMIT_UNITS[name]}",
-                    parameter=name,
-                    value=value,
-                )
+            positive(getattr(self, name), name, _LIMIT_UNITS[name])
 
 
 class PoseReport:

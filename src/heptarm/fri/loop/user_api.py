@@ -29,7 +29,7 @@ from heptarm.fri.protocol.messages import (
     SessionState,
 )
 from heptarm.fri.session.statistics import Counters, Histogram
-from heptarm.values.arrays import scalar
+from heptarm.values.arrays import finite_entries, instance, numbers, scalar, shown
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
 from heptarm.values.pose import Pose
 
@@ -159,7 +159,7 @@ class Outputs:
 
 def _vector(value: npt.ArrayLike, size: int, name: str) -> Floats:
     """A vector that a law assigns; the guard handles entries that are not finite."""
-    result: Floats = np.asarray(value, dtype=np.float64)
+    result = numbers(value, name, f"{size} numbers")
     if result.shape != (size,):
         raise ShapeError(f"{name} must have shape ({size},), got {result.shape}", parameter=name, value=value)
     return result
@@ -181,7 +181,7 @@ class Output:
     __slots__ = ("_e1", "_pose", "_q", "_tau", "_wrench", "io")
 
     def __init__(self, outputs: Outputs | None = None) -> None:
-        self.io = Outputs() if outputs is None else outputs
+        self.io = Outputs() if outputs is None else instance(outputs, Outputs, "outputs")
         self._e1 = math.nan
         self._q: Floats = np.zeros(7)
         self._tau: Floats = np.zeros(7)
@@ -292,7 +292,7 @@ class Params:
             raise AttributeError("parameters are read-only in a law")
         checked = []
         for name, value in values.items():
-            given: Floats = np.asarray(value, dtype=np.float64)
+            given = finite_entries(numbers(value, name), name, nan=True)
             if name not in self._schema:
                 raise AttributeError(f"no parameter {name!r}; there are {', '.join(self._schema) or 'none'}")
             shape, start = self._schema[name]
@@ -317,16 +317,17 @@ class Params:
         Raises:
             ShapeError: a value is neither a number nor an array of numbers.
         """
+        if not isinstance(values, Mapping):
+            raise ShapeError(
+                f"params must be numbers and arrays by name, got {shown(values)}",
+                parameter="params",
+                value=values,
+            )
         parts: list[Floats] = []
         schema: dict[str, tuple[tuple[int, ...], int]] = {}
         start = 0
         for name, value in values.items():
-            try:
-                given: Floats = np.asarray(value, dtype=np.float64)
-            except (TypeError, ValueError):
-                raise ShapeError(
-                    f"{name} must be a number or an array of numbers, got {value!r}", parameter=name
-                ) from None
+            given = numbers(value, name, "a number or an array of numbers")
             schema[name] = (given.shape, start)
             parts.append(given.reshape(-1))
             start += given.size

@@ -242,7 +242,10 @@ class Session:
         trouble = str(error)
         expected = self._configured or self.version
         if "speaks FRI" not in trouble and expected is not None and spoken is not expected:
-            trouble += f"; likely cause: the controller speaks FRI {spoken.value}, this client is set to {expected.value}"
+            trouble += (
+                f"; likely cause: the controller speaks FRI {spoken.value}, this client is set to "
+                f"{expected.value}"
+            )
         if self.trouble != trouble:  # once, not in every cycle
             self.trouble = trouble
             self._report(Kind.WRONG_VERSION, trouble, now)

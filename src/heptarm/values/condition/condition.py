@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arrays import Value, within
+from heptarm.values.arrays import Value, shown, within
 from heptarm.values.frames import check_name
 
 
@@ -75,7 +75,7 @@ class Condition(Value):
 def _condition(other: object) -> Condition:
     if not isinstance(other, Condition):
         raise ShapeError(
-            f"condition must be a Condition, got {other!r}",
+            f"condition must be a Condition, got {shown(other)}",
             parameter="condition",
             value=other,
             hint="put comparisons in brackets: (force > 10) | (torque[3] > 8)",
@@ -98,7 +98,7 @@ def check_condition(condition: object, parameter: str = "until") -> Condition:
     """
     if not isinstance(condition, Condition):
         raise ShapeError(
-            f"{parameter} must be a condition, got {condition!r}",
+            f"{parameter} must be a condition, got {shown(condition)}",
             parameter=parameter,
             value=condition,
             hint="build one with heptarm.when, for example force > 10",
@@ -153,7 +153,7 @@ class SignalIs(Condition):
     def __post_init__(self) -> None:
         check_name(self.signal, "signal")
         if not isinstance(self.value, bool):
-            raise ShapeError(f"value must be True or False, got {self.value!r}", parameter="value")
+            raise ShapeError(f"value must be True or False, got {shown(self.value)}", parameter="value")
 
     def __gt__(self, other: float) -> SignalOutside:
         return SignalOutside(self.signal, -UNBOUNDED, other)
@@ -211,7 +211,7 @@ class PathReached(Condition):
     def __post_init__(self) -> None:
         if self.reference not in ("start", "destination"):
             raise ShapeError(
-                f"reference must be 'start' or 'destination', got {self.reference!r}",
+                f"reference must be 'start' or 'destination', got {shown(self.reference)}",
                 parameter="reference",
                 value=self.reference,
             )

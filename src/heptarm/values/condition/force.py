@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isnan, nan
 
-from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arrays import within
+from heptarm.errors import LimitError
+from heptarm.values.arrays import shown, within, word
 from heptarm.values.condition.condition import Condition, band_text, check_band
 from heptarm.values.frames import TOOL, check_name
 
@@ -16,9 +16,29 @@ FORCE, TORQUE, JOINT = 1000.0, 1000.0, 500.0
 _AXES = ("x", "y", "z")
 
 
-def _check_estimate(axis: str | None, frame: str, tolerance: float, unit: str) -> None:
-    if axis is not None and axis not in _AXES:
-        raise ShapeError(f"axis must be 'x', 'y' or 'z', got {axis!r}", parameter="axis", value=axis)
+def check_axis(axis: str) -> None:
+    """Refuse what is no axis. Raises ShapeError."""
+    word(axis, "axis", _AXES)
+
+
+def check_joint(joint: int) -> None:
+    """Refuse what is no joint, 0 for A1 to 6 for A7.
+
+    Raises:
+        LimitError: it is none.
+    """
+    if not isinstance(joint, int) or isinstance(joint, bool) or not 0 <= joint <= 6:
+        raise LimitError(
+            f"joint must be 0 (A1) to 6 (A7), got {shown(joint)}",
+            code=2,
+            parameter="joint",
+            value=joint,
+            allowed="[0, 6]",
+        )
+
+
+def check_estimate(frame: str, tolerance: float, unit: str) -> None:
+    """Refuse what is no frame or no tolerance of an estimate."""
     check_name(frame, "frame")
     if not (isinstance(tolerance, float) and isnan(tolerance)):
         within(tolerance, "tolerance", 0.0, FORCE, above=True, unit=unit)
@@ -40,7 +60,7 @@ class ForceAbove(Condition):
 
     def __post_init__(self) -> None:
         within(self.threshold, "threshold", 0.0, FORCE, unit="N")
-        _check_estimate(None, self.frame, self.tolerance, "N")
+        check_estimate(self.frame, self.tolerance, "N")
 
     def __str__(self) -> str:
         return f"force > {self.threshold:g} N"
@@ -64,7 +84,8 @@ class NormalForceAbove(Condition):
 
     def __post_init__(self) -> None:
         within(self.threshold, "threshold", 0.0, FORCE, unit="N")
-        _check_estimate(self.axis, self.frame, self.tolerance, "N")
+        check_axis(self.axis)
+        check_estimate(self.frame, self.tolerance, "N")
 
     def __str__(self) -> str:
         return f"force normal to {self.axis} of {self.frame} > {self.threshold:g} N"
@@ -88,7 +109,8 @@ class ShearForceAbove(Condition):
 
     def __post_init__(self) -> None:
         within(self.threshold, "threshold", 0.0, FORCE, unit="N")
-        _check_estimate(self.axis, self.frame, self.tolerance, "N")
+        check_axis(self.axis)
+        check_estimate(self.frame, self.tolerance, "N")
 
     def __str__(self) -> str:
         return f"force across {self.axis} of {self.frame} > {self.threshold:g} N"
@@ -114,7 +136,8 @@ class ForceOutside(Condition):
 
     def __post_init__(self) -> None:
         check_band(self.low, self.high, FORCE, "N")
-        _check_estimate(self.axis, self.frame, self.tolerance, "N")
+        check_axis(self.axis)
+        check_estimate(self.frame, self.tolerance, "N")
 
     def __str__(self) -> str:
         return f"force along {self.axis} of {self.frame} {band_text(self.low, self.high, FORCE, 'N')}"
@@ -140,7 +163,8 @@ class TorqueOutside(Condition):
 
     def __post_init__(self) -> None:
         check_band(self.low, self.high, TORQUE, "Nm")
-        _check_estimate(self.axis, self.frame, self.tolerance, "Nm")
+        check_axis(self.axis)
+        check_estimate(self.frame, self.tolerance, "Nm")
 
     def __str__(self) -> str:
         return f"torque about {self.axis} of {self.frame} {band_text(self.low, self.high, TORQUE, 'Nm')}"
@@ -161,14 +185,7 @@ class JointTorqueOutside(Condition):
     high: float
 
     def __post_init__(self) -> None:
-        if not isinstance(self.joint, int) or isinstance(self.joint, bool) or not 0 <= self.joint <= 6:
-            raise LimitError(
-                f"joint must be 0 (A1) to 6 (A7), got {self.joint!r}",
-                code=2,
-                parameter="joint",
-                value=self.joint,
-                allowed="[0, 6]",
-            )
+        check_joint(self.joint)
         check_band(self.low, self.high, JOINT, "Nm")
 
     def __str__(self) -> str:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from math import nan
 
 from heptarm.errors import ShapeError
+from heptarm.values.arrays import finite
 from heptarm.values.condition.condition import Condition, PathReached, SignalIs
 from heptarm.values.condition.force import (
     FORCE,
@@ -25,6 +26,9 @@ from heptarm.values.condition.force import (
     NormalForceAbove,
     ShearForceAbove,
     TorqueOutside,
+    check_axis,
+    check_estimate,
+    check_joint,
 )
 from heptarm.values.frames import TOOL
 
@@ -80,6 +84,9 @@ class Force:
     frame: str = TOOL
     tolerance: float = nan
 
+    def __post_init__(self) -> None:
+        check_estimate(self.frame, self.tolerance, "N")
+
     def __call__(self, *, frame: str = TOOL, tolerance: float = nan) -> Force:
         """The same force with other axes, or with a tolerance."""
         return Force(frame, tolerance)
@@ -92,14 +99,17 @@ class Force:
 
     def along(self, axis: str) -> Component:
         """Its component along an axis, with sign."""
+        check_axis(axis)
         return Component(lambda low, high: ForceOutside(axis, low, high, self.frame, self.tolerance), FORCE)
 
     def normal(self, axis: str) -> Magnitude:
         """Its magnitude along an axis, in either direction."""
+        check_axis(axis)
         return Magnitude(lambda threshold: NormalForceAbove(axis, threshold, self.frame, self.tolerance))
 
     def shear(self, axis: str) -> Magnitude:
         """Its magnitude across an axis."""
+        check_axis(axis)
         return Magnitude(lambda threshold: ShearForceAbove(axis, threshold, self.frame, self.tolerance))
 
 
@@ -115,16 +125,21 @@ class Torque:
     frame: str = TOOL
     tolerance: float = nan
 
+    def __post_init__(self) -> None:
+        check_estimate(self.frame, self.tolerance, "Nm")
+
     def __call__(self, *, frame: str = TOOL, tolerance: float = nan) -> Torque:
         """The same torque with other axes, or with a tolerance."""
         return Torque(frame, tolerance)
 
     def __getitem__(self, joint: int) -> Component:
         """External torque of a joint, 0 for A1 to 6 for A7."""
+        check_joint(joint)
         return Component(lambda low, high: JointTorqueOutside(joint, low, high), JOINT)
 
     def about(self, axis: str) -> Component:
         """Its component about an axis of the frame."""
+        check_axis(axis)
         return Component(lambda low, high: TorqueOutside(axis, low, high, self.frame, self.tolerance), TORQUE)
 
 
@@ -159,7 +174,8 @@ class Path:
         Raises:
             ShapeError: negative seconds: after the end there is no motion.
         """
-        if seconds < 0:
+        finite(metres, "metres", unit="m")
+        if finite(seconds, "seconds", unit="s") < 0:
             raise ShapeError(
                 f"seconds must not be negative before the end, got {seconds:g} s",
                 parameter="seconds",
