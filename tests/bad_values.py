@@ -66,6 +66,7 @@ BY_ANNOTATION: dict[str, object] = {
     "Callable": _nothing,
     "SignalValue": True,
     "SessionState": SessionState.IDLE,
+    "Fault": "emergency_stop",
 }
 #: Number of entries of an array, by the name of the parameter; 7 otherwise.
 VECTORS = {
@@ -94,6 +95,11 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "circ": {"via": OTHER},
     "SineImpedance.lissajous": {"plane": "xy"},
     "SineImpedance.spiral": {"plane": "xy"},
+    "Arm.set_override": {"value": 1.0},
+    "Arm.fri": {"kind": "monitor"},
+    "Arm.touch": {"distance": 0.01, "force": 5.0},
+    "Arm.touch_twice": {"distance": 0.01, "force": 5.0},
+    "connect": {"target": "127.0.0.1:9"},
     "CollisionGuard.named": {"part": heptarm.CollisionGuard.of(20.0).parts[0], "state": None},
     **{
         f"{band}.{side}": {"low": 0.5, "high": 1.5}
@@ -126,6 +132,10 @@ ACCEPTED: dict[tuple[str, str], str] = {
         (f"Output.{part}", bad): "the guard keeps the last target"
         for part in ("q", "tau", "wrench", "pose", "e1")
         for bad in ("nan", "inf", "-inf", "nan array", "inf array")
+    },
+    **{
+        (f"Client.command.{part}", "nan array"): "keeps the last target"
+        for part in ("q", "tau", "wrench", "pose")
     },
     ("Trajectory.positions", "empty list"): "no times",
     ("Trajectory.positions", "too long"): "any number of times",
@@ -398,10 +408,18 @@ def made_by(name: str, found: object) -> Iterator[Call]:
 # ------------------------------------------------------------------------------------------------------ check
 
 
-def wrong(call: Call) -> Iterator[str]:
-    """What goes wrong with bad values, in words."""
+def wrong(call: Call, *, only_meaningless: bool = False) -> Iterator[str]:
+    """What goes wrong with bad values, in words.
+
+    Args:
+        call: the call.
+        only_meaningless: leave out values that only the function itself can refuse, such as -1 for a number: on an arm
+            they may be carried out.
+    """
     for parameter, annotation in call.parameters.items():
         for bad, value in bad_values(annotation, parameter):
+            if only_meaningless and has_meaning(annotation, bad):
+                continue
             if (call.name, bad) in ACCEPTED or (f"{call.name}.{parameter}", bad) in ACCEPTED:
                 continue
             what = f"{call.name}({parameter}={bad})"

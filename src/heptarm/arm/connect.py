@@ -11,13 +11,14 @@ from typing import Literal
 from heptarm.arm.arm import Arm
 from heptarm.arm.link.connection import STATE_RATE, TIMEOUT, WATCHDOG, Connection, Options
 from heptarm.arm.link.local_simulator import PrivateCabinet
-from heptarm.arm.link.state_stream import GROUPS
+from heptarm.arm.link.state_stream import GROUPS, groups_of
 from heptarm.arm.link.target import parse_target, target_from_env
 from heptarm.errors import ShapeError
 from heptarm.io import tcp
 from heptarm.io.clock import RealClock
 from heptarm.io.transport import Transport
-from heptarm.values.arrays import within
+from heptarm.values.arrays import flag, instance, within, word
+from heptarm.wire import messages as wire
 
 _log = logging.getLogger("heptarm.arm")
 
@@ -71,12 +72,12 @@ def connect(
         VersionMismatch: client and cabinet speak different versions of the protocol.
         NotInControl: another client controls the robot; the text names it.
     """
-    if on_disconnect not in ("stop", "finish"):
-        raise ShapeError(
-            f'on_disconnect must be "stop" or "finish", got {on_disconnect!r}',
-            parameter="on_disconnect",
-            value=on_disconnect,
-        )
+    word(on_disconnect, "on_disconnect", ("stop", "finish"))
+    flag(control, "control")
+    for given, what in ((target, "target"), (name, "name"), (key, "key")):
+        if given is not None:
+            instance(given, str, what)
+    groups_of(groups, ~wire.Groups.NONE)
     if name is not None and len(name.encode()) > _MAX_NAME:
         raise ShapeError(
             f"name must have at most {_MAX_NAME} bytes, got {len(name.encode())}: {name!r}",

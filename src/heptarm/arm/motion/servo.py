@@ -15,13 +15,13 @@ import numpy.typing as npt
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.handle import Block, BreakRule, MotionHandle
 from heptarm.arm.translate.modes import mode_message
-from heptarm.errors import CommandRejected, HeptarmError, LimitError, LocalProtocolError, ShapeError, Timeout
+from heptarm.errors import CommandRejected, HeptarmError, LimitError, LocalProtocolError, Timeout
 from heptarm.io.tcp import WarmUpConnection
-from heptarm.values.arrays import Array, array, optional, within
-from heptarm.values.condition.condition import Condition
+from heptarm.values.arrays import Array, array, instance, optional, within, word
+from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.frames import TOOL, check_name
-from heptarm.values.mode.mode import Mode
-from heptarm.values.pose import Pose
+from heptarm.values.mode.mode import MODES, Mode
+from heptarm.values.pose import Pose, check_pose
 from heptarm.values.result import Result
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
@@ -105,19 +105,11 @@ class ServoRequest:
     until: Condition | None = None
 
     def __post_init__(self) -> None:
-        if self.engine not in ENGINES:
-            raise ShapeError(
-                f"engine must be one of {', '.join(map(repr, ENGINES))}, got {self.engine!r}",
-                parameter="engine",
-                value=self.engine,
-            )
+        word(self.engine, "engine", ENGINES)
         check_name(self.moving, "moving")
-        if self.kind not in KINDS:
-            raise ShapeError(
-                f"kind must be one of {', '.join(map(repr, KINDS))}, got {self.kind!r}",
-                parameter="kind",
-                value=self.kind,
-            )
+        word(self.kind, "kind", KINDS)
+        if self.until is not None:
+            check_condition(self.until)
         self._refuse_foreign_limits()
         within(self.rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
         optional(self.watchdog, "watchdog", _MIN_WATCHDOG, _MAX_WATCHDOG, unit="s")
@@ -438,7 +430,7 @@ class Servo(Block):
         Raises:
             ModeConflict: another kind of mode than the one with which the servo motion began.
         """
-        message = mode_message(mode)
+        message = mode_message(instance(mode, MODES, "mode"))
         assert message is not None
         _ = self.start  # raises unless it has begun
         self._connection.request(wire.ServoSettings(servo=self._number, mode=message))
@@ -556,9 +548,6 @@ class PoseServo(Servo):
             ShapeError: not a Pose.
         """
         began = self._clock.nanos()
-        if not isinstance(pose, Pose):
-            raise ShapeError(
-                f"pose must be a Pose, got {pose!r}", parameter="pose", value=pose, hint="Pose.of(xyz, quat)"
-            )
+        check_pose(pose)
         self._send(began, wire.ServoPose, pose.xyz.tolist() + pose.quat.tolist())
         return pose

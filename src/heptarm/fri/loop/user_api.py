@@ -30,6 +30,7 @@ from heptarm.fri.protocol.messages import (
 )
 from heptarm.fri.session.statistics import Counters, Histogram
 from heptarm.values.arrays import finite_entries, instance, numbers, scalar, shown
+from heptarm.values.frames import check_name
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
 from heptarm.values.pose import Pose
 
@@ -98,6 +99,7 @@ class Signals:
             LimitError: the value is outside the range of the output.
         """
         outputs = ", ".join(one.name for one in self._signals if one.is_output) or "none"
+        check_name(name, "name")
         try:
             signal = self._signals[find_name(name, self.names)]
         except CommandRejected as error:
@@ -116,7 +118,7 @@ class Signals:
                 value=name,
                 allowed=outputs,
             )
-        number = float(value)
+        number = float(value) if isinstance(value, bool) else scalar(value, "value")
         low, high = signal.low, signal.high
         whole = signal.kind == "analog" or number == round(number) if math.isfinite(number) else False
         if not (low <= number <= high) or not whole:
@@ -124,7 +126,7 @@ class Signals:
                 signal.kind, "a finite number"
             )
             raise LimitError(
-                f"{signal.name} ({signal.kind}) must be {allowed}, got {value!r}",
+                f"{signal.name} ({signal.kind}) must be {allowed}, got {shown(value)}",
                 parameter=signal.name,
                 value=value,
                 allowed=allowed,

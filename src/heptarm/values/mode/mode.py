@@ -12,7 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias, get_args
 
-from heptarm.values.arrays import Value
+from heptarm.errors import ShapeError
+from heptarm.values.arrays import Value, shown
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.sine import SineImpedance
 
@@ -27,3 +28,18 @@ class Position(Value):
 Mode: TypeAlias = Position | JointImpedance | CartesianImpedance | SineImpedance
 #: The same as classes, for isinstance.
 MODES: tuple[type, ...] = get_args(Mode)
+
+
+def check_mode(mode: Mode | None) -> None:
+    """Refuse what is neither a control mode nor None.
+
+    Raises:
+        ShapeError: it is something else.
+    """
+    if mode is not None and not isinstance(mode, MODES):
+        raise ShapeError(
+            f"mode must be a control mode, got {shown(mode)}",
+            parameter="mode",
+            value=mode,
+            hint="make one with heptarm.modes, for example JointImpedance(300.0)",
+        )
