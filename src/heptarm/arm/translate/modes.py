@@ -7,7 +7,7 @@ from typing import Any, cast
 from heptarm.arm.translate.fields import NAMES, message_of, value_of
 from heptarm.values.frames import TOOL
 from heptarm.values.mode.impedance import CartesianImpedance
-from heptarm.values.mode.mode import MODES, Mode, Position, check_mode
+from heptarm.values.mode.mode import MODES, HandGuiding, Mode, Position, check_mode
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.wire import messages as wire
 
@@ -28,8 +28,10 @@ def mode_message(mode: Mode | None) -> wire.Mode | None:
     return cast("wire.Mode", message_of(NAMES[type(mode).__name__], mode))
 
 
-def read_mode(message: wire.Mode) -> Mode:
+def read_mode(message: wire.Mode) -> Mode | HandGuiding:
     """The mode of a message."""
+    if isinstance(message, wire.HandGuidingMode):
+        return HandGuiding()
     if isinstance(message, wire.SpiralPattern):
         return SineImpedance.spiral(
             message.plane.name.lower(),

@@ -17,12 +17,17 @@ from heptarm.values.arrays import Value, shown
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.sine import SineImpedance
 
-__all__ = ["CartesianImpedance", "JointImpedance", "Mode", "Position", "SineImpedance"]
+__all__ = ["CartesianImpedance", "HandGuiding", "JointImpedance", "Mode", "Position", "SineImpedance"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Position(Value):
     """Stiff position control, the default."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandGuiding(Value):
+    """Guided by hand: what `state.mode` is while a `hand_guide` motion runs; no motion can be given it."""
 
 
 Mode: TypeAlias = Position | JointImpedance | CartesianImpedance | SineImpedance
