@@ -2,7 +2,7 @@
 PY := .venv/bin/python
 STAMPS := build/stamps
 
-.PHONY: setup cabinet demo test test-ros2 test-ros1 conformance lint check bench figures docs wheel clean
+.PHONY: setup cabinet demo test test-ros test-ros2 test-ros1 test-long conformance lint check bench figures docs wheel clean help
 
 setup: $(STAMPS)/venv cabinet  ## virtual environment, package, compiled cabinet
 
@@ -48,10 +48,18 @@ lint: $(STAMPS)/venv  ## ruff, mypy, import contract
 check: $(STAMPS)/venv  ## the generated files agree with the schema
 	$(PY) schema/generate.py --check
 
-test: setup $(STAMPS)/browser lint check  ## everything; fast tests first
-	$(PY) -m pytest -n $(WORKERS) --dist loadfile $(LONGEST)
-	@$(MAKE) --no-print-directory test-ros2
-	@$(MAKE) --no-print-directory test-ros1
+test: setup $(STAMPS)/browser lint check  ## everything; what takes long begins first
+	$(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(LONGEST)
+	@$(MAKE) --no-print-directory test-ros
+
+# Each of them mostly waits, and takes one processor at most.
+test-ros: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## both ROS nodes, side by side
+	@$(MAKE) --no-print-directory -j2 --output-sync=target test-ros2 test-ros1
+
+test-long: setup $(STAMPS)/browser  ## everything with LONG=1: soaks, long searches, all cases of conformance
+	LONG=1 $(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --timeout 3600 $(LONGEST)
+	@LONG=1 $(MAKE) --no-print-directory test-ros
+	@$(MAKE) --no-print-directory conformance
 
 test-ros2: setup $(STAMPS)/ros2  ## the ROS 2 node with real rclpy, where there are wheels of it
 	@if [ -x build/ros2/bin/python ]; then build/ros2/bin/python -m pytest $(LONGEST) tests/ros2; \
@@ -81,3 +89,6 @@ wheel: setup  ## a wheel with the compiled jars, in dist/
 
 clean:  ## everything that make made, but for the virtual environment
 	rm -rf build dist docs/_build src/heptarm/sim/jars .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+
+help:  ## this list
+	@sed -n 's/^\([a-z0-9-]*\):.*## \(.*\)/\1|\2/p' $(MAKEFILE_LIST) | sort | awk -F'|' '{printf "  make %-12s %s\n", $$1, $$2}'

@@ -47,13 +47,18 @@ def _end(owners: set[str] | None) -> list[reaper.Started]:
     """Processes that some owners (None: any) have left; they are ended, if they do not end by themselves."""
     ended: dict[int, reaper.Started] = {}
     patience = time.monotonic() + GRACE
-    while left := [one for one in reaper.started(_run, but=_before) if owners is None or one.owner in owners]:
+    while left := [one for one in running() if owners is None or one.owner in owners]:
         if time.monotonic() > patience:  # until they are gone: they may start others meanwhile
             for process in left:
                 reaper.end(process)
                 ended[process.pid] = process
         time.sleep(0.02)
     return list(ended.values())
+
+
+def running() -> list[reaper.Started]:
+    """The processes that the tests of this process have started."""
+    return reaper.started(_run, but=_before)
 
 
 def _chain(item: pytest.Item | None) -> set[str]:

@@ -60,6 +60,13 @@ def started(run: str, *, but: Collection[int] = ()) -> list[Started]:
     return found
 
 
+def abort(process: Started) -> None:
+    """End it with SIGABRT, on which Python can print its stacks."""
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.kill(process.pid, signal.SIGABRT)
+        os.kill(process.pid, signal.SIGCONT)
+
+
 def end(process: Started) -> None:
     """End it at once, also where it is stopped."""
     with contextlib.suppress(ProcessLookupError, PermissionError):

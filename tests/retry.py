@@ -29,6 +29,8 @@ IN_A_ROW = 2
 #: Whatever keeps the machine busy may end meanwhile [s].
 PAUSE = 1.0
 
+_LATE_ANSWERS = ("this machine answers late", "QualityLost")
+_LATE_TARGETS = ("no target arrived", "Starved")
 _FILE = "RETRIES_OF_HEPTARM"
 _log = logging.getLogger(__name__)
 
@@ -57,18 +59,28 @@ def retry(attempt: Callable[[], T], cause: Callable[[T | Exception], str]) -> T:
 
 
 def answers_late(outcome: object) -> str:
-    """The cause of a program or a call that was told that FRI answers came late from this machine."""
+    """The cause of a program or a call that was told that FRI answers came late from this machine.
+
+    A session on this machine that loses its quality has no other cause, even where too few answers tell it.
+    """
     said = str(outcome.stderr) if isinstance(outcome, subprocess.CompletedProcess) else str(outcome)
     hint = str(getattr(outcome, "hint", ""))  # of an error of heptarm
     failed = not isinstance(outcome, subprocess.CompletedProcess) or outcome.returncode != 0
-    return "FRI answers came late" if failed and "this machine answers late" in said + hint else ""
+    words = f"{type(outcome).__name__} {said} {hint}"
+    return "FRI answers came late" if failed and any(one in words for one in _LATE_ANSWERS) else ""
 
 
 def starved(outcome: object) -> str:
     """The cause of a program or a call whose servo targets came too late."""
     if isinstance(outcome, subprocess.CompletedProcess):
-        return "servo targets came late" if "want of targets" in outcome.stderr else ""
+        failed = outcome.returncode != 0 and any(one in outcome.stderr for one in _LATE_TARGETS)
+        return "servo targets came late" if failed else ""
     return "servo targets came late" if type(outcome).__name__ == "Starved" else ""
+
+
+def busy(outcome: object) -> str:
+    """The cause of a program or a call that this machine was too busy for, in a servo motion or with FRI."""
+    return answers_late(outcome) or starved(outcome)
 
 
 def _again(cause: str, left: int) -> bool:

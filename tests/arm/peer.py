@@ -201,7 +201,7 @@ class Peer:
                     client.say(reply, request if reply.KIND == "answer" else 0)
             return
         if isinstance(message, wire.Hello):
-            client.say(welcome(client.session, **self.changes))
+            client.say(welcome(**self.changes))
         elif isinstance(message, wire.Subscribe):
             client.say(wire.Accepted(id=0), request)
             client.rate = message.rate

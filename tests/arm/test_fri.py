@@ -8,7 +8,6 @@ import os
 import signal
 import socket
 import threading
-import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -115,12 +114,12 @@ def test_the_guard_makes_a_step_a_motion_and_names_what_it_limited(arm: ha.Arm) 
     with arm.fri("position", period_ms=LONG, policy=policy, limits=limits) as rt:
         goal = rt.start.q_ipo + 0.4 * A7
         rt.command(q=np.where(A7, goal, np.nan))
-        fastest = 0.0
         for s in rt:
-            fastest = max(fastest, abs(arm.state.dq[6]))
             if abs(s.q[6] - goal[6]) < 2e-3:
                 break
-    assert 0.1 < fastest < 1.1 * 0.2 * arm.robot.dq_max[6]
+        sent = {s.sequence: s.q_sent[6] for s in rt.history() if s.is_answered}
+    steps = [abs(sent[k + 1] - sent[k]) for k in sent if k + 1 in sent]
+    assert 0.1 < max(steps) / (LONG * 1e-3) < 1.001 * 0.2 * arm.robot.dq_max[6]
     assert any("A7: velocity limited" in line for line in rt.limited)
 
 
@@ -263,7 +262,7 @@ def test_when_nothing_arrives_the_error_says_where_to_look(arm: ha.Arm, kind: st
 def test_another_version_is_told_in_plain_words(arm: ha.Arm) -> None:
     with (
         pytest.raises(ha.ConnectFailed, match=r"the other side speaks FRI 1\.x.*this side FRI 2.7"),
-        arm.fri("position", period_ms=LONG, version="2.7", timeout=0.5),
+        arm.fri("position", period_ms=LONG, version="2.7", timeout=2.0),
     ):
         pass
     with pytest.raises(ha.CommandRejected, match="must be one of"), arm.fri("monitor", version="1.99"):
@@ -273,14 +272,14 @@ def test_another_version_is_told_in_plain_words(arm: ha.Arm) -> None:
 # ------------------------------------------------------------------------------------------ bad ends
 
 
+@patient
 def test_a_law_that_fails_brakes_the_arm_and_is_told_of(arm: ha.Arm) -> None:
     with (
         pytest.raises(ha.StreamError, match=r"the law failed.*ZeroDivisionError: nothing to divide by.*line"),
         arm.fri("position", period_ms=LONG, law=fail) as rt,
     ):
-        assert not rt.wait(20.0) and not rt.active
-        time.sleep(0.3)
-        assert np.abs(arm.state.dq).max() < 0.01
+        assert not rt.wait(30.0) and not rt.active
+        arm.wait_until(lambda state: np.abs(state.dq).max() < 0.01)
     assert rt.result is not None and rt.result.cause is ha.Cause.CANCELLED
 
 
@@ -298,17 +297,17 @@ def test_a_stop_from_another_thread_ends_the_loop(arm: ha.Arm) -> None:
     arm.wait_for_rest()
 
 
+@patient
 def test_a_loop_that_is_killed_loses_the_quality_and_the_next_one_works(arm: ha.Arm) -> None:
     with (
         pytest.raises(ha.QualityLost, match="quality is (POOR|FAIR).*process has ended"),
         arm.fri("position", period_ms=LONG, law=swing, params={"amplitude": 0.05}) as rt,
     ):
-        rt.wait(0.5)
         os.kill(int(rt.client._header[at.PID]), signal.SIGKILL)
-        assert not rt.wait(20.0)
+        assert not rt.wait(30.0)
     arm.wait_for_rest()
     with arm.fri("position", period_ms=LONG) as rt:
-        assert rt.wait(0.1)
+        assert rt.next() is not None
 
 
 def test_a_loop_that_stands_still_ends_a_monitor_too(arm: ha.Arm) -> None:
@@ -332,6 +331,7 @@ def test_an_error_of_the_block_is_not_hidden_and_the_arm_rests(arm: ha.Arm) -> N
     arm.wait_for_rest()
 
 
+@patient
 def test_an_emergency_stop_ends_the_overlay_in_words_and_the_next_session_works() -> None:
     with ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0) as arm:
         arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=0.6)
@@ -341,7 +341,7 @@ def test_an_emergency_stop_ends_the_overlay_in_words_and_the_next_session_works(
                 pytest.raises(ha.MotionAborted, match="emergency stop|safety stop 1") as error,
                 arm.fri("position", period_ms=LONG, law=swing, params={"amplitude": 0.1}) as rt,
             ):
-                rt.wait(0.5)
+                assert rt.next() is not None
                 arm.operator.fault("emergency_stop")
                 assert not rt.wait(30.0)
                 # the session that monitors goes on
@@ -350,4 +350,4 @@ def test_an_emergency_stop_ends_the_overlay_in_words_and_the_next_session_works(
             with pytest.raises(ha.NeedsOperator, match="release the emergency stop"), arm.fri("position"):
                 pass
             arm.operator.clear()
-            assert arm.recover(timeout=10.0).done
+            assert arm.recover(timeout=30.0).done

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.values.condition.signals import force, path
+from heptarm.values.condition.force import force
+from heptarm.values.condition.signals import path
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.values.mode.mode import HandGuiding, Position
@@ -24,7 +25,7 @@ HOME = ha.deg(0, 35, 0, -80, 0, 65, 0)
 @pytest.fixture(scope="module")
 def table() -> Iterator[ha.Arm]:
     """An arm above a table."""
-    target = f"sim://iiwa14?box=0.6,0,{TABLE / 2},0.4,0.6,{TABLE}"
+    target = f"sim://iiwa14?speed=2&box=0.6,0,{TABLE / 2},0.4,0.6,{TABLE}"
     with ha.connect(target, watchdog=10.0, timeout=20.0) as arm:
         yield arm
 
@@ -267,11 +268,11 @@ def test_taught_by_hand_and_replayed(arm: ha.Arm) -> None:
     way = whole.trimmed().thinned()
     assert len(way) < len(whole)
     shares: list[float] = []
-    replay = arm.replay(way, by="spline", pace=0.3, on_progress=shares.append)
+    replay = arm.replay(way, by="spline", speed_scaling=0.3, on_progress=shares.append)
     assert shares == sorted(shares) and shares[-1] == 1.0
     assert replay.result.arrived and replay.deviation < 0.05
     assert np.abs(arm.wait_for_rest().q - way.q[-1]).max() < 2e-3
-    replay = retry(lambda: arm.replay(way, pace=0.5), starved)
+    replay = retry(lambda: arm.replay(way, speed_scaling=0.5), starved)
     assert replay.result.arrived and replay.deviation < 0.3
     assert np.abs(arm.wait_for_rest().q - way.q[-1]).max() < 0.01
 
@@ -279,7 +280,7 @@ def test_taught_by_hand_and_replayed(arm: ha.Arm) -> None:
 def test_what_cannot_be_replayed(arm: ha.Arm) -> None:
     there = arm.wait_for_rest().q
     away = there + [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5]
-    with pytest.raises(ha.LimitError, match="pace"):
+    with pytest.raises(ha.LimitError, match="speed_scaling"):
         arm.replay(ha.Trajectory.of([0.0, 0.1], [there, away]))
     with pytest.raises(ha.CommandRejected, match="iiwa7"):
         arm.replay(ha.Trajectory.of([0.0, 1.0], [there, away], robot="iiwa7"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
+from dataclasses import replace
 
 import pytest
 
@@ -120,8 +121,12 @@ def test_requests_from_many_threads(peer: Peer) -> None:
 
 def test_an_answer_that_does_not_come(peer: Peer) -> None:
     peer.expect(wire.Stop)
-    with peer.arm(timeout=0.2) as arm, pytest.raises(ha.Timeout, match="Stop"):
-        arm.stop()
+    with peer.arm() as arm:
+        patient = arm._connection.options
+        arm._connection.options = replace(patient, timeout=0.2)
+        with pytest.raises(ha.Timeout, match="Stop"):
+            arm.stop()
+        arm._connection.options = patient
 
 
 def test_a_cabinet_that_breaks_the_protocol(peer: Peer) -> None:

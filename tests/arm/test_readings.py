@@ -16,7 +16,10 @@ from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import deg
 from heptarm.values.state import GROUP_NAMES
 from tests.conftest import RunningCabinet
+from tests.simulators import FASTER
 
+#: Of the shared virtual cabinet.
+SPEED = FASTER
 #: Inaccuracy of a simulated torque sensor [Nm].
 SENSOR = 0.5
 

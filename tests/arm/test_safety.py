@@ -137,7 +137,9 @@ def test_t1_is_slow(safe: Arm) -> None:
     assert safe.recover(timeout=20.0).done
     fastest = 0.0
     handle = safe.start(ptp(AWAY))
-    for state in safe.states(rate=100, duration=1.5):
+    for state in safe.states(rate=100):
+        if handle.done:
+            break
         turn = abs(state.dq[0]) if np.isfinite(state.dq[0]) else 0.0
         fastest = max(fastest, float(turn * np.hypot(*state.pose.xyz[:2])))
     assert handle.wait(timeout=30.0).arrived
@@ -242,7 +244,7 @@ def test_recover_reconnects(cabinet: RunningCabinet) -> None:
     arm = ha.connect(cabinet.target, watchdog=5.0)
     try:
         arm._connection.link._transport.close()
-        deadline = time.monotonic() + 10.0
+        deadline = time.monotonic() + 30.0
         while arm.connected and time.monotonic() < deadline:
             time.sleep(0.02)
         assert not arm.connected

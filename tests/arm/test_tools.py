@@ -22,9 +22,12 @@ from heptarm.values.tool import KnownTool
 from heptarm.wire.codes import Code
 from tests.conftest import RunningCabinet
 from tests.doubles.test_tools import PROJECT as DOUBLES_PROJECT
+from tests.simulators import FASTER
 
 HOME = deg(0, 30, 0, -90, 0, 60, 0)
 PATIENCE = 5.0
+#: Of the shared virtual cabinet.
+SPEED = FASTER
 TIP = Pose.xyz_abc(0.03, 0.0, 0.15, *deg(0, 90, 0))
 GRIPPER = Tool("gripper", mass=2.0, com=(0.0, 0.0, 0.08), tcp=TIP, frames={"pad": Pose.at(0.0, 0.04, 0.1)})
 PART = Workpiece("part", mass=1.0, com=(0.0, 0.0, 0.05), frames={"peg": Pose.at(0.0, 0.0, 0.1)})
@@ -133,7 +136,7 @@ def test_another_frame_of_the_tool_can_be_the_default(bare: Arm) -> None:
 def test_the_wrench_is_told_where_and_as_one_likes() -> None:
     """Too light a declaration: the rest of the weight is a force that the arm feels."""
     heavy = Tool("heavy", mass=3.0, com=(0.0, 0.0, 0.1), tcp=Pose.at(0, 0, 0.2))
-    with ha.connect("sim://iiwa14?payload=3,0,0,0.1", watchdog=PATIENCE) as arm:
+    with ha.connect("sim://iiwa14?speed=3&payload=3,0,0,0.1", watchdog=PATIENCE) as arm:
         arm.move(ptp(HOME))
         state = settled(arm)
         assert state.wrench.force == pytest.approx((0, 0, -29.43), abs=0.3)
@@ -154,7 +157,7 @@ def test_the_wrench_is_told_where_and_as_one_likes() -> None:
 
 def test_a_servo_motion_under_impedance_wants_the_load_to_be_right() -> None:
     soft = JointImpedance(500.0)
-    with ha.connect("sim://iiwa14?payload=5,0,0,0.1", watchdog=PATIENCE) as arm:
+    with ha.connect("sim://iiwa14?speed=3&payload=5,0,0,0.1", watchdog=PATIENCE) as arm:
         arm.move(ptp(HOME))
         with pytest.raises(ha.NotReady, match="load data"), arm.servo(mode=soft, watchdog=2.0):
             pass
@@ -220,7 +223,7 @@ def test_an_error_in_the_block_takes_the_tool_off_and_comes_through(bare: Arm) -
 def test_tools_and_places_of_the_project(tmp_path: Path) -> None:
     file = tmp_path / "RoboticsAPI.data.xml"
     file.write_text(PROJECT)
-    with ha.connect(f"sim://iiwa14?project={file}", watchdog=PATIENCE) as arm:
+    with ha.connect(f"sim://iiwa14?speed=3&project={file}", watchdog=PATIENCE) as arm:
         assert list(arm.tools) == ["Gripper"]
         assert arm.tools["Gripper"].mass == 1.5
         assert arm.frames["/Table/Corner"].xyz == pytest.approx((0.51, 0.02, 0.1))

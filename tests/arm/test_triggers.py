@@ -11,12 +11,14 @@ import heptarm as ha
 from heptarm.arm.translate.triggers import trigger_messages
 from heptarm.do import notify, set_output
 from heptarm.model.kinematics import forward
-from heptarm.values.condition.signals import force, io, path
+from heptarm.values.condition.force import force
+from heptarm.values.condition.signals import io, path
 from heptarm.values.io import Signal
 from heptarm.values.motion.motion import Motion
 from heptarm.values.robot import robot
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
+from tests.simulators import FASTER
 
 WORLD = "MediaFlange.UserButton<bool MediaFlange.LEDBlue>bool Cell.Part<u8 Cell.Level>analog12[-10,10]"
 PROJECT = f"""<persistence><processDataContainer>
@@ -32,7 +34,7 @@ SLOWLY = ha.lin_rel(y=0.1, frame="base", speed_mps=0.01)
 def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ha.Arm]:
     project = tmp_path_factory.mktemp("project") / "RoboticsAPI.data.xml"
     project.write_text(PROJECT)
-    with ha.connect(f"sim://iiwa14?project={project}", watchdog=10.0, timeout=20.0) as arm:
+    with ha.connect(f"sim://iiwa14?speed={FASTER:g}&project={project}", watchdog=10.0, timeout=20.0) as arm:
         yield arm
 
 

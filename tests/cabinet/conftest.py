@@ -16,8 +16,7 @@ Maker = Callable[..., FakeCabinet]
 
 @pytest.fixture(scope="session")
 def shared_cabinet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeCabinet]:
-    # a busy machine may hold up a test for seconds: whoever tests silence makes a cabinet of its own
-    with FakeCabinet(log=tmp_path_factory.mktemp("fake") / "log", heartbeat=2.0) as cabinet:
+    with FakeCabinet(log=tmp_path_factory.mktemp("fake") / "log") as cabinet:
         yield cabinet
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
-import hmac
 import socket
 import time
 from collections.abc import Callable
@@ -13,6 +11,7 @@ from typing import Any, TypeVar
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from heptarm.wire.frames import Frame, FrameReader, pack
+from heptarm.wire.key import FrameTag, KeyExchange
 
 M = TypeVar("M")
 NONCE = bytes(range(32))
@@ -33,22 +32,28 @@ class Peer:
         self._next = 0
         self._request = 0
         self._seq = 0
+        self._tag: FrameTag | None = None
         if hello:
             self.welcome = self.greet(name=name, key=key)
 
     def greet(self, *, name: str = "peer", key: str = "", major: int = wire.MAJOR) -> wire.Welcome:
-        self.send(wire.Hello(major=major, minor=0, name=name, version="0", nonce=NONCE))
+        hello = self.hello = wire.Hello(major=major, minor=0, name=name, version="0", nonce=NONCE)
+        self.send(hello)
         message = self.next()
         if isinstance(message, wire.Challenge):
-            proof = hmac.new(key.encode(), message.nonce + NONCE, hashlib.sha256).digest()
-            self.send(wire.Proof(mac=proof))
-            message = self.next()
+            exchange = KeyExchange(key.encode())
+            for one in (hello, message):
+                exchange.add(one.TYPE, one.encode())
+            tags = exchange.tags(NONCE, message.nonce)
+            self.send(wire.Proof(mac=exchange.client_mac()))
+            message = self.next()  # nothing follows the Welcome before this client says something
+            self._tag, self.reader.tag = tags
         assert isinstance(message, wire.Welcome), message
         return message
 
     def pack(self, message: Any, request: int = 0) -> bytes:
         self._seq += 1
-        return pack(message.TYPE, message.encode(), seq=self._seq - 1, request=request)
+        return pack(message.TYPE, message.encode(), seq=self._seq - 1, request=request, tag=self._tag)
 
     def send(self, message: Any, request: int = 0) -> None:
         self.socket.sendall(self.pack(message, request))

@@ -63,6 +63,7 @@ def test_targets_are_followed_and_counted_and_the_stream_closes_at_rest(cabinet:
         for step in range(50):
             peer.send(target(servo, 0.01 * step))
             time.sleep(0.002)
+        reached(peer, 0.49)  # whoever closes drops a target that waits
         assert isinstance(peer.ask(wire.ServoClose(servo=servo)), wire.Accepted)
         end = finish(peer, servo)
         assert (end.cause, end.q[6]) == (wire.Cause.CANCELLED, 0.49)
@@ -96,8 +97,12 @@ def test_a_target_that_came_while_the_cabinet_stood_still_counts(make: Callable[
     cabinet = make()
     with controller(cabinet.port) as peer:
         servo = opened(peer)
-        peer.send(target(servo, 0.3, watchdog=0.5))
+        peer.send(target(servo, 0.3))
         reached(peer, 0.3)
+        peer.send(target(servo, 0.3, watchdog=0.5))
+        peer.ask(
+            wire.Subscribe(groups=wire.Groups.JOINTS, rate=0.0)
+        )  # its answer shows that the target is there
         cabinet.process.send_signal(signal.SIGSTOP)
         time.sleep(0.7)
         peer.send(target(servo, 0.4))
@@ -233,7 +238,7 @@ def test_the_straight_engine_follows_poses_and_no_joints(cabinet: FakeCabinet) -
         (LINE | {"linear": wire.CartesianDynamics(jerk=10.0)}, "linear.jerk"),
         (LINE | {"linear": wire.CartesianDynamics(orientation_jerk=10.0)}, "linear.orientation_jerk"),
         ({"linear": wire.CartesianDynamics(velocity=0.1)}, "linear"),
-        (LINE | {"speed_timeout": 0.5}, "speed_timeout"),
+        (LINE | {"timing": wire.ServoTiming(speed_timeout=0.5)}, "timing.speed_timeout"),
     ],
 )
 def test_limits_that_an_engine_does_not_heed_are_refused(

@@ -222,7 +222,7 @@ def case_a_trajectory_is_taught_and_replayed(probe: Probe, stage: Stage) -> None
     way = taught.trajectory
     assert "the key 'done'" in taught.message and taught.name == "wave"
     assert 2 <= len(way.points) < taught.recorded and list(way.joint_names) == [f"A{i}" for i in range(1, 8)]
-    again = probe.send("replay", "Replay", name="wave", by="spline", pace=0.5)
+    again = probe.send("replay", "Replay", name="wave", by="spline", speed_scaling=0.5)
     result = done(again.end())
     assert result.deviation < 0.1 and math.isnan(result.lag)
     assert max(one.progress for one in again.told) > 0.2
@@ -236,7 +236,7 @@ def case_a_trajectory_is_taught_and_replayed(probe: Probe, stage: Stage) -> None
 
     until(repeated, "the trajectory is not replayed")
     assert tries[-1].deviation < 0.3 and math.isfinite(tries[-1].lag)
-    slowly = probe.send("replay", "Replay", name="wave", pace=0.05)
+    slowly = probe.send("replay", "Replay", name="wave", speed_scaling=0.05)
     until(lambda: slowly.told and slowly.told[-1].progress > 0.01, "it does not begin")
     slowly.cancel()
     refused(slowly.end(), "cancelled")

@@ -294,7 +294,7 @@ def case_modes_with_all_their_parameters(probe: Probe, stage: Stage) -> None:
 
 def case_tools_with_frames_and_what_the_arm_is(probe: Probe, stage: Stage) -> None:
     info = done(probe.call("info", "GetInfo"))
-    assert info.model == "iiwa14" and info.is_virtual and info.pace > 0.0 and info.controller
+    assert info.model == "iiwa14" and info.is_virtual and info.real_time_factor > 0.0 and info.controller
     np.testing.assert_allclose(info.q_max, robot("iiwa14").q_max)
     tip = probe.make("geometry_msgs/Pose")
     tip.position.z, tip.orientation.w = 0.2, 1.0

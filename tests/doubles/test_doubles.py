@@ -86,7 +86,7 @@ def _run(
     command = [*_command(application, classes, *data, speed=speed), *more]
     if project is not None:
         command += ["--project", str(project)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False)
 
 
 def test_a_sunrise_application_behaves_as_on_a_cabinet(tmp_path: Path) -> None:

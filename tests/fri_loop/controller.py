@@ -120,8 +120,9 @@ class Controller:
 
     def settle(self) -> None:
         """Wait for answers to three more messages."""
-        count = len(self.answers)
+        count, deadline = len(self.answers), time.monotonic() + 30.0
         while len(self.answers) < count + 3:
+            assert time.monotonic() < deadline, "the client answers no more"
             time.sleep(self.period_ms * 1e-3)
 
     def walk(self, *states: SessionState, pause: float = 0.05) -> None:

@@ -136,6 +136,21 @@ def test_a_law_that_uses_what_belongs_to_this_process_is_refused() -> None:
     assert "not arms, locks or files" in error.value.hint
 
 
+def test_a_process_that_ends_while_it_starts_is_told_with_what_it_printed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A law's module that this process can import, but the loop's cannot."""
+    (tmp_path / "law_with_a_camera.py").write_text(
+        f"import os\nif os.getpid() != {os.getpid()}:\n    raise RuntimeError('no camera here')\n"
+        "def law(state, out, params):\n    pass\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    law = importlib.import_module("law_with_a_camera").law
+    with pytest.raises(ConnectFailed, match="ended while it started: .*RuntimeError: no camera here"):
+        Client(0, law=law, realtime=False)
+    assert "no camera here" in capfd.readouterr().err, "and it is printed"
+
+
 def _until(client: Client, goal: np.ndarray) -> None:
     deadline = time.monotonic() + 30.0
     while time.monotonic() < deadline:

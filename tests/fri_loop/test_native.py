@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import random
 
 import numpy as np
@@ -17,6 +16,7 @@ from heptarm.fri.loop.user_api import Output, State
 from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
 from heptarm.fri.protocol.protobuf import put_bytes, put_varint
 from heptarm.fri.protocol.version import MONITORING_ID, Version
+from tests.long import longer
 
 from .controller import IPO
 from .laws import offset, torque
@@ -27,8 +27,7 @@ try:
 except Unavailable as reason:
     pytest.skip(f"no native part: {reason}", allow_module_level=True)
 
-#: A longer search on demand.
-EXAMPLES = int(os.environ.get("HEPTARM_EXAMPLES", "25"))
+EXAMPLES = longer(25, 1000)
 
 
 class Twins:

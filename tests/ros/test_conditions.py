@@ -7,7 +7,8 @@ import pytest
 from heptarm.errors import CommandRejected, LimitError
 from heptarm.ros.interface.conditions import condition_of
 from heptarm.values.condition.condition import Condition
-from heptarm.values.condition.signals import force, io, path, torque
+from heptarm.values.condition.force import force, torque
+from heptarm.values.condition.signals import io, path
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,8 @@ from typing import Any
 import heptarm as ha
 from heptarm import Arm, Tool
 from heptarm.do import notify, set_output
-from heptarm.values.condition.signals import Force, force, io, path, torque
+from heptarm.values.condition.force import Force, force, torque
+from heptarm.values.condition.signals import io, path
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.motion.hand_guiding import hand_guide
@@ -250,9 +251,9 @@ CALLS: dict[str, Call] = {
     "ServoOpen.frame": Call(_servo(moving=...), "moving"),
     "ServoOpen.velocity": Call(_servo(speed=...), "speed"),
     "ServoOpen.acceleration": Call(_servo(acceleration=...), "acceleration"),
-    "ServoOpen.min_trajectory_time": Call(_servo(min_trajectory_time=...), "min_trajectory_time"),
-    "ServoOpen.goal_timeout": Call(_servo(goal_timeout=...), "goal_timeout"),
-    "ServoOpen.speed_timeout": Call(_servo(speed_timeout=...), "speed_timeout"),
+    "ServoTiming.min_trajectory_time": Call(_servo(min_trajectory_time=...), "min_trajectory_time"),
+    "ServoTiming.goal_timeout": Call(_servo(goal_timeout=...), "goal_timeout"),
+    "ServoTiming.speed_timeout": Call(_servo(speed_timeout=...), "speed_timeout"),
     "ServoJoints.watchdog": Call(_servo(watchdog=...), "watchdog"),
     "ServoJoints.q": Call(_within(lambda servo, v: servo.set(v)), "q", 7),
     "ServoJointsVelocity.watchdog": Call(_servo(watchdog=...), "watchdog"),

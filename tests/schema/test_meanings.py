@@ -15,7 +15,8 @@ import pytest
 import heptarm as ha
 from heptarm import Arm, Tool
 from heptarm.arm.translate.modes import mode_message
-from heptarm.values.condition.signals import Force, io, path, torque
+from heptarm.values.condition.force import Force, torque
+from heptarm.values.condition.signals import io, path
 from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.motion.motion import Motion

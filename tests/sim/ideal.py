@@ -122,5 +122,5 @@ def begin(kind: str, *, seed: int = 0) -> Ideal:
     plant.tick()
     if order.is_servo:
         away = np.random.default_rng(seed).uniform(-0.8, 0.8, 7)
-        plant.ring.post(order.id, np.array(READY) + away)
+        plant.shared.post(order.id, np.array(READY) + away)
     return plant

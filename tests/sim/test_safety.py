@@ -20,7 +20,7 @@ STOPS = (StopRequest.EMERGENCY_STOP, StopRequest.OPERATOR_SAFETY, StopRequest.PR
 
 
 def flags(plant: Plant) -> int:
-    return int(plant.ring.ints[plant.tick_count % SLOTS, StateWords.FLAGS])
+    return int(plant.shared.ints[plant.tick_count % SLOTS, StateWords.FLAGS])
 
 
 def to_standstill(plant: Plant, *, most: int = 1500) -> int:

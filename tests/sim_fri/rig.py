@@ -40,7 +40,7 @@ class Arm:
         self.loads: list[tuple[Array | None, Array | None]] = []
         self.mode: Mode | None = None
         self.holds = 0
-        self.ring = SharedState()
+        self.shared = SharedState()
 
     def reading(self) -> Reading:
         q, ipo = tuple(self.q.tolist()), tuple(self.q_ipo.tolist())
@@ -53,7 +53,7 @@ class Arm:
         self.action = action
 
     def tick(self) -> None:
-        self.ring.header[HeaderWords.NEWEST] += 1
+        self.shared.header[HeaderWords.NEWEST] += 1
         if self.action is not None:
             self.q = self.action.q
             self.loads.append((self.action.tau, self.action.wrench))

@@ -16,7 +16,7 @@ from heptarm.io.transport import Transport
 Pair = tuple[Transport, Transport]
 
 
-def receive(transport: Transport, size: int, *, chunk: int = 65536, seconds: float = 3.0) -> bytes:
+def receive(transport: Transport, size: int, *, chunk: int = 65536, seconds: float = 30.0) -> bytes:
     """Receive that many bytes."""
     buffer, got = memoryview(bytearray(chunk)), b""
     deadline = time.monotonic() + seconds

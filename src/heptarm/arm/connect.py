@@ -9,10 +9,11 @@ import socket
 from typing import Literal
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.link.connection import STATE_RATE, TIMEOUT, WATCHDOG, Connection, Options
+from heptarm.arm.link.connection import STATE_RATE, TIMEOUT, Connection, Options
 from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.arm.link.state_stream import GROUPS, groups_of
 from heptarm.arm.link.target import parse_target, target_from_env
+from heptarm.arm.watchdog import CONNECTION
 from heptarm.errors import ShapeError
 from heptarm.io import tcp
 from heptarm.io.clock import RealClock
@@ -47,7 +48,7 @@ def connect(
     state_rate: float = STATE_RATE,
     groups: tuple[str, ...] = GROUPS,
     on_disconnect: Literal["stop", "finish"] = "stop",
-    watchdog: float = WATCHDOG,
+    watchdog: float = CONNECTION.default,
 ) -> Arm:
     """Connect to an arm.
 
@@ -93,7 +94,7 @@ def connect(
         rate=within(state_rate, "state_rate", 0.0, 1000.0, unit="Hz"),
         groups=groups,
         finishes=on_disconnect == "finish",
-        watchdog=within(watchdog, "watchdog", 0.1, 10.0, unit="s"),
+        watchdog=CONNECTION.time(watchdog),
     )
     chosen = parse_target(target_from_env() if target is None else target)
     private = PrivateCabinet.start(chosen) if chosen.is_private else None

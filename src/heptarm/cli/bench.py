@@ -88,7 +88,7 @@ def bench(
     """Measure how fast and how reliably FRI messages are answered, and name the main disturbance."""
     if not fri:
         raise CommandRejected(
-            "--fri is missing: FRI is what this command measures", hint="heptarm bench --fri"
+            "--fri is required: this command measures FRI", hint="heptarm bench --fri"
         )
     seconds = within(duration, "duration", 0.1, 86400.0, unit="s")
     if plot is not None:

@@ -14,6 +14,7 @@ from rich.table import Table
 from heptarm import testing
 from heptarm.arm.connect import connect
 from heptarm.arm.link.target import VARIABLE
+from heptarm.arm.watchdog import CHECK
 from heptarm.cli.options import (
     Json,
     Target,
@@ -22,8 +23,8 @@ from heptarm.cli.options import (
 from heptarm.cli.output import confirm, emit
 from heptarm.testing import Outcome, Report, Scenario, Verdict
 
-#: Time limits of the link [s]: a machine that also simulates may answer late.
-_WATCHDOG, _TIMEOUT = 5.0, 20.0
+#: Longest wait for an answer [s]: a machine that also simulates may be late.
+_TIMEOUT = 20.0
 _STYLES = {Verdict.SHOWN: "green", Verdict.FAILED: "red", Verdict.LEFT_OUT: "yellow"}
 
 
@@ -55,7 +56,7 @@ def check(
         return 0
     target = target or os.environ.get(VARIABLE, "").strip() or testing.stage(speed=sim_speed)
     console = Console()
-    with connect(target, watchdog=_WATCHDOG, timeout=_TIMEOUT) as arm:
+    with connect(target, watchdog=CHECK.default, timeout=_TIMEOUT) as arm:
         if not as_json:
             console.print(
                 f"{len(chosen)} scenarios on {arm.robot.title}{' (virtual)' if arm.is_virtual else ''}"

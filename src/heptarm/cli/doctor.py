@@ -51,7 +51,7 @@ _VERSION = (
     "leave --fri-version (version= in a program) out: heptarm takes it from the first message; a client that is built "
     "with KUKA's SDK has to be built for the cabinet's version"
 )
-_UNKNOWN = "look at the messages on the smartPAD and at the log of the cabinet's application"
+_UNKNOWN = "read the messages on the smartPAD and the log of the cabinet application"
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,7 +207,7 @@ def _target(target: str) -> Iterator[CheckResult]:
             socket.create_connection((parsed.host, parsed.port), timeout=3).close()
             yield CheckResult("network", "ok", f"{parsed.host}:{parsed.port} accepts connections")
         except OSError as error:
-            remedy = "is the cabinet application (or heptarm sim) running? is this machine in its network?"
+            remedy = "start the cabinet application or heptarm sim, and check that this machine is in its network"
             yield CheckResult(
                 "network", "bad", f"{parsed.host}:{parsed.port} does not answer ({error})", remedy
             )
@@ -248,7 +248,7 @@ def _round_trip(arm: Arm) -> CheckResult:
 def _age(arm: Arm) -> CheckResult:
     ages = [state.age * 1e3 for state in arm.states(duration=1.0)]
     if not ages:
-        return CheckResult("state", "bad", "no state came within a second", "look at the cabinet's log")
+        return CheckResult("state", "bad", "no state received within 1 s", "read the log of the cabinet")
     found = f"{len(ages)} states in 1 s, {np.median(ages):.2f} ms old, 99 % below {np.percentile(ages, 99):.2f} ms"
     how = "note" if np.median(ages) > _OLD_MS else "ok"
     return CheckResult("state", how, found, "subscribe at a lower rate" if how == "note" else "")

@@ -40,5 +40,5 @@ def install_cabinet(
     else:
         print(f"{len(files)} Java sources and the project's data are in {out}.")
         print(f"They speak protocol {protocol} and pair with heptarm {__version__}.")
-        print(f"Go on with the steps in {out / 'INSTALL.md'}.")
+        print(f"Continue with the steps in {out / 'INSTALL.md'}.")
     return 0

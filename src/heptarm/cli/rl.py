@@ -13,6 +13,7 @@ from cyclopts import Parameter
 from heptarm.arm.connect import connect
 from heptarm.cli.options import (
     Json,
+    Model,
     Speed,
     Target,
     Yes,
@@ -47,7 +48,7 @@ AnyPolicy = Annotated[
 def train(
     *,
     out: PolicyFile = Path("reach.npz"),
-    robot: Annotated[Literal["iiwa7", "iiwa14"], Parameter(help="Robot.")] = "iiwa14",
+    robot: Model = "iiwa14",
     action: Annotated[Literal["joint", "cartesian"], Parameter(help="What the policy decides.")] = "joint",
     feature: Annotated[
         bool, Parameter(negative="", help="Let the policy also observe the direction to the target.")

@@ -18,6 +18,7 @@ from cyclopts import Group, Parameter
 from heptarm.cli.options import (
     FRI,
     Json,
+    Model,
 )
 from heptarm.cli.output import emit, is_silent, lines
 from heptarm.errors import CommandRejected, ConnectFailed
@@ -29,10 +30,10 @@ _APP = Group("Your own application")
 
 def sim(
     *,
-    model: Annotated[Literal["iiwa7", "iiwa14"], Parameter(help="Robot.")] = "iiwa14",
+    model: Model = "iiwa14",
     host: Annotated[str, Parameter(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, Parameter(help="Port; 0 takes a free one.")] = 30001,
-    speed: Annotated[float, Parameter(help="Simulated seconds per second.")] = 1.0,
+    speed: Annotated[float, Parameter(help="Simulated seconds per second of real time.")] = 1.0,
     view: Annotated[bool, Parameter(negative="", help="Open a live 3D view in the browser.")] = False,
     view_port: Annotated[int, Parameter(help="Port of the view; 0 takes a free one.")] = 8080,
     key: Annotated[str, Parameter(help="Pre-shared key that clients must know.")] = "",
@@ -74,7 +75,7 @@ def sim(
         str,
         Parameter(
             group=_APP,
-            help="Its class, where there are several applications; only what it needs is compiled.",
+            help="Its class, if there are several applications; only this class and what it needs are compiled.",
         ),
     ] = "",
     app_data: Annotated[
@@ -93,7 +94,7 @@ def sim(
         Path | None,
         Parameter(
             group=_APP,
-            help="File of such buttons, one per line; # begins a comment. They come before --answer.",
+            help="File of such buttons, one per line; # starts a comment. They are used before those of --answer.",
         ),
     ] = None,
     fri: Annotated[

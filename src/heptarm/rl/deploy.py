@@ -143,7 +143,7 @@ def _run(arm: Arm, pilot: Pilot, goal: Target, settings: DeploySettings) -> tupl
     fine = _FINE if settings.latency > 0 else 1
     delay = ceil(settings.latency * task.rate * fine - 1e-9)
     # the arm's time is what counts: a simulator may run faster than the clock on the wall
-    rate = task.rate * fine * arm.pace
+    rate = task.rate * fine * arm.real_time_factor
     waiting: deque[tuple[int, Array]] = deque()
     joints, targets = np.empty((task.steps + 1, 7)), np.empty((task.steps, 3))
     with arm.servo(

@@ -19,6 +19,7 @@ from heptarm.arm.link.link import Link
 from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.arm.link.state_stream import GROUPS, StateFeed, States, StateSample, groups_of
 from heptarm.arm.translate.state import read_firing, read_result, read_robot, read_signals, read_state
+from heptarm.arm.watchdog import CONNECTION
 from heptarm.errors import (
     CommandRejected,
     ConnectionLost,
@@ -40,8 +41,6 @@ from heptarm.wire.messages import Message
 
 _log = logging.getLogger("heptarm.arm")
 
-#: Silence after which the cabinet counts a controller as lost, unless the client chooses another [s].
-WATCHDOG: float = wire.TakeControl().watchdog
 #: Time for the connection and for the answer to a request, unless the client chooses another [s].
 TIMEOUT = 5.0
 #: States per second, unless the client chooses another rate [Hz].
@@ -68,7 +67,7 @@ class Options:
     rate: float = STATE_RATE
     groups: tuple[str, ...] = GROUPS
     finishes: bool = False
-    watchdog: float = WATCHDOG
+    watchdog: float = CONNECTION.default
 
 
 #: FRI sessions whose last change is kept.
@@ -325,8 +324,8 @@ class Connection:
         return self._link is not None and self._link.error is None
 
     @property
-    def pace(self) -> float:
-        """Cabinet seconds per second of our clock."""
+    def real_time_factor(self) -> float:
+        """Seconds of the cabinet's clock per second of this computer's."""
         return max(self.link.offset.rate, 0.001)
 
     def open(self) -> None:
@@ -454,7 +453,7 @@ class Connection:
         chosen = groups_of(groups, self.welcome.groups)
         within(rate, "rate", 0.0, self.welcome.max_rate, unit="Hz")
         self.request(wire.Subscribe(groups=chosen, rate=rate))
-        self.link.expect_states(rate * self.pace)
+        self.link.expect_states(rate * self.real_time_factor)
         self.options = replace(self.options, rate=rate, groups=tuple(groups))
 
     def run(self, message: wire.Run | wire.ServoOpen | wire.FriOpen, program: SentProgram) -> None:
@@ -559,7 +558,7 @@ class Connection:
         sample, rate = self.feed.newest, self.options.rate
         if rate <= 0:
             raise StaleState("no states are subscribed", hint="arm.subscribe(rate=100)")
-        limit = max(_STALE, _STALE_PERIODS / (rate * self.pace))
+        limit = max(_STALE, _STALE_PERIODS / (rate * self.real_time_factor))
         age = float("inf") if sample is None else (self.clock.nanos() - sample.received) * 1e-9
         if sample is not None and age <= limit:
             return self.build(sample)

@@ -123,7 +123,7 @@ class Heartbeat:
     Attributes:
         timeout: silence after which the cabinet ends the session [s].
         watchdog: silence after which the cabinet counts a controller as lost [s]; infinite: not in control.
-        received: our clock when bytes last arrived [ns].
+        received: our clock when a frame last arrived [ns].
     """
 
     __slots__ = ("received", "timeout", "watchdog")
@@ -415,6 +415,7 @@ class Link:
         try:
             self._reader = get_ident()
             self._read(wait=False)
+            self._heartbeat.check(self._clock.nanos(), self.peer)
         finally:
             self._reader = 0
             self._reading.release()
@@ -427,10 +428,11 @@ class Link:
             size = self._transport.receive_into(view, wait=wait)
             if size == 0:
                 return
-            now = self._heartbeat.received = self._clock.nanos()
+            now = self._clock.nanos()
             session = self._session
             session.receive_data(view[:size])
             for event in session.events():
+                self._heartbeat.received = now  # only a whole frame is a sign of life
                 if type(event) is StateReceived:
                     self._on_state(event.body, now)
                 elif type(event) is Received:

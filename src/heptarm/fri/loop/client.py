@@ -192,9 +192,17 @@ class Client(Reader):
     def _wait_for_loop(self, timeout: float) -> None:
         deadline = time.monotonic() + timeout
         while self._header[at.STATUS] == at.Status.STARTING:
-            if not self._worker.is_alive() or time.monotonic() > deadline:
+            if not self._worker.is_alive():
+                raise ConnectFailed(
+                    f"the loop's process ended while it started: {self._worker.printed() or 'it printed nothing'}"
+                )
+            if time.monotonic() > deadline:
                 self._worker.kill()
-                raise ConnectFailed(f"the loop's process did not start within {timeout:g} s")
+                printed = self._worker.printed()
+                raise ConnectFailed(
+                    f"the loop's process did not start within {timeout:g} s"
+                    + (f": {printed}" if printed else "")
+                )
             time.sleep(2e-3)
         if (status := self._header[at.STATUS]) in (at.Status.FAILED, at.Status.NO_PORT):
             self._worker.join(1.0)

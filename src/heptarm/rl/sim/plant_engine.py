@@ -80,7 +80,7 @@ class PlantEngine:
         """Let one decision pass with commanded joints, shape (envs, 7) [rad]."""
         self._time += self._period
         for index, plant in enumerate(self.plants):
-            plant.ring.post(_SERVO, command[index])
+            plant.shared.post(_SERVO, command[index])
             plant.step(round(self._time[index] / TICK) - plant.tick_count)
             state = plant.snapshot
             self.q[index], self.dq[index] = state.q, state.dq

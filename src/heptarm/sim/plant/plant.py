@@ -106,8 +106,8 @@ class Snapshot:
 class _Inputs:
     """What the controller reads from the shared state; see `ControllerInputs`."""
 
-    def __init__(self, ring: SharedState) -> None:
-        self._header, self.signals, self.target = ring.reals, ring.signals, ring.target
+    def __init__(self, shared: SharedState) -> None:
+        self._header, self.signals, self.target = shared.reals, shared.signals, shared.target
 
     @property
     def override(self) -> float:
@@ -132,7 +132,7 @@ class Plant:
         self.data = mujoco.MjData(self.model)
         self.data.qpos[:7] = q
         mujoco.mj_forward(self.model, self.data)
-        self.ring = SharedState()
+        self.shared = SharedState()
         self.tick_count = 0
         self.on_wake: Callable[[int], None] | None = None
         self._views()
@@ -142,7 +142,7 @@ class Plant:
             deque()
         )  # to take effect in the next tick
         self._control = ActiveLaw(self.robot, self.model, self.data)
-        self.signals = IoImage(self.ring.signals)
+        self.signals = IoImage(self.shared.signals)
         self._sensed = MeasuredState(
             self._q, self._dq, self._mass[:7, :7], self._bias, self._passive, self._q, self._q, self._q
         )
@@ -153,7 +153,7 @@ class Plant:
         self._braked = self._sensed
         self._halted = 0  # ticks for which a stop on the path has been in force
         self.interpolator = Interpolator(
-            self.robot, _Inputs(self.ring), self._sensed, self._load, self._control, self.safety
+            self.robot, _Inputs(self.shared), self._sensed, self._load, self._control, self.safety
         )
         self.condition_monitor = self.interpolator.condition_monitor
         self._write(0, 0.0, nan)
@@ -178,11 +178,11 @@ class Plant:
     @property
     def override(self) -> float:
         """Factor on every programmed speed, 0 to 1; Java writes it directly into the shared state."""
-        return float(self.ring.reals[HeaderWords.OVERRIDE])
+        return float(self.shared.reals[HeaderWords.OVERRIDE])
 
     @override.setter
     def override(self, value: float) -> None:
-        self.ring.reals[HeaderWords.OVERRIDE] = value
+        self.shared.reals[HeaderWords.OVERRIDE] = value
 
     @property
     def idle(self) -> bool:
@@ -326,7 +326,7 @@ class Plant:
             self._brakes = PositionLaw.continuing(self._tau_cmd, self._braked)
 
     def _write(self, order: int, progress: float, remaining: float) -> None:
-        k, r = self.tick_count, self.ring
+        k, r = self.tick_count, self.shared
         slot = k % SLOTS
         words, reals = r.ints[slot], r.floats[slot]
         words[StateWords.SEQ] = 2 * k + 1
@@ -382,7 +382,7 @@ class Plant:
     @property
     def snapshot(self) -> Snapshot:
         """The newest state, copied."""
-        slot = self.ring.floats[self.tick_count % SLOTS]
+        slot = self.shared.floats[self.tick_count % SLOTS]
         return Snapshot(
             self.tick_count * TICK,
             self._q.copy(),

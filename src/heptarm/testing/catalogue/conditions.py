@@ -9,7 +9,8 @@ from heptarm.testing.measure import above, below, fresh, holds, near, note, reco
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
 from heptarm.values.condition.condition import Condition
-from heptarm.values.condition.signals import Force, Path, force, io, path, torque
+from heptarm.values.condition.force import Force, force, torque
+from heptarm.values.condition.signals import Path, io, path
 from heptarm.values.motion.line import lin_rel
 from heptarm.values.motion.motion import hold
 from heptarm.values.motion.ptp import ptp

@@ -9,7 +9,8 @@ from heptarm.testing.catalogue.modes import held, let_go
 from heptarm.testing.measure import Unfit, above, below, fresh, holds, near, watch
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import DEEPEST, HOME
-from heptarm.values.condition.signals import Force, force, io
+from heptarm.values.condition.force import Force, force
+from heptarm.values.condition.signals import io
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.motion import hold

@@ -81,7 +81,7 @@ def touched(arm: Arm) -> None:
 @scenario(line=8, rows="H12 H13", risk=Risk.CONTACT, operator=True, space=0.1, needs=("ptp",))
 def taps(arm: Arm) -> None:
     """A motion is interrupted by a tap and goes on after two more."""
-    from heptarm.values.condition.signals import force
+    from heptarm.values.condition.force import force
 
     target = ptp(HOME + deg(0, 0, 0, 0, 0, 0, 60), speed=0.2)
     handle = arm.start(target, until=force > 15)
@@ -92,7 +92,7 @@ def taps(arm: Arm) -> None:
     done = Event()
 
     def tap() -> None:
-        while not done.wait(0.4 / max(arm.pace, 1.0)):
+        while not done.wait(0.4 / max(arm.real_time_factor, 1.0)):
             arm.operator.push((0.0, 0.0, 30.0), duration=0.1)
 
     hand = Thread(target=tap)
@@ -148,7 +148,7 @@ def taught(arm: Arm) -> None:
     above(float(offset.max()), 0.05, "taught: a joint was guided by", unit="rad")
     trajectory = whole.trimmed().thinned()
     above(float(len(trajectory)), 1.5, "positions kept, each with its time")
-    replay = arm.replay(trajectory, by="spline", pace=0.5)
+    replay = arm.replay(trajectory, by="spline", speed_scaling=0.5)
     holds(replay.result.arrived, "it was done again")
     below(replay.deviation, 0.05, "farthest from what was taught", unit="rad")
     near(arm.wait_for_rest().q, trajectory.q[-1], 2e-3, "its end", unit="rad")

@@ -34,7 +34,7 @@ def round_trip(arm: Arm) -> None:
 def clock(arm: Arm) -> None:
     """The two clocks are compared: the age of a state is known, though nobody has set a clock."""
     ages = [state.age for state in arm.states(duration=0.3)]
-    below(abs(float(np.median(ages))), 0.05 * max(arm.pace, 1.0), "median age of the states", unit="s")
+    below(abs(float(np.median(ages))), 0.05 * max(arm.real_time_factor, 1.0), "median age of the states", unit="s")
 
 
 @scenario(line=10, rows="O6 O7 O8 O10", risk=Risk.FAULT, virtual=True, space=0.5, needs=("ptp",))

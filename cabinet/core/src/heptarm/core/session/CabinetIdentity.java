@@ -28,9 +28,10 @@ final class CabinetIdentity {
         return settings.key;
     }
 
-    Welcome welcome(int session, byte[] proof) {
+    /** The Welcome, without a proof of the key. */
+    Welcome welcome(int session) {
         return new Welcome(Protocol.MAJOR, Protocol.MINOR, session, ServerSettings.VERSION, robot.cabinet, robot.isVirtual, robot.info,
                 robot.capabilities, tools.known(), robot.tools.frames(), robot.signals.signals(), ALL_GROUPS, settings.maxRate,
-                settings.heartbeat, authority.name(), proof);
+                settings.heartbeat, authority.name(), new byte[0]);
     }
 }

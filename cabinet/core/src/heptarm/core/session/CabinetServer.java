@@ -144,12 +144,17 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
 
     public void closed(ClientConnection client, String why) {
         clients.remove(client);
-        ending(client, why);
+        ending(client, 0, why);
     }
 
-    public void ending(ClientConnection client, String why) {
+    public void ending(ClientConnection client, int code, String why) {
         service.sampler.unsubscribe(client);
-        if (service.authority.isController(client)) {
+        if (!service.authority.isController(client)) {
+            return;
+        }
+        if (code == Code.FORGED_FRAME || code == Code.BAD_FRAME) {
+            service.authority.distrust(client, why);
+        } else {
             service.authority.lost(client, why);
         }
     }

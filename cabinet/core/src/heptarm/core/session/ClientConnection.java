@@ -9,12 +9,14 @@ import java.util.ArrayDeque;
 import heptarm.core.Clock;
 import heptarm.core.Log;
 import heptarm.core.Threads;
+import heptarm.core.key.FrameTag;
 import heptarm.core.state.StateSampler;
 import heptarm.wire.Code;
 import heptarm.wire.Goodbye;
 import heptarm.wire.Message;
 import heptarm.wire.Protocol;
 import heptarm.wire.State;
+import heptarm.wire.Welcome;
 
 /**
  * One connection: a reader thread that answers requests, and a writer thread with an outbox for everything else.
@@ -48,6 +50,12 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     private long dropped;
 
     private int seq;
+    private int expected;
+    /** Tags of the client's frames and of ours; null without a key. */
+    private FrameTag theirs;
+    private FrameTag ours;
+    private byte[] tagged = new byte[0];
+    private long arrived;
     private Thread reader;
     private Thread writer;
     private final long connected;
@@ -59,8 +67,8 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
 
     /** Receives the end of a connection. */
     interface Owner {
-        /** The client receives no more states and events, and controls nothing any more. */
-        void ending(ClientConnection client, String why);
+        /** The client receives no more states and events, and controls nothing any more; code: of the Goodbye, 0: none. */
+        void ending(ClientConnection client, int code, String why);
 
         /** The connection is closed. */
         void closed(ClientConnection client, String why);
@@ -166,7 +174,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         try {
             while (!gone) {
                 if (filled == buffer.length) {
-                    byte[] larger = new byte[Math.min(buffer.length * 4, Protocol.HEADER + Protocol.MAX_BODY)];
+                    byte[] larger = new byte[Math.min(buffer.length * 4, Protocol.HEADER + Protocol.MAX_BODY + Protocol.TAG)];
                     System.arraycopy(buffer, 0, larger, 0, filled);
                     buffer = larger;
                 }
@@ -174,7 +182,10 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
                 if (count < 0) {
                     break;
                 }
-                lastReceived = clock.nanos();
+                arrived = clock.nanos();
+                if (theirs == null) {
+                    lastReceived = arrived; // with a key only whole frames of the client are a sign of life
+                }
                 filled += count;
                 int used = handleFrames(buffer, filled);
                 filled -= used;
@@ -206,21 +217,46 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
                 goodbye(Code.BAD_FRAME, "it sent bytes that are not a heptarm frame");
                 return filled;
             }
-            if (filled - pos < Protocol.HEADER + length) {
+            int rest = pos + Protocol.HEADER + length;
+            int end = theirs == null ? rest : rest + Protocol.TAG;
+            if (data[pos + FrameEncoder.FLAGS] != (theirs == null ? 0 : FrameEncoder.TAGGED)) {
+                forged(theirs == null ? "a frame has flags that this session does not have" : "a frame has no tag");
+                return filled;
+            }
+            if (filled < end) {
                 break;
+            }
+            if (theirs != null && !theirs.fits(data, pos, rest)) {
+                forged("a frame has a wrong tag");
+                return filled;
             }
             int version = data[pos + 2] & 0xFF;
             int type = (data[pos + 4] & 0xFF) << 8 | data[pos + 5] & 0xFF;
             long request = int32(data, pos + 14) & 0xFFFFFFFFL;
+            if (int32(data, pos + FrameEncoder.SEQUENCE) != expected) {
+                forged("frame " + (expected & 0xFFFFFFFFL) + " was expected, frame "
+                        + (int32(data, pos + FrameEncoder.SEQUENCE) & 0xFFFFFFFFL) + " came");
+                return filled;
+            }
+            expected++;
+            if (expected == 0 && theirs != null) {
+                theirs.beginRound();
+            }
+            lastReceived = arrived;
             if (handshake.isOpen()) {
                 long stamp = (long) int32(data, pos + 18) << 32 | int32(data, pos + 22) & 0xFFFFFFFFL;
                 dispatcher.handle(this, type, request, stamp, data, pos + Protocol.HEADER, length);
             } else {
                 handshake.handle(version, type, data, pos + Protocol.HEADER, length);
             }
-            pos += Protocol.HEADER + length;
+            pos = end;
         }
         return ending ? filled : pos;
+    }
+
+    /** End a session in which a frame is not the next one of the client. */
+    private void forged(String what) {
+        goodbye(Code.FORGED_FRAME, what + ": it was forged, changed, repeated, reordered or lost on its way");
     }
 
     private static int int32(byte[] data, int at) {
@@ -253,7 +289,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
             leave("it does not read its answers");
             return;
         }
-        writeFrame(frame);
+        writeFrame(frame, ours);
     }
 
     /** Claim the connection: other frames wait until {@link #writeClaimed}. False: the connection is ending. */
@@ -267,14 +303,21 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         }
     }
 
-    /** Write a message over the claimed connection and free it. */
-    void writeClaimed(Message message) {
-        writeFrame(frames.frame(message, 0));
+    /**
+     * Write the Welcome over the claimed connection and free it; every later frame has a tag.
+     *
+     * @param incoming tags of the client's frames, null: none
+     * @param outgoing tags of the frames to the client, null: none
+     */
+    void open(byte[] welcome, FrameTag incoming, FrameTag outgoing) {
+        theirs = incoming; // before the Welcome, after which the client sends tagged frames
+        writeFrame(frames.frame(Welcome.TYPE, welcome), outgoing);
     }
 
-    private void writeFrame(byte[] frame) {
+    private void writeFrame(byte[] frame, FrameTag next) {
         try {
             write(frame);
+            ours = next;
         } catch (IOException e) {
             leave("the connection broke (" + e.getMessage() + ")");
         } finally {
@@ -325,7 +368,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
             ending = true;
             outbox.notify();
         }
-        owner.ending(this, text);
+        owner.ending(this, code, text);
     }
 
     /** Refuse a connection. */
@@ -390,11 +433,31 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
 
     private void write(byte[] frame) throws IOException {
         FrameEncoder.putInt(frame, FrameEncoder.SEQUENCE, seq++); // only the thread that holds `writing` gets here
+        byte[] data = frame;
+        int length = frame.length;
+        if (ours != null) {
+            data = withTag(frame);
+            length += Protocol.TAG;
+        }
         long now = clock.nanos();
         writeBegan = now;
-        out.write(frame);
+        out.write(data, 0, length);
         lastSent = now;
         writeBegan = 0;
+    }
+
+    /** The frame with its tag, in a buffer that the next one overwrites. */
+    private byte[] withTag(byte[] frame) {
+        if (tagged.length < frame.length + Protocol.TAG) {
+            tagged = new byte[2 * frame.length + Protocol.TAG];
+        }
+        System.arraycopy(frame, 0, tagged, 0, frame.length);
+        tagged[FrameEncoder.FLAGS] = FrameEncoder.TAGGED;
+        ours.write(tagged, 0, frame.length);
+        if (seq == 0) {
+            ours.beginRound();
+        }
+        return tagged;
     }
 
     // ------------------------------------------------------------------------------------------- the end

@@ -7,6 +7,10 @@ import heptarm.wire.Protocol;
 
 /** Encodes frames; the connection that sends one fills in its sequence number. */
 final class FrameEncoder {
+    /** Offset of the flags in the header. */
+    static final int FLAGS = 3;
+    /** Flag of a frame that ends with a tag. */
+    static final int TAGGED = 1;
     /** Offset of the sequence number in the header. */
     static final int SEQUENCE = 10;
     private static final int LENGTH = 6;

@@ -1,16 +1,13 @@
 package heptarm.core.session;
 
-import java.security.GeneralSecurityException;
 import java.security.MessageDigest;
 import java.security.SecureRandom;
 
-import javax.crypto.Mac;
-import javax.crypto.spec.SecretKeySpec;
-
 import heptarm.core.CommandRejected;
+import heptarm.core.key.FrameTag;
+import heptarm.core.key.KeyExchange;
 import heptarm.wire.Challenge;
 import heptarm.wire.Code;
-import heptarm.wire.Encoder;
 import heptarm.wire.Hello;
 import heptarm.wire.Message;
 import heptarm.wire.Messages;
@@ -25,8 +22,6 @@ import heptarm.wire.WireException;
 
 /** The first frames of a connection: versions, the key, the Welcome. The schema's table lists which message is legal when. */
 final class Handshake {
-    private static final String HMAC = "HmacSHA256";
-    private static final int NONCE = 32;
     private static final SecureRandom RANDOM = new SecureRandom();
 
     private final CabinetIdentity identity;
@@ -35,6 +30,7 @@ final class Handshake {
     private String name = "a client";
     private Hello hello;
     private byte[] nonce;
+    private KeyExchange exchange;
 
     Handshake(CabinetIdentity identity, ClientConnection client) {
         this.identity = identity;
@@ -69,10 +65,18 @@ final class Handshake {
                     "message " + type + " is illegal in session state " + state + "; send Hello first");
         }
         state = next;
+        if (message instanceof Hello && identity.key().length() > 0) {
+            exchange = new KeyExchange(identity.key());
+        }
+        if (exchange != null && message instanceof Hello) {
+            exchange.add(type, data, offset, length);
+        }
         if (message instanceof Hello) {
             greet((Hello) message);
         } else if (message instanceof Proof) {
             verify((Proof) message);
+            exchange.add(type, data, offset, length);
+            welcome();
         } else {
             client.leave("it said goodbye");
         }
@@ -98,21 +102,23 @@ final class Handshake {
         if (message.major != Protocol.MAJOR) {
             throw new CommandRejected(Code.WRONG_VERSION, versions(message.major + "." + message.minor));
         }
-        if (identity.key().length() == 0) {
-            welcome(new byte[0]);
+        if (exchange == null) {
+            welcome();
             return;
         }
-        nonce = new byte[NONCE];
+        nonce = new byte[Protocol.NONCE];
         RANDOM.nextBytes(nonce);
+        Challenge challenge = new Challenge(nonce);
+        byte[] body = challenge.body();
+        exchange.add(Challenge.TYPE, body, 0, body.length);
         sent(Challenge.TYPE);
-        client.answer(new Challenge(nonce), 0);
+        client.answer(challenge, 0);
     }
 
     private void verify(Proof proof) throws CommandRejected {
-        if (!MessageDigest.isEqual(mac(nonce, hello.nonce), proof.mac)) {
+        if (!MessageDigest.isEqual(exchange.clientMac(), proof.mac)) {
             throw new CommandRejected(Code.WRONG_KEY, "the pre-shared key is wrong; use the one in the process data heptarm.key");
         }
-        welcome(mac(hello.nonce, nonce));
     }
 
     private static String versions(String theirs) {
@@ -120,23 +126,29 @@ final class Handshake {
                 + " (heptarm " + ServerSettings.VERSION + "); install matching versions on both";
     }
 
-    private byte[] mac(byte[] first, byte[] second) {
-        try {
-            Mac mac = Mac.getInstance(HMAC);
-            mac.init(new SecretKeySpec(Encoder.utf8(identity.key()), HMAC));
-            mac.update(first);
-            return mac.doFinal(second);
-        } catch (GeneralSecurityException e) {
-            throw new IllegalStateException("no HMAC-SHA-256", e);
-        }
-    }
-
-    private void welcome(byte[] proof) {
+    private void welcome() {
         if (!client.claim()) {
             return; // the cabinet application is closing
         }
         sent(Welcome.TYPE); // events are queued from here on; the Welcome goes out first and reflects all earlier ones
-        client.writeClaimed(identity.welcome(client.session(), proof));
+        byte[] body = identity.welcome(client.session()).body();
+        FrameTag theirs = null;
+        FrameTag ours = null;
+        if (exchange != null) {
+            body = withMac(body, exchange.cabinetMac(Welcome.TYPE, body));
+            theirs = exchange.clientTag(hello.nonce, nonce);
+            ours = exchange.cabinetTag(hello.nonce, nonce);
+        }
+        client.open(body, theirs, ours);
+    }
+
+    /** The body of a Welcome, whose last field is an empty mac, with its mac. */
+    private static byte[] withMac(byte[] body, byte[] mac) {
+        byte[] whole = new byte[body.length + mac.length];
+        System.arraycopy(body, 0, whole, 0, body.length);
+        FrameEncoder.putInt(whole, body.length - 4, mac.length);
+        System.arraycopy(mac, 0, whole, body.length, mac.length);
+        return whole;
     }
 
     void refuse(int code, String text) {

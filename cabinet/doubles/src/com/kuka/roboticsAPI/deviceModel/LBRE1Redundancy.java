@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.deviceModel;
 
-/** Redundancy of an LBR: arm angle E1 [rad], status and turn bits. */
+/** Redundancy of an LBR: arm angle E1 [rad], Status and Turn. */
 public class LBRE1Redundancy extends StatusTurnRedundancy {
     private double e1;
 

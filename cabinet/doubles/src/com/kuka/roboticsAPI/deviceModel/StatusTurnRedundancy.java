@@ -2,7 +2,7 @@ package com.kuka.roboticsAPI.deviceModel;
 
 import com.kuka.roboticsAPI.geometricModel.redundancy.AbstractRedundancyCollection;
 
-/** Which of the postures of a pose: status and turn bits; -1: not given. */
+/** Configuration for a pose: Status and Turn; -1: not given. */
 public class StatusTurnRedundancy extends AbstractRedundancyCollection {
     private int status;
     private int turn;

@@ -1,5 +1,5 @@
 package com.kuka.roboticsAPI.geometricModel.redundancy;
 
-/** What a pose leaves open of a robot's joints. */
+/** Redundancy of a robot at a pose. */
 public interface IRedundancyCollection {
 }
