@@ -18,7 +18,7 @@ from heptarm.errors import ShapeError
 from heptarm.io import tcp
 from heptarm.io.clock import RealClock
 from heptarm.io.transport import Transport
-from heptarm.values.arrays import flag, instance, within, word
+from heptarm.values.arrays import finite, flag, instance, within, word
 from heptarm.wire import messages as wire
 
 _log = logging.getLogger("heptarm.arm")
@@ -94,7 +94,7 @@ def connect(
         rate=within(state_rate, "state_rate", 0.0, 1000.0, unit="Hz"),
         groups=groups,
         finishes=on_disconnect == "finish",
-        watchdog=CONNECTION.time(watchdog),
+        watchdog=CONNECTION.time(finite(watchdog, "watchdog", unit="s")),
     )
     chosen = parse_target(target_from_env() if target is None else target)
     private = PrivateCabinet.start(chosen) if chosen.is_private else None
