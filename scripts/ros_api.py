@@ -178,7 +178,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
     "heptarm": {
         "arc": ("as CIRC or SPLINE, with points computed by the client", "~/run_program"),
         "circ": ("~/move_pose", "~/run_program"),
-        "connect": (LIFE, "parameters `target`, `key`, `watchdog`, `state_rate`"),
+        "connect": (LIFE, "parameters `target`, `key_file`, `watchdog`, `state_rate`"),
         "deg": ("ROS uses radians",),
         "ellipse": ("as SPLINE, with points computed by the client", "~/run_program"),
         "hand_guide": ("~/guide", "~/teach", "~/run_program"),

@@ -1,4 +1,4 @@
-"""`heptarm sim --app`: applications of other people, and those written on heptarm's core without any network."""
+"""`heptarm sim --app`: applications of other people, and those on heptarm's core without a network."""
 
 from __future__ import annotations
 
@@ -224,7 +224,7 @@ def test_sources_run_in_the_encodings_that_they_are_written_in(tmp_path: Path, e
 
 
 def wrong(folder: Path, body: str, imports: str = "") -> str:
-    """What is said about an application that does not compile."""
+    """Messages about an application that does not compile."""
     (folder / "Wrong.java").write_text(
         f"{imports} import com.kuka.roboticsAPI.deviceModel.LBR;"
         "import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;\n"
@@ -359,7 +359,7 @@ def test_a_typed_line_answers_a_dialog_that_says_what_to_type(asking: Path) -> N
         ("--view-port", "8081"),
         ("--host", "0.0.0.0"),
         ("--port", "0"),
-        ("--key", "secret"),
+        ("--key-file", "cell.key"),
         ("--fri", "1.15"),
         ("--fri-io", "G.S<bool"),
     ],

@@ -26,7 +26,7 @@ def free_port() -> int:
 
 
 class Told(list[Any]):
-    """What a controller has printed; and what is typed to it."""
+    """Output and input of a controller process."""
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         super().__init__()
@@ -42,7 +42,7 @@ class Told(list[Any]):
 def controller(
     port: int, *arguments: str, version: str = "1.15", typed: bool = False
 ) -> Iterator[tuple[Any, Told]]:
-    """`heptarm sim --fri`; what it prints, at last also how it ended."""
+    """`heptarm sim --fri`: its output, including its end."""
     command = [*HEPTARM, "sim", "--json", "--fri", version, "--fri-client", f"127.0.0.1:{port}"]
     with ctrl_c_interrupts():
         started = subprocess.Popen(
@@ -102,6 +102,53 @@ def test_a_bare_controller_has_signals_and_asks_for_frames() -> None:
         assert line in texts
 
 
+def test_a_bare_controller_has_a_posture_an_impedance_a_force_and_faults() -> None:
+    options = ("--fri-mode", "joint-impedance", "--fri-stiffness", "500", "--fri-force", "0,0,-20")
+    start = (10.0, 20.0, 0.0, -80.0, 0.0, 70.0, 5.0)
+    posture = ("--fri-start", ",".join(map(str, start)), "--fault", "emergency_stop@60", "--payload", "1")
+    with (
+        Client(0, realtime=False) as client,
+        controller(client.port, "--fri-period", "10", *options, *posture, version="2.7", typed=True) as (
+            _,
+            told,
+        ),
+    ):
+        state = client.wait("COMMANDING_ACTIVE", timeout=60.0)
+        assert state.q_ipo == pytest.approx(np.radians(start), abs=0.02)
+        assert state.wrench[2] < -20.0  # the force, and the payload that the controller does not know of
+        for s in client:
+            deflection = s.tau_ext / 500.0
+            if np.abs(deflection).max() > 0.01 and s.q - s.q_ipo == pytest.approx(deflection, abs=2e-3):
+                break
+        told.say("emergency_stop")
+        client.wait("MONITORING_READY", timeout=30.0)
+        told.say("clear")
+        client.wait("COMMANDING_ACTIVE", timeout=30.0)
+    ends = [one["text"] for one in told if one.get("event") == "OverlayEnded"]
+    assert len(ends) == 2 and "safety stop" in ends[0]
+
+
+def test_torques_begin_on_an_impedance_that_holds_the_arm() -> None:
+    with (
+        Client(0, realtime=False) as client,
+        controller(client.port, "--fri-command", "torque", "--fri-force", "0,0,-20"),
+    ):
+        begin = client.wait("COMMANDING_ACTIVE", timeout=60.0).q.copy()
+        for s in client:
+            assert np.abs(s.q - begin).max() < 0.2
+            if s.t > 0.5:
+                break
+
+
+def test_the_network_of_a_bare_controller_has_faults() -> None:
+    faults = ("--fri-network", "loss=0.5", "--fri-network", "delay=0.001")
+    with Client(0, realtime=False) as client, controller(client.port, *faults) as (_, told):
+        client.wait("MONITORING_WAIT", timeout=60.0)
+        for _ in zip(range(30), client, strict=False):
+            pass
+    assert told[-1]["answers"]["lost"] > 5
+
+
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
@@ -114,6 +161,19 @@ def test_a_bare_controller_has_signals_and_asks_for_frames() -> None:
         (("--fri", "1.15", "--fri-frame", "x" * 64), "63 bytes"),
         (("--fri", "1.15", "--fri-client", "here"), "no IPv4 address"),
         (("--fri", "1.15", "--fri-client", "127.0.0.1:x"), "HOST:PORT"),
+        (("--fri", "1.15", "--fri-start", "0,30,0"), "--fri-start must be 7 finite numbers"),
+        (("--fri", "1.15", "--fri-start", "0,130,0,0,0,0,0"), "A2 must be in [-120, 120] deg"),
+        (("--fri", "1.15", "--fri-stiffness", "300"), "--fri-stiffness needs an impedance"),
+        (("--fri", "1.15", "--fri-mode", "joint-impedance", "--fri-stiffness", "9000"), "[0, 5000] Nm/rad"),
+        (
+            ("--fri", "1.15", "--fri-command", "torque", "--fri-mode", "position"),
+            "not possible in control mode",
+        ),
+        (("--fri", "1.15", "--fri-force", "1,2"), "--fri-force must be 3 finite numbers"),
+        (("--fri", "1.15", "--fri-network", "luck=1"), "one of loss, duplicate"),
+        (("--fri", "1.15", "--fri-network", "loss=2"), "loss must be in [0, 1]"),
+        (("--fri", "1.15", "--fault", "explode@1"), "not understood"),
+        (("--fri", "1.15", "--key", "x"), "--key cannot be used with --fri"),
     ],
 )
 def test_what_no_cabinet_would_do_is_refused_in_words(arguments: tuple[str, ...], why: str) -> None:

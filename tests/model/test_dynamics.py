@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
-
 import numpy as np
 import pytest
 
@@ -19,7 +17,7 @@ from heptarm.model.dynamics import (
 )
 from heptarm.model.kinematics import forward, jacobian
 from heptarm.values.robot import ROBOTS, Body, RobotModel
-from tests.model.arms import MODELS, random_q
+from tests.model.arms import random_q
 
 ALL = list(ROBOTS.values())
 LOAD = Body(3.0, (0.02, -0.01, 0.08), (0.02, 0.03, 0.025, 0.001, -0.002, 0.003))
@@ -30,9 +28,11 @@ def by_name(robot: RobotModel) -> str:
 
 
 def mujoco_model(robot: RobotModel, load: Body | None = None) -> tuple[object, object]:
-    """The plant's model without the assumptions that are not rigid-body dynamics, perhaps with a load."""
+    """The plant's model reduced to rigid-body dynamics, optionally with a load."""
     mujoco = pytest.importorskip("mujoco")
-    spec = mujoco.MjSpec.from_string(files("heptarm.sim").joinpath("models", f"{robot.name}.xml").read_text())
+    from heptarm.sim.plant.world import specification
+
+    spec = specification(robot.name)
     if load is not None:
         xx, yy, zz, xy, xz, yz = load.inertia
         tool = spec.body("link_7").add_body(name="load", pos=robot.links.flange)
@@ -44,7 +44,7 @@ def mujoco_model(robot: RobotModel, load: Body | None = None) -> tuple[object, o
     return model, mujoco.MjData(model)
 
 
-@pytest.mark.parametrize("robot", MODELS, ids=by_name)
+@pytest.mark.parametrize("robot", ALL, ids=by_name)
 @pytest.mark.parametrize("load", [None, LOAD], ids=["bare", "loaded"])
 def test_that_of_mujoco(robot: RobotModel, load: Body | None) -> None:
     mujoco = pytest.importorskip("mujoco")
@@ -64,7 +64,7 @@ def test_that_of_mujoco(robot: RobotModel, load: Body | None) -> None:
         assert np.abs(forward_dynamics(robot, q, dq, tau, load=load) - ddq).max() < 1e-8
 
 
-@pytest.mark.parametrize("robot", MODELS, ids=by_name)
+@pytest.mark.parametrize("robot", ALL, ids=by_name)
 def test_links_are_those_of_the_plant(robot: RobotModel) -> None:
     pytest.importorskip("mujoco")
     model, _ = mujoco_model(robot)
@@ -120,7 +120,7 @@ def test_laws(robot: RobotModel) -> None:
 
 @pytest.mark.parametrize("robot", ALL, ids=by_name)
 def test_gravity_is_the_slope_of_the_potential(robot: RobotModel) -> None:
-    """The load's share is the wrench of its weight, through the Jacobian."""
+    """The load adds the wrench of its weight, mapped by the Jacobian."""
     rng = np.random.default_rng(23)
     for _ in range(20):
         q = random_q(robot, rng)

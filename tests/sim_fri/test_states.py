@@ -1,15 +1,19 @@
-"""The state table of a session, one test for each way from a state to another."""
+"""The state table of a session, one test for each transition."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from heptarm.errors import CommandRejected, LimitError, ModeConflict
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.version import Version
+from heptarm.sim.fri import cartesian
 from heptarm.sim.fri.overlay import CONTROLS, MotionOverlay
 from heptarm.sim.fri.settings import QualityChanged, SessionConfiguration
-from tests.sim_fri.rig import Rig, State
+from tests.sim_fri.rig import Rig, State, mirror
 
 MODES = [(mode, control) for mode, controls in CONTROLS.items() for control in controls]
 
@@ -57,6 +61,61 @@ def test_ready_to_commanding_wait_to_active(mode: m.CommandMode, control: m.Cont
     assert ipo.overlay is (m.Overlay.CARTESIAN if mode is m.CommandMode.CARTESIAN_POSE else m.Overlay.JOINT)
     waits = [s for s in rig.client.seen if s.connection and s.connection.state is State.COMMANDING_WAIT]
     assert waits and all(s.ipo is not None and s.ipo.q is not None and s.ipo.tracking is None for s in waits)
+
+
+@pytest.mark.parametrize("version", Version)
+@pytest.mark.parametrize(("period", "multiplier"), [(1, 1), (2, 1), (5, 1), (10, 1), (100, 1), (5, 4)])
+def test_a_client_sees_every_state_in_several_messages(
+    version: Version, period: int, multiplier: int
+) -> None:
+    """Public clients set themselves up when MONITORING_READY begins, whenever the application starts its motion."""
+    rig = Rig(configuration=SessionConfiguration(version, period, multiplier))
+    rig.controller.open()
+    while rig.controller.state is not State.MONITORING_READY:
+        rig.run(1)
+    rig.controller.start(MotionOverlay())  # in the tick in which the session becomes ready
+    rig.until(State.COMMANDING_ACTIVE)
+    rig.run(period)
+    seen = [one.connection.state for one in rig.client.seen if one.connection is not None]
+    assert seen.count(State.MONITORING_READY) > 4 * multiplier
+    assert seen.count(State.COMMANDING_WAIT) > 9 * multiplier
+    assert seen == sorted(seen)
+    ready = [
+        one for one in rig.client.seen if one.connection and one.connection.state is State.MONITORING_READY
+    ]
+    assert all(
+        one.ipo == m.IpoData(command_mode=m.CommandMode.NO_COMMAND, overlay=m.Overlay.NONE) for one in ready
+    )
+
+
+def test_an_overlay_that_is_stopped_before_it_waits_has_ended() -> None:
+    rig = Rig().ready()
+    rig.controller.start(MotionOverlay())
+    rig.controller.stop()
+    rig.run(100)
+    assert rig.end.cause == "cancelled" and rig.states[-1] is State.MONITORING_READY
+
+
+@pytest.mark.parametrize("mode", [m.CommandMode.POSITION, m.CommandMode.WRENCH, m.CommandMode.CARTESIAN_POSE])
+def test_a_client_may_mirror_the_measured_position_of_a_compliant_arm(mode: m.CommandMode) -> None:
+    rig = Rig(Version.V2_5)
+    rig.arm.q = sagged = rig.arm.q_ipo + 0.02
+    pose = cartesian.transformation(rig.arm.robot, tuple(sagged.tolist()))
+
+    def measured(message: m.Monitoring) -> m.Command:
+        if mode is m.CommandMode.CARTESIAN_POSE:
+            return replace(
+                mirror(message), pose=pose, redundancy=m.Redundancy(m.RedundancyStrategy.E1, sagged[2])
+            )
+        return replace(mirror(message), q=tuple(sagged.tolist()))
+
+    rig.client.waiting = rig.client.law = measured
+    rig.active(MotionOverlay(mode, m.ControlMode.CARTESIAN_IMPEDANCE))
+    rig.run(1)
+    assert np.abs(rig.arm.q - rig.arm.q_ipo).max() < 0.003  # the set-point begins at the interpolator's ...
+    rig.run(50)
+    assert rig.controller.state is State.COMMANDING_ACTIVE, rig.told
+    assert rig.arm.q == pytest.approx(sagged, abs=1e-6)  # ... and goes where the client wants it
 
 
 def test_commanding_wait_to_ready_when_the_application_stops() -> None:

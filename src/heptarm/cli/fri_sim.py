@@ -7,8 +7,10 @@ import re
 import signal as system
 import sys
 import threading
+import weakref
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, fields, replace
+from math import isfinite
 from typing import TYPE_CHECKING
 
 from heptarm.cli.output import emit, is_silent, lines
@@ -16,11 +18,15 @@ from heptarm.errors import CommandRejected, ConnectFailed, require
 from heptarm.fri.protocol.messages import IoDirection, IoType, IoValue
 from heptarm.fri.protocol.version import Version
 from heptarm.values.arrays import within
+from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
+from heptarm.values.mode.mode import Mode, Position
 from heptarm.values.pose import deg
 
 if TYPE_CHECKING:
+    from heptarm.sim.fri.faults import LinkFaults
     from heptarm.sim.fri.server import Server
     from heptarm.sim.fri.settings import Event
+    from heptarm.sim.runtime.operator import SimulatedOperator
     from heptarm.sim.runtime.standalone_fri import Standalone
 
 _SIGNAL = re.compile(r"(.+\.[^.<>]+)([<>])(bool|u[0-9]+|analog.*)")
@@ -29,24 +35,11 @@ _WORDS = {"true": 1.0, "false": 0.0}
 START = (0.0, 30.0, 0.0, -90.0, 0.0, 60.0, 0.0)
 
 
-def run(
-    *,
-    version: str,
-    model: str,
-    command: str,
-    client: str,
-    period: float,
-    multiplier: int,
-    port: int | None,
-    signals: tuple[str, ...],
-    frames: tuple[str, ...],
-    speed: float,
-    verbose: bool,
-    as_json: bool,
-) -> int:
-    """Offer one session after the other until Ctrl-C or SIGTERM; return the exit code.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FriControllerOptions:
+    """Options of `heptarm sim --fri`.
 
-    Args:
+    Attributes:
         version: of FRI, such as "1.15".
         model: of the robot.
         command: "monitor", "position", "torque", "wrench" or "pose".
@@ -56,7 +49,40 @@ def run(
         port: the controller's own; None: the client's, or the next free one on the same machine.
         signals: that the client sees, as `signal` reads them.
         frames: names of frames that the client is asked for.
+        mode: "position", "joint-impedance" or "cartesian-impedance"; "": the usual one of the command.
+        stiffness: of the impedance, numbers with commas between them; "": the usual one.
+        start: joint positions at the beginning, seven numbers [deg]; "": `START`.
+        force: on the flange from the beginning, three numbers, base axes [N]; "": none.
+        network: faults of the network in both directions, each NAME=VALUE.
+        faults: actions of the operator, each NAME@SECONDS.
+        payload: on the flange, MASS or MASS,X,Y,Z [kg, m]; "": none.
         speed: simulated seconds per second.
+    """
+
+    version: str
+    model: str
+    command: str
+    client: str
+    period: float
+    multiplier: int
+    port: int | None
+    signals: tuple[str, ...]
+    frames: tuple[str, ...]
+    mode: str
+    stiffness: str
+    start: str
+    force: str
+    network: tuple[str, ...]
+    faults: tuple[str, ...]
+    payload: str
+    speed: float
+
+
+def run(options: FriControllerOptions, *, verbose: bool, as_json: bool) -> int:
+    """Offer one session after the other until Ctrl-C or SIGTERM; return the exit code.
+
+    Args:
+        options: what to run.
         verbose: also print each change of quality.
         as_json: print objects.
 
@@ -64,35 +90,35 @@ def run(
         CommandRejected: version, command and period do not go together; the text gives the reason.
         ConnectFailed: the port is taken, or the client's address is none.
     """
-    standalone = made(
-        version=version,
-        model=model,
-        command=command,
-        client=client,
-        period=period,
-        multiplier=multiplier,
-        port=port,
-        signals=signals,
-        frames=frames,
-        speed=speed,
-        tell=_printer(verbose=verbose, as_json=as_json),
-    )
+    standalone, operator = _made(options, listener=_printer(verbose=verbose, as_json=as_json))
+    before = {}
     for number in (system.SIGTERM, system.SIGINT):
         if system.getsignal(number) is not system.SIG_IGN:  # a shell's background job ignores Ctrl-C
-            system.signal(number, lambda *_: standalone.stop())
+            before[number] = system.signal(number, lambda *_: standalone.stop())
     controller, own = standalone.server.controller, standalone.server.port
-    ready = {"ready": True, "fri": version, "client": client, "port": own, "model": model, "command": command}
+    ready = {
+        "ready": True,
+        "fri": options.version,
+        "client": options.client,
+        "port": own,
+        "model": options.model,
+        "command": options.command,
+    }
     if as_json:
         emit(ready)
     else:
         print(
-            f"A virtual {model} speaks FRI {version} from UDP port {own} to a client on {client}, every {period:g} ms, "
-            f"and offers a {command} overlay. Ctrl-C ends it."
+            f"A virtual {options.model} speaks FRI {options.version} from UDP port {own} to a client on "
+            f"{options.client}, every {options.period:g} ms, and offers a {options.command} overlay. Ctrl-C ends it."
         )
         sys.stdout.flush()
-    if signals and not is_silent():
-        threading.Thread(target=_read_values, args=(standalone.server,), daemon=True).start()
+    if not is_silent():
+        # the thread may outlive the arm and must not keep it: bindings report what is left at the end as leaks
+        targets = weakref.proxy(standalone.server), weakref.proxy(operator)
+        threading.Thread(target=_read_lines, args=targets, daemon=True).start()
     standalone.run()
+    for number, handler in before.items():
+        system.signal(number, handler)
     counts = asdict(controller.meter.counts)
     if as_json:
         emit({"ended": True, "answers": counts, "refused": controller.traffic.refused})
@@ -104,42 +130,132 @@ def run(
     return 0
 
 
-def made(
-    *,
-    version: str,
-    model: str,
-    command: str,
-    client: str,
-    period: float,
-    multiplier: int,
-    port: int | None,
-    signals: tuple[str, ...],
-    frames: tuple[str, ...],
-    speed: float,
-    tell: Callable[[Event], None],
-) -> Standalone:
-    """The controller with its arm; see `run`. `tell` is called with each event."""
+def _made(
+    options: FriControllerOptions, *, listener: Callable[[Event], None]
+) -> tuple[Standalone, SimulatedOperator]:
+    """The controller with its arm, and the operator beside it."""
     require("mujoco", extra="sim")
-    from heptarm.sim.fri.sessions import PlantArm
+    from heptarm.sim.fri.faults import FaultScenario
     from heptarm.sim.fri.settings import SessionConfiguration
+    from heptarm.sim.plant.payload import parse_payload
     from heptarm.sim.plant.plant import Plant
-    from heptarm.sim.runtime.standalone_fri import Standalone, StandaloneSettings, command_mode
+    from heptarm.sim.runtime.operator import SimulatedOperator
+    from heptarm.sim.runtime.standalone_fri import (
+        OperatedArm,
+        Standalone,
+        StandaloneSettings,
+        command_mode,
+        usual_mode,
+    )
+    from heptarm.values.robot import robot
 
     try:
-        spoken = Version.of(version)
+        spoken = Version.of(options.version)
     except ValueError as error:
-        raise CommandRejected(str(error), parameter="--fri", value=version) from None
+        raise CommandRejected(str(error), parameter="--fri", value=options.version) from None
+    command, link = command_mode(options.command), link_faults(options.network)
     settings = StandaloneSettings(
         configuration=SessionConfiguration(
-            spoken, whole(period), multiplier, signals=tuple(map(signal, signals)), transformations=frames
+            spoken,
+            whole(options.period),
+            options.multiplier,
+            signals=tuple(map(signal, options.signals)),
+            transformations=options.frames,
         ),
-        client=address(client),
-        port=port,
-        command=command_mode(command),
-        speed=within(speed, "speed", 0.0, 100.0, above=True),
+        client=address(options.client),
+        port=options.port,
+        command=command,
+        mode=control(options.mode, options.stiffness, usual_mode(command)),
+        speed=within(options.speed, "speed", 0.0, 100.0, above=True),
+        scenario=FaultScenario(to_client=link, from_client=replace(link, seed=link.seed + 1)),
     )
-    plant = Plant(model, q=tuple(deg(*START).tolist()))
-    return Standalone(PlantArm(plant), settings, listener=tell)
+    start = deg(*(numbers(options.start, "--fri-start", 7) if options.start else START))
+    robot(options.model).check(start, "--fri-start")
+    plant = Plant(options.model, q=tuple(start.tolist()))
+    if options.force:
+        x, y, z = numbers(options.force, "--fri-force", 3)
+        plant.apply_wrench((x, y, z))
+    operator = SimulatedOperator(plant)
+    try:
+        if options.payload:
+            plant.set_payload(parse_payload(options.payload))
+        for fault in options.faults:
+            operator.schedule(fault)
+    except ValueError as error:
+        raise CommandRejected(str(error)) from None
+    return Standalone(OperatedArm(plant, operator), settings, listener=listener), operator
+
+
+def control(mode: str, stiffness: str, usual: Mode) -> Mode:
+    """The control mode of the names on the command line.
+
+    Raises:
+        CommandRejected: a stiffness that does not fit the mode.
+        LimitError: a stiffness out of range.
+    """
+    from heptarm.sim.runtime.standalone_fri import STIFFNESS
+
+    if mode == "position" or (not mode and isinstance(usual, Position)):
+        if stiffness:
+            raise CommandRejected(
+                "--fri-stiffness needs an impedance",
+                parameter="--fri-stiffness",
+                hint="add --fri-mode joint-impedance or cartesian-impedance",
+            )
+        return Position()
+    if mode == "joint-impedance" or (not mode and isinstance(usual, JointImpedance)):
+        values = numbers(stiffness, "--fri-stiffness", 1, 7) if stiffness else None
+        if values is None:
+            return usual if isinstance(usual, JointImpedance) else JointImpedance(STIFFNESS)
+        return JointImpedance(values[0] if len(values) == 1 else values)
+    if not stiffness:
+        return CartesianImpedance()
+    values = numbers(stiffness, "--fri-stiffness", 2, 6)
+    return CartesianImpedance(values if len(values) == 6 else (*values[:1] * 3, *values[1:] * 3))
+
+
+def numbers(text: str, name: str, *counts: int) -> tuple[float, ...]:
+    """Numbers with commas between them.
+
+    Raises:
+        CommandRejected: they are not as many, or not finite numbers.
+    """
+    try:
+        values = tuple(float(one) for one in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) not in counts or not all(map(isfinite, values)):
+        raise CommandRejected(
+            f"{name} must be {' or '.join(map(str, counts))} finite numbers with commas between them, got {text!r}",
+            parameter=name,
+            value=text,
+            hint=f"for example {name}={','.join(['10'] * counts[-1])}",
+        )
+    return values
+
+
+def link_faults(texts: tuple[str, ...]) -> LinkFaults:
+    """Faults of the network of texts NAME=VALUE.
+
+    Raises:
+        CommandRejected: there is no such fault, or its value is no number.
+        LimitError: a value out of range.
+    """
+    from heptarm.sim.fri.faults import LinkFaults
+
+    known = [one.name for one in fields(LinkFaults) if one.name not in ("silence", "seed")]
+    values = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        if name not in known:
+            raise CommandRejected(
+                f"--fri-network must be NAME=VALUE, NAME one of {', '.join(known)}; got {text!r}",
+                parameter="--fri-network",
+                value=text,
+                hint="probabilities are in [0, 1], times in s, as in delay=0.002",
+            )
+        (values[name],) = numbers(value, f"--fri-network {name}", 1)
+    return replace(LinkFaults(), **values)  # type: ignore[arg-type]
 
 
 def address(text: str) -> tuple[str, int]:
@@ -176,25 +292,27 @@ def signal(text: str) -> IoValue:
     return IoValue(name, types[kind[0]], IoDirection.INPUT if direction == "<" else IoDirection.OUTPUT, 0)
 
 
-def _read_values(server: Server) -> None:
-    """Set typed values until standard input is closed."""
+def _read_lines(server: Server, operator: SimulatedOperator) -> None:
+    """Execute typed lines until standard input is closed."""
     with contextlib.suppress(OSError):
-        _set_typed(server)
+        for said in lines():
+            try:
+                _execute(said, server, operator)
+            except (CommandRejected, ValueError, OverflowError) as error:
+                print(error, file=sys.stderr, flush=True)
 
 
-def _set_typed(server: Server) -> None:
-    """Give signals the values that are typed: `set Group.Name 1`."""
-    for said in lines():
-        verb, name, value = (*said.split(), "", "", "")[:3]
-        try:
-            if verb != "set":
-                raise ValueError
-            number = _WORDS[value.lower()] if value.lower() in _WORDS else float(value)
-            server.set(name, int(number) if number == int(number) else number)
-        except CommandRejected as error:
-            print(error, file=sys.stderr, flush=True)
-        except (ValueError, OverflowError):
-            print(f"{said!r} is not understood; type `set GROUP.NAME VALUE`", file=sys.stderr, flush=True)
+def _execute(said: str, server: Server, operator: SimulatedOperator) -> None:
+    """Give a signal of the session its value, `set GROUP.NAME VALUE`; anything else is an action of the operator."""
+    verb, name, value = (*said.split(), "", "", "")[:3]
+    if verb != "set":
+        operator.do(said)
+        return
+    try:
+        number = _WORDS[value.lower()] if value.lower() in _WORDS else float(value)
+    except ValueError:
+        raise ValueError(f"{said!r} is not understood; type `set GROUP.NAME VALUE`") from None
+    server.set(name, int(number) if number == int(number) else number)
 
 
 def whole(period: float) -> int:

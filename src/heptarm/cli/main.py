@@ -21,7 +21,7 @@ COMMANDS = {
     "demo": "demo:demo",
     "sim": "sim:sim",
     "state": "state:state",
-    "stop": "motion:stop",
+    "stop": "stop:stop",
     "recover": "motion:recover",
     "servo": "motion:servo",
     "teach": "motion:teach",
@@ -32,6 +32,7 @@ COMMANDS = {
     "install-cabinet": "install_cabinet:install_cabinet",
 }
 MOVES = {"ptp": "motion:move_ptp", "lin": "motion:move_lin", "lin_rel": "motion:move_lin_rel"}
+KEYS = {"new": "key:new", "set": "key:store", "list": "key:show", "forget": "key:forget"}
 LEARNING = {"train": "rl:train", "eval": "rl:evaluate", "deploy": "rl:deploy"}
 
 app = App(
@@ -59,8 +60,10 @@ def _add(group: App, commands: dict[str, str], *, listed: bool) -> App:
 _words = [one for one in sys.argv[1:] if not one.startswith("-")]
 _add(app, COMMANDS, listed=not _words)
 _move = App(name="move", help="Move the arm and wait until it is at rest.")
+_keys = App(name="key", help="Make, store and list the pre-shared keys of cabinets.")
 _learn = App(name="rl", help="Train, evaluate and deploy a policy that reaches targets.")
 app.command(_add(_move, MOVES, listed=_words == ["move"]))
+app.command(_add(_keys, KEYS, listed=_words == ["key"]))
 app.command(_add(_learn, LEARNING, listed=_words == ["rl"]))
 
 
@@ -69,9 +72,11 @@ def main() -> None:
     try:
         code = app()
     except HeptarmError as error:
+        from heptarm.arm.translate.text import printable
+
         if os.environ.get("HEPTARM_DEBUG"):
             raise
-        print(f"heptarm: {error}", file=sys.stderr)
+        print(f"heptarm: {printable(str(error), lines=True)}", file=sys.stderr)
         sys.exit(1)
     except KeyboardInterrupt:
         sys.exit(130)

@@ -1,4 +1,4 @@
-"""Commands that move an arm: `heptarm move`, `servo`, `teach`, `replay`; and `stop` and `recover`."""
+"""Commands that move an arm: `heptarm move`, `servo`, `teach`, `replay`; and `recover`."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from typing import Annotated, Literal
 import numpy as np
 from cyclopts import Parameter
 
-from heptarm.arm.connect import connect
 from heptarm.arm.motion.servo import ServoStats
 from heptarm.arm.translate.motions import items
-from heptarm.cli.options import Access, Json, MoveOptions, Speed, Target
+from heptarm.cli.options import NO_TARGET, Access, Json, MoveOptions, Speed, Target
 from heptarm.cli.output import confirm, emit, state_data
 from heptarm.errors import CommandRejected, NotReady
 from heptarm.values.arrays import within
@@ -87,7 +86,7 @@ def _move(motion: Motion, options: MoveOptions) -> int:
     Raises:
         HeptarmError: refused, or ended under way.
     """
-    with connect(options.target, control=not options.dry_run) as arm:
+    with options.target.connect(control=not options.dry_run) as arm:
         # a motion outside the limits is refused here, before any question
         items((motion,), arm.robot, options.speed)
         title, percent = arm.robot.title, f"{options.speed:.0%}"
@@ -127,7 +126,7 @@ def servo(
     turn = radians(within(amplitude, "amplitude", 0.0, 45.0, unit="deg"))
     hertz = within(frequency, "frequency", 0.0, 5.0, above=True, unit="Hz")
     seconds = within(duration, "duration", 0.0, 86400.0, above=True, unit="s")
-    with connect(access.target) as arm:
+    with access.target.connect() as arm:
         if not (
             arm.is_virtual or access.yes or confirm(f"Swing A{index + 1} of the real {arm.robot.title}?")
         ):
@@ -177,7 +176,7 @@ def teach(
     """Record a trajectory while a person guides the arm by hand."""
     limit = within(seconds, "seconds", 0.0, 86400.0, above=True, unit="s")
     mode = compliance(free, frame="base") if free else None
-    with connect(access.target) as arm:
+    with access.target.connect() as arm:
         asked = free and not (arm.is_virtual or access.yes)
         if asked and not confirm(
             f"The real {arm.robot.title} becomes compliant for {limit:g} s. Does a person hold it?"
@@ -225,7 +224,7 @@ def replay(
         trajectory = Trajectory.load(file)
     except OSError as error:
         raise CommandRejected(f"{file}: {error.strerror}", parameter="file", value=str(file)) from error
-    with connect(access.target) as arm:
+    with access.target.connect() as arm:
         if not (arm.is_virtual or access.yes or confirm(f"Move the real {arm.robot.title} along {file}?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
         done = arm.replay(trajectory, by=by, speed_scaling=speed_scaling)
@@ -237,23 +236,14 @@ def replay(
     return 0
 
 
-def stop(*, target: Target = None, as_json: Json = False) -> int:
-    """Stop the arm; needs no control."""
-    with connect(target, control=False) as arm:
-        arm.stop()
-        arm.wait_for_rest()
-    emit({"stopped": True}) if as_json else print("the arm is at rest")
-    return 0
-
-
 def recover(
     *,
     timeout: Annotated[float, Parameter(help="How long to wait for a person to do the rest [s].")] = 0.0,
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Make the robot ready again after a stop; exit code 1 if a person has to do the rest, which is printed."""
-    with connect(target) as arm:
+    with target.connect() as arm:
         recovery = arm.recover(timeout=timeout)
         if as_json:
             emit({"done": recovery.done, "did": list(recovery.did), "remaining": list(recovery.remaining)})

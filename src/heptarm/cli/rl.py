@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from cyclopts import Parameter
 
-from heptarm.arm.connect import connect
 from heptarm.cli.options import (
+    NO_TARGET,
     Json,
     Model,
     Speed,
@@ -166,7 +166,7 @@ def deploy(
         bool, Parameter(negative="", help="With --out: also a film of the first episodes.")
     ] = False,
     yes: Yes = False,
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Let a policy control an arm at 30 Hz with a servo motion; needs no torch."""
@@ -174,7 +174,7 @@ def deploy(
     settings = DeploySettings(
         mode=None if stiffness is None else JointImpedance(stiffness), latency=latency, speed=speed
     )
-    with connect(target) as arm:
+    with target.connect() as arm:
         if not (arm.is_virtual or yes or confirm(f"Let the policy control the real {arm.robot.title}?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
         if ask:

@@ -18,14 +18,23 @@ from cyclopts import Group, Parameter
 from heptarm.cli.options import (
     FRI,
     Json,
+    KeyFile,
     Model,
 )
 from heptarm.cli.output import emit, is_silent, lines
 from heptarm.errors import CommandRejected, ConnectFailed
+from heptarm.io.keys import environment, find_key
 from heptarm.sim.runtime.operator import WORDS
 from heptarm.values.simulator_options import SimulatorOptions
 
 _APP = Group("Your own application")
+
+#: The error of Java for an address that this machine does not have.
+_NOT_HERE = "Cannot assign requested address"
+_NOT_HERE_HINT = (
+    "the application uses an address that this machine does not have: replace it with --map ADDRESS=127.0.0.1, "
+    "or give it to this machine: sudo ip address add ADDRESS/32 dev lo"
+)
 
 
 def sim(
@@ -36,7 +45,8 @@ def sim(
     speed: Annotated[float, Parameter(help="Simulated seconds per second of real time.")] = 1.0,
     view: Annotated[bool, Parameter(negative="", help="Open a live 3D view in the browser.")] = False,
     view_port: Annotated[int, Parameter(help="Port of the view; 0 takes a free one.")] = 8080,
-    key: Annotated[str, Parameter(help="Pre-shared key that clients must know.")] = "",
+    key_file: KeyFile = None,
+    key: Annotated[str, Parameter(show=False)] = "",
     fault: Annotated[
         tuple[str, ...],
         Parameter(
@@ -97,6 +107,15 @@ def sim(
             help="File of such buttons, one per line; # starts a comment. They are used before those of --answer.",
         ),
     ] = None,
+    addresses: Annotated[
+        tuple[str, ...],
+        Parameter(
+            name="--map",
+            group=_APP,
+            help="OLD=NEW: replace an address of the lab in string literals of the sources, in process data and in FRI "
+            "sessions, as in 172.31.1.25=127.0.0.1; may be repeated.",
+        ),
+    ] = (),
     fri: Annotated[
         str | None,
         Parameter(
@@ -129,16 +148,57 @@ def sim(
         tuple[str, ...],
         Parameter(group=FRI, help="Name of a frame that the client is asked for; may be repeated."),
     ] = (),
+    fri_mode: Annotated[
+        Literal["", "position", "joint-impedance", "cartesian-impedance"],
+        Parameter(
+            group=FRI,
+            help="Control mode under the overlay. Default: position; joint-impedance for torques, "
+            "cartesian-impedance for wrenches.",
+        ),
+    ] = "",
+    fri_stiffness: Annotated[
+        str,
+        Parameter(
+            group=FRI,
+            help="Of joint-impedance: one number or seven [Nm/rad], default 200. Of cartesian-impedance: along and "
+            "about the axes, as 2000,200, or six numbers [N/m, Nm/rad], default 2000,200.",
+        ),
+    ] = "",
+    fri_start: Annotated[
+        str, Parameter(group=FRI, help="A1,...,A7 at the start [deg]. Default: 0,30,0,-90,0,60,0.")
+    ] = "",
+    fri_force: Annotated[
+        str,
+        Parameter(
+            group=FRI,
+            help="FX,FY,FZ on the flange from the start, base axes [N]; --fault 'push 0 0 -20 2@5' pushes for 2 s "
+            "after 5 s.",
+        ),
+    ] = "",
+    fri_network: Annotated[
+        tuple[str, ...],
+        Parameter(
+            group=FRI,
+            help="Fault of the network in both directions, as loss=0.01, delay=0.002 or jitter=0.001: loss, duplicate, "
+            "corrupt, reorder and burst are probabilities, delay, jitter and burst_time [s]; may be repeated.",
+        ),
+    ] = (),
     as_json: Json = False,
 ) -> int:
     """Run a virtual cabinet until Ctrl-C; with --fri, a bare FRI controller; with --app, your own application."""
+    if key:
+        raise CommandRejected(
+            "--key is not accepted: every user of this machine can read a command line",
+            parameter="key",
+            hint="put the key into a file of mode 0600 and use --key-file, or set HEPTARM_KEY",
+        )
     if application is not None:
         defaults = {
             "--view": (view, False),
             "--view-port": (view_port, 8080),
             "--host": (host, "127.0.0.1"),
             "--port": (port, 30001),
-            "--key": (key, ""),
+            "--key-file": (key_file, None),
             "--fri": (fri, None),
             "--fri-command": (fri_command, "position"),
             "--fri-client": (fri_client, "127.0.0.1:30200"),
@@ -147,6 +207,11 @@ def sim(
             "--fri-port": (fri_port, None),
             "--fri-io": (fri_io, ()),
             "--fri-frame": (fri_frame, ()),
+            "--fri-mode": (fri_mode, ""),
+            "--fri-stiffness": (fri_stiffness, ""),
+            "--fri-start": (fri_start, ""),
+            "--fri-force": (fri_force, ""),
+            "--fri-network": (fri_network, ()),
         }
         _refuse_beside_app({name for name, (value, default) in defaults.items() if value != default})
         return _application(
@@ -154,6 +219,7 @@ def sim(
             main=app_class,
             data=app_data,
             answers=(*_read_answers(answers), *answer),
+            addresses=addresses,
             model=model,
             speed=speed,
             faults=fault,
@@ -162,14 +228,28 @@ def sim(
             verbose=verbose,
             as_json=as_json,
         )
-    given = {"--app-class": app_class, "--app-data": app_data, "--answer": answer, "--answers": answers}
+    given = {
+        "--app-class": app_class,
+        "--app-data": app_data,
+        "--answer": answer,
+        "--answers": answers,
+        "--map": addresses,
+    }
     for name, value in given.items():
         if value:
             raise CommandRejected(f"{name} needs --app", parameter=name.lstrip("-"), hint="add --app FOLDER")
     if fri is not None:
         from heptarm.cli import fri_sim
 
-        return fri_sim.run(
+        own = {"--view": view, "--key": bool(key), "--project": project is not None}
+        for name, present in own.items():
+            if present:
+                raise CommandRejected(
+                    f"{name} cannot be used with --fri: there is no cabinet application",
+                    parameter=name.lstrip("-"),
+                    hint=f"leave out {name} or --fri",
+                )
+        options = fri_sim.FriControllerOptions(
             version=fri,
             model=model,
             command=fri_command,
@@ -179,10 +259,16 @@ def sim(
             port=fri_port,
             signals=fri_io,
             frames=fri_frame,
+            mode=fri_mode,
+            stiffness=fri_stiffness,
+            start=fri_start,
+            force=fri_force,
+            network=fri_network,
+            faults=fault,
+            payload=payload,
             speed=speed,
-            verbose=verbose,
-            as_json=as_json,
         )
+        return fri_sim.run(options, verbose=verbose, as_json=as_json)
     return _cabinet(
         model=model,
         host=host,
@@ -190,7 +276,7 @@ def sim(
         speed=speed,
         view=view,
         view_port=view_port,
-        key=key,
+        key_file=key_file,
         faults=fault,
         payload=payload,
         project=project,
@@ -207,7 +293,7 @@ def _cabinet(
     speed: float,
     view: bool,
     view_port: int,
-    key: str,
+    key_file: Path | None,
     faults: tuple[str, ...],
     payload: str,
     project: Path | None,
@@ -218,13 +304,14 @@ def _cabinet(
 
     Raises:
         ConnectFailed: the cabinet or the view does not start; the text gives the reason.
+        CommandRejected: the key cannot be used.
     """
+    key = find_key(key_file=key_file, host=host, port=port)
     options = SimulatorOptions(
         model=model,
         host=host,
         port=port,
         speed=speed,
-        key=key,
         fault=faults,
         payload=payload,
         project=project,
@@ -233,7 +320,7 @@ def _cabinet(
     )
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ExitStack() as stack:
-        cabinet = stack.enter_context(_child(_command(options)))
+        cabinet = stack.enter_context(_child(_command(options), key))
         ready = _ready(cabinet, f"the virtual cabinet does not start on {host}:{port}")
         target = f"sim://{host}:{ready['port']}"
         if view:
@@ -247,7 +334,8 @@ def _cabinet(
                         target,
                         "--port",
                         str(view_port),
-                    ]
+                    ],
+                    key,
                 )
             )
             ready["view"] = _ready(viewer, "the view does not start")["url"]
@@ -320,6 +408,7 @@ def _application(
     main: str,
     data: tuple[str, ...],
     answers: tuple[int, ...],
+    addresses: tuple[str, ...],
     model: str,
     speed: float,
     faults: tuple[str, ...],
@@ -333,8 +422,13 @@ def _application(
     Raises:
         HeptarmError: it does not compile, there is no such application, or an option is illegal.
     """
-    from heptarm.sim.runtime.application import compile_application
+    from heptarm.sim.runtime.addresses import AddressMap
+    from heptarm.sim.runtime.application import compile_application, unused_addresses
 
+    try:
+        mapped = AddressMap.of(addresses)
+    except ValueError as error:
+        raise CommandRejected(str(error), parameter="map") from None
     if any(button < 0 for button in answers):
         raise CommandRejected(
             f"--answer must be the number of a button, from 0, got {min(answers)}",
@@ -343,17 +437,25 @@ def _application(
         )
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with TemporaryDirectory(prefix="heptarm-") as out:
-        application = compile_application(folder, Path(out), main=main)
-        for reason in application.left_out:
-            print(f"heptarm: {reason}", file=sys.stderr, flush=True)
+        application = compile_application(folder, Path(out), main=main, addresses=mapped)
+        data_file = project or application.project
+        notes = [*application.left_out]
+        for address in unused_addresses(folder, data_file, mapped):
+            notes.append(
+                f"--map: {address} is in no string of the sources and in no process data; where it comes from "
+                f"elsewhere, give it to this machine: sudo ip address add {address}/32 dev lo"
+            )
+        for note in notes:
+            print(f"heptarm: {note}", file=sys.stderr, flush=True)
         options = SimulatorOptions(
             model=model,
             speed=speed,
             application=application.main,
             background=application.background,
             classpath=(out, *map(str, application.jars)),
-            project=project or application.project,
+            project=data_file,
             data=data,
+            map=addresses,
             answer=answers,
             fault=faults,
             payload=payload,
@@ -361,7 +463,7 @@ def _application(
             verbose=verbose,
         )
         failure = ""
-        with _child(_command(options)) as cabinet:
+        with _child(_command(options), None) as cabinet:
             try:
                 ready = _first(cabinet, "the virtual cabinet does not start")
                 if not ready.get("ready"):
@@ -382,6 +484,8 @@ def _application(
             emit({"application": application.main, "ended": not failure, "error": failure})
         elif failure:
             print(f"heptarm: {application.main} ended with an error: {failure}", file=sys.stderr)
+            if _NOT_HERE in failure:
+                print(f"heptarm: {_NOT_HERE_HINT}", file=sys.stderr)
         return 1 if failure or cabinet.returncode else 0
 
 
@@ -441,12 +545,22 @@ def _answer(cabinet: subprocess.Popen[str], as_json: bool) -> str:
 
 
 class _child(subprocess.Popen[str]):
-    """A process that ends when its standard input is closed, and therefore with this process."""
+    """A process that ends when its standard input is closed, and therefore with this process.
 
-    def __init__(self, command: list[str]) -> None:
+    Args:
+        command: to start.
+        key: pre-shared key that it uses, in its environment; None: none.
+    """
+
+    def __init__(self, command: list[str], key: str | None) -> None:
         # a session of its own: Ctrl-C reaches this process only, which then ends its children in order
         super().__init__(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            env=environment(key),
         )
 
     def __exit__(self, *_: Any) -> None:

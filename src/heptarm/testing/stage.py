@@ -23,7 +23,7 @@ def stage(*, model: str = "iiwa14", speed: float = 1.0) -> str:
     """Target of a private simulator on which every scenario can play.
 
     Args:
-        model: "iiwa7" or "iiwa14".
+        model: "iiwa7", "iiwa14", "med7" or "med14".
         speed: simulated seconds per second.
     """
     options = {

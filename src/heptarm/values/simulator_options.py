@@ -34,7 +34,12 @@ class SimulatorOptions:
             "simulated seconds per second; 0: as fast as possible", in_target=True, allowed=(0.01, 100.0)
         ),
     )
-    key: str = field(default="", metadata=_about("pre-shared key that clients must know"))
+    key_file: Path | None = field(
+        default=None,
+        metadata=_about(
+            "file with the pre-shared key that clients must know; default: the environment variable HEPTARM_KEY"
+        ),
+    )
     application: str = field(
         default="", metadata=_about("class of another application; the process ends with it")
     )
@@ -73,6 +78,14 @@ class SimulatorOptions:
     )
     data: tuple[str, ...] = field(
         default=(), metadata=_about("process data; may be repeated", metavar="NAME=VALUE")
+    )
+    map: tuple[str, ...] = field(
+        default=(),
+        metadata=_about(
+            "address of the lab's network and the one that takes its place in process data and FRI sessions; may be "
+            "repeated",
+            metavar="ADDRESS=ADDRESS",
+        ),
     )
     fault: tuple[str, ...] = field(
         default=(),

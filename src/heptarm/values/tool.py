@@ -150,7 +150,7 @@ def unknown(name: str, parameter: str, known: tuple[str, ...]) -> CommandRejecte
     """The error of an unknown name."""
     listed = ", ".join(known) or "none"
     return CommandRejected(
-        f"{parameter} is {shown(name)}, which is unknown; there are: {listed}",
+        f"{parameter} must be one of {listed}, got {shown(name)}",
         code=42,
         parameter=parameter,
         value=name,

@@ -28,6 +28,7 @@ from heptarm.fri.loop.telemetry import Reader
 from heptarm.fri.loop.user_api import Params
 from heptarm.fri.protocol.version import Version
 from heptarm.io.shared import MemoryBlock
+from heptarm.io.udp import ALL_INTERFACES, own_address
 from heptarm.values.arrays import array, callback, finite, flag, instance, integer, within
 from heptarm.values.frames import check_name
 from heptarm.values.io import SignalValue
@@ -89,7 +90,7 @@ class Client(Reader):
 
     Args:
         port: UDP port to bind.
-        host: address to bind; "0.0.0.0" for all.
+        host: own address to bind; "0.0.0.0" for all. None: the one that routes to `remote`; all without a remote.
         remote: address of the controller; None accepts any.
         version: FRI release such as "1.15"; None recognises it from the first datagram.
         model: robot, for the limits.
@@ -117,7 +118,7 @@ class Client(Reader):
         self,
         port: int = PORT,
         *,
-        host: str = "0.0.0.0",
+        host: str | None = None,
         remote: str | None = None,
         version: str | None = None,
         model: str | RobotModel = "iiwa14",
@@ -143,9 +144,9 @@ class Client(Reader):
             cpu=cpu,
         )
         integer(port, "port", 0, 65535)
-        instance(host, str, "host")
-        if remote is not None:
-            instance(remote, str, "remote")
+        for address, what in ((host, "host"), (remote, "remote")):
+            if address is not None:
+                instance(address, str, what)
         within(timeout, "timeout", 0.0, LONGEST, above=True, unit="s")
         arm = robot(model) if isinstance(model, str) else instance(model, RobotModel, "model")
         self._limits = limits or Limits.of(arm)
@@ -161,7 +162,7 @@ class Client(Reader):
             json.dumps(
                 {
                     "port": port,
-                    "host": host,
+                    "host": _own(remote) if host is None else host,
                     "remote": remote,
                     "version": wire,
                     "limits": asdict(self._limits),
@@ -365,6 +366,11 @@ def _seven(pose: Pose | npt.ArrayLike) -> npt.NDArray[np.float64]:
     if not np.isnan(values[3:]).any():
         Pose.of((0.0, 0.0, 0.0), values[3:])  # raises the error about its norm
     return values
+
+
+def _own(remote: str | None) -> str:
+    """Address to bind: datagrams of the controller arrive there."""
+    return ALL_INTERFACES if remote is None else own_address(remote)
 
 
 def _plain(policy: Policy) -> dict[str, Any]:

@@ -1,26 +1,23 @@
-"""The arm as the trainers simulate it: the shipped model with full dynamics and the plant's servo.
+"""The simulated arm of training: the included model with full dynamics and the plant's servo.
 
 The plant closes its loop every millisecond in Python; for training the same gains become MuJoCo actuators, so
-that a decision of 1/30 s is eight steps of the engine without leaving it. Behind each stands a low-pass that
-plays the servo's interpolation. Gravity is taken as compensated, so it is switched off; what the controller
-does not know (a payload) pulls as an external force.
+that a decision of 1/30 s is eight steps inside the engine. Each has a low-pass filter that
+models the servo's interpolation. Gravity counts as compensated, so it is switched off; what the controller
+does not know (a payload) acts as an external force.
 """
 
 from __future__ import annotations
 
 from math import isfinite
-from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from heptarm import sim
 from heptarm.rl.task import ReachTask
 from heptarm.sim.control.laws import BANDWIDTH, DAMPING
+from heptarm.sim.plant.world import specification
 from heptarm.values.arrays import Array
-
-_MODELS = Path(str(sim.__file__)).parent / "models"
 
 #: Steps of the engine in a decision.
 SUBSTEPS = 8
@@ -35,7 +32,7 @@ def build(task: ReachTask) -> Any:
     Returns:
         An `mujoco.MjModel`; its seven controls are commanded joints [rad].
     """
-    spec = mujoco.MjSpec.from_file(str(_MODELS / f"{task.robot.replace('med', 'iiwa')}.xml"))
+    spec = specification(task.robot)
     stiffness, damping = gains(mass(task))
     for index, servo in enumerate(spec.actuators):
         servo.dyntype = mujoco.mjtDyn.mjDYN_FILTEREXACT
@@ -53,7 +50,7 @@ def build(task: ReachTask) -> Any:
 
 def mass(task: ReachTask) -> Array:
     """Inertia that each joint moves at the task's home, shape (7,) [kg m²]."""
-    model = mujoco.MjModel.from_xml_path(str(_MODELS / f"{task.robot.replace('med', 'iiwa')}.xml"))
+    model = specification(task.robot).compile()
     data = mujoco.MjData(model)
     data.qpos[:7] = task.home
     mujoco.mj_forward(model, data)

@@ -78,7 +78,11 @@ PARAMETERS = (
         "",
         'target of the connection, as in heptarm.connect; "": the environment variable HEPTARM_TARGET',
     ),
-    Parameter("key", "", "pre-shared key of the cabinet, if it has one"),
+    Parameter(
+        "key_file",
+        "",
+        'file with the pre-shared key of the cabinet; "": HEPTARM_KEY, or the key stored for the target',
+    ),
     Parameter(
         "watchdog",
         ROS_NODE.default,

@@ -102,6 +102,10 @@ class ActiveLaw:
         self._law, self._frames = PositionLaw(), None
         return True
 
+    def take_over(self, law: PositionLaw) -> None:
+        """Continue with the position control that has held the arm."""
+        self._law, self._frames = law, None
+
     def retune(self, mode: Mode) -> bool:
         """Change the parameters of the law in force; returns whether the mode is of its kind."""
         law = self._law

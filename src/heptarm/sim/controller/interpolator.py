@@ -227,6 +227,16 @@ class Interpolator:
         """End a running command (0: whichever runs) by an error, from any thread."""
         self._aborts.append((order_id, text))
 
+    def trip(self, text: str) -> None:
+        """The brakes close at once: the running command ends by an error where the arm is."""
+        self.command.stay(self._q)
+        self.is_overlaid = False
+        run = self.run
+        if run is not None:
+            run.failure = run.failure or text
+            run.braking = run.ended = True
+            run.path = run.follower = run.guided = None
+
     def advance(self) -> tuple[float, float]:
         """Shift the set-points and compute the next one; returns progress and remaining time."""
         while (cancellation := self.queue.cancelled()) is not None:

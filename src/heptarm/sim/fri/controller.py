@@ -3,9 +3,10 @@
 ::
 
     IDLE --open--> MONITORING_WAIT <--quality--> MONITORING_READY
-                                                        |  start
+                                                        |  start, after `SETTLED` answers' time
                                                  COMMANDING_WAIT --mirrored--> COMMANDING_ACTIVE
 
+A client sees every state in several messages, whatever the period: clients set themselves up when a state begins.
 The overlay ends, and with it both commanding states, when the application stops it, the quality falls below GOOD, a
 command is illegal, the client does not synchronise, or a safety stop occurs; the session then monitors again. `close`
 returns to IDLE from every state, with one last message that reports it.
@@ -25,7 +26,7 @@ from heptarm.errors import ModeConflict, Unreachable
 from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.codec import decode_command
 from heptarm.fri.protocol.protobuf import MalformedMessage
-from heptarm.fri.protocol.version import Version
+from heptarm.fri.protocol.version import Version, is_framed
 from heptarm.sim.control.laws import Superposition
 from heptarm.sim.fri import cartesian
 from heptarm.sim.fri.io import SessionIo
@@ -45,13 +46,17 @@ from heptarm.sim.seam import TICK_NS
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 
-#: Successive answers that have to mirror the interpolator before commands are executed.
+#: Receive periods for which a session is in MONITORING_READY before an overlay takes it on.
+SETTLED = 5
+#: Successive answers that have to mirror the position before commands are executed.
 MIRRORED = 10
 #: Largest deviation of a mirrored position [rad; m and rad].
 MIRROR = 1e-3
 #: Time limit of the synchronisation [ns].
 SYNCHRONISATION = 3_000_000_000
 
+#: So many unreadable datagrams, and not a readable one, mean a client of another version.
+FOREIGN = 5
 #: Number of sent messages that an answer may refer to.
 KEPT = 512
 #: Largest number of different refusals that a session reports.
@@ -62,10 +67,11 @@ _WORD = 0xFFFFFFFF
 
 @dataclass(slots=True)
 class _SentMessage:
-    """A sent message: its time, session state and interpolator data."""
+    """A sent message: its time, session state, measured position and interpolator data."""
 
     at: int
     state: m.SessionState
+    monitor: m.MonitorData | None
     ipo: m.IpoData | None
 
 
@@ -127,12 +133,14 @@ class Controller:
         self._ticks = 0
         self._farewell = False
         self._used = False
+        self._ready = 0  # receive periods in MONITORING_READY
         self._next = 0  # number of the next message
         self._asked: list[_SentMessage | None] = [None] * KEPT
         self._heard = -1  # number of the newest answered message
         self._reflected = 0  # the client's counter in its newest answer
         self._since: int | None = None  # start of the synchronisation
         self._mirrored = 0
+        self._mirrors: Array | None = None  # joints of the newest mirrored command
         self._fault = ""  # why the client is not synchronised
         self._limits: CommandLimits | None = None
         self._set_point: CommandInterpolator | None = None
@@ -171,15 +179,21 @@ class Controller:
     def start(self, overlay: MotionOverlay) -> None:
         """Start an overlay with its motion: wait for the client to synchronise.
 
+        The session stays in MONITORING_READY for `SETTLED` receive periods at least.
+
         Raises:
             CommandRejected: this session cannot have such an overlay.
             ModeConflict: command and control mode do not match, or the session is not ready.
         """
         overlay.check(self.configuration)
-        if self.state is not m.SessionState.MONITORING_READY:
+        if self.state is not m.SessionState.MONITORING_READY or self.overlay is not None:
             raise ModeConflict(
-                f"FRI session in {self.state.name} with quality {self.quality.name}; "
-                "an overlay needs MONITORING_READY",
+                f"FRI session in {self.state.name} with quality {self.quality.name}"
+                + (
+                    "; an overlay needs MONITORING_READY"
+                    if self.overlay is None
+                    else " and an overlay already"
+                ),
                 parameter="overlay",
                 hint="wait until the client answers well enough"
                 if self.overlay is None
@@ -188,7 +202,7 @@ class Controller:
         self.overlay = overlay
         self._limits = CommandLimits(self._robot, overlay.mode)
         self._since, self._mirrored, self._fault = None, 0, "it has not answered yet"
-        self._go(m.SessionState.COMMANDING_WAIT)
+        self._mirrors = None
 
     def stop(self) -> None:
         """End the overlay after its motion; does nothing without an overlay."""
@@ -209,6 +223,8 @@ class Controller:
             command = decode_command(datagram, self.configuration.version)
         except MalformedMessage as error:
             self._refuse(error.text + _likely_cause(error.text, datagram, self.configuration.version))
+            if self.traffic.refused >= FOREIGN and not self.traffic.taken:
+                self._report_refusal(self._foreign(datagram))
             return
         age = (self._next - 1 - command.header.reflected) & _WORD
         number = self._next - 1 - age
@@ -233,6 +249,21 @@ class Controller:
             elif self.state is m.SessionState.COMMANDING_ACTIVE:
                 self._execute(command, number)
 
+    def _foreign(self, datagram: bytes) -> str:
+        """What a client is that no message can be read of."""
+        version = self.configuration.version
+        if version.traits.framed:
+            other = "1.x or 2.5"
+        else:
+            other = (
+                Version.V2_7.value
+                if is_framed(datagram)
+                else "2.x"
+                if not version.traits.quaternions
+                else "1.x"
+            )
+        return f"nothing the client sends can be read as FRI {version.value}; is it built for {other}?"
+
     def _refuse(self, text: str) -> None:
         self.traffic.refused += 1
         self._report_refusal(text)
@@ -249,22 +280,33 @@ class Controller:
         self._mirrored = 0 if self._fault else self._mirrored + 1
 
     def _deviation(self, command: m.Command, asked: _SentMessage) -> str:
-        """How a command differs from the interpolator's position that it has to mirror; empty if it does not."""
-        ipo = asked.ipo
-        assert ipo is not None and ipo.q is not None
+        """How a command differs from the positions of which it has to mirror one; empty if it does not.
+
+        Clients mirror the interpolator's position or, as some do, the measured one, which differs from it where the
+        arm is compliant.
+        """
+        ipo, monitor = asked.ipo, asked.monitor
+        assert ipo is not None and ipo.q is not None and monitor is not None and monitor.q is not None
         if ipo.pose is not None and command.pose is not None:
             try:
-                gap, turn = cartesian.distance(cartesian.matrix(command.pose), cartesian.matrix(ipo.pose))
+                pose = cartesian.matrix(command.pose)
             except ValueError as error:
                 return str(error)
+            gap, turn = cartesian.distance(pose, cartesian.matrix(ipo.pose))
             if max(gap, turn) <= MIRROR:
+                self._mirrors = np.array(ipo.q)
+                return ""
+            if monitor.pose and max(cartesian.distance(pose, cartesian.matrix(monitor.pose))) <= MIRROR:
+                self._mirrors = np.array(monitor.q)
                 return ""
             return f"its pose is {1e3 * gap:.1f} mm and {np.degrees(turn):.2f} deg off the interpolator's"
-        delta = np.abs(np.array(command.q) - np.array(ipo.q))
-        if (delta <= MIRROR).all():  # a NaN is not
-            return ""
-        axis = int(np.argmax(~(delta <= MIRROR)))
-        return f"its A{axis + 1} is {np.degrees(delta[axis]):.2f} deg off the interpolator's"
+        q = np.array(command.q)
+        delta = np.abs(q - np.array(ipo.q))
+        if not (delta <= MIRROR).all() and not (np.abs(q - np.array(monitor.q)) <= MIRROR).all():
+            axis = int(np.argmax(~(delta <= MIRROR)))  # a NaN is not equal
+            return f"its A{axis + 1} is {np.degrees(delta[axis]):.2f} deg off the interpolator's"
+        self._mirrors = q
+        return ""
 
     def _execute(self, command: m.Command, number: int) -> None:
         """Execute a command; an illegal one ends the overlay."""
@@ -339,6 +381,9 @@ class Controller:
         """Activate a synchronised overlay, or end one."""
         if reading.safety is not m.Safety.NORMAL_OPERATION:
             self._end("safety", f"the motion with the FRI overlay was ended by a {_STOPS[reading.safety]}")
+        elif self.state is m.SessionState.MONITORING_READY:
+            if self._ready >= SETTLED:
+                self._go(m.SessionState.COMMANDING_WAIT)
         elif self.state is m.SessionState.COMMANDING_WAIT:
             if self._since is None:
                 self._since = now
@@ -353,7 +398,9 @@ class Controller:
     def _activate(self, reading: Reading) -> None:
         start = np.array(reading.q_ipo)
         self._set_point = CommandInterpolator(self._robot, start, ticks=self.configuration.receive_ms)
-        self._last, self._last_number = start, self._heard
+        # the client's commands continue what it mirrored
+        self._last = start if self._mirrors is None else self._mirrors
+        self._last_number = self._heard
         self._a3 = reading.q_ipo[2]
         self._tau = self._wrench = None
         self._go(m.SessionState.COMMANDING_ACTIVE)
@@ -372,11 +419,14 @@ class Controller:
         self.overlay = self.superposition = self._set_point = None
         self._events.append(OverlayEnded(cause, text))
         enough = self.quality >= m.Quality.GOOD
-        self._go(m.SessionState.MONITORING_READY if enough else m.SessionState.MONITORING_WAIT)
+        after = m.SessionState.MONITORING_READY if enough else m.SessionState.MONITORING_WAIT
+        if after is not self.state:
+            self._go(after)
 
     def _go(self, state: m.SessionState) -> None:
         self._events.append(StateChanged(state, self.state))
         self.state = state
+        self._ready = 0
 
     def _message(self, reading: Reading, now: int) -> bytes:
         configuration = self.configuration
@@ -388,16 +438,20 @@ class Controller:
             header=m.Header(number & _WORD, self._reflected & _WORD),
             stamp=stamp,
             status=SessionStatus(
-                self.state, self.quality, self.overlay, self.meter.fraction if active else None
+                self.state,
+                self.quality,
+                self.overlay if active or self.state is m.SessionState.COMMANDING_WAIT else None,
+                self.meter.fraction if active else None,
             ),
             configuration=configuration,
             robot=self._robot,
             signals=tuple(self.exchange.signals.values()),
             requested=self.exchange.requested(stamp),
         )
-        self._asked[number % KEPT] = _SentMessage(now, self.state, message.ipo)
+        self._asked[number % KEPT] = _SentMessage(now, self.state, message.monitor, message.ipo)
         if self.state is not m.SessionState.IDLE and number % configuration.multiplier == 0:
             self.meter.asked(number // configuration.multiplier, now)
+            self._ready += self.state is m.SessionState.MONITORING_READY
         self.traffic.sent += 1
         return self._writer.encode(message)
 

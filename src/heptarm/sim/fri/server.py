@@ -14,6 +14,7 @@ from dataclasses import replace
 from heptarm.errors import ConnectFailed
 from heptarm.fri.protocol.messages import DriveState
 from heptarm.fri.protocol.version import MAX_DATAGRAM
+from heptarm.io.udp import own_address
 from heptarm.sim.fri.controller import MOST_REFUSALS, Controller
 from heptarm.sim.fri.faults import FaultScenario, FaultyLink
 from heptarm.sim.fri.overlay import MotionOverlay, OverlayTarget, Reading
@@ -34,10 +35,23 @@ _STAMPS = 35 if sys.platform.startswith("linux") else None
 _STAMP = struct.Struct("@qq")
 
 
+def is_here(host: str) -> bool:
+    """Whether an address is one of this machine's."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind((host, 0))
+        except OSError:
+            return False
+        return True
+
+
 def source_port(client: Address) -> int:
-    """The cabinet's port for a client: the client's own, as on a cabinet, unless both are on this machine."""
+    """The cabinet's port for a client: the client's own, as on a cabinet, unless both are on this machine.
+
+    There the client needs its port, whichever of the two starts first.
+    """
     host, port = client
-    if host != "localhost" and not host.startswith("127."):
+    if not is_here(host):
         return port
     return port + 1 if port + 1 in PORTS or port not in PORTS else PORT
 
@@ -52,8 +66,8 @@ class Server:
         configuration: of the session.
         arm: the arm under the overlays.
         client: destination of the messages, IPv4.
-        port: source port; None: see `source_port`; 0: any free one.
-        bind: own address; empty: all.
+        port: source port; None, or the client's own on this machine: see `source_port`; 0: any free one.
+        bind: own address; empty: the one that routes to the client.
         speed: seconds of the arm's time per second; 0: the arm's time does not depend on the clock.
         clock: monotonic time [ns].
         scenario: faults to inject.
@@ -84,7 +98,11 @@ class Server:
     ) -> None:
         self._arm = arm
         self._client = _resolved(client)
-        self._socket = _beside(bind, client) if port is None else _bound(bind, port)
+        self._is_client_here = is_here(self._client[0])
+        self._peers = {self._client}
+        bind = bind or _towards(self._client)
+        shared = port == client[1] and self._is_client_here
+        self._socket = _beside(bind, client) if port is None or shared else _bound(bind, port)
         self.port: int = self._socket.getsockname()[1]
         self._stamped = _request_stamps(self._socket)
         self._clock, self._speed, self._origin = clock, speed, clock()
@@ -177,7 +195,7 @@ class Server:
             except OSError as error:
                 self._report(f"receiving on port {self.port} failed: {error}")
                 break
-            if address != self._client:
+            if address not in self._peers and not self._answers_from(address):
                 self.strangers += 1
                 self._report(
                     f"a datagram from {address[0]}:{address[1]} was ignored; the session's client is "
@@ -187,6 +205,13 @@ class Server:
             self._back.send(datagram, self._arrival(ancillary, wall, now))
         for answer, at in self._back.taken(now):
             self.controller.receive(answer, at)
+
+    def _answers_from(self, address: Address) -> bool:
+        """Whether an address is the client's, too: a client on this machine may answer from another one of its own."""
+        known = address[1] == self._client[1] and self._is_client_here and is_here(address[0])
+        if known:
+            self._peers.add(address)
+        return known
 
     def _arrival(self, ancillary: list[tuple[int, int, bytes]], wall: int, now: int) -> int:
         """Arrival time of a datagram: the kernel's time stamp, or else halfway between the last tick and this one."""
@@ -219,6 +244,14 @@ def _resolved(client: Address) -> Address:
         return socket.gethostbyname(host), port
     except (OSError, UnicodeError) as error:
         raise ConnectFailed(f"the FRI client {host!r} has no IPv4 address: {error}") from error
+
+
+def _towards(client: Address) -> str:
+    """Own address from which the client is reached; empty, which means all, while there is no route to it."""
+    try:
+        return own_address(client[0])
+    except ConnectFailed:
+        return ""
 
 
 def _bound(bind: str, port: int) -> socket.socket:

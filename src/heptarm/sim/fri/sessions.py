@@ -156,10 +156,13 @@ class Sessions:
         plant: the plant; `tick` comes before each of its ticks, in the same thread.
         version: wire format of the cabinet's FRI.
         speed: simulated seconds per second.
+        address: the address here of a client's address at the lab.
     """
 
-    def __init__(self, plant: Plant, *, version: Version, speed: float) -> None:
-        self._plant, self._version, self._speed = plant, version, speed
+    def __init__(
+        self, plant: Plant, *, version: Version, speed: float, address: Callable[[str], str] = str
+    ) -> None:
+        self._plant, self._version, self._speed, self._address = plant, version, speed, address
         self._lock = threading.Lock()
         self._sessions: dict[int, _Session] = {}
         self._last = 0
@@ -189,7 +192,10 @@ class Sessions:
             transformations=transformations,
         )
         arm = _Arm(self._plant)
-        server = Server(configuration, arm, client=client, port=port, speed=self._speed)
+        host, remote = client
+        server = Server(
+            configuration, arm, client=(self._address(host), remote), port=port, speed=self._speed
+        )
         session = _Session(self._plant, server, arm, IoImageSync(signals, image), channel)
         server.open()
         with self._lock:

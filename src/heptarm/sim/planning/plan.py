@@ -83,8 +83,10 @@ def timed(
         PlanError: the path leaves the workspace or the joint limits, or passes a singularity.
     """
     samples = sample(robot, path, start, Pose.of(order.tcp[:3], order.tcp[3:]))
+    # an axis that is outside, after its drive has tripped, may come back
+    lowest, highest = np.minimum(robot.q_min, start) - 1e-9, np.maximum(robot.q_max, start) + 1e-9
     for q in samples.q:
-        outside = (q < robot.q_min - 1e-9) | (q > robot.q_max + 1e-9)
+        outside = (q < lowest) | (q > highest)
         if outside.any():
             check_limits(robot, q[int(outside.any(axis=1).argmax())], " on the path")
     edges = [0, *(index + 1 for index in rests)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -16,7 +17,8 @@ from heptarm.sim.control.controller import ActiveLaw
 from heptarm.sim.control.laws import MeasuredState, PositionLaw, Superposition
 from heptarm.sim.controller.interpolator import Interpolator
 from heptarm.sim.controller.safety import SafetyController, StopRequest
-from heptarm.sim.planning.command import TICK, Order
+from heptarm.sim.planning.command import TICK
+from heptarm.sim.plant.drive_monitor import DriveMonitor
 from heptarm.sim.plant.external_load import ExternalLoad
 from heptarm.sim.plant.io_image import IoImage
 from heptarm.sim.plant.payload import PayloadModel
@@ -26,6 +28,8 @@ from heptarm.sim.seam import SLOTS, TICK_NS, HeaderWords, SafetyFlags, StateWord
 from heptarm.values.arrays import Array
 from heptarm.values.mode.mode import Mode as ControlMode
 from heptarm.values.robot import Body, RobotModel, robot
+
+log = logging.getLogger("heptarm.sim")
 
 #: Closer to the straight arm than this [rad] the elbow does not determine the arm angle well.
 _STRAIGHT = 1e-2
@@ -62,6 +66,8 @@ def posture(robot: RobotModel, q: Sequence[float]) -> tuple[float, int]:
 #: After a stop on the path the brakes close when no axis is faster than this [rad/s], or after this many ticks.
 BRAKE_SPEED = 0.02
 BRAKE_TICKS = 400
+#: A brake that cannot hold its axis slips as far behind it [rad].
+BRAKE_SLIP = 0.05
 
 _REQUEST_FLAGS = {
     StopRequest.EMERGENCY_STOP: SafetyFlags.EMERGENCY_STOP,
@@ -119,13 +125,22 @@ class Plant:
     """A simulated robot.
 
     Args:
-        model: "iiwa7" or "iiwa14".
+        model: "iiwa7", "iiwa14", "med7" or "med14".
         q: joint positions at the start, shape (7,) [rad].
         boxes: fixed boxes around it.
+        monitored: whether drives trip; see `heptarm.sim.plant.drive_monitor`.
+
+    Attributes:
+        submit: plans a command and queues it; see `heptarm.sim.controller.queue.MotionQueue.submit`.
     """
 
     def __init__(
-        self, model: str = "iiwa14", *, q: tuple[float, ...] = HOME, boxes: Sequence[Box] = ()
+        self,
+        model: str = "iiwa14",
+        *,
+        q: tuple[float, ...] = HOME,
+        boxes: Sequence[Box] = (),
+        monitored: bool = True,
     ) -> None:
         self.robot: RobotModel = robot(model)
         self.model = compiled(model, boxes)
@@ -152,10 +167,13 @@ class Plant:
         self._brakes: PositionLaw | None = None  # closed
         self._braked = self._sensed
         self._halted = 0  # ticks for which a stop on the path has been in force
+        self._monitor = DriveMonitor(self.robot) if monitored else None
+        self._tripped = False  # by a drive's own supervision
         self.interpolator = Interpolator(
             self.robot, _Inputs(self.shared), self._sensed, self._load, self._control, self.safety
         )
         self.condition_monitor = self.interpolator.condition_monitor
+        self.submit = self.interpolator.queue.submit
         self._write(0, 0.0, nan)
 
     def _views(self) -> None:
@@ -188,17 +206,6 @@ class Plant:
     def idle(self) -> bool:
         """Whether no command is running or waiting."""
         return self.interpolator.queue.idle
-
-    def submit(self, order: Order) -> None:
-        """Plan a command from the end of the queue and append it.
-
-        While the arm brakes, its final position is not known; then the command is planned when its turn comes, and
-        its listener receives a planning error.
-
-        Raises:
-            PlanError: it cannot be planned; nothing has changed.
-        """
-        self.interpolator.queue.submit(order)
 
     def cancel(self, order_id: int | None = None) -> None:
         """Cancel a command (None: all): the running one brakes on its path, waiting ones are dropped."""
@@ -303,6 +310,8 @@ class Plant:
         # the torque sensors are on the link side of the gear: they do not measure rotor inertia and gear friction
         self._tau = torque - self._armature * self._acc + self._passive
         self._load.measure(sensed.mass @ self._acc + sensed.bias - self._passive - torque)
+        if self._monitor is not None and not self._tripped:
+            self._supervise(self._monitor)
         self.tick_count += 1
         self._write(interpolator.order, progress, remaining)
 
@@ -312,18 +321,41 @@ class Plant:
             self._brake_or_open()
         return self.interpolator.advance()
 
+    def _supervise(self, monitor: DriveMonitor) -> None:
+        """Let a drive trip: its brakes close at once, wherever the arm is."""
+        is_stiff = self._brakes is None and self._control.is_stiff
+        lag = self.interpolator.command.after - self._q if is_stiff else None
+        reason = monitor.check(self._dq, self._q, self._tau, lag)
+        if reason:
+            self._tripped = True
+            self.safety.request_stop(StopRequest.DRIVE_ERROR)
+            self.interpolator.trip(reason)
+            self._close_brakes()
+            log.warning("%s", reason)
+
     def _brake_or_open(self) -> None:
         """Close the brakes when a stop has brought the arm to rest; open them when execution may continue."""
         if not self.safety.latched:
-            self._brakes, self._halted = None, 0
+            if self._tripped and self._brakes is not None:  # the arm is where the brakes have stopped it
+                self._control.take_over(self._brakes)
+                self.interpolator.command.stay(self._braked.now)
+            if self._tripped and self._monitor is not None:
+                self._monitor.acknowledge(self._q)
+            self._brakes, self._halted, self._tripped = None, 0, False
             return
+        if self._tripped:
+            here = self._braked.now
+            np.clip(here, self._q - BRAKE_SLIP, self._q + BRAKE_SLIP, out=here)
         self._halted = self._halted + 1 if self.interpolator.rests else 0
         if self._brakes is not None or not self._halted:
             return
         if self._halted > BRAKE_TICKS or float(np.abs(self._dq).max()) < BRAKE_SPEED:
-            here = self._q.copy()
-            self._braked = replace(self._sensed, before=here, now=here, after=here, is_overlaid=False)
-            self._brakes = PositionLaw.continuing(self._tau_cmd, self._braked)
+            self._close_brakes()
+
+    def _close_brakes(self) -> None:
+        here = self._q.copy()
+        self._braked = replace(self._sensed, before=here, now=here, after=here, is_overlaid=False)
+        self._brakes = PositionLaw.continuing(self._tau_cmd, self._braked)
 
     def _write(self, order: int, progress: float, remaining: float) -> None:
         k, r = self.tick_count, self.shared

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import mujoco
 
+from heptarm.values.robot import robot
+
 MODELS = Path(__file__).parents[1] / "models"
 _NUMBERS = 6
 #: Contact type of the world's shapes, as the floor's.
@@ -48,12 +50,24 @@ class Box:
         return Box((x, y, z), (length, width, height))
 
 
+def specification(model: str) -> mujoco.MjSpec:
+    """MuJoCo's description of a robot: "iiwa7", "iiwa14", "med7" or "med14".
+
+    The Med robots have the shapes of the iiwa ones, and the masses of their own links.
+    """
+    spec = mujoco.MjSpec.from_file(str(MODELS / f"{model.replace('med', 'iiwa')}.xml"))
+    if model.startswith("med"):
+        links = robot(model).links
+        for index in range(7):
+            body, inertia = spec.body(f"link_{index + 1}"), links.inertia[index]
+            body.mass, body.ipos = links.mass[index], links.com[index]
+            body.fullinertia = (*inertia.diagonal(), inertia[0, 1], inertia[0, 2], inertia[1, 2])
+    return spec
+
+
 def compiled(model: str, boxes: Sequence[Box] = ()) -> mujoco.MjModel:
-    """MuJoCo's model of a robot ("iiwa7" or "iiwa14") among boxes."""
-    path = str(MODELS / f"{model.replace('med', 'iiwa')}.xml")
-    if not boxes:
-        return mujoco.MjModel.from_xml_path(path)
-    spec = mujoco.MjSpec.from_file(path)
+    """MuJoCo's model of a robot among boxes, see `specification`."""
+    spec = specification(model)
     for number, box in enumerate(boxes):
         spec.worldbody.add_geom(
             name=f"box {number}",

@@ -14,6 +14,10 @@ from tempfile import TemporaryDirectory
 
 from heptarm import _resources
 from heptarm.errors import CommandRejected, MissingExtra
+from heptarm.sim.runtime.addresses import AddressMap
+
+#: Every address stays.
+UNMAPPED = AddressMap({})
 
 #: Workbench's file name of process data, frames and tools.
 PROJECT = "RoboticsAPI.data.xml"
@@ -108,6 +112,22 @@ def _without_comments(text: str) -> str:
     return _COMMENT.sub(lambda match: match[1] or " ", text)
 
 
+def _in_literals(text: str, addresses: AddressMap) -> str:
+    """Replace addresses in string literals; comments stay."""
+    return _COMMENT.sub(lambda match: addresses.apply(match[1]) if match[1] else match[0], text)
+
+
+def unused_addresses(folder: Path, data: Path | None, addresses: AddressMap) -> list[str]:
+    """Addresses that neither a literal of the sources nor the project file contains."""
+    literals = (
+        match[1]
+        for source in _sources(folder, "java")
+        for match in _COMMENT.finditer(read_source(source))
+        if match[1]
+    )
+    return addresses.unused([*literals, read_source(data) if data is not None else ""])
+
+
 def _modern(text: str) -> str:
     """Blank the unused imports of packages inside old JREs; every line keeps its number."""
     if not _INTERNAL.search(text):
@@ -137,13 +157,16 @@ def _libraries(folder: Path) -> tuple[Path, ...]:
     return tuple(found)
 
 
-def compile_application(folder: Path, out: Path, *, main: str = "") -> Application:
+def compile_application(
+    folder: Path, out: Path, *, main: str = "", addresses: AddressMap = UNMAPPED
+) -> Application:
     """Compile a folder of Java sources against the doubles.
 
     Args:
         folder: of the project, or of its sources.
         out: an empty folder for the classes.
         main: the application's class, with or without its package; "": the only one.
+        addresses: replaced in string literals.
 
     Raises:
         CommandRejected: no sources, no such application, several of them, or errors of the compiler.
@@ -159,7 +182,7 @@ def compile_application(folder: Path, out: Path, *, main: str = "") -> Applicati
     data = next((file for file in _sources(folder, "xml") if file.name == PROJECT), None)
     left_out: list[str] = []
     with TemporaryDirectory(prefix="heptarm-sources-") as place:
-        copies = _Copies(Path(place), folder, sources)
+        copies = _Copies(Path(place), folder, sources, addresses)
         if not main:
             _compile(copies, list(copies.names.values()), out, jars, chosen=chosen)
         else:
@@ -180,12 +203,12 @@ def compile_application(folder: Path, out: Path, *, main: str = "") -> Applicati
 class _Copies:
     """Sources as UTF-8 in folders that fit their packages, as javac's source path needs them."""
 
-    def __init__(self, place: Path, folder: Path, sources: list[Path]) -> None:
+    def __init__(self, place: Path, folder: Path, sources: list[Path], addresses: AddressMap) -> None:
         self.roots: list[Path] = []
         self.names: dict[str, Path] = {}
         self._origin: dict[str, str] = {}
         for source in sources:
-            text = _modern(read_source(source))
+            text = _in_literals(_modern(read_source(source)), addresses)
             package = _PACKAGE.search(_without_comments(text))
             path = Path(*(package[1].split(".") if package else ()), source.name)
             # two files of one name keep apart, so that javac reports the duplicate

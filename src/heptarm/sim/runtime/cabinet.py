@@ -23,12 +23,14 @@ from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 from heptarm.fri.protocol.version import Version
+from heptarm.io.keys import find_key
 from heptarm.sim.fri.sessions import Sessions
 from heptarm.sim.plant.payload import parse_payload
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.shared_state import Trace
 from heptarm.sim.plant.world import Box
 from heptarm.sim.runtime import project
+from heptarm.sim.runtime.addresses import AddressMap
 from heptarm.sim.runtime.operator import SimulatedOperator, timed
 from heptarm.sim.runtime.realtime_loop import ANSWER_GAP, RealtimeLoop, batch_scheduled
 from heptarm.values.simulator_options import SimulatorOptions, flag
@@ -73,14 +75,16 @@ def process_data(options: SimulatorOptions) -> dict[str, project.Value]:
     """Process data of the project, overridden by the command line; a value keeps its type in the project.
 
     Raises:
-        ValueError: a value does not fit its type, or the file is not a project file.
+        ValueError: a value does not fit its type, the file is not a project file, or the key cannot be used.
     """
     data: dict[str, project.Value] = {"heptarm.max_rate": 1000.0, "heptarm.key": ""}
     if options.project is not None:
-        data |= project.read_process_data(options.project)
+        addresses = AddressMap.of(options.map)
+        for name, value in project.read_process_data(options.project).items():
+            data[name] = addresses.apply(value) if isinstance(value, str) else value
     data |= {"heptarm.bind": options.host, "heptarm.port": options.port}
-    if options.key:
-        data["heptarm.key"] = options.key
+    if key := find_key(key_file=options.key_file):
+        data["heptarm.key"] = key
     for pair in options.data:
         name, equals, text = pair.partition("=")
         if not equals:
@@ -98,7 +102,12 @@ class VirtualCabinet:
 
         self.options = options
         self.plant = Plant(options.model, boxes=[Box.of(text) for text in options.box])
-        self.sessions = Sessions(self.plant, version=Version.of(options.fri_version), speed=options.speed)
+        self.sessions = Sessions(
+            self.plant,
+            version=Version.of(options.fri_version),
+            speed=options.speed,
+            address=AddressMap.of(options.map).apply,
+        )
         self.operator = SimulatedOperator(self.plant)
         for fault in options.fault:
             self.operator.schedule(fault)
@@ -271,7 +280,7 @@ def main(argv: list[str] | None = None) -> int:
             parse_payload(options.payload)
         if options.project is not None:
             project.read_project(options.project)
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError) as error:  # a CommandRejected is a ValueError
         print(json.dumps({"ready": False, "error": str(error)}), flush=True)
         return 2
     with batch_scheduled():

@@ -138,6 +138,14 @@ class RealtimeLoop:
         gc.collect()
         gc.freeze()
         gc.disable()
+        try:
+            self._loop()
+        finally:
+            # otherwise the plant outlives its modules, and the bindings of its libraries report leaks
+            gc.enable()
+            gc.unfreeze()
+
+    def _loop(self) -> None:
         self._shared.reals[HeaderWords.RATE] = self._speed
         now_ns, period, header = time.monotonic_ns, self._period, self._shared.header
         spin = min(SPIN_NS, int(SPIN_FRACTION * period))

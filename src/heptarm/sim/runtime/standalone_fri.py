@@ -17,12 +17,15 @@ from heptarm.fri.protocol.version import Version
 from heptarm.sim.fri.faults import FaultScenario
 from heptarm.sim.fri.overlay import HoldingTarget, MotionOverlay, control_mode
 from heptarm.sim.fri.server import PORT, Address, Server
+from heptarm.sim.fri.sessions import PlantArm
 from heptarm.sim.fri.settings import (
     Event,
     OverlayEnded,
     SessionConfiguration,
 )
+from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.shared_state import SharedState
+from heptarm.sim.runtime.operator import SimulatedOperator
 from heptarm.sim.runtime.realtime_loop import ANSWER_GAP, RealtimeLoop
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
@@ -52,12 +55,37 @@ class SimulatedArm(HoldingTarget, Protocol):
         """One millisecond."""
 
 
+#: Usual stiffness beneath a torque overlay [Nm/rad], as public applications choose it.
+STIFFNESS = 200.0
+
+
+class OperatedArm(PlantArm):
+    """A plant with a simulated operator, who acts before each tick."""
+
+    def __init__(self, plant: Plant, operator: SimulatedOperator) -> None:
+        super().__init__(plant)
+        self._operator = operator
+
+    def hold(self, mode: Mode) -> None:
+        """Hold the present position; continues after a stop that is not requested any more."""
+        self.plant.resume()
+        super().hold(mode)
+
+    def tick(self) -> None:
+        """Advance by one millisecond."""
+        self._operator.tick()
+        super().tick()
+
+
 def usual_mode(command: m.CommandMode) -> Mode:
-    """The control mode in which a client command mode is mostly used: the most compliant one that fits."""
+    """The control mode in which a client command mode is mostly used.
+
+    Beneath torques and wrenches it holds the arm: without stiffness a small torque drives a joint into its limit.
+    """
     if command is m.CommandMode.TORQUE:
-        return JointImpedance(0.0)
+        return JointImpedance(STIFFNESS)
     if command is m.CommandMode.WRENCH:
-        return CartesianImpedance((0.0,) * 6)
+        return CartesianImpedance()
     return Position()
 
 
@@ -168,7 +196,9 @@ class Standalone:
         """Start a hold with an overlay whenever the session is ready for one."""
         controller = self.server.controller
         self._pause = max(0, self._pause - 1)
-        if self._overlay is None or self._pause or controller.state is not m.SessionState.MONITORING_READY:
+        if self._overlay is None or self._pause or controller.overlay is not None:
+            return
+        if controller.state is not m.SessionState.MONITORING_READY:
             return
         if self._arm.reading().safety is m.Safety.NORMAL_OPERATION:
             self._arm.hold(self._mode)

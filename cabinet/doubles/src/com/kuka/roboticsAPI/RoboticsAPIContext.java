@@ -24,6 +24,12 @@ public class RoboticsAPIContext {
         return station.controller;
     }
 
+    /** Not simulated: the project's data are read before the application starts, and never written. */
+    public <T> T getEngine(Class<T> type) {
+        throw new UnsupportedOperationException("the virtual cabinet has no " + type.getName()
+                + "; it reads the project's data.xml once and does not change it");
+    }
+
     /** The device of a type. */
     public <T> T getDeviceFromType(Class<T> type) {
         if (!type.isInstance(station.robot)) {

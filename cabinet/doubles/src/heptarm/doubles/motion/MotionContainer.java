@@ -14,9 +14,12 @@ import com.kuka.roboticsAPI.commandModel.IControllerCommand;
 import com.kuka.roboticsAPI.conditionModel.ICallbackAction;
 import com.kuka.roboticsAPI.conditionModel.ICondition;
 import com.kuka.roboticsAPI.conditionModel.ITriggerAction;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.deviceModel.PositionInformation;
 import com.kuka.roboticsAPI.executionModel.CommandInvalidException;
 import com.kuka.roboticsAPI.executionModel.ExecutionState;
 import com.kuka.roboticsAPI.executionModel.IFiredConditionInfo;
+import com.kuka.roboticsAPI.executionModel.IFiredTriggerInfo;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
@@ -311,7 +314,20 @@ public final class MotionContainer implements IMotionContainer, MotionListener {
         if (!breaks) {
             ITriggerAction action = watched.action(index);
             if (action instanceof ICallbackAction) {
-                dispatch(() -> ((ICallbackAction) action).onTriggerFired(() -> this));
+                LBR robot = Station.current().robot;
+                PositionInformation there = new PositionInformation(robot.getCurrentCartesianPosition(robot.getFlange()),
+                        robot.getCommandedCartesianPosition(robot.getFlange()));
+                dispatch(() -> ((ICallbackAction) action).onTriggerFired(new IFiredTriggerInfo() {
+                    @Override
+                    public IMotionContainer getMotionContainer() {
+                        return MotionContainer.this;
+                    }
+
+                    @Override
+                    public PositionInformation getPositionInformation() {
+                        return there;
+                    }
+                }));
             }
         }
     }

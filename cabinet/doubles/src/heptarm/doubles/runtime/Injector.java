@@ -22,6 +22,7 @@ import com.kuka.roboticsAPI.conditionModel.ObserverManager;
 import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseController;
 import com.kuka.roboticsAPI.controllerModel.sunrise.SunriseLBR;
+import com.kuka.roboticsAPI.deviceModel.Device;
 import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
 import com.kuka.roboticsAPI.persistenceModel.processDataModel.IProcessData;
 import com.kuka.roboticsAPI.uiModel.IApplicationUI;
@@ -31,6 +32,7 @@ import com.kuka.task.ITaskManager;
 /** Injects objects of the cabinet, process data, tools by template name and classes of the project into a task. */
 final class Injector {
     private final ApplicationServices services;
+    private final Station station;
     private final Object[] offers;
     private final Class<?>[] types = {SunriseLBR.class, SunriseController.class, Controller.class, IApplicationData.class,
         ITaskLogger.class, IApplicationUI.class, ObserverManager.class, IApplicationControl.class, RoboticsAPIContext.class,
@@ -39,6 +41,7 @@ final class Injector {
 
     Injector(ApplicationServices services, Station station) {
         this.services = services;
+        this.station = station;
         this.offers = new Object[] {station.robot, station.controller, station.controller, services, services.logger, services.pad,
             services.observers, services, station.context, station.tasks, station.automaticResume.manager};
     }
@@ -82,6 +85,9 @@ final class Injector {
     }
 
     private Object find(Class<?> type, Named named, String where) throws ReflectiveOperationException {
+        if (named != null && type.isAssignableFrom(SunriseLBR.class) && Device.class.isAssignableFrom(type)) {
+            return device(named.value(), where);
+        }
         if (named != null && PhysicalObject.class.isAssignableFrom(type)) {
             return services.createFromTemplate(named.value());
         }
@@ -104,6 +110,16 @@ final class Injector {
             }
         }
         return made;
+    }
+
+    /** The robot, by its name in the station setup. */
+    private Object device(String name, String where) {
+        String present = station.robot.getName();
+        if (!present.equals(name)) {
+            throw new IllegalArgumentException("nothing to inject into " + where + ": the virtual cabinet's robot is " + present
+                    + ", not " + name + "; choose another robot with --model");
+        }
+        return station.robot;
     }
 
     /** Whether a class is none of the project's. */

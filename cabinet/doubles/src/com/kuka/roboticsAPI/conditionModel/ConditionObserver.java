@@ -14,16 +14,22 @@ public class ConditionObserver {
     }
 
     private final Station station;
+    private final ICondition observed;
     private final Condition condition;
     private final boolean onEnable;
     private final Hearer hearer;
     private long watch;
 
-    ConditionObserver(Station station, Condition condition, boolean onEnable, Hearer hearer) {
+    ConditionObserver(Station station, ICondition observed, Condition condition, boolean onEnable, Hearer hearer) {
         this.station = station;
+        this.observed = observed;
         this.condition = condition;
         this.onEnable = onEnable;
         this.hearer = hearer;
+    }
+
+    public ICondition getCondition() {
+        return observed;
     }
 
     public synchronized void enable() {

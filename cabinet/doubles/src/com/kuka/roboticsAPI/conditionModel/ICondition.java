@@ -4,7 +4,10 @@ package com.kuka.roboticsAPI.conditionModel;
 public interface ICondition {
     ICondition or(ICondition... others);
 
-    ICondition and(ICondition... others);
+    /** An application's own condition may lack it; the virtual cabinet can monitor its own conditions only. */
+    default ICondition and(ICondition... others) {
+        throw new UnsupportedOperationException("the virtual cabinet cannot combine a condition of class " + getClass().getName());
+    }
 
     ICondition xor(ICondition other);
 

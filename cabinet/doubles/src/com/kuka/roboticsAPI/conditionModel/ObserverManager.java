@@ -37,8 +37,8 @@ public class ObserverManager {
 
     private ConditionObserver make(ICondition condition, NotificationType type, ConditionObserver.Hearer hearer) {
         boolean onEnable = type == NotificationType.OnEnable || type == NotificationType.All;
-        ConditionObserver made = new ConditionObserver(station, AbstractCondition.translate(condition, station.robot), onEnable,
-                (observer, time, value) -> {
+        ConditionObserver made = new ConditionObserver(station, condition,
+                AbstractCondition.translate(condition, station.robot), onEnable, (observer, time, value) -> {
                     try {
                         hearer.edge(observer, time, value);
                     } catch (RuntimeException e) {

@@ -1,5 +1,9 @@
 package com.kuka.roboticsAPI.deviceModel;
 
+import com.kuka.common.params.IParameterSet;
+
+import heptarm.doubles.runtime.ParameterList;
+
 /** Redundancy of an LBR: arm angle E1 [rad], Status and Turn. */
 public class LBRE1Redundancy extends StatusTurnRedundancy {
     private double e1;
@@ -31,6 +35,16 @@ public class LBRE1Redundancy extends StatusTurnRedundancy {
 
     public double getE1() {
         return e1;
+    }
+
+    @Override
+    public IParameterSet getAllParameters() {
+        return ParameterList.of("LBRE1Redundancy", getStatus(), getTurn(), e1);
+    }
+
+    @Override
+    public LBRE1Redundancy copy() {
+        return new LBRE1Redundancy(e1, getStatus(), getTurn());
     }
 
     @Override

@@ -1,6 +1,9 @@
 package com.kuka.roboticsAPI.deviceModel;
 
+import com.kuka.common.params.IParameterSet;
 import com.kuka.roboticsAPI.geometricModel.redundancy.AbstractRedundancyCollection;
+
+import heptarm.doubles.runtime.ParameterList;
 
 /** Configuration for a pose: Status and Turn; -1: not given. */
 public class StatusTurnRedundancy extends AbstractRedundancyCollection {
@@ -31,6 +34,16 @@ public class StatusTurnRedundancy extends AbstractRedundancyCollection {
 
     public int getTurn() {
         return turn;
+    }
+
+    @Override
+    public IParameterSet getAllParameters() {
+        return ParameterList.of("StatusTurnRedundancy", status, turn);
+    }
+
+    @Override
+    public StatusTurnRedundancy copy() {
+        return new StatusTurnRedundancy(status, turn);
     }
 
     @Override

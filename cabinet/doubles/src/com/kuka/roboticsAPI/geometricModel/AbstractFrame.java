@@ -109,6 +109,10 @@ public abstract class AbstractFrame {
         return redundancy.get(device);
     }
 
+    public Map<Device, IRedundancyCollection> getRedundancyInformation() {
+        return new HashMap<>(redundancy);
+    }
+
     public void setRedundancyInformation(Device device, IRedundancyCollection value) {
         redundancy.put(device, value);
     }

@@ -57,6 +57,11 @@ public class Frame extends AbstractFrame {
         return copy;
     }
 
+    /** Another frame as seen from this one, now. */
+    public Transformation staticTransformationTo(Frame other) {
+        return transformationTo(other);
+    }
+
     /** Moves this frame by a transformation in its own axes. */
     public Frame transform(ITransformation by) {
         fromParent = fromParent.compose(by);

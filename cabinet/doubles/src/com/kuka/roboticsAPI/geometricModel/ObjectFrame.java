@@ -92,6 +92,22 @@ public class ObjectFrame extends AbstractFrame {
         return null;
     }
 
+    /** A frame of the application at the present place, in the same parent. */
+    public Frame copy() {
+        return new Frame(getParent(), fromParent());
+    }
+
+    /** A frame of the application at the present place, in another one. */
+    public Frame copy(ObjectFrame reference) {
+        return new Frame(reference, reference.transformationTo(this));
+    }
+
+    /** Not simulated: where projects store such parameters is not known. */
+    public <T> T getAdditionalParameter(String parameter) {
+        throw new UnsupportedOperationException("the virtual cabinet does not read additional parameters of frames, such as "
+                + parameter + " of " + name + "; use process data");
+    }
+
     public Frame copyWithRedundancy() {
         Frame copy = new Frame(transformationFromWorld());
         copyRedundancyTo(copy);

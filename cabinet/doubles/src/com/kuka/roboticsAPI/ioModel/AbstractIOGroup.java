@@ -40,11 +40,16 @@ public abstract class AbstractIOGroup {
         outputs.put(name, new Output(group, name, type, low, high));
     }
 
+    /** An output that no device is connected to; here like any other. */
+    protected void addMockedDigitalOutput(String name, IOTypes type, int bits) {
+        addDigitalOutput(name, type, bits);
+    }
+
     protected void addAnalogOutput(String name, IOTypes type, int bits, double low, double high) {
         outputs.put(name, new Output(group, name, type, low, high));
     }
 
-    protected boolean getBooleanIOValue(String name, boolean isOutput) {
+    public boolean getBooleanIOValue(String name, boolean isOutput) {
         return getIO(name, isOutput).value() != 0.0;
     }
 

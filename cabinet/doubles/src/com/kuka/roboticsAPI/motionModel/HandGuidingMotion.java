@@ -87,6 +87,11 @@ public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
         return this;
     }
 
+    /** The older name of {@link #setJointVelocityLimit}. */
+    public HandGuidingMotion setAxisSpeedLimit(double radiansPerSecond) {
+        return setJointVelocityLimit(radiansPerSecond);
+    }
+
     /** Former name of {@link #setJointLimitsMax}. */
     public HandGuidingMotion setAxisLimitsMax(double... radians) {
         return setJointLimitsMax(radians);

@@ -19,6 +19,10 @@ public class MotionBatch extends RobotMotion<MotionBatch> {
         this.motions = List.of(motions);
     }
 
+    public List<RobotMotion<?>> getMotions() {
+        return motions;
+    }
+
     @Override
     public List<RobotMotion<?>> parts() {
         return motions;

@@ -9,16 +9,19 @@ import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
 import heptarm.doubles.seam.MotionKind;
 import heptarm.doubles.seam.MotionOrder;
 
-/** Holds the position for a time; -1: until cancelled. */
+/** Holds the position for a time; -1: until cancelled; 0: it ends at once. */
 public class PositionHold extends RobotMotion<PositionHold> {
+    /** One cycle of the controller [s]. */
+    private static final double SHORTEST = 1e-3;
+
     /** NaN: until cancelled [s]. */
     private final double seconds;
 
     public PositionHold(IMotionControlMode mode, long duration, TimeUnit unit) {
-        if (duration == 0 || duration < -1) {
-            throw new IllegalArgumentException("duration must be positive, or -1 for no end, got " + duration + " s");
+        if (duration < -1) {
+            throw new IllegalArgumentException("duration must be 0 or positive, or -1 for no end, got " + duration);
         }
-        seconds = duration < 0 ? Double.NaN : unit.toNanos(duration) * 1e-9;
+        seconds = duration < 0 ? Double.NaN : duration == 0 ? SHORTEST : unit.toNanos(duration) * 1e-9;
         setMode(mode);
     }
 

@@ -26,11 +26,12 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
     private static final double STIFFEST_ROTATION = 300.0;
     /** Largest stiffness that the plant takes [Nm/rad]. */
     private static final double PLANT_NULL_SPACE_STIFFNESS = 5000.0;
+    private static final double DEFAULT_DAMPING = 0.7;
     private static final double LEAST_DAMPING = 0.1;
     private static final double LEAST_NULL_SPACE_DAMPING = 0.3;
 
     private final double[] stiffness = {2000, 2000, 2000, 200, 200, 200};
-    private final double[] damping = filled(0.7);
+    private final double[] damping = filled(DEFAULT_DAMPING);
     private final double[] additionalControlForce = new double[DIRECTIONS];
     private double[] maxControlForce = filled(OFF);
     private double[] maxCartesianVelocity = filled(OFF);
@@ -189,6 +190,16 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
 
     public double[] getDamping() {
         return damping.clone();
+    }
+
+    /** Not simulated: the unit and the effect are not documented. */
+    public CartesianImpedanceControlMode setMaxJointSpeed(double... speeds) {
+        throw new UnsupportedOperationException("the virtual cabinet has no largest joint speed of Cartesian impedance");
+    }
+
+    public CartesianImpedanceControlMode setDampingToDefaultValue() {
+        Arrays.fill(damping, DEFAULT_DAMPING);
+        return this;
     }
 
     public double[] getMaxPathDeviation() {

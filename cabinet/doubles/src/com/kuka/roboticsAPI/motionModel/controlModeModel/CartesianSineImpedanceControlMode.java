@@ -170,6 +170,19 @@ public class CartesianSineImpedanceControlMode extends CartesianImpedanceControl
         return this;
     }
 
+    public double getRiseTime() {
+        return riseTime;
+    }
+
+    /** NaN: for ever. */
+    public double getHoldTime() {
+        return holdTime;
+    }
+
+    public double getFallTime() {
+        return fallTime;
+    }
+
     /** The motion does not end before the pattern. */
     public CartesianSineImpedanceControlMode setStayActiveUntilPatternFinished(boolean stay) {
         stayActive = stay;

@@ -10,6 +10,11 @@ public class PositionMastering {
         this.robot = robot;
     }
 
+    /** With a tool; mastering does not depend on it here. */
+    public MasteringInfo getMasteringInfo(String tool) {
+        return new MasteringInfo(this);
+    }
+
     /** Of an axis, counted from 0. */
     public boolean isAxisMastered(int axis) {
         if (axis < 0 || axis >= robot.getJointCount()) {

@@ -1,0 +1,6 @@
+package com.kuka.common.params;
+
+/** A value of a set of parameters. */
+public interface IParameter<V> {
+    V value();
+}

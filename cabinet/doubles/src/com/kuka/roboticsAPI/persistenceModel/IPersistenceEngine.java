@@ -1,0 +1,6 @@
+package com.kuka.roboticsAPI.persistenceModel;
+
+/** Access to the project's stored data. */
+public interface IPersistenceEngine {
+    Object getDefaultDataSource();
+}
