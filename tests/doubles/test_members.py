@@ -21,5 +21,5 @@ def test_members_that_few_applications_use(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     done = _run("sample.Members", tmp_path, f"sample.file={said}", more=("--model", "med7"))
-    assert done.returncode == 1 and "the virtual cabinet's robot is LBR_Med_7_R800_1" in done.stdout
+    assert done.returncode != 0 and "the virtual cabinet's robot is LBR_Med_7_R800_1" in done.stdout
     assert "choose another robot with --model" in done.stdout
