@@ -2,11 +2,11 @@
 PY := .venv/bin/python
 STAMPS := build/stamps
 
-.PHONY: setup cabinet demo test test-ros2 test-ros1 conformance lint check bench figures docs wheel clean
+.PHONY: setup cabinet demo test test-ros test-ros2 test-ros1 test-long conformance lint check bench soak figures lock docs wheel clean help
 
 setup: $(STAMPS)/venv cabinet  ## virtual environment, package, compiled cabinet
 
-$(STAMPS)/venv: pyproject.toml scripts/setup.sh
+$(STAMPS)/venv: pyproject.toml scripts/setup.sh $(wildcard scripts/lock/all.txt scripts/lock/torch.txt)
 	scripts/setup.sh all
 	@mkdir -p $(STAMPS) && touch $@
 
@@ -24,13 +24,13 @@ LONGEST := --durations=15 --durations-min=3
 
 ROS2_PACKAGES := $(shell find ros2/interfaces ros2/heptarm_msgs -type f)
 
-$(STAMPS)/ros2: scripts/setup_ros2.sh scripts/ros2_interfaces.py scripts/ros2_requirements.txt $(ROS2_PACKAGES) $(STAMPS)/venv
+$(STAMPS)/ros2: scripts/setup_ros2.sh scripts/ros2_interfaces.py scripts/ros2_requirements.txt $(wildcard scripts/lock/ros2.txt) $(ROS2_PACKAGES) $(STAMPS)/venv
 	scripts/setup_ros2.sh
 	@mkdir -p $(STAMPS) && if [ -x build/ros2/bin/python ]; then touch $@; fi  # asked again where there is none
 
 ROS1_PACKAGES := $(shell find ros1/interfaces -type f)
 
-$(STAMPS)/ros1: scripts/setup_ros1.sh scripts/ros1_interfaces.py $(ROS1_PACKAGES) $(ROS2_PACKAGES) $(STAMPS)/venv
+$(STAMPS)/ros1: scripts/setup_ros1.sh scripts/ros1_interfaces.py $(wildcard scripts/lock/ros1.txt scripts/lock/numpy.txt) $(ROS1_PACKAGES) $(ROS2_PACKAGES) $(STAMPS)/venv
 	scripts/setup_ros1.sh
 	@mkdir -p $(STAMPS) && if [ -x build/ros1/bin/python ]; then touch $@; fi
 
@@ -48,10 +48,18 @@ lint: $(STAMPS)/venv  ## ruff, mypy, import contract
 check: $(STAMPS)/venv  ## the generated files agree with the schema
 	$(PY) schema/generate.py --check
 
-test: setup $(STAMPS)/browser lint check  ## everything; fast tests first
-	$(PY) -m pytest -n $(WORKERS) --dist loadfile $(LONGEST)
-	@$(MAKE) --no-print-directory test-ros2
-	@$(MAKE) --no-print-directory test-ros1
+test: setup $(STAMPS)/browser lint check  ## everything; what takes long begins first
+	$(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(LONGEST)
+	@$(MAKE) --no-print-directory test-ros
+
+# Each of them mostly waits, and takes one processor at most.
+test-ros: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## both ROS nodes, side by side
+	@$(MAKE) --no-print-directory -j2 --output-sync=target test-ros2 test-ros1
+
+test-long: setup $(STAMPS)/browser  ## everything with LONG=1: soaks, long searches, all cases of conformance
+	LONG=1 $(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --timeout 3600 $(LONGEST)
+	@LONG=1 $(MAKE) --no-print-directory test-ros
+	@$(MAKE) --no-print-directory conformance
 
 test-ros2: setup $(STAMPS)/ros2  ## the ROS 2 node with real rclpy, where there are wheels of it
 	@if [ -x build/ros2/bin/python ]; then build/ros2/bin/python -m pytest $(LONGEST) tests/ros2; \
@@ -61,16 +69,24 @@ test-ros1: setup $(STAMPS)/ros1  ## the ROS 1 node with a real roscore, where th
 	@if [ -x build/ros1/bin/python ]; then build/ros1/bin/python -m pytest $(LONGEST) tests/ros1; \
 	else echo "no ROS 1 here: the tests of its node are skipped"; fi
 
-conformance: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## every case of conformance against both nodes, with each way of execution
-	@for way in servo spline fri; do for ros in ros2 ros1; do \
-	if [ -x build/$$ros/bin/python ]; then echo "$$ros, $$way:"; \
-	CONFORMANCE=all EXECUTION=$$way build/$$ros/bin/python -m pytest -q tests/$$ros/test_conformance.py || exit 1; fi; done; done
+conformance: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## every case of conformance against both nodes, with each kind of execution
+	@for execution in servo spline fri; do for ros in ros2 ros1; do \
+	if [ -x build/$$ros/bin/python ]; then echo "$$ros, $$execution:"; \
+	CONFORMANCE=all EXECUTION=$$execution build/$$ros/bin/python -m pytest -q tests/$$ros/test_conformance.py || exit 1; fi; done; done
 
 bench: setup  ## figures as JSON lines; GROUP=fri or ONLY=name selects, LIST=1 lists them, STORE=1 stores the run
 	@$(PY) -m bench $(if $(GROUP),--group $(GROUP)) $(if $(ONLY),--only $(ONLY)) $(if $(LIST),--list) $(if $(STORE),--store)
 
+MINUTES ?= 3
+
+soak: setup  ## everything at once on a virtual cabinet for MINUTES=3: what grows, what is lost; in build/soak
+	$(PY) -m bench.trust --minutes $(MINUTES)
+
 figures: $(STAMPS)/venv  ## docs/explanation/figures.md, from the newest stored run
 	$(PY) scripts/figures_page.py
+
+lock: $(STAMPS)/venv  ## versions and checksums of all packages, in scripts/lock
+	$(PY) scripts/lock.py
 
 docs: $(STAMPS)/venv  ## the site, in docs/_build/html
 	.venv/bin/sphinx-build -W -q -b html docs docs/_build/html
@@ -81,3 +97,6 @@ wheel: setup  ## a wheel with the compiled jars, in dist/
 
 clean:  ## everything that make made, but for the virtual environment
 	rm -rf build dist docs/_build src/heptarm/sim/jars .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
+
+help:  ## this list
+	@sed -n 's/^\([a-z0-9-]*\):.*## \(.*\)/\1|\2/p' $(MAKEFILE_LIST) | sort | awk -F'|' '{printf "  make %-12s %s\n", $$1, $$2}'

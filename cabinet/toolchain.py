@@ -89,7 +89,9 @@ def find_ecj(jdk: Jdk) -> list[str]:
     raise ToolMissing(
         "the Eclipse compiler (ecj) is missing; only it still compiles for Java 6. On Debian or Ubuntu:\n"
         f"    sudo sh -c '{INSTALL}'\n"
-        "elsewhere fetch org.eclipse.jdt:ecj:3.32.0 from Maven Central and set ECJ_JAR to the jar's path"
+        "elsewhere, with Maven's client, which checks its checksum:\n"
+        "    mvn --strict-checksums dependency:copy -Dartifact=org.eclipse.jdt:ecj:3.32.0 -DoutputDirectory=build\n"
+        "    export ECJ_JAR=$PWD/build/ecj-3.32.0.jar"
     )
 
 

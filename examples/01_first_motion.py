@@ -1,4 +1,4 @@
-"""Connect, move, print where the arm is."""
+"""Connect, move, and print the pose of the flange."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""Print the state ten times a second for a second while the arm moves."""
+"""Print the state ten times per second, for one second, while the arm moves."""
 
 import os
 

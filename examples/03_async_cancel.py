@@ -1,4 +1,4 @@
-"""Await a motion in asyncio, and cancel another one under way."""
+"""Await a motion in asyncio, and cancel another one while it runs."""
 
 import asyncio
 import os

@@ -1,4 +1,4 @@
-"""A square of four straight lines as one program, and how far the arm was from closing it."""
+"""Move along a square of four straight lines as one program, and print the distance between start and end."""
 
 import os
 

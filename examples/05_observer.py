@@ -1,4 +1,4 @@
-"""Two clients of one virtual cabinet: one controls, the other watches and stops it."""
+"""Connect two clients to one virtual cabinet: one controls the arm, the other observes and stops it."""
 
 import json
 import subprocess
@@ -14,14 +14,14 @@ with (
     ha.connect(target, name="controller") as arm,
     ha.connect(target, control=False, name="observer") as observer,
 ):
-    print("the observer sees that", observer.controller, "is in control")
+    print("the client in control is", observer.controller)
     handle = arm.start(ha.ptp(ha.deg(90, 30, 0, -90, 0, 60, 0)), speed=0.3)
     observer.wait_until(lambda state: state.q[0] > 0.2)
     observer.stop()
     try:
         handle.wait()
     except ha.MotionAborted as error:
-        print("the controller hears:", error)
+        print("the controller receives:", error)
 
 cabinet.stdin.close()
 cabinet.wait()

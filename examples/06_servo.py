@@ -1,4 +1,4 @@
-"""Follow a stream of targets that is made while the arm moves: a swing of the wrist."""
+"""Swing the wrist with a stream of targets that are computed while the arm moves."""
 
 import os
 

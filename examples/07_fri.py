@@ -1,4 +1,4 @@
-"""FRI: a law in a process of its own swings the wrist, and one of its parameters changes while it runs."""
+"""Swing the wrist by an FRI law that runs in a process of its own, and change one of its parameters meanwhile."""
 
 import math
 import os

@@ -1,4 +1,4 @@
-"""An arc, a blended square, a spline and an ellipse, and what the arm made of them; --plot shows their shapes."""
+"""Move along an arc, a blended square, a spline and an ellipse, and measure them; --plot shows them."""
 
 import os
 import sys
@@ -11,7 +11,7 @@ SPEED, ZONE = 0.25, 0.02  # m/s, m
 
 
 def drawn(arm: ha.Arm, motion) -> np.ndarray:
-    """Carry out a motion and return where the flange was meanwhile, shape (n, 3) [m]."""
+    """Execute a motion and return the positions of the flange, shape (n, 3) [m]."""
     handle = arm.start(motion)
     places = []
     for state in arm.states(rate=200):

@@ -1,4 +1,4 @@
-"""Find the height of a table by touching it twice: fast, up a little, and once more, slowly."""
+"""Measure the height of a table by touching it twice: fast, then slowly."""
 
 import os
 

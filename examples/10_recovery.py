@@ -1,4 +1,4 @@
-"""An emergency stop under way: what the program sees, what it may do, and what it leaves to a person."""
+"""Recover from an emergency stop during a motion: what the program may do, and what a person has to do."""
 
 import threading
 
@@ -7,7 +7,7 @@ import heptarm as ha
 home = ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0), speed=0.5)
 away = ha.ptp(ha.deg(60, 30, 0, -90, 0, 60, 0), speed=0.3)
 
-# a simulator of one's own, since somebody has to press the button
+# a private simulator, since the program also plays the person who presses the button
 with ha.connect("sim://iiwa14", watchdog=2.0) as arm:
     arm.move(home)
     threading.Timer(1.0, arm.operator.fault, ["emergency_stop"]).start()

@@ -1,4 +1,4 @@
-"""A gripper that a client defines: its tip moves, its weight is not felt, and what it holds is not felt either."""
+"""Define and attach a gripper and a workpiece: motions refer to its tip, and their weights are compensated."""
 
 import os
 
@@ -9,14 +9,14 @@ PART = ha.Workpiece("part", mass=0.5, com=(0, 0, 0.02))
 
 
 def load(arm: ha.Arm) -> str:
-    """What A2 has to hold, and what it takes for an external force [Nm]."""
+    """Measured torque of A2, and how much of it counts as external [Nm]."""
     arm.move(ha.hold(0.5))
-    return f"A2 holds {arm.state.tau[1]:6.1f} Nm, of which {abs(arm.state.tau_ext[1]):.1f} Nm from outside"
+    return f"torque of A2 {arm.state.tau[1]:6.1f} Nm, external {abs(arm.state.tau_ext[1]):.1f} Nm"
 
 
 with ha.connect(os.environ.get("HEPTARM_TARGET", "sim://iiwa14")) as arm:
     arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=0.6)
-    print("bare:    ", load(arm))
+    print("no tool: ", load(arm))
     with arm.tool(GRIPPER):
         print("gripper: ", load(arm))
         tip = arm.state.pose

@@ -1,4 +1,4 @@
-"""Follow poses on straight lines: a hand that goes round a square while a program chooses the next corner."""
+"""Follow pose targets on straight lines, along a square whose next corner the program chooses while the arm moves."""
 
 import os
 

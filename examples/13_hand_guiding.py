@@ -11,7 +11,7 @@ import heptarm as ha
 
 
 def person(arm: ha.Arm) -> None:
-    """Hold the switch of the hand guiding device, pull until a joint has turned by 10 degrees, let go."""
+    """Hold the switch of the hand guiding device, push until a joint has turned by 10 degrees, release the switch."""
     arm.wait_until(lambda state: state.motion is not None and state.motion.active)
     start = arm.state.q
     arm.operator.guide()
@@ -32,5 +32,5 @@ with ha.connect(os.environ.get("HEPTARM_TARGET_TO_GUIDE", "sim://iiwa14"), watch
     print(f"{whole.duration:.1f} s were recorded, {len(taught)} of {len(whole)} points are kept")
     with TemporaryDirectory() as folder:
         file = taught.save(Path(folder) / "taught.npz")
-        replay = arm.replay(ha.Trajectory.load(file), by="spline", pace=0.3)
-    print(f"{replay.result.cause.value}, {np.degrees(replay.deviation):.2f} deg off at most")
+        replay = arm.replay(ha.Trajectory.load(file), by="spline", speed_scaling=0.3)
+    print(f"{replay.result.cause.value}, {np.degrees(replay.deviation):.2f} deg largest deviation")

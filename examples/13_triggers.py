@@ -1,4 +1,4 @@
-"""A lamp that shines on a part of the way, and a program that follows its own events."""
+"""Switch a lamp on and off at points of the path, and print the events of the motions."""
 
 import os
 

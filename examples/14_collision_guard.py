@@ -1,11 +1,11 @@
-"""Stop at a collision: which joint felt it, how much, and a compliant reaction."""
+"""Stop at a collision, print the joint and its torque, and react with compliance."""
 
 import os
 
 import heptarm as ha
 from heptarm.values.mode.impedance import JointImpedance
 
-TABLE = "sim://iiwa14?box=0.6,0,0.15,0.4,0.6,0.3"  # stands where the arm is going to
+TABLE = "sim://iiwa14?box=0.6,0,0.15,0.4,0.6,0.3"  # a box in the path of the arm
 
 with ha.connect(os.environ.get("HEPTARM_TARGET_WITH_TABLE", TABLE), watchdog=2.0) as arm:
     arm.move(ha.ptp(ha.deg(0, 35, 0, -80, 0, 65, 0)), speed=0.5)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import key_vectors
 from spec import SIZES, Field, Spec
 
 
@@ -38,8 +39,8 @@ def protocol(spec: Spec) -> str:
         "|---|---|---|",
     ]
     lines += [f"| `{one['name']}` | `{one['type']}` | {one.get('doc', '')} |" for one in spec.header]
+    lines += ["", *key_vectors.page(spec)]
     lines += [
-        "",
         "## Types",
         "",
         "`str` is a u16 count of bytes and UTF-8; `bytes` a u32 count and bytes; `list<T>` a u16 count and the entries;"

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import docs
 import java
+import key_vectors
 import native
 import plant
 import python
@@ -35,6 +36,7 @@ def outputs() -> dict[Path, str]:
         pages / "errors.md": docs.errors(spec),
         ROOT / "src" / "heptarm" / "fri" / "loop" / "native_layout.h": native.header(),
         schema.HERE / "golden" / "vectors.json": json.dumps(sample_bodies.golden(spec), indent=1) + "\n",
+        schema.HERE / "golden" / "key.json": json.dumps(key_vectors.vectors(spec), indent=1) + "\n",
     }
     seam = plant.load()
     result[ROOT / "src" / "heptarm" / "sim" / "seam.py"] = plant.python_module(seam)

@@ -53,7 +53,10 @@ def header() -> str:
     lines += _enum("words of the shared header", {f"H_{name}": layout[name] for name in words})
     counts = {f"COUNT_{name.upper()}": i for i, name in enumerate(statistics.COUNTERS)}
     lines += _enum("counters from H_COUNTS on", counts)
-    lines += _enum("words of a state", _prefixed(layout, "S_") | _named(memory, "STATE_WORDS"))
+    arrays = {f"S_{name.upper()}": place.start for name, place in memory.ARRAYS.items()}
+    lines += _enum("words of a state", _prefixed(layout, "S_") | arrays | _named(memory, "STATE_WORDS"))
+    places = (f"[{tag}] = S_{name.upper()}" for name, (tag, _) in messages.MONITORED.items())
+    lines += [f"#define MONITORED {{{', '.join(places)}}} /* by number of the field in a message */", ""]
     command = _prefixed(layout, "C_") | _named(memory, "COMMAND_WORDS", "COMMAND_SLOTS")
     lines += _enum("words of a command", command)
     lines += _enum("parts that a command has", _prefixed(layout, "GIVEN_"))

@@ -80,6 +80,11 @@ def load(folder: Path = HERE) -> Seam:
         ValueError: an unknown type or attribute.
     """
     raw = tomllib.loads((folder / "plant.toml").read_text(encoding="utf-8"))
+    wire = tomllib.loads((HERE / "protocol.toml").read_text(encoding="utf-8"))["struct"]
+    for entry in raw["struct"].values():
+        if like := entry.get("like"):
+            same = [one for one in wire[like]["fields"] if one["name"] not in entry.get("without", ())]
+            entry["fields"] = [*same, *entry.get("fields", ())]
     kinds, constants = kinds_of(raw), raw["constants"]
 
     def fields(entries: list[dict[str, Any]]) -> list[Field]:
@@ -90,7 +95,7 @@ def load(folder: Path = HERE) -> Seam:
 
     enums = {n: Enum(n, e.get("base", "u8"), e["doc"], e["values"]) for n, e in raw["enum"].items()}
     enums |= {n: Enum(n, e["base"], e["doc"], e["values"], flags=True) for n, e in raw["flags"].items()}
-    structs = {n: Struct(n, s["doc"], fields(s["fields"])) for n, s in raw["struct"].items()}
+    structs = {n: Struct(n, s["doc"], fields(s.get("fields", []))) for n, s in raw["struct"].items()}
     unions = {
         n: Union(n, u["doc"], [(m["tag"], m["type"]) for m in u["members"]]) for n, u in raw["union"].items()
     }

@@ -219,6 +219,15 @@ def fields(spec: Spec, chosen: list[Field]) -> list[str]:
     return [f"    {one.name}: {annotation(one.type)}{default(spec, one)}" for one in chosen]
 
 
+def _ranges(chosen: list[Field]) -> list[str]:
+    """Ranges of numbers, for those who check a value before they send it."""
+    found = {one.name: (one.low, one.high) for one in chosen if one.type.name == "f64" and one.ranged}
+    if not found:
+        return []
+    pairs = ", ".join(f'"{name}": ({_number(low)}, {_number(high)})' for name, (low, high) in found.items())
+    return [f"    RANGES: ClassVar[dict[str, tuple[float, float]]] = {{{pairs}}}"]
+
+
 def _methods(name: str, body: Body, fields: list[Field]) -> list[str]:
     lines = ["", "    def _write(self, out: list[bytes]) -> None:"]
     lines += [f"        {line}" for line in body.write] or ["        pass"]
@@ -300,6 +309,8 @@ def messages(spec: Spec) -> str:
         f"MINOR = {p['minor']}",
         f"PORT = {p['port']}",
         f"MAGIC = {p['magic']:#06x}",
+        f"NONCE = {p['nonce']}",
+        f"TAG = {p['tag']}",
     ]
     layout = "".join(PRIMITIVES[one["type"]] for one in spec.header)
     lines += [f"MAX_BODY = {p['max_body']}", f'HEADER = Struct(">{layout}")', '_MASK = Struct(">H")', ""]
@@ -331,6 +342,8 @@ def messages(spec: Spec) -> str:
             f"class {name}:",
         ]
         lines += [f'    """{_doc(struct.doc)}"""', ""]
+        if ranges := _ranges(struct.fields):
+            lines += [*ranges, ""]
         lines += fields(spec, struct.fields) + _methods(name, body, struct.fields) + [""]
     for message in spec.messages.values():
         body = Body(spec, message.name, message.fields)
@@ -352,6 +365,7 @@ def messages(spec: Spec) -> str:
             if not body.is_run:
                 raise ValueError(f"{message.name}: a one-way message is one run of numbers")
             lines += [f"    LAYOUT: ClassVar[Struct] = _{message.name}_0"]
+        lines += _ranges(message.fields)
         lines += [""]
         if message.groups:
             lines += _state(message)

@@ -91,6 +91,8 @@ class Union:
     name: str
     doc: str
     members: list[tuple[int, str]]
+    #: Fields that some members have; in Java the union has a method for each, which returns "", NaN or null for the others.
+    common: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -213,7 +215,8 @@ def load(folder: Path = HERE) -> Spec:
         n: Struct(n, s["doc"], [parse_field(f, kinds) for f in s["fields"]]) for n, s in raw["struct"].items()
     }
     unions = {
-        n: Union(n, u["doc"], [(m["tag"], m["type"]) for m in u["members"]]) for n, u in raw["union"].items()
+        n: Union(n, u["doc"], [(m["tag"], m["type"]) for m in u["members"]], tuple(u.get("common", ())))
+        for n, u in raw["union"].items()
     }
     messages = {}
     for name, entry in raw["message"].items():

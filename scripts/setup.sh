@@ -29,13 +29,49 @@ if [ ! -x $venv/bin/python ]; then
     fi
     "$python" -m venv $venv
 fi
-# Old versions of pip can search for a long time for a set of versions that fit.
-$venv/bin/python -m pip install -q --disable-pip-version-check -U "pip>=24"
-case ",$extras," in
-*,all,* | *,dev,* | *,rl,*)
-    # A version for which there is a build without CUDA here; any newer one would bring gigabytes that no test needs.
-    $venv/bin/python -m pip install -q --disable-pip-version-check "torch==2.13.0" ||
+pip() { $venv/bin/python -m pip "$@"; }
+export PIP_DISABLE_PIP_VERSION_CHECK=1
+
+# Installs exactly the files whose SHA-256 a lock file names. If they are not to be had here, it says so and fails; a file
+# with another content ends the set-up.
+locked() {
+    name=$1
+    shift
+    if said=$(pip install -q --require-hashes --no-deps "$@" -r "scripts/lock/$name.txt" 2>&1); then
+        return 0
+    fi
+    case $said in
+    *"DO NOT MATCH THE HASHES"*)
+        echo "$said" >&2
+        echo "a downloaded file is not the one that scripts/lock/$name.txt names; nothing of it was installed" >&2
+        exit 1
+        ;;
+    esac
+    echo "$said" | grep ERROR >&2 || true
+    return 1
+}
+
+torch() { # A version for which there is a build without CUDA here; any newer one would bring gigabytes that no test needs.
+    pip install -q "torch==2.13.0" || {
         echo "torch 2.13.0 is not to be had here; another version will be taken" >&2
-    ;;
-esac
-$venv/bin/python -m pip install -q --disable-pip-version-check -e ".[$extras]"
+        return 1
+    }
+}
+
+# Old versions of pip can search for a long time for a set of versions that fit.
+pip install -q -U "pip>=24"
+if [ "$extras" = all ]; then
+    if ! locked torch --no-index; then
+        echo "the locked build of torch is not on this machine; another build is installed, without a checksum" >&2
+        torch || true
+    fi
+    if locked all; then
+        pip install -q --no-deps --no-build-isolation -e . && pip check && exit 0
+    fi
+    echo "the locked versions are not all to be had here, or do not suffice; the newest are installed, without checksums" >&2
+else
+    case ",$extras," in
+    *,all,* | *,dev,* | *,rl,*) torch || true ;;
+    esac
+fi
+pip install -q -e ".[$extras]"

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Makes build/ros1: rospy from Debian's packages, our interfaces, our node. Where there are no such packages, it says so and
-# ends well without build/ros1: the tests are skipped then. Where making it fails, it fails.
+# Makes build/ros1: rospy from Debian's packages, our interfaces, our node. Without such packages it reports that and
+# succeeds without build/ros1: the tests are skipped then. An error of the set-up itself is a failure.
 set -eu
 cd "$(dirname "$0")/.."
 venv=build/ros1
@@ -37,8 +37,19 @@ if ! complete; then
 fi
 # Without pip of its own, which Debian keeps in a further package.
 [ -x $venv/bin/python ] || $python -m venv --system-site-packages --without-pip $venv
-.venv/bin/python -m pip --python $venv/bin/python install -q --disable-pip-version-check "numpy>=1.22,<3" "lazy-loader>=0.4" "cloudpickle>=2.2" "pytest>=8" "pytest-timeout>=2.3" "hypothesis>=6.100" ||
-    failed "numpy, pytest and hypothesis cannot be installed for $($venv/bin/python -V)"
+packages() { # of one lock file, with its checksums; where they are not to be had, others without
+    said=$(.venv/bin/python -m pip --python $venv/bin/python install -q --disable-pip-version-check \
+        --require-hashes --no-deps -r "scripts/lock/$1.txt" 2>&1) && return 0
+    echo "$said" >&2
+    case $said in
+    *"DO NOT MATCH THE HASHES"*) failed "a downloaded file is not the one that scripts/lock/$1.txt names" ;;
+    esac
+    echo "the locked versions are not to be had here; others are installed, without checksums" >&2
+    .venv/bin/python -m pip --python $venv/bin/python install -q --disable-pip-version-check -r "scripts/lock/$1.in" ||
+        failed "numpy, pytest and hypothesis cannot be installed for $($venv/bin/python -V)"
+}
+$venv/bin/python -c 'import numpy; assert (1, 22) <= tuple(map(int, numpy.__version__.split(".")[:2])) < (3, 0)' 2>/dev/null || packages numpy
+packages ros1
 site=$($venv/bin/python -c 'import sysconfig; print(sysconfig.get_paths()["purelib"])')
 $venv/bin/python scripts/ros1_interfaces.py "$site" ros1/interfaces/control_msgs ros1/interfaces/tf2_msgs ros1/heptarm_msgs
 printf '%s\n' "$PWD/src" "$PWD/ros1/heptarm_ros1/src" >"$site/heptarm_sources.pth"

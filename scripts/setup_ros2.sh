@@ -1,6 +1,6 @@
 #!/bin/sh
-# Makes build/ros2: rclpy from PyPI's wheels, our interfaces, our node, for machines without ROS. Where there are no
-# wheels, it says so and ends well without build/ros2: the tests are skipped then. Where making it fails, it fails.
+# Makes build/ros2: rclpy from PyPI's wheels, our interfaces, our node, for machines without ROS. Without
+# wheels it reports that and succeeds without build/ros2: the tests are skipped then. An error of the set-up is a failure.
 set -eu
 cd "$(dirname "$0")/.."
 venv=build/ros2
@@ -26,9 +26,19 @@ for compiler in gcc g++; do
 done
 python=$(.venv/bin/python -c 'import sys; print(sys._base_executable)')
 [ -x $venv/bin/python ] || "$python" -m venv $venv
-if ! said=$($venv/bin/python -m pip install -q --disable-pip-version-check -r scripts/ros2_requirements.txt 2>&1); then
+wheels() { said=$($venv/bin/python -m pip install -q --disable-pip-version-check "$@" 2>&1); }
+fetched=yes
+wheels --require-hashes --no-deps -r scripts/lock/ros2.txt || fetched=no
+case $fetched-$said in
+no-*"No matching distribution"*)
+    echo "the locked versions are not to be had here; others are installed, without checksums" >&2
+    if wheels -r scripts/ros2_requirements.txt; then fetched=yes; fi
+    ;;
+esac
+if [ $fetched = no ]; then
     echo "$said" >&2
     case $said in
+    *"DO NOT MATCH THE HASHES"*) failed "a downloaded file is not the one that scripts/lock/ros2.txt names" ;;
     *onnection* | *imed\ out* | *resolution*) failed "the wheels cannot be fetched" ;;
     *"No matching distribution"*) no "there are no wheels for $($venv/bin/python -V)" ;;
     esac

@@ -19,13 +19,13 @@ HEAD = """# Sunrise in the virtual cabinet
 
 <!-- made by scripts/sunrise_page.py from tests/doubles/surface.toml; change that list -->
 
-The classes of Sunrise.OS 1.11 to 1.17 that applications use, as `heptarm sim --app` offers them: {classes} classes
-with {members} members. They are doubles, written for the simulation from what public applications call; nothing of
-KUKA's is in them. Names and signatures are those that applications use; where there is only our guess, it is said.
-What they do is simulated on the virtual arm, in simulated time.
+`heptarm sim --app` offers these classes of Sunrise.OS 1.11 to 1.17: {classes} classes with {members} members. They
+are doubles, written for the simulation after the calls in public applications; they contain no code of KUKA's. Names
+and signatures are those that applications use; guesses are marked. The doubles act on the virtual arm, in simulated
+time.
 
-A test compiles and runs sample applications that use each of these classes, and holds every member of the list
-against the doubles.
+A test compiles and runs sample applications that use each of these classes, and compares every member of the list
+with the doubles.
 """
 
 
@@ -39,7 +39,7 @@ def page() -> str:
         for one in part.classes:
             lines.append(f"| `{one.name.replace('$', '.')}` | {len(one.members) or ''} | {one.does} |")
         lines.append("")
-    lines += ["## What there is not\n", "| left out | why |", "|---|---|"]
+    lines += ["## What is missing\n", "| missing | reason |", "|---|---|"]
     lines += [f"| {what} | {why} |" for what, why in without]
     return "\n".join(lines) + "\n"
 

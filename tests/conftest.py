@@ -1,4 +1,9 @@
-"""The whole suite: fast tests first, then slow ones, then those with a browser."""
+"""The whole suite: its order, and one virtual cabinet for all.
+
+In one process fast tests come first, then slow ones, then those with a browser. Workers of pytest-xdist begin with the
+folders whose tests wait for simulators and other processes, and fill up with the many short files of the rest: so no
+worker is left alone with something long at the end.
+"""
 
 from __future__ import annotations
 
@@ -9,25 +14,37 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import settings
 
+from tests.long import LONG
+
 if TYPE_CHECKING:
     from heptarm import Arm
 
-pytest_plugins = ["tests.processes", "tests.retry"]
+pytest_plugins = ["tests.processes", "tests.hangs", "tests.retry"]
 
 _LATE = ("slow", "browser")
+#: Folders with what takes long; training at the end of them, since it leaves little time to what runs beside it.
+_LONG_FIRST = ("docs", "arm", "examples", "cli", "scenarios", "doubles", "ros", "cabinet", "house", "rl")
 
-# no timing assertions, least of all on a machine that does other things as well
+# no timing assertions, above all on a busy machine
 settings.register_profile("heptarm", deadline=None)
 settings.load_profile("heptarm")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Sorts the tests; the sort is stable, so files keep their own order."""
-    items.sort(key=_rank)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Sorts the tests, and leaves out the long ones; the sort is stable, so files keep their own order."""
+    items.sort(key=_folder if hasattr(config, "workerinput") else _rank)
+    if not LONG and (long := [item for item in items if item.get_closest_marker("long")]):
+        config.hook.pytest_deselected(items=long)
+        items[:] = [item for item in items if item not in long]
 
 
 def _rank(item: pytest.Item) -> int:
     return max((1 + _LATE.index(mark.name) for mark in item.iter_markers() if mark.name in _LATE), default=0)
+
+
+def _folder(item: pytest.Item) -> int:
+    name = item.path.parent.name
+    return _LONG_FIRST.index(name) if name in _LONG_FIRST else len(_LONG_FIRST)
 
 
 # ------------------------------------------------------------------------------- a virtual cabinet for all
@@ -43,17 +60,21 @@ class RunningCabinet:
 
     @property
     def target(self) -> str:
-        """What to connect to."""
+        """The target to connect to."""
         return f"sim://{self.host}:{self.port}"
 
 
 @pytest.fixture(scope="module")
-def cabinet() -> Iterator[RunningCabinet]:
-    """One virtual iiwa 14 for a module, in real time; tests leave it at rest and without a controller."""
+def cabinet(request: pytest.FixtureRequest) -> Iterator[RunningCabinet]:
+    """One virtual iiwa 14 for a module, at rest and without a controller after each test.
+
+    It runs in real time, or at the SPEED of the module.
+    """
     from heptarm.arm.link.local_simulator import PrivateCabinet
     from heptarm.arm.link.target import Target
 
-    running = PrivateCabinet.start(Target(model="iiwa14"))
+    speed = getattr(request.module, "SPEED", 1.0)
+    running = PrivateCabinet.start(Target(model="iiwa14", options=(("speed", f"{speed:g}"),)))
     yield RunningCabinet(running.host, running.port, running.pid)
     running.close()
 
@@ -72,5 +93,5 @@ def arm(cabinet: RunningCabinet) -> Iterator[Arm]:
 
 @pytest.fixture
 def private_target() -> str:
-    """A target that starts a virtual cabinet of one's own, five times as fast as time."""
+    """A target that starts a private virtual cabinet, five times as fast as real time."""
     return "sim://iiwa14?speed=5"

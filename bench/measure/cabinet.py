@@ -52,16 +52,25 @@ class Cabinet:
         """Keep the plant's loop on one processor; its other threads stay free."""
         os.sched_setaffinity(self.process.pid, {cpu})
 
+    def operate(self, words: str) -> None:
+        """Let the simulated operator act, and wait until that is done."""
+        assert self.process.stdin is not None and self.process.stdout is not None
+        self.process.stdin.write(f"{words}\n")
+        self.process.stdin.flush()
+        reply = json.loads(self.process.stdout.readline() or '{"error": "the cabinet has ended"}')
+        if reply["error"]:
+            raise RuntimeError(reply["error"])
+
     def memory(self) -> float:
         """Proportional set size [MB]: what the process adds to the machine."""
         text = Path(f"/proc/{self.process.pid}/smaps_rollup").read_text()
         return next(int(line.split()[1]) for line in text.splitlines() if line.startswith("Pss:")) / 1024
 
     def stats(self) -> dict[str, Any]:
-        """The loop's statistics so far."""
+        """Statistics of the loop so far."""
         self._stats.unlink(missing_ok=True)
         self.process.send_signal(signal.SIGUSR1)
-        deadline = time.monotonic() + 5.0
+        deadline = time.monotonic() + 30.0
         while not self._stats.exists() and time.monotonic() < deadline:
             time.sleep(0.01)
         return dict(json.loads(self._stats.read_text()))
@@ -84,7 +93,4 @@ class Cabinet:
         if self.process.poll() is None:
             self.end()
         self._close_pipes()
-        for pipe in (self.process.stdin, self.process.stdout):
-            if pipe is not None:
-                pipe.close()
         self._folder.cleanup()

@@ -16,8 +16,8 @@ FRAMES = int(os.environ.get("BENCH_FRAMES", "100000"))
 _PER_CONNECTION = 250
 
 
-def _frame(number: int, body: bytes, request: int) -> bytes:
-    return messages.HEADER.pack(messages.MAGIC, messages.MAJOR, 0, number, len(body), 0, request, 0) + body
+def _frame(number: int, body: bytes, request: int, seq: int) -> bytes:
+    return messages.HEADER.pack(messages.MAGIC, messages.MAJOR, 0, number, len(body), seq, request, 0) + body
 
 
 def _seeds() -> list[tuple[int, bytes]]:
@@ -45,9 +45,8 @@ def garbage(target: tuple[str, int], frames: int, seed: int = 3) -> int:
     """Send frames that are random, mutated, cut, or of wrong types; returns how many were sent."""
     chance = random.Random(seed)
     seeds = _seeds()
-    hello = _frame(
-        messages.Hello.TYPE, messages.Hello(major=messages.MAJOR, minor=0, name="garbage").encode(), 0
-    )
+    greeting = messages.Hello(major=messages.MAJOR, minor=0, name="garbage", nonce=bytes(messages.NONCE))
+    hello = _frame(messages.Hello.TYPE, greeting.encode(), 0, 0)
     sent = 0
     while sent < frames:
         with socket.create_connection(target, timeout=5) as peer:
@@ -57,8 +56,8 @@ def garbage(target: tuple[str, int], frames: int, seed: int = 3) -> int:
                 peer.sendall(hello)
             try:
                 # what follows bytes that are no frame, or a refused greeting, is discarded and would prove nothing
-                for _ in range(_PER_CONNECTION if greeted else 2):
-                    data, is_frame = _one(chance, seeds)
+                for seq in range(1, 1 + _PER_CONNECTION) if greeted else range(2):
+                    data, is_frame = _one(chance, seeds, seq)
                     peer.sendall(data)
                     sent += 1
                     if sent >= frames or not is_frame:
@@ -71,14 +70,14 @@ def garbage(target: tuple[str, int], frames: int, seed: int = 3) -> int:
     return sent
 
 
-def _one(chance: random.Random, seeds: list[tuple[int, bytes]]) -> tuple[bytes, bool]:
+def _one(chance: random.Random, seeds: list[tuple[int, bytes]], seq: int) -> tuple[bytes, bool]:
     number, body = chance.choice(seeds)
     kind = chance.random()
     if kind < 0.005:
         return b"\0" + chance.randbytes(chance.randrange(30, 200)), False
     if kind < 0.2:
         return _frame(
-            chance.randrange(200), chance.randbytes(chance.randrange(0, 300)), chance.randrange(5)
+            chance.randrange(200), chance.randbytes(chance.randrange(0, 300)), chance.randrange(5), seq
         ), True
     changed = bytearray(body)
     for _ in range(chance.randrange(1, 6)):
@@ -86,7 +85,7 @@ def _one(chance: random.Random, seeds: list[tuple[int, bytes]]) -> tuple[bytes, 
             changed[chance.randrange(len(changed))] = chance.randrange(256)
     if kind < 0.4:
         changed = changed[: chance.randrange(len(changed) + 1)]
-    return _frame(number, bytes(changed), chance.randrange(1, 2**32)), True
+    return _frame(number, bytes(changed), chance.randrange(1, 2**32), seq), True
 
 
 @benchmark("garbage")

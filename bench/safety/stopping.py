@@ -57,14 +57,14 @@ def _stop(kind: str, how: str, random: np.random.Generator) -> tuple[float, floa
     plant.submit(order)
     plant.tick()
     if order.is_servo:
-        plant.ring.post(order.id, np.array(READY) + random.uniform(-REACH, REACH, 7))
+        plant.shared.post(order.id, np.array(READY) + random.uniform(-REACH, REACH, 7))
     plant.step(int(random.integers(1, 700)))
     allowed = stopping_time(plant, how) + SETTLING
     return _rest(plant, how), allowed
 
 
 def _stop_guided(kind: str, how: str, random: np.random.Generator) -> tuple[float, float]:
-    """The same while the arm follows a Cartesian target, or a hand that keeps pushing."""
+    """The same while the arm follows a Cartesian target, or a person who keeps pushing."""
     plant = Plant("iiwa14", q=READY)
     if kind == "guiding":
         plant.submit(Order(1, "guide", guide=hand_guide()))
@@ -76,10 +76,10 @@ def _stop_guided(kind: str, how: str, random: np.random.Generator) -> tuple[floa
         fastest = float(np.abs(plant.snapshot.dq).max())
         allowed = braking(fastest, 0.0, float(robot.ddq_max.min()), float(robot.dddq_max.min())) + SETTLING
         return _rest(plant, how), allowed
-    plant.submit(Order(1, "straight", straight=QUICK))
+    plant.submit(Order(1, "straight", straight_limits=QUICK))
     plant.tick()
     here = _tip(plant)
-    plant.ring.post(1, Pose.of(here.xyz + random.uniform(-DISTANCE, DISTANCE, 3), here.quat).array)
+    plant.shared.post(1, Pose.of(here.xyz + random.uniform(-DISTANCE, DISTANCE, 3), here.quat).array)
     plant.step(int(random.integers(3, 700)))
     if how != "path":
         allowed = stopping_time(plant, how)

@@ -21,11 +21,11 @@ HERE, THERE = (0.0, 0.5, 0.0, -1.3, 0.0, 0.9, 0.0), (0.6, 0.7, 0.2, -1.0, 0.3, 0
 
 
 class Moving:
-    """The plant, which moves to and fro."""
+    """The plant, moving back and forth."""
 
     def __init__(self) -> None:
         self._plant, self._number = Plant("iiwa14", q=HERE), 0
-        self.ring = self._plant.ring
+        self.shared = self._plant.shared
 
     def prepare(self) -> None:
         """Order the next motion; a plan costs more than a tick and is not part of it."""
@@ -43,7 +43,7 @@ class Bare:
 
     def __init__(self) -> None:
         plant = Plant("iiwa14", q=HERE)
-        self._model, self._data, self.ring = plant.model, plant.data, SharedState()
+        self._model, self._data, self.shared = plant.model, plant.data, SharedState()
         self._model.opt.gravity[:] = 0.0
 
     def prepare(self) -> None:
@@ -55,9 +55,9 @@ class Bare:
 
 
 def paced(
-    ring: SharedState, prepare: Callable[[], None], step: Callable[[], None], count: int
+    shared: SharedState, prepare: Callable[[], None], step: Callable[[], None], count: int
 ) -> list[float]:
-    """What each of some steps of a realtime loop costs [us]."""
+    """Durations of steps of a realtime loop [us]."""
     costs: list[float] = []
 
     def tick() -> None:
@@ -68,7 +68,7 @@ def paced(
             loop.stop()
         prepare()
 
-    loop = RealtimeLoop(ring, tick)
+    loop = RealtimeLoop(shared, tick)
     loop.run()
     return costs
 
@@ -79,4 +79,4 @@ if __name__ == "__main__":
         name, count = line.split()
         side = sides[name]
         side.prepare()
-        print(json.dumps(paced(side.ring, side.prepare, side.step, int(count))), flush=True)
+        print(json.dumps(paced(side.shared, side.prepare, side.step, int(count))), flush=True)

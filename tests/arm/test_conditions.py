@@ -1,4 +1,4 @@
-"""Break conditions through everything: API, TCP, the Java application, the doubles, the plant, and a table in it."""
+"""Break conditions through the whole stack: API, TCP, Java application, doubles, plant, and a table in it."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ import pytest
 
 import heptarm as ha
 from heptarm.arm.translate.conditions import condition_message
-from heptarm.values.condition.signals import force, io, path, torque
+from heptarm.values.condition.force import force, torque
+from heptarm.values.condition.signals import io, path
 from heptarm.values.io import Signal, find_signal
 from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.wire import messages as wire
+from tests.simulators import FASTER
 
 TOUCH = force(frame="base").along("z") > 10
 TABLE = 0.3
+TARGET = f"sim://iiwa14?speed={FASTER:g}&box=0.6,0,{TABLE / 2},0.4,0.6,{TABLE}"
 SIGNALS = tuple(
     Signal(name, is_output=False, kind="boolean")
     for name in ("MediaFlange.UserButton", "MediaFlange.InputX3Pin3", "Cell.Button", "Line.Button")
@@ -25,7 +28,7 @@ SIGNALS = tuple(
 @pytest.fixture(scope="module")
 def table() -> Iterator[ha.Arm]:
     """An arm above a table."""
-    with ha.connect(f"sim://iiwa14?box=0.6,0,{TABLE / 2},0.4,0.6,{TABLE}", watchdog=5.0, timeout=30.0) as arm:
+    with ha.connect(TARGET, watchdog=5.0, timeout=30.0) as arm:
         yield arm
 
 

@@ -1,15 +1,18 @@
-"""FRI sessions through everything: API, TCP, Java application, doubles, plant, and UDP to the loop's process."""
+"""FRI sessions through the whole stack: API, TCP, Java application, doubles, plant, and UDP to the loop's process."""
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import math
 import os
 import signal
 import socket
+import struct
+import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,7 +32,7 @@ from tests.retry import answers_late, retry
 
 A7 = np.array([0, 0, 0, 0, 0, 0, 1.0])
 SOFT = CartesianImpedance(stiffness=(1500, 1500, 1500, 150, 150, 150))
-#: Long enough for a machine that does other things as well.
+#: Long enough for a busy machine.
 LONG = 10
 
 
@@ -44,7 +47,7 @@ def arm(cabinet: RunningCabinet) -> Iterator[ha.Arm]:
 
 
 def patient(test: Callable[..., None]) -> Callable[..., None]:
-    """A test that begins again if this machine was too busy to answer in time."""
+    """Repeat a test if this machine was too busy to answer in time."""
 
     @functools.wraps(test)
     def tried(*arguments: Any, **named: Any) -> None:
@@ -82,7 +85,7 @@ def test_a_law_moves_the_arm_and_its_parameters_change_while_it_runs(arm: ha.Arm
         seen = [s for s in rt.history() if s.is_commanding]
         turned = max(s.q[6] - start[6] for s in seen)
     assert 0.03 < turned < 0.06
-    # the arm is where it was told to be, two messages later at most
+    # the arm is at the commanded position at most two messages later
     told = np.array([s.q_sent for s in seen])
     found = np.array([s.q for s in seen])
     assert min(np.abs(found[2:] - told[k : len(told) - 2 + k]).max() for k in range(3)) < 3e-3
@@ -104,8 +107,8 @@ def test_the_simple_form_commands_in_the_loop_and_the_next_session_needs_nothing
                 rt.command(q=goal)
                 if np.abs(s.q - goal).max() < 2e-3:
                     break
-        assert rt.next() is None  # and nothing more comes
-    assert rt.limited and "A7" in rt.report  # a jump was asked for; the guard made a motion of it
+        assert rt.next() is None  # and no more messages arrive
+    assert rt.limited and "A7" in rt.report  # a jump was commanded; the guard turned it into a motion
 
 
 @patient
@@ -115,12 +118,12 @@ def test_the_guard_makes_a_step_a_motion_and_names_what_it_limited(arm: ha.Arm) 
     with arm.fri("position", period_ms=LONG, policy=policy, limits=limits) as rt:
         goal = rt.start.q_ipo + 0.4 * A7
         rt.command(q=np.where(A7, goal, np.nan))
-        fastest = 0.0
         for s in rt:
-            fastest = max(fastest, abs(arm.state.dq[6]))
             if abs(s.q[6] - goal[6]) < 2e-3:
                 break
-    assert 0.1 < fastest < 1.1 * 0.2 * arm.robot.dq_max[6]
+        sent = {s.sequence: s.q_sent[6] for s in rt.history() if s.is_answered}
+    steps = [abs(sent[k + 1] - sent[k]) for k in sent if k + 1 in sent]
+    assert 0.1 < max(steps) / (LONG * 1e-3) < 1.001 * 0.2 * arm.robot.dq_max[6]
     assert any("A7: velocity limited" in line for line in rt.limited)
 
 
@@ -187,7 +190,7 @@ def test_what_does_not_go_together_is_refused_here_as_it_is_there(
         mode=mode_message(mode),  # type: ignore[arg-type]
     )
     with pytest.raises(ha.CommandRejected) as there:
-        arm._connection.request(message)
+        arm.connection.request(message)
     assert here.value.code == there.value.code == code
     assert type(here.value) is type(there.value) and here.value.hint
 
@@ -249,6 +252,25 @@ def test_a_port_that_is_taken_is_named_with_the_remedy(arm: ha.Arm) -> None:
             pass
 
 
+def udp_addresses(pid: int) -> set[str]:
+    """Own addresses of the UDP sockets of a process."""
+    inodes = set()
+    for one in Path(f"/proc/{pid}/fd").iterdir():
+        with contextlib.suppress(OSError):
+            inodes.add(os.readlink(one))
+    rows = [line.split() for line in Path("/proc/net/udp").read_text().splitlines()[1:]]
+    found = [row[1].partition(":")[0] for row in rows if f"socket:[{row[9]}]" in inodes]
+    return {socket.inet_ntoa(struct.pack("=I", int(address, 16))) for address in found}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux")
+def test_both_sides_use_the_interface_of_their_peer_only(arm: ha.Arm, cabinet: RunningCabinet) -> None:
+    with arm.fri("monitor", period_ms=2) as rt:
+        assert rt.next() is not None
+        assert udp_addresses(rt.client._worker._process.pid) == {"127.0.0.1"}
+        assert udp_addresses(cabinet.pid) == {"127.0.0.1"}
+
+
 @pytest.mark.parametrize("kind", ["position", "monitor"])
 def test_when_nothing_arrives_the_error_says_where_to_look(arm: ha.Arm, kind: str) -> None:
     with (
@@ -256,14 +278,14 @@ def test_when_nothing_arrives_the_error_says_where_to_look(arm: ha.Arm, kind: st
         arm.fri(kind, period_ms=LONG, host="192.0.2.7", timeout=0.3),  # type: ignore[arg-type]
     ):
         pass
-    with arm.fri("monitor", period_ms=2) as rt:  # and nothing has to be started anew
+    with arm.fri("monitor", period_ms=2) as rt:  # and nothing has to be restarted
         assert rt.next() is not None
 
 
 def test_another_version_is_told_in_plain_words(arm: ha.Arm) -> None:
     with (
         pytest.raises(ha.ConnectFailed, match=r"the other side speaks FRI 1\.x.*this side FRI 2.7"),
-        arm.fri("position", period_ms=LONG, version="2.7", timeout=0.5),
+        arm.fri("position", period_ms=LONG, version="2.7", timeout=2.0),
     ):
         pass
     with pytest.raises(ha.CommandRejected, match="must be one of"), arm.fri("monitor", version="1.99"):
@@ -273,14 +295,14 @@ def test_another_version_is_told_in_plain_words(arm: ha.Arm) -> None:
 # ------------------------------------------------------------------------------------------ bad ends
 
 
+@patient
 def test_a_law_that_fails_brakes_the_arm_and_is_told_of(arm: ha.Arm) -> None:
     with (
         pytest.raises(ha.StreamError, match=r"the law failed.*ZeroDivisionError: nothing to divide by.*line"),
         arm.fri("position", period_ms=LONG, law=fail) as rt,
     ):
-        assert not rt.wait(20.0) and not rt.active
-        time.sleep(0.3)
-        assert np.abs(arm.state.dq).max() < 0.01
+        assert not rt.wait(30.0) and not rt.active
+        arm.wait_until(lambda state: np.abs(state.dq).max() < 0.01)
     assert rt.result is not None and rt.result.cause is ha.Cause.CANCELLED
 
 
@@ -293,22 +315,23 @@ def test_a_stop_from_another_thread_ends_the_loop(arm: ha.Arm) -> None:
         threading.Timer(0.2, arm.stop).start()
         for s in rt:
             rt.command(q=s.q_ipo)
-        rt.command(q=rt.start.q)  # does nothing any more
+        rt.command(q=rt.start.q)  # no longer has an effect
     assert error.value.cause is ha.Cause.STOPPED
     arm.wait_for_rest()
 
 
+@patient
 def test_a_loop_that_is_killed_loses_the_quality_and_the_next_one_works(arm: ha.Arm) -> None:
+    # on a port of its own: the cabinet goes on sending to it, also if another test took it meanwhile
     with (
         pytest.raises(ha.QualityLost, match="quality is (POOR|FAIR).*process has ended"),
-        arm.fri("position", period_ms=LONG, law=swing, params={"amplitude": 0.05}) as rt,
+        arm.fri("position", period_ms=LONG, port=0, law=swing, params={"amplitude": 0.05}) as rt,
     ):
-        rt.wait(0.5)
         os.kill(int(rt.client._header[at.PID]), signal.SIGKILL)
-        assert not rt.wait(20.0)
+        assert not rt.wait(30.0)
     arm.wait_for_rest()
     with arm.fri("position", period_ms=LONG) as rt:
-        assert rt.wait(0.1)
+        assert rt.next() is not None
 
 
 def test_a_loop_that_stands_still_ends_a_monitor_too(arm: ha.Arm) -> None:
@@ -332,6 +355,7 @@ def test_an_error_of_the_block_is_not_hidden_and_the_arm_rests(arm: ha.Arm) -> N
     arm.wait_for_rest()
 
 
+@patient
 def test_an_emergency_stop_ends_the_overlay_in_words_and_the_next_session_works() -> None:
     with ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0) as arm:
         arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=0.6)
@@ -341,13 +365,13 @@ def test_an_emergency_stop_ends_the_overlay_in_words_and_the_next_session_works(
                 pytest.raises(ha.MotionAborted, match="emergency stop|safety stop 1") as error,
                 arm.fri("position", period_ms=LONG, law=swing, params={"amplitude": 0.1}) as rt,
             ):
-                rt.wait(0.5)
+                assert rt.next() is not None
                 arm.operator.fault("emergency_stop")
                 assert not rt.wait(30.0)
-                # the session that monitors goes on
+                # the monitoring session continues
                 assert next(s.safety for s in watching if s.safety) is Safety.STOP_1
             assert error.value.cause is ha.Cause.SAFETY
             with pytest.raises(ha.NeedsOperator, match="release the emergency stop"), arm.fri("position"):
                 pass
             arm.operator.clear()
-            assert arm.recover(timeout=10.0).done
+            assert arm.recover(timeout=30.0).done

@@ -1,4 +1,4 @@
-"""`arm.fri("pose")` as a 2.x cabinet would offer it: the session's object before a tiny controller."""
+"""`arm.fri("pose")` as a 2.x cabinet would offer it: the session object with a minimal controller."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Cabinet:
         self.clock = SimpleNamespace(nanos=time.monotonic_ns, sleep=time.sleep)
 
     def check_may_wait(self, call: str) -> None:
-        """Nothing waits in a callback here."""
+        """No callback waits here."""
 
     def enter_block(self, program: object, what: str) -> None:
         """No other block is open here."""
@@ -78,7 +78,7 @@ def test_a_session_of_kind_pose_takes_poses_and_nothing_else() -> None:
         timeout=10.0,
     )
     keep = Policy(Missing.HOLD)
-    request = FriRequest("pose", message, lambda: Client(0, realtime=False, policy=keep), has_law=False)
+    request = FriRequest("pose", message, lambda _: Client(0, realtime=False, policy=keep), has_law=False)
     with Fri(cast(Any, Cabinet()), request) as rt:
         goal = ha.Pose.at(0.0, 0.0, 0.01) @ rt.start.pose
         with pytest.raises(ha.ModeConflict, match=r'q is not commanded .* "pose"') as refused:

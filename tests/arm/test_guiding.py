@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.values.condition.signals import force, path
+from heptarm.values.condition.force import force
+from heptarm.values.condition.signals import path
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.mode.impedance import JointImpedance
 from heptarm.wire import messages as wire
@@ -23,7 +24,7 @@ HOME = ha.deg(0, 35, 0, -80, 0, 65, 0)
 @pytest.fixture(scope="module")
 def table() -> Iterator[ha.Arm]:
     """An arm above a table."""
-    target = f"sim://iiwa14?box=0.6,0,{TABLE / 2},0.4,0.6,{TABLE}"
+    target = f"sim://iiwa14?speed=2&box=0.6,0,{TABLE / 2},0.4,0.6,{TABLE}"
     with ha.connect(target, watchdog=10.0, timeout=20.0) as arm:
         yield arm
 
@@ -38,7 +39,7 @@ def arm(table: ha.Arm) -> Iterator[ha.Arm]:
 
 
 def lead(arm: ha.Arm, push: list[float], way: float) -> None:
-    """Push until a joint has turned so far [rad]."""
+    """Push until a joint has turned by this angle [rad]."""
     before = arm.state.q
     arm.operator.push(push, duration=300.0)
     try:
@@ -100,9 +101,9 @@ def test_what_makes_no_sense_is_refused(arm: ha.Arm) -> None:
         arm.start(ha.hand_guide(), until=path.after(0.1))
     with pytest.raises(ha.LimitError, match="A1"):
         arm.start(ha.hand_guide(q_max=[9.0] + [np.nan] * 6))
-    low = wire.HandGuide(q_min=(-9.0,) * 7)  # past the client's own checks
+    low = wire.HandGuide(q_min=(-9.0,) * 7)  # bypassing the checks of the client
     with pytest.raises(ha.LimitError, match="joint limit of hand guiding must be in"):
-        arm._connection.request(wire.Run(items=(wire.Item(motion=low),)))
+        arm.connection.request(wire.Run(items=(wire.Item(motion=low),)))
 
 
 def test_led_precisely_along_one_axis(arm: ha.Arm) -> None:
@@ -228,7 +229,7 @@ def test_a_guard_with_a_margin_is_watched_here(arm: ha.Arm) -> None:
     assert guard.is_moving
     met: list[ha.Collision] = []
     with pytest.raises(ha.CollisionDetected) as error, arm.guarded(guard, on_collision=met.append):
-        for _ in range(2):  # it goes on watching
+        for _ in range(2):  # it continues to monitor
             with contextlib.suppress(ha.MotionAborted):
                 arm.move(ha.lin_rel(z=-0.4, frame="base", speed_mps=0.05))
             arm.wait_for_rest()
@@ -262,11 +263,11 @@ def test_taught_by_hand_and_replayed(arm: ha.Arm) -> None:
     way = whole.trimmed().thinned()
     assert len(way) < len(whole)
     shares: list[float] = []
-    replay = arm.replay(way, by="spline", pace=0.3, on_progress=shares.append)
+    replay = arm.replay(way, by="spline", speed_scaling=0.3, on_progress=shares.append)
     assert shares == sorted(shares) and shares[-1] == 1.0
     assert replay.result.arrived and replay.deviation < 0.05
     assert np.abs(arm.wait_for_rest().q - way.q[-1]).max() < 2e-3
-    replay = retry(lambda: arm.replay(way, pace=0.5), starved)
+    replay = retry(lambda: arm.replay(way, speed_scaling=0.5), starved)
     assert replay.result.arrived and replay.deviation < 0.3
     assert np.abs(arm.wait_for_rest().q - way.q[-1]).max() < 0.01
 
@@ -274,7 +275,7 @@ def test_taught_by_hand_and_replayed(arm: ha.Arm) -> None:
 def test_what_cannot_be_replayed(arm: ha.Arm) -> None:
     there = arm.wait_for_rest().q
     away = there + [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5]
-    with pytest.raises(ha.LimitError, match="pace"):
+    with pytest.raises(ha.LimitError, match="speed_scaling"):
         arm.replay(ha.Trajectory.of([0.0, 0.1], [there, away]))
     with pytest.raises(ha.CommandRejected, match="iiwa7"):
         arm.replay(ha.Trajectory.of([0.0, 1.0], [there, away], robot="iiwa7"))

@@ -19,7 +19,7 @@ HOME = ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0))
 
 
 def later(seconds: float, *messages: wire.Message):
-    """Replies that come after a while."""
+    """Replies that arrive later."""
 
     def reply(client: Served, _: int) -> None:
         def speak() -> None:
@@ -120,13 +120,16 @@ def test_a_rejection_becomes_the_error_of_its_code(
 
 
 def test_a_stopped_move_carries_its_evidence(peer: Peer) -> None:
-    peer.runs(
-        1,
-        wire.MotionStarted(id=1, item=0),
-        later(0.5, peer.finished(1, wire.Cause.STOPPED, text="red button")),
-    )
+    def stop() -> None:
+        before = arm.state.stamp
+        arm.wait_until(lambda state: state.stamp > before + 300_000_000)  # some states for the history
+        peer.tell(peer.finished(1, wire.Cause.STOPPED, text="red button"))
+
+    button = threading.Thread(target=stop)
+    peer.runs(1, wire.MotionStarted(id=1, item=0), lambda *_: button.start())
     with peer.arm() as arm, pytest.raises(ha.MotionAborted, match="red button") as error:
         arm.move(HOME)
+        button.join()
     assert error.value.cause is ha.Cause.STOPPED
     assert error.value.state is not None and 10 <= len(error.value.history) <= 50
     assert error.value.history[-1].stamp > error.value.history[0].stamp
@@ -291,7 +294,8 @@ def test_a_handle_refuses_a_wrong_timeout(peer: Peer, wrong: object) -> None:
         handle.wait(timeout=20.0)
 
 
-def test_after_a_move_the_states_show_rest(peer: Peer) -> None:
+def test_after_a_move_the_states_show_rest(peer: Peer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("heptarm.arm.motion.rest._SETTLING", 20.0)
     peer.dq, peer.motion = (0.5,) * 7, 1
 
     def rest() -> None:

@@ -70,7 +70,7 @@ def test_holds() -> None:
     assert isinstance(item.motion, wire.Hold) and item.motion.duration == 2.5
     endless = one(hold()).motion
     assert isinstance(endless, wire.Hold) and isnan(endless.duration)
-    assert is_endless([hold()]) and not is_endless([hold(1.0), ptp(np.zeros(7))])
+    assert is_endless([hold()], ROBOT) and not is_endless([hold(1.0), ptp(np.zeros(7))], ROBOT)
 
 
 def test_limits_of_the_connected_robot() -> None:

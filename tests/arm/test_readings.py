@@ -1,4 +1,4 @@
-"""What a state tells besides positions: how sure the estimate of forces is, redundancy, stamps of the groups."""
+"""Readings of a state besides positions: inaccuracy of the estimated forces, redundancy, stamps of the groups."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import deg
 from heptarm.values.state import GROUP_NAMES
 from tests.conftest import RunningCabinet
+from tests.simulators import FASTER
 
+#: Of the shared virtual cabinet.
+SPEED = FASTER
 #: Inaccuracy of a simulated torque sensor [Nm].
 SENSOR = 0.5
 

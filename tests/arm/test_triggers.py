@@ -1,4 +1,4 @@
-"""Triggers and events through everything: API, TCP, the Java application, the doubles, the plant."""
+"""Triggers and events through the whole stack: API, TCP, Java application, doubles, plant."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ import heptarm as ha
 from heptarm.arm.translate.triggers import trigger_messages
 from heptarm.do import notify, set_output
 from heptarm.model.kinematics import forward
-from heptarm.values.condition.signals import force, io, path
+from heptarm.values.condition.force import force
+from heptarm.values.condition.signals import io, path
 from heptarm.values.io import Signal
 from heptarm.values.motion.motion import Motion
 from heptarm.values.robot import robot
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
+from tests.simulators import FASTER
 
 WORLD = "MediaFlange.UserButton<bool MediaFlange.LEDBlue>bool Cell.Part<u8 Cell.Level>analog12[-10,10]"
 PROJECT = f"""<persistence><processDataContainer>
@@ -32,7 +34,7 @@ SLOWLY = ha.lin_rel(y=0.1, frame="base", speed_mps=0.01)
 def cell(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ha.Arm]:
     project = tmp_path_factory.mktemp("project") / "RoboticsAPI.data.xml"
     project.write_text(PROJECT)
-    with ha.connect(f"sim://iiwa14?project={project}", watchdog=10.0, timeout=20.0) as arm:
+    with ha.connect(f"sim://iiwa14?speed={FASTER:g}&project={project}", watchdog=10.0, timeout=20.0) as arm:
         yield arm
 
 
@@ -44,7 +46,7 @@ def arm(cell: ha.Arm) -> ha.Arm:
 
 
 def place(event: ha.MotionEvent) -> np.ndarray:
-    """Where the flange was commanded to be, shape (3,) [m]."""
+    """Commanded position of the flange, shape (3,) [m]."""
     assert event.state is not None and event.state.joints is not None
     return forward(robot("iiwa14"), event.state.joints.q_cmd)[:3, 3]
 
@@ -113,7 +115,7 @@ def test_events_come_by_callbacks_too_under_override_and_pause(arm: ha.Arm) -> N
     assert handle.wait_started(20.0) and not handle.done
     arm.resume()
     arm.set_override(0.9)
-    handle.add_event_callback(lambda event: 1 / 0)  # its errors are its own
+    handle.add_event_callback(lambda event: 1 / 0)  # its errors are not heptarm's
     assert handle.wait().arrived
     arm.set_override(1.0)
     late: list[ha.MotionEvent] = []

@@ -1,4 +1,4 @@
-"""One fake cabinet for all tests that leave it as they found it, and a maker for those that need their own."""
+"""One fake cabinet for all tests that restore its state, and a factory for those that need their own."""
 
 from __future__ import annotations
 
@@ -16,8 +16,7 @@ Maker = Callable[..., FakeCabinet]
 
 @pytest.fixture(scope="session")
 def shared_cabinet(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeCabinet]:
-    # a busy machine may hold up a test for seconds: whoever tests silence makes a cabinet of its own
-    with FakeCabinet(log=tmp_path_factory.mktemp("fake") / "log", heartbeat=2.0) as cabinet:
+    with FakeCabinet(log=tmp_path_factory.mktemp("fake") / "log") as cabinet:
         yield cabinet
 
 

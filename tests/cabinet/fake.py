@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from types import TracebackType
 
@@ -25,11 +27,15 @@ def classes(folder: str = "java") -> str:
     octets = b"".join(path.read_bytes() for path in (*jars, *sources))
     out = _OUT / hashlib.sha256(octets).hexdigest()[:16]
     path = os.pathsep.join(str(jar) for jar in jars)
-    if not (out / "done").exists():
-        out.mkdir(parents=True, exist_ok=True)
-        javac = [toolchain.find_jdk().javac, "--release", "17", "-d", str(out), "-classpath", path]
+    if not out.exists():
+        _OUT.mkdir(parents=True, exist_ok=True)
+        part = Path(tempfile.mkdtemp(dir=_OUT))  # another worker may compile at the same time
+        javac = [toolchain.find_jdk().javac, "--release", "17", "-d", str(part), "-classpath", path]
         subprocess.run([*javac, *map(str, sources)], check=True)
-        (out / "done").touch()
+        try:
+            part.rename(out)
+        except OSError:  # the other one was faster
+            shutil.rmtree(part)
     return f"{path}{os.pathsep}{out}"
 
 
@@ -40,7 +46,7 @@ class FakeCabinet:
         rate: cabinet seconds per second.
         key: pre-shared key.
         allow: allow-list.
-        heartbeat: of the server [s].
+        heartbeat: of the server [s]; a client may be silent for five of them.
         getter: what each reading of the robot costs [s].
         log: file for its log.
     """
@@ -52,7 +58,7 @@ class FakeCabinet:
         rate: float = 1.0,
         key: str = "",
         allow: str = "",
-        heartbeat: float = 0.5,
+        heartbeat: float = 2.0,
         getter: float = 0.0,
     ) -> None:
         self.log = log
@@ -83,7 +89,7 @@ class FakeCabinet:
         return sorted(self._say("threads").split())
 
     def close(self) -> list[str]:
-        """Closes the server; returns the names of the threads that it leaves."""
+        """Closes the server; returns the names of the threads that are left."""
         left = self._say("close").split()
         assert self.process.wait(timeout=10) == 0
         return left

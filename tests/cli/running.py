@@ -9,16 +9,18 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import IO, Any
 
 from tests.interrupts import ctrl_c_interrupts
 
+#: Environment variables that would change what a command does.
+_OURS = ("HEPTARM_TARGET", "HEPTARM_KEY")
 HEPTARM = [sys.executable, "-m", "heptarm.cli.main"]
 
 
 def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """One command, to its end."""
-    variables = {name: value for name, value in os.environ.items() if name != "HEPTARM_TARGET"} | environment
+    variables = {name: value for name, value in os.environ.items() if name not in _OURS} | environment
     return subprocess.run(
         [*HEPTARM, *arguments], capture_output=True, text=True, timeout=120, env=variables, check=False
     )
@@ -32,11 +34,11 @@ def objects(*arguments: str) -> list[dict[str, Any]]:
 
 
 @contextmanager
-def sim(*arguments: str) -> Iterator[dict[str, Any]]:
+def sim(*arguments: str, stderr: IO[str] | None = None) -> Iterator[dict[str, Any]]:
     """`heptarm sim --json` in the foreground of another process; ended as by Ctrl-C."""
     command = [*HEPTARM, "sim", "--json", "--port", "0", *arguments]
     with ctrl_c_interrupts():
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=stderr, text=True)
     with process:
         try:
             assert process.stdout is not None

@@ -1,4 +1,4 @@
-"""`heptarm sim --app`: applications of other people, and those written on heptarm's core without any network."""
+"""`heptarm sim --app`: applications of other people, and those on heptarm's core without a network."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ PROJECT = """
 """
 
 
-def sim(folder: Path, *options: str, speed: str = "5", said: str = "") -> subprocess.CompletedProcess[str]:
+def sim(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
     command = [
         sys.executable,
         "-m",
@@ -64,7 +64,7 @@ def sim(folder: Path, *options: str, speed: str = "5", said: str = "") -> subpro
         "5",
         *options,
     ]
-    return subprocess.run(command, input=said, capture_output=True, text=True, timeout=120, check=False)
+    return subprocess.run(command, input="", capture_output=True, text=True, timeout=120, check=False)
 
 
 @pytest.fixture
@@ -85,7 +85,7 @@ def test_a_foreign_application_runs_with_its_own_process_data(lab: Path) -> None
 
 @needs_javac
 def test_its_error_is_told_and_process_data_can_be_given(lab: Path) -> None:
-    done = sim(lab, "--app-data", "lab.times=6", speed="0")
+    done = sim(lab, "--app-data", "lab.times=6")
     assert done.returncode == 1
     assert "a stiff neck" in done.stderr
 
@@ -110,7 +110,7 @@ def test_applications_are_found_and_one_has_to_be_chosen(lab: Path) -> None:
 
 @needs_javac
 def test_a_whole_project_runs_with_its_tools_frames_signals_and_background_task() -> None:
-    done = sim(ROOT / "examples" / "sunrise", "--app-data", "cell.parts=1", speed="3")
+    done = sim(ROOT / "examples" / "sunrise", "--app-data", "cell.parts=1")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "1 parts are placed, the gripper closed 1 times" in done.stderr
 
@@ -165,7 +165,7 @@ def test_jars_of_a_project_count_unless_they_are_kukas(lab: Path) -> None:
     ],
 )
 def test_an_application_on_heptarms_core_needs_no_network(name: str, said: tuple[str, ...]) -> None:
-    done = sim(SAMPLES, "--app-class", name, speed="2")
+    done = sim(SAMPLES, "--app-class", name)
     assert done.returncode == 0, done.stdout + done.stderr
     for text in said:
         assert text in done.stderr
@@ -226,7 +226,7 @@ def test_sources_run_in_the_encodings_that_they_are_written_in(tmp_path: Path, e
 
 
 def wrong(folder: Path, body: str, imports: str = "") -> str:
-    """What is said about an application that does not compile."""
+    """Messages about an application that does not compile."""
     (folder / "Wrong.java").write_text(
         f"{imports} import com.kuka.roboticsAPI.deviceModel.LBR;"
         "import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;\n"
@@ -361,7 +361,7 @@ def test_a_typed_line_answers_a_dialog_that_says_what_to_type(asking: Path) -> N
         ("--view-port", "8081"),
         ("--host", "0.0.0.0"),
         ("--port", "0"),
-        ("--key", "secret"),
+        ("--key-file", "cell.key"),
         ("--fri", "1.15"),
         ("--fri-io", "G.S<bool"),
     ],

@@ -1,8 +1,9 @@
-"""`heptarm doctor --fri` and `heptarm bench --fri`: each fault is named, with what to do about it."""
+"""`heptarm doctor --fri` and `heptarm bench --fri`: each fault is named, with its remedy."""
 
 from __future__ import annotations
 
 import json
+import re
 import socket
 import subprocess
 import threading
@@ -31,19 +32,19 @@ def verdicts(*arguments: str, fails: bool = False) -> dict[str, dict[str, Any]]:
 
 
 def test_a_cabinet_with_fri_is_looked_at_without_moving_anything(cabinet: RunningCabinet) -> None:
-    found = verdicts("--target", cabinet.target, "--fri-period", "10", "--seconds", "4")
+    found = verdicts("--target", cabinet.target, "--fri-period", "10", "--seconds", "2")
     assert found["FRI command"]["how"] == "ok"
     assert "position, torque, wrench; not offered: pose; signals" in found["FRI command"]["found"]
     assert "FRI 1.14-1.16, every 10 ms" in found["FRI messages"]["found"]
-    assert "EXCELLENT" in found["FRI quality"]["found"]
+    assert re.search("EXCELLENT|GOOD", found["FRI quality"]["found"])
     assert "ms median" in found["FRI answers"]["found"]
-    assert "FRI session" not in found  # which would tell of an error
+    assert "FRI session" not in found  # which would contain an error
 
 
 def test_somebody_elses_application_is_listened_to(tmp_path: Path) -> None:
     port, picture = free_port(), tmp_path / "fri.png"
     with controller(port, "--fri-period", "10", version="2.5"):
-        found = verdicts("--listen", "--fri-port", str(port), "--seconds", "4")
+        found = verdicts("--listen", "--fri-port", str(port), "--seconds", "2")
         assert "FRI 2.5, every 10 ms" in found["FRI messages"]["found"]
         assert found["FRI command"]["found"].endswith("command: POSITION")
         wrong = verdicts(
@@ -56,7 +57,7 @@ def test_somebody_elses_application_is_listened_to(tmp_path: Path) -> None:
             *("--plot", str(picture)),
         )
     told = json.loads(done.stdout)
-    assert told["messages"] > 50 and told["period_s"] == 0.01 and told["latency_s"]["p50"] > 0
+    assert told["messages"] > 10 and told["period_s"] == 0.01 and told["latency_s"]["p50"] > 0
     assert done.returncode == (0 if told["good"] else 1)
     assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 20_000
 
@@ -64,7 +65,7 @@ def test_somebody_elses_application_is_listened_to(tmp_path: Path) -> None:
 def test_an_application_that_starts_no_overlay_is_told_of() -> None:
     port = free_port()
     with controller(port, "--fri-period", "10", "--fri-command", "monitor"):
-        found = verdicts("--listen", "--fri-port", str(port), "--seconds", "3")
+        found = verdicts("--listen", "--fri-port", str(port), "--seconds", "2")
     assert "nothing can be commanded" in found["FRI command"]["found"]
     assert "FRIJointOverlay" in found["FRI command"]["remedy"]
 

@@ -1,4 +1,4 @@
-"""`heptarm teach` and `heptarm replay`; the hand is the simulator's operator, whose words come with a time."""
+"""`heptarm teach` and `heptarm replay`; the simulated operator guides the arm by timed commands."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from tests.cli.running import objects, run, sim
 def test_taught_and_replayed(tmp_path: Path) -> None:
     file = tmp_path / "way.npz"
     hand = [word for second in range(2, 40, 2) for word in ("--fault", f"push 0 4 4 0.3@{second}")]
-    with sim(*hand) as ready:
+    with sim(*hand, "--speed", "2") as ready:
         target = ("--target", ready["target"])
         (taught,) = objects("teach", str(file), "--free", "xyz", "--seconds", "3", *target)
         assert taught["recorded"] > taught["points"] >= 2 and file.exists()
-        (done,) = objects("replay", str(file), "--by", "spline", "--pace", "0.3", *target)
+        (done,) = objects("replay", str(file), "--by", "spline", "--speed-scaling", "0.3", *target)
         assert done["cause"] == "finished" and done["deviation_rad"] < 0.2
         refused = run("replay", str(tmp_path / "none.npz"), *target)
         assert refused.returncode == 1 and "none.npz" in refused.stderr

@@ -1,6 +1,6 @@
 """Every Python snippet of the documentation runs, page by page, against one virtual cabinet; the site builds.
 
-A page's blocks run in order in one process, as a reader would type them. A block whose fence says
+The blocks of a page run in order in one process, as a reader would type them. A block whose fence is
 ``python no-run`` is only compiled; pages without a block that runs are skipped.
 """
 
@@ -14,11 +14,17 @@ from pathlib import Path
 
 import pytest
 
-from tests.retry import answers_late, retry
+from tests.retry import busy, retry
+from tests.simulators import PATCH
 
 ROOT = Path(__file__).resolve().parents[2]
 BLOCK = re.compile(r"^( *)```(?:python|\{code-block\} python)([^\n]*)\n(.*?)^\1```", re.S | re.M)
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+#: Simulators of these pages run in real time: their programs look at the clock of this machine, or answer FRI.
+REAL_TIME = (
+    *("fri.md", "data-flow-fri.md", "data-flow-servo.md", "guidance.md", "io.md", "servo.md", "state.md"),
+    "stopping.md",
+)
 RUNNER = """
 import os, sys
 os.environ.setdefault("MPLBACKEND", "Agg")
@@ -56,13 +62,15 @@ def test_snippets_run(page: Path, tmp_path: Path) -> None:
     files = []
     for line, source, run in _blocks(page):
         if run:
-            # Named after its place in the page, so that a traceback leads there.
+            # Named after its line in the page, so that a traceback refers to it.
             files.append(tmp_path / f"{page.stem}-line-{line}.py")
             files[-1].write_text(source, encoding="utf-8")
 
+    program = RUNNER if page.name in REAL_TIME else PATCH + RUNNER
+
     def run_page() -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            [sys.executable, "-W", "error::SyntaxWarning", "-c", RUNNER, *map(str, files)],
+            [sys.executable, "-W", "error::SyntaxWarning", "-c", program, *map(str, files)],
             cwd=tmp_path,
             env=os.environ | {"HEPTARM_TARGET": "sim://iiwa14"},
             capture_output=True,
@@ -71,7 +79,7 @@ def test_snippets_run(page: Path, tmp_path: Path) -> None:
             check=False,
         )
 
-    done = retry(run_page, answers_late)
+    done = retry(run_page, busy)
     assert done.returncode == 0, f"{_id(page)}:\n{done.stdout}\n{done.stderr}"
 
 

@@ -1,8 +1,7 @@
-"""The native part does what the Python turn does, to the last bit: twins that see the same exchange."""
+"""The native part equals the Python cycle to the last bit: two loops process the same exchange."""
 
 from __future__ import annotations
 
-import os
 import random
 
 import numpy as np
@@ -17,6 +16,7 @@ from heptarm.fri.loop.user_api import Output, State
 from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
 from heptarm.fri.protocol.protobuf import put_bytes, put_varint
 from heptarm.fri.protocol.version import MONITORING_ID, Version
+from tests.long import longer
 
 from .controller import IPO
 from .laws import offset, torque
@@ -27,12 +27,11 @@ try:
 except Unavailable as reason:
     pytest.skip(f"no native part: {reason}", allow_module_level=True)
 
-#: A longer search on demand.
-EXAMPLES = int(os.environ.get("HEPTARM_EXAMPLES", "25"))
+EXAMPLES = longer(25, 1000)
 
 
 class Twins:
-    """One bench in pure Python, one with the native part; everything happens to both."""
+    """One loop in pure Python, one with the native part; both receive the same input."""
 
     def __init__(self, **options: object) -> None:
         policy = options.pop("policy", None)
@@ -189,7 +188,7 @@ def test_laws(law: object) -> None:
 
 @pytest.mark.parametrize("wire", [Version.V1_15, Version.V2_5])
 def test_every_octet_of_a_message_damaged(wire: Version) -> None:
-    """What Python refuses, the native part refuses; a tag of zero or an illegal pose is nothing to read on in."""
+    """The native part refuses what Python refuses; a zero tag or an illegal pose ends the decoding."""
     twins = Twins(wire=wire)
     twins.step(state=SessionState.COMMANDING_WAIT)
     for octet in range(len(twins.pure.controller.datagram())):

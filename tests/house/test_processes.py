@@ -1,4 +1,4 @@
-"""What a test has started ends with it: also if it fails, hangs or is killed itself."""
+"""Processes started by a test end with it, also if it fails, hangs or is killed."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 _CONFTEST = """
-pytest_plugins = ["tests.processes"]
+pytest_plugins = ["tests.processes", "tests.hangs"]
 
 def pytest_sessionstart():
     from tests import processes
+    from tests import hangs
     processes.GRACE = 0.3
+    hangs.AHEAD = 1.0
 """
 _HEAD = """
 import os, pathlib, signal, subprocess, sys, time
@@ -34,7 +36,7 @@ def start(name):
 
 
 def run(folder: Path, body: str, *options: str) -> tuple[subprocess.CompletedProcess[str], list[int]]:
-    """Run a file of tests in a pytest of its own; returns the processes that it has started, too."""
+    """Run a file of tests in a separate pytest; return its result and the processes that it has started."""
     (folder / "conftest.py").write_text(_CONFTEST)
     (folder / "test_it.py").write_text(_HEAD + body)
     (folder / "pytest.ini").write_text("[pytest]\n")
@@ -86,6 +88,23 @@ def test_a_test_that_hangs_leaves_none(tmp_path: Path) -> None:
     )
     assert "1 failed" in done.stdout and "error" not in done.stdout.splitlines()[-1], done.stdout
     assert len(started) == 2 and not any(map(runs, started))
+
+
+@pytest.mark.parametrize("options", [(), ("-n", "1")], ids=["here", "in a worker"])
+def test_a_test_that_hangs_leaves_its_stacks_in_the_log(tmp_path: Path, options: tuple[str, ...]) -> None:
+    body = """
+def wait_for_nobody(program):
+    subprocess.run([sys.executable, "-c", program], check=True)
+
+def test_hangs():
+    wait_for_nobody("import time\\ndef sit_there():\\n    time.sleep(60)\\nsit_there()")
+"""
+    done, _ = run(tmp_path, body, "--timeout=4", *options)
+    assert "1 failed" in done.stdout, done.stdout
+    log = done.stdout + done.stderr  # what a test's processes print is shown with its failure
+    assert "test_it.py::test_hangs hangs; its processes:" in log and "sit_there()" in log, log
+    assert "in wait_for_nobody" in log, "its own stack"
+    assert "line 3 in sit_there" in log, "and that of its process"
 
 
 def test_what_a_fixture_starts_lives_as_long_as_the_fixture(tmp_path: Path) -> None:

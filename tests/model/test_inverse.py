@@ -12,6 +12,7 @@ from heptarm.model import inverse_kinematics as ik
 from heptarm.model.kinematics import forward
 from heptarm.values.pose import Pose, Redundancy, deg
 from heptarm.values.robot import RobotModel
+from tests.long import longer
 from tests.model.arms import MODELS, denavit_hartenberg, random_q
 
 pytestmark = pytest.mark.parametrize("robot", MODELS, ids=lambda m: m.name)
@@ -30,12 +31,7 @@ def check_complete(robot: RobotModel, count: int, seed: int) -> None:
 
 
 def test_complete(robot: RobotModel) -> None:
-    check_complete(robot, 2000, 10)
-
-
-@pytest.mark.slow
-def test_complete_10000(robot: RobotModel) -> None:
-    check_complete(robot, 10_000, 11)
+    check_complete(robot, longer(2000, 10_000), 10)
 
 
 def test_redundancy_and_back(robot: RobotModel) -> None:
@@ -147,7 +143,7 @@ def test_intervals_are_exact(robot: RobotModel) -> None:
 
 
 def test_intervals_find_what_a_grid_would_miss(robot: RobotModel) -> None:
-    """Close to six limits at once hardly any arm angle is left."""
+    """Close to six limits at once, hardly any arm angle is feasible."""
     corner = 0.9999 * robot.q_max * np.array([-1, 1, -1, 1, 1, 0.094, 1])
     wanted = forward(robot, corner)
     status = ik.redundancy(robot, corner).status

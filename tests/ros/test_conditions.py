@@ -1,4 +1,4 @@
-"""Conditions as texts: what Python's own words would build, and nothing else."""
+"""Conditions as texts: the same conditions as in Python, and nothing else."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import pytest
 from heptarm.errors import CommandRejected, LimitError
 from heptarm.ros.interface.conditions import condition_of
 from heptarm.values.condition.condition import Condition
-from heptarm.values.condition.signals import force, io, path, torque
+from heptarm.values.condition.force import force, torque
+from heptarm.values.condition.signals import io, path
 
 
 @pytest.mark.parametrize(

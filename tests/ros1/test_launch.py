@@ -23,7 +23,7 @@ def test_two_arms_are_two_nodes(ros: None) -> None:
 
 def test_arguments_are_explained(ros: None) -> None:
     said = roslaunch("--ros-args", "heptarm_ros1", "heptarm.launch")
-    for argument in ("target", "key", "prefix", "names", "params"):
+    for argument in ("target", "key_file", "prefix", "names", "params"):
         assert f"  {argument}" in said, said
 
 

@@ -15,7 +15,8 @@ from typing import Any
 import heptarm as ha
 from heptarm import Arm, Tool
 from heptarm.do import notify, set_output
-from heptarm.values.condition.signals import Force, force, io, path, torque
+from heptarm.values.condition.force import Force, force, torque
+from heptarm.values.condition.signals import io, path
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.motion.hand_guiding import hand_guide
@@ -57,7 +58,7 @@ def _servo(**settings: Any) -> Callable[[Arm, Any], object]:
 
 
 def _within(call: Callable[[Any, Any], object], kind: str = "joint") -> Callable[[Arm, Any], object]:
-    """Does something with the servo motion that runs."""
+    """Uses the running servo motion."""
 
     def do(arm: Arm, value: Any) -> object:
         with arm.servo(kind, watchdog=2.0) as servo:
@@ -89,7 +90,7 @@ def _fri(**settings: Any) -> Callable[[Arm, Any], object]:
 
 def _connected(**settings: Any) -> Callable[[Arm, Any], object]:
     def do(arm: Arm, value: Any) -> object:
-        host = f"sim://{arm._connection.link.peer}"
+        host = f"sim://{arm.connection.link.peer}"
         given = {name: value if one is ... else one for name, one in settings.items()}
         return ha.connect(host, **given)
 
@@ -250,9 +251,9 @@ CALLS: dict[str, Call] = {
     "ServoOpen.frame": Call(_servo(moving=...), "moving"),
     "ServoOpen.velocity": Call(_servo(speed=...), "speed"),
     "ServoOpen.acceleration": Call(_servo(acceleration=...), "acceleration"),
-    "ServoOpen.min_trajectory_time": Call(_servo(min_trajectory_time=...), "min_trajectory_time"),
-    "ServoOpen.goal_timeout": Call(_servo(goal_timeout=...), "goal_timeout"),
-    "ServoOpen.speed_timeout": Call(_servo(speed_timeout=...), "speed_timeout"),
+    "ServoTiming.min_trajectory_time": Call(_servo(min_trajectory_time=...), "min_trajectory_time"),
+    "ServoTiming.goal_timeout": Call(_servo(goal_timeout=...), "goal_timeout"),
+    "ServoTiming.speed_timeout": Call(_servo(speed_timeout=...), "speed_timeout"),
     "ServoJoints.watchdog": Call(_servo(watchdog=...), "watchdog"),
     "ServoJoints.q": Call(_within(lambda servo, v: servo.set(v)), "q", 7),
     "ServoJointsVelocity.watchdog": Call(_servo(watchdog=...), "watchdog"),

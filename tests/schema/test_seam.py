@@ -1,4 +1,4 @@
-"""The seam between the doubles and the plant: values come back as they went, and the memory has no gaps."""
+"""The seam between the doubles and the plant: values survive a round trip, and the memory has no gaps."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ SINE = seam.SineImpedance(
 )
 CONDITIONS = (
     seam.JointTorqueOutside(joint=6, low=-1.0, high=2.0),
-    seam.ForceAbove(frame=FRAME, threshold=3.0),
+    seam.WrenchAbove(frame=FRAME, components=seam.WrenchComponents(7), threshold=3.0),
     seam.AnyOf(
         parts=(
-            seam.ShearForceAbove(frame=FRAME, axis=seam.Axis.Y, threshold=4.0),
+            seam.WrenchOutside(frame=FRAME, component=4, low=-4.0, high=5.0),
             seam.Inverted(part=seam.SignalIs(place=511, value=True)),
             seam.AllOf(parts=(seam.PathReached(reference=seam.PathReference.END, distance=-0.1, delay=0.2),)),
         )

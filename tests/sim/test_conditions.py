@@ -1,4 +1,4 @@
-"""Conditions on the plant: one that fires brakes the motion on its path; triggers go off, observers watch on."""
+"""Conditions on the plant: break conditions brake the motion on its path, triggers fire, observers continue."""
 
 from __future__ import annotations
 
@@ -12,27 +12,25 @@ from heptarm.sim.plant.world import Box
 from heptarm.sim.seam import (
     AllOf,
     AnyOf,
-    Axis,
     Condition,
-    ForceAbove,
-    ForceOutside,
     Inverted,
     JointTorqueOutside,
     MeasuringFrame,
-    NormalForceAbove,
     PathReached,
     PathReference,
-    ShearForceAbove,
     SignalIs,
     SignalOutside,
-    TorqueOutside,
+    WrenchAbove,
+    WrenchComponents,
+    WrenchOutside,
 )
 from tests.sim.driving import READY, Ear, ready, run
 
 #: Points and axes of the flange, and the base's axes at the flange.
 OWN = MeasuringFrame(point_moves=True, point=(0.0, 0.0, 0.0), axes_move=True, axes=(0.0, 0.0, 0.0, 1.0))
 BASE = MeasuringFrame(point_moves=True, point=(0.0, 0.0, 0.0), axes_move=False, axes=(0.0, 0.0, 0.0, 1.0))
-X, Y, Z = Axis
+X, Y, Z, *_ = WrenchComponents
+ALL = X | Y | Z
 DOWN = {
     "kind": "lin_rel",
     "offset": (0, 0, -0.2, 0, 0, 0, 1),
@@ -67,29 +65,35 @@ FORCE = (0.0, 3.0, 10.0)
 FIRES: list[tuple[str, Condition, bool]] = [
     ("joint torque", JointTorqueOutside(joint=1, low=-0.5, high=0.5), True),
     ("a wide band", JointTorqueOutside(joint=1, low=-50.0, high=50.0), False),
-    ("all of the force", ForceAbove(frame=OWN, threshold=10.0), True),
-    ("not that much", ForceAbove(frame=OWN, threshold=11.0), False),
-    ("along z", NormalForceAbove(frame=BASE, axis=Z, threshold=9.0), True),
-    ("along x", NormalForceAbove(frame=BASE, axis=X, threshold=9.0), False),
-    ("across z", ShearForceAbove(frame=BASE, axis=Z, threshold=2.5), True),
-    ("across y", ShearForceAbove(frame=BASE, axis=Y, threshold=9.0), True),
-    ("across z, too much", ShearForceAbove(frame=BASE, axis=Z, threshold=9.0), False),
-    ("a component", ForceOutside(frame=BASE, axis=Z, low=-5.0, high=5.0), True),
-    ("its sign", ForceOutside(frame=BASE, axis=Z, low=-100.0, high=11.0), False),
-    ("in the flange's axes z points down", ForceOutside(frame=OWN, axis=Z, low=-5.0, high=100.0), True),
-    ("torque about x", TorqueOutside(frame=BASE, axis=X, low=-1.0, high=0.5), True),
-    ("not", Inverted(part=ForceAbove(frame=OWN, threshold=11.0)), True),
+    ("all of the force", WrenchAbove(frame=OWN, components=ALL, threshold=10.0), True),
+    ("not that much", WrenchAbove(frame=OWN, components=ALL, threshold=11.0), False),
+    ("along z", WrenchAbove(frame=BASE, components=Z, threshold=9.0), True),
+    ("along x", WrenchAbove(frame=BASE, components=X, threshold=9.0), False),
+    ("across z", WrenchAbove(frame=BASE, components=X | Y, threshold=2.5), True),
+    ("across y", WrenchAbove(frame=BASE, components=X | Z, threshold=9.0), True),
+    ("across z, too much", WrenchAbove(frame=BASE, components=X | Y, threshold=9.0), False),
+    ("a component", WrenchOutside(frame=BASE, component=2, low=-5.0, high=5.0), True),
+    ("its sign", WrenchOutside(frame=BASE, component=2, low=-100.0, high=11.0), False),
+    ("in the flange's axes z points down", WrenchOutside(frame=OWN, component=2, low=-5.0, high=100.0), True),
+    ("torque about x", WrenchOutside(frame=BASE, component=3, low=-1.0, high=0.5), True),
+    ("not", Inverted(part=WrenchAbove(frame=OWN, components=ALL, threshold=11.0)), True),
     (
         "and",
         AllOf(
-            parts=(ForceAbove(frame=OWN, threshold=10.0), NormalForceAbove(frame=BASE, axis=X, threshold=9.0))
+            parts=(
+                WrenchAbove(frame=OWN, components=ALL, threshold=10.0),
+                WrenchAbove(frame=BASE, components=X, threshold=9.0),
+            )
         ),
         False,
     ),
     (
         "or",
         AnyOf(
-            parts=(ForceAbove(frame=OWN, threshold=10.0), NormalForceAbove(frame=BASE, axis=X, threshold=9.0))
+            parts=(
+                WrenchAbove(frame=OWN, components=ALL, threshold=10.0),
+                WrenchAbove(frame=BASE, components=X, threshold=9.0),
+            )
         ),
         True,
     ),
@@ -115,7 +119,8 @@ def test_a_torque_is_seen_from_where_it_is_measured() -> None:
     seen = -lever * 10.0  # about x
     for band, fires in (((seen - 0.2, seen + 0.2), False), ((-100.0, seen - 0.2), True)):
         order, heard = broken(
-            {"kind": "hold", "duration": 0.02}, TorqueOutside(frame=away, axis=X, low=band[0], high=band[1])
+            {"kind": "hold", "duration": 0.02},
+            WrenchOutside(frame=away, component=3, low=band[0], high=band[1]),
         )
         run(plant, order)
         assert ("fired" in heard) is fires
@@ -124,7 +129,7 @@ def test_a_torque_is_seen_from_where_it_is_measured() -> None:
 def test_a_line_down_onto_a_push_brakes_on_its_path() -> None:
     plant = ready()
     start = forward(plant.robot, plant.snapshot.q)[:3, 3]
-    order, heard = broken(DOWN, ForceOutside(frame=BASE, axis=Z, low=-1000.0, high=10.0))
+    order, heard = broken(DOWN, WrenchOutside(frame=BASE, component=2, low=-1000.0, high=10.0))
     plant.submit(order)
     plant.step(700)
     plant.apply_wrench((0.0, 0.0, 15.0))
@@ -133,7 +138,7 @@ def test_a_line_down_onto_a_push_brakes_on_its_path() -> None:
     way = forward(plant.robot, track.q_cmd[-1])[:3, 3] - start
     assert -0.15 < way[2] < -0.04 and np.abs(way[:2]).max() < 1e-3
     assert np.abs(track.acceleration).max() < 1.2 * plant.robot.ddq_max.max()
-    plant.submit(Order(2, "ptp", joints=READY))  # and the next motion begins where it came to rest
+    plant.submit(Order(2, "ptp", joints=READY))  # and the next motion starts where it came to rest
     run(plant)
     assert np.abs(plant.snapshot.q_cmd - READY).max() < 1e-9
 
@@ -197,10 +202,10 @@ def test_on_a_joint_motion_the_moved_frame_counts() -> None:
 
 def test_a_servo_motion_breaks_too() -> None:
     plant = ready()
-    order, heard = broken({"kind": "servo"}, ForceAbove(frame=OWN, threshold=5.0))
+    order, heard = broken({"kind": "servo"}, WrenchAbove(frame=OWN, components=ALL, threshold=5.0))
     plant.submit(order)
     plant.step(5)
-    plant.ring.post(1, np.array(READY) + 0.2)
+    plant.shared.post(1, np.array(READY) + 0.2)
     plant.step(200)
     plant.apply_wrench((0.0, 0.0, 8.0))
     run(plant)
@@ -210,13 +215,19 @@ def test_a_servo_motion_breaks_too() -> None:
 
 def test_an_observer_hears_edges_whatever_moves() -> None:
     plant, heard = ready(), []
-    number = plant.condition_monitor.observe(ForceAbove(frame=OWN, threshold=5.0), heard.append, at_once=True)
+    number = plant.condition_monitor.observe(
+        WrenchAbove(frame=OWN, components=ALL, threshold=5.0), heard.append, at_once=True
+    )
     plant.step(100)
     pushed(plant, (8.0, 0.0, 0.0))
     late: list[bool] = []
     told: list[bool] = []
-    plant.condition_monitor.observe(ForceAbove(frame=OWN, threshold=5.0), late.append, at_once=False)
-    plant.condition_monitor.observe(ForceAbove(frame=OWN, threshold=5.0), told.append, at_once=True)
+    plant.condition_monitor.observe(
+        WrenchAbove(frame=OWN, components=ALL, threshold=5.0), late.append, at_once=False
+    )
+    plant.condition_monitor.observe(
+        WrenchAbove(frame=OWN, components=ALL, threshold=5.0), told.append, at_once=True
+    )
     plant.step(10)
     plant.apply_wrench((0.0, 0.0, 0.0))
     plant.step(300)
@@ -234,10 +245,10 @@ def test_signals_are_conditions() -> None:
     )
     plant.submit(order)
     plant.step(10)
-    plant.ring.signals[3] = 1.0
+    plant.shared.signals[3] = 1.0
     plant.step(10)
     assert heard == ["started"]
-    plant.ring.signals[4] = 2.0
+    plant.shared.signals[4] = 2.0
     run(plant)
     assert heard == ["started", "fired", "condition"]
 
@@ -247,7 +258,7 @@ def test_a_line_down_stops_on_a_table() -> None:
     plant = Plant(q=READY, boxes=[table])
     height = float(forward(plant.robot, plant.snapshot.q)[2, 3])
     down = {**DOWN, "offset": (0, 0, -height, 0, 0, 0, 1), "cart_velocity": 0.02}
-    order, heard = broken(down, ForceOutside(frame=BASE, axis=Z, low=-1000.0, high=10.0))
+    order, heard = broken(down, WrenchOutside(frame=BASE, component=2, low=-1000.0, high=10.0))
     run(plant, order)
     assert heard == ["started", "fired", "condition"]
     plant.step(200)

@@ -1,4 +1,4 @@
-"""The operator of the virtual cabinet: what can be said, when it happens, and what is not understood."""
+"""The operator of the virtual cabinet: commands, their times, and unknown commands."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def test_two_stops_are_cleared_one_by_one() -> None:
     operator.do("gate")
     operator.do("external_emergency_stop")
     plant.step()
-    flags = int(plant.ring.ints[1, StateWords.FLAGS])
+    flags = int(plant.shared.ints[1, StateWords.FLAGS])
     assert flags & SafetyFlags.EXTERNAL_STOP and flags & SafetyFlags.SAFEGUARD_OPEN
     operator.do("clear gate")
     assert plant.safety.stop_requests == {StopRequest.EXTERNAL_EMERGENCY_STOP}
@@ -128,11 +128,11 @@ def test_signals_are_set_and_keys_pressed_also_at_a_time() -> None:
     pressed: list[tuple[str, int]] = []
     operator.press = lambda bar, slot: not pressed.append((bar, slot))  # type: ignore[func-returns-value]
     operator.schedule("set cell.door true@0.01")
-    operator.schedule("set Cell.Lid true@0.01")  # there is none: the arm goes on
+    operator.schedule("set Cell.Lid true@0.01")  # there is none: the arm continues
     for _ in range(20):
         operator.tick()
         plant.tick()
-    assert plant.ring.signals[place] == plant.signals.get("Cell.Door") == 1.0
+    assert plant.shared.signals[place] == plant.signals.get("Cell.Door") == 1.0
     with pytest.raises(ValueError, match="ambiguous"):
         operator.do("set Door 0")
     operator.do("press 2")

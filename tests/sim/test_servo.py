@@ -1,4 +1,4 @@
-"""Servo motions on the plant: the newest target wins, limits hold at every tick, and everything stops."""
+"""Servo motions on the plant: the newest target counts, limits hold at every tick, and every stop works."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.planning.command import Order
 from heptarm.sim.plant.plant import Plant
+from heptarm.sim.seam import ServoTiming
 from heptarm.values.arrays import Array
 from heptarm.values.mode.impedance import JointImpedance
 from tests.sim.driving import READY, Ear, ready
@@ -46,7 +47,7 @@ def commands(plant: Plant, ticks: int) -> Array:
 def test_a_far_target_is_reached_within_every_limit(kind: str) -> None:
     plant, _ = serving(kind, joint_velocity=(0.5,) * 7, joint_acceleration=(0.5,) * 7)
     target = HERE + [0.8, -0.4, 0.3, 0.5, -0.6, 0.2, 1.0]
-    plant.ring.post(7, target)
+    plant.shared.post(7, target)
     path = np.vstack([[HERE] * 3, commands(plant, 4000)])
     assert np.abs(path[-1] - target).max() < 1e-6
     speed = np.diff(path, axis=0) * 1e3
@@ -68,7 +69,7 @@ def test_whatever_the_targets_the_limits_hold(seed: int, every: int, kind: str, 
     for tick in range(600):
         if tick % every == 0:
             goal = np.clip(HERE + random.normal(0, 0.5, 7), robot.q_min + 0.3, robot.q_max - 0.3)
-            plant.ring.post(7, goal, random.normal(0, 1.0, 7) if with_velocity else None)
+            plant.shared.post(7, goal, random.normal(0, 1.0, 7) if with_velocity else None)
         plant.tick()
         path.append(plant.snapshot.q_cmd)
     speed = np.diff(np.array(path), axis=0) * 1e3
@@ -80,7 +81,7 @@ def test_whatever_the_targets_the_limits_hold(seed: int, every: int, kind: str, 
 @pytest.mark.parametrize("kind", KINDS)
 def test_cancelling_brakes_at_full_deceleration_to_rest(kind: str) -> None:
     plant, ear = serving(kind)
-    plant.ring.post(7, HERE + [1.5, 0, 0, 0, 0, 0, 2.0])
+    plant.shared.post(7, HERE + [1.5, 0, 0, 0, 0, 0, 2.0])
     plant.step(500)
     speed = np.abs(plant.snapshot.dq)
     plant.cancel(7)
@@ -95,37 +96,37 @@ def test_cancelling_brakes_at_full_deceleration_to_rest(kind: str) -> None:
 
 def test_targets_for_another_motion_are_not_followed() -> None:
     plant, _ = serving()
-    plant.ring.post(6, HERE + 0.3)
+    plant.shared.post(6, HERE + 0.3)
     assert (commands(plant, 100) == HERE).all()
 
 
 def test_of_two_targets_between_ticks_the_newest_wins() -> None:
     plant, _ = serving()
-    plant.ring.post(7, HERE + 0.3)
-    plant.ring.post(7, HERE - 0.1)
+    plant.shared.post(7, HERE + 0.3)
+    plant.shared.post(7, HERE - 0.1)
     assert np.abs(commands(plant, 3000)[-1] - (HERE - 0.1)).max() < 1e-9
 
 
 def test_a_passing_velocity_is_kept_for_a_moment_then_the_arm_rests() -> None:
     plant, _ = serving()
-    plant.ring.post(7, HERE + [0, 0, 0, 0, 0, 0, 0.2], np.array([0, 0, 0, 0, 0, 0, 0.5]))
+    plant.shared.post(7, HERE + [0, 0, 0, 0, 0, 0, 0.2], np.array([0, 0, 0, 0, 0, 0, 0.5]))
     path = commands(plant, 3000)[:, 6]
     assert path.max() > READY[6] + 0.2 + 0.04  # passed by
     assert path[-1] == pytest.approx(path[-500], abs=1e-9)  # and rests
 
 
 def test_a_target_that_stays_ends_the_motion_after_its_timeout() -> None:
-    plant, ear = serving(goal_timeout=0.3)
-    plant.ring.post(7, HERE + 0.05)
+    plant, ear = serving(servo_timing=ServoTiming(goal_timeout=0.3))
+    plant.shared.post(7, HERE + 0.05)
     to_rest(plant)
     assert ear.causes == ["started", "done"]
 
 
 def test_a_velocity_that_leads_out_of_the_limits_stops_the_arm() -> None:
-    plant, ear = serving(speed_timeout=1.0)
+    plant, ear = serving(servo_timing=ServoTiming(speed_timeout=1.0))
     edge = HERE.copy()
     edge[6] = plant.robot.q_max[6] - 0.01
-    plant.ring.post(7, edge, np.array([0, 0, 0, 0, 0, 0, 1.0]))
+    plant.shared.post(7, edge, np.array([0, 0, 0, 0, 0, 0, 1.0]))
     to_rest(plant, most=6000)
     cause, text = ear.heard[-1]
     assert cause == "error" and "violates limit A7" in text
@@ -136,7 +137,7 @@ def test_the_override_and_a_pause_slow_it_down(kind: str) -> None:
     plant, _ = serving(kind)
     plant.pause()
     plant.step(600)
-    plant.ring.post(7, HERE + 0.2)
+    plant.shared.post(7, HERE + 0.2)
     assert np.abs(commands(plant, 300)[-1] - HERE).max() < 1e-9
     plant.resume()
     assert np.abs(commands(plant, 2500)[-1] - HERE - 0.2).max() < 1e-6
@@ -221,7 +222,7 @@ def test_a_motion_planned_behind_an_impedance_motion_starts_where_the_arm_is() -
 def test_whoever_cancels_a_motion_that_a_stop_halts_turns_nothing_back(kind: str, fast: bool) -> None:
     for lag in (*range(0, 16, 3), 17, 18, 19, 25, 60):
         plant, ear = serving(kind, joint_velocity=(0.2,) * 7, joint_acceleration=(0.2,) * 7)
-        plant.ring.post(7, HERE + 0.5)
+        plant.shared.post(7, HERE + 0.5)
         plant.step(600)
         path = [plant.snapshot.q_cmd]
         plant.safety.request_stop(StopRequest.OPERATOR_SAFETY)

@@ -1,4 +1,4 @@
-"""The shared ring is never seen torn, and the loop keeps time."""
+"""The shared state is never read torn, and the loop keeps time."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.sim.driving import ready
 def test_a_slot_holds_the_state_of_its_tick() -> None:
     plant = ready()
     plant.step(300)
-    slot = plant.ring.read(300)
+    slot = plant.shared.read(300)
     assert slot is not None
     assert np.array_equal(slot[2:9], plant.snapshot.q) and np.array_equal(slot[9:16], plant.snapshot.q_cmd)
     assert slot.view(np.int64)[StateWords.TIME] == 300_000_000 == plant.time_ns
@@ -27,9 +27,9 @@ def test_a_slot_holds_the_state_of_its_tick() -> None:
 def test_overwritten_and_torn_slots_read_as_none() -> None:
     plant = ready()
     plant.step(300)
-    assert plant.ring.read(300 - SLOTS) is None and plant.ring.read(301) is None
-    plant.ring.ints[300 % SLOTS, StateWords.SEQ] = 2 * 300 + 1  # as while it is written
-    assert plant.ring.read(300) is None
+    assert plant.shared.read(300 - SLOTS) is None and plant.shared.read(301) is None
+    plant.shared.ints[300 % SLOTS, StateWords.SEQ] = 2 * 300 + 1  # as while it is written
+    assert plant.shared.read(300) is None
 
 
 def test_somebody_is_woken_only_when_their_time_has_come() -> None:
@@ -38,7 +38,7 @@ def test_somebody_is_woken_only_when_their_time_has_come() -> None:
     plant.on_wake = woken.append
     plant.step(10)
     assert woken == []
-    plant.ring.header[HeaderWords.WAKE] = 15_000_000
+    plant.shared.header[HeaderWords.WAKE] = 15_000_000
     plant.step(4)
     assert woken == []
     plant.step(1)
@@ -51,8 +51,8 @@ def test_a_reader_never_sees_a_torn_slot_while_the_plant_ticks() -> None:
 
     def look() -> None:
         while not stop.is_set():
-            tick = int(plant.ring.header[HeaderWords.NEWEST])
-            slot = plant.ring.read(tick)
+            tick = int(plant.shared.header[HeaderWords.NEWEST])
+            slot = plant.shared.read(tick)
             if slot is not None:
                 read[0] += 1
                 if slot.view(np.int64)[StateWords.TIME] != tick * 1_000_000:
@@ -71,7 +71,7 @@ import sys, threading, time
 from heptarm.sim.runtime.realtime_loop import RealtimeLoop
 from heptarm.sim.plant.plant import Plant
 plant = Plant()
-loop = RealtimeLoop(plant.ring, plant.tick, speed=float(sys.argv[1]))
+loop = RealtimeLoop(plant.shared, plant.tick, speed=float(sys.argv[1]))
 threading.Timer(0.5, loop.stop).start()
 began = time.monotonic()
 loop.run()
@@ -88,7 +88,7 @@ def _pace(speed: float) -> list[float]:
 
 def test_the_loop_keeps_the_requested_speed() -> None:
     per_second, tick, _ = _pace(1.0)
-    assert 100 < per_second < 1100 and tick > 0.0  # time that the machine does not give is given up
+    assert 100 < per_second < 1100 and tick > 0.0  # time that the machine does not provide is given up
     assert 100 < _pace(4.0)[0] < 4400
     assert _pace(0.0)[0] > 100  # as fast as it goes
 

@@ -1,4 +1,4 @@
-"""Straight servo motions on the plant: lines in space, limits along each axis, braking on the line."""
+"""Straight servo motions on the plant: straight lines, limits along each axis, braking on the line."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from heptarm.model.kinematics import forward
 from heptarm.sim.planning.command import Order
 from heptarm.sim.plant.plant import Plant
-from heptarm.sim.seam import StraightLimits
+from heptarm.sim.seam import ServoTiming, StraightLimits
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 from tests.sim.driving import READY, Ear, numbers, ready
@@ -27,7 +27,7 @@ def serving(tcp: Pose | None = None, **terms: object) -> tuple[Plant, Ear, Pose]
 
 
 def places(plant: Plant, ticks: int, tcp: Pose | None = None) -> tuple[Array, list[Pose]]:
-    """Where the moved frame was commanded to, tick by tick."""
+    """Commanded positions of the motion frame, tick by tick."""
     seen = []
     for _ in range(ticks):
         plant.tick()
@@ -46,7 +46,7 @@ def beside(line: Array, start: Array, end: Array) -> float:
 def test_from_rest_the_moved_frame_goes_straight_and_turns_in_step() -> None:
     plant, _, start = serving(TCP)
     goal = Pose.of(start.xyz + [0.05, 0.12, -0.08], start.quat) @ Pose.xyz_abc(0, 0, 0, 0.4, 0.2, 0.0)
-    plant.ring.post(7, goal.array)
+    plant.shared.post(7, goal.array)
     line, poses = places(plant, 2500, TCP)
     assert poses[-1].distance_to(goal) < 1e-9 and poses[-1].angle_to(goal) < 1e-9
     assert beside(line, start.xyz, goal.xyz) < 1e-6
@@ -63,7 +63,7 @@ def test_limits_hold_along_each_axis_of_the_chosen_frame(turned: bool) -> None:
     line = [start.xyz] * 2
     for _ in range(12):
         turn = Pose.xyz_abc(0, 0, 0, *random.uniform(-0.2, 0.2, 3))
-        plant.ring.post(7, (Pose.of(start.xyz + random.uniform(-0.1, 0.1, 3), start.quat) @ turn).array)
+        plant.shared.post(7, (Pose.of(start.xyz + random.uniform(-0.1, 0.1, 3), start.quat) @ turn).array)
         line.extend(places(plant, int(random.integers(30, 300)))[0])
     seen = np.array(line) @ (axes.rotation if turned else np.eye(3))
     speed = np.diff(seen, axis=0) * 1e3
@@ -79,7 +79,7 @@ def test_a_rotation_keeps_its_speed_and_acceleration_across_targets() -> None:
     for step in range(900):
         if step % 40 == 0:  # the goal turns about an axis that turns itself
             angle = min(step, 500) * 1e-3
-            plant.ring.post(
+            plant.shared.post(
                 7, (Pose.of(start.xyz, start.quat) @ Pose.xyz_abc(0, 0, 0, angle, angle / 2, 0)).array
             )
         _, (pose,) = places(plant, 1)
@@ -92,9 +92,9 @@ def test_a_rotation_keeps_its_speed_and_acceleration_across_targets() -> None:
 
 def test_a_target_across_the_way_bends_it_without_a_halt() -> None:
     plant, _, start = serving()
-    plant.ring.post(7, Pose.of(start.xyz + [0.0, 0.15, 0.0], start.quat).array)
+    plant.shared.post(7, Pose.of(start.xyz + [0.0, 0.15, 0.0], start.quat).array)
     first, _ = places(plant, 500)
-    plant.ring.post(7, Pose.of(start.xyz + [0.0, 0.15, 0.1], start.quat).array)
+    plant.shared.post(7, Pose.of(start.xyz + [0.0, 0.15, 0.1], start.quat).array)
     second, poses = places(plant, 2500)
     speed = np.linalg.norm(np.diff(np.vstack([first, second]), axis=0), axis=1) * 1e3
     moving = speed[200:700]
@@ -103,9 +103,9 @@ def test_a_target_across_the_way_bends_it_without_a_halt() -> None:
 
 
 def test_cancelling_brakes_on_the_line_within_what_a_motion_may() -> None:
-    plant, ear, start = serving(straight=StraightLimits(velocity=(0.5,) * 6, acceleration=(0.4,) * 6))
+    plant, ear, start = serving(straight_limits=StraightLimits(velocity=(0.5,) * 6, acceleration=(0.4,) * 6))
     goal = start.xyz + [0.0, 0.3, 0.1]
-    plant.ring.post(7, Pose.of(goal, start.quat).array)
+    plant.shared.post(7, Pose.of(goal, start.quat).array)
     places(plant, 900)
     speed = float(np.linalg.norm(np.diff(places(plant, 3)[0], axis=0)[-1]) * 1e3)
     plant.cancel(7)
@@ -119,8 +119,8 @@ def test_cancelling_brakes_on_the_line_within_what_a_motion_may() -> None:
 
 
 def test_at_its_target_it_times_out() -> None:
-    plant, ear, start = serving(goal_timeout=0.3)
-    plant.ring.post(7, Pose.of(start.xyz + [0, 0, 0.02], start.quat).array)
+    plant, ear, start = serving(servo_timing=ServoTiming(goal_timeout=0.3))
+    plant.shared.post(7, Pose.of(start.xyz + [0, 0, 0.02], start.quat).array)
     while not plant.idle:
         plant.tick()
     assert ear.causes == ["started", "done"]
@@ -131,7 +131,7 @@ def test_the_override_and_a_pause_slow_it_down() -> None:
     plant.pause()
     plant.step(600)
     goal = start.xyz + [0, 0.05, 0.02]
-    plant.ring.post(7, Pose.of(goal, start.quat).array)
+    plant.shared.post(7, Pose.of(goal, start.quat).array)
     assert np.abs(places(plant, 200)[0] - start.xyz).max() < 1e-9
     plant.resume()
     assert np.abs(places(plant, 2500)[0][-1] - goal).max() < 1e-6
@@ -144,13 +144,13 @@ def test_a_line_that_slowly_ends_at_the_reach_of_the_arm_is_an_error_too() -> No
         Order(
             7,
             "straight",
-            straight=StraightLimits(velocity=(1e-4,) * 6, acceleration=(1.0,) * 6),
+            straight_limits=StraightLimits(velocity=(1e-4,) * 6, acceleration=(1.0,) * 6),
             listener=ear,
         )
     )
     plant.step(2)
     outward = start.xyz - (0.0, 0.0, plant.robot.d_bs)
-    plant.ring.post(7, Pose.of(start.xyz + 0.01 * outward, start.quat).array)
+    plant.shared.post(7, Pose.of(start.xyz + 0.01 * outward, start.quat).array)
     while not plant.idle:
         plant.tick()
         assert plant.tick_count < 10_000
@@ -162,7 +162,7 @@ def test_a_line_that_leaves_the_workspace_ends_the_motion_in_a_controlled_stop(
     goal: tuple[float, ...],
 ) -> None:
     plant, ear, start = serving()
-    plant.ring.post(7, Pose.of(goal, start.quat).array)
+    plant.shared.post(7, Pose.of(goal, start.quat).array)
     fastest = 0.0
     while not plant.idle:
         plant.tick()

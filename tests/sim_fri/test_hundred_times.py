@@ -1,6 +1,6 @@
-"""Each fault many times in a row: it ends in a designed state, its cause in words, and commanding works again.
+"""Each fault many times in a row: it ends in a designed state with its cause as text, and commanding works again.
 
-A few times here; `python -m bench --only fri_faults` does each a hundred times.
+A few times here, a hundred times in `make test-long`.
 """
 
 from __future__ import annotations
@@ -9,13 +9,15 @@ from collections.abc import Callable
 
 import pytest
 
+from tests.long import longer
 from tests.sim_fri import kills, scenarios
 from tests.sim_fri.pair import Pair
 
 
 @pytest.mark.parametrize("fault", scenarios.FAULTS)
 def test_again_and_again(fault: Callable[[Pair], str]) -> None:
-    assert scenarios.again(fault, 10) == 10
+    times = longer(10, 100)
+    assert scenarios.again(fault, times) == times
 
 
 def test_duplicates_count_once() -> None:
@@ -28,4 +30,5 @@ def test_garbage_between_the_datagrams() -> None:
 
 @pytest.mark.parametrize("kill", [kills.clients, kills.controllers])
 def test_processes_that_are_killed(kill: Callable[[int], int]) -> None:
-    assert kill(2) == 2
+    times = longer(2, 20)
+    assert kill(times) == times

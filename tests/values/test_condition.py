@@ -1,4 +1,4 @@
-"""Conditions are values: built by comparing and combining, checked when made, never asked for their truth."""
+"""Conditions are values: built by comparisons and combinations, checked when created, without a truth value."""
 
 from __future__ import annotations
 
@@ -15,9 +15,6 @@ from heptarm.values.condition.condition import (
     Condition,
     Inverted,
     OneOf,
-    PathReached,
-    SignalIs,
-    SignalOutside,
     check_condition,
     condition_nodes,
 )
@@ -28,8 +25,10 @@ from heptarm.values.condition.force import (
     NormalForceAbove,
     ShearForceAbove,
     TorqueOutside,
+    force,
+    torque,
 )
-from heptarm.values.condition.signals import force, io, path, torque
+from heptarm.values.condition.signals import PathReached, SignalIs, SignalOutside, io, path
 
 TOUCH = force.along("z") > 15
 HIT = abs(torque[3]) > 8
@@ -40,18 +39,18 @@ HIT = abs(torque[3]) > 8
     [
         (force > 10, ForceAbove(10)),
         (10 < force, ForceAbove(10)),  # noqa: SIM300
-        (force(frame="base", tolerance=5.0) > 10, ForceAbove(10, "base", 5.0)),
+        (force(frame="base", tolerance=5.0) > 10, ForceAbove(10, frame="base", tolerance=5.0)),
         (force < 10, Inverted(ForceAbove(10))),
         (TOUCH, ForceOutside("z", -1000, 15)),
         (force.along("x") < -3, ForceOutside("x", -3, 1000)),
         (abs(force.along("y")) > 4, ForceOutside("y", -4, 4)),
         (force.along("y").inside(-4, 5), Inverted(ForceOutside("y", -4, 5))),
         (force.normal("z") > 20, NormalForceAbove("z", 20)),
-        (force(frame="base").shear("z") > 20, ShearForceAbove("z", 20, "base")),
+        (force(frame="base").shear("z") > 20, ShearForceAbove("z", 20, frame="base")),
         (torque[6] > 2, JointTorqueOutside(6, -500, 2)),
         (HIT, JointTorqueOutside(3, -8, 8)),
         (torque.about("x").outside(-1, 2), TorqueOutside("x", -1, 2)),
-        (torque(frame="base").about("z") > 2, TorqueOutside("z", -1000, 2, "base")),
+        (torque(frame="base").about("z") > 2, TorqueOutside("z", -1000, 2, frame="base")),
         (io.user_button, SignalIs("user_button")),
         (~io["MediaFlange.UserButton"], SignalIs("MediaFlange.UserButton", False)),
         (io["Cell.Part"].outside(1, 3), SignalOutside("Cell.Part", 1, 3)),

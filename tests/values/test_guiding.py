@@ -10,7 +10,6 @@ import pytest
 import heptarm as ha
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.mode.impedance import CartesianImpedance
-from heptarm.values.motion.motion import limited_to
 
 NAN = np.nan
 
@@ -22,7 +21,7 @@ def test_hand_guiding_keeps_what_it_is_given() -> None:
     assert guide == ha.hand_guide(
         q_max=[0.5] + [NAN] * 6, cartesian_velocity=0.2, at_limit="all", outside="pull"
     )
-    assert limited_to(guide, 0.1) is guide
+    assert guide.limited_to(0.1) is guide
 
 
 @pytest.mark.parametrize(
@@ -56,7 +55,7 @@ def test_yielding_is_soft_where_it_is_told_to_be() -> None:
 
 
 def taught() -> ha.Trajectory:
-    """A second of rest, a turn of A1 there and A2 back, half a second of rest; 100 positions a second."""
+    """One second of rest, a rotation of A1 and of A2 back, half a second of rest; 100 positions per second."""
     t = np.arange(0.0, 4.0, 0.01)
     q = np.zeros((len(t), 7))
     go = np.clip(t - 1.0, 0.0, 2.5)

@@ -1,4 +1,4 @@
-"""Motions are values: checked when made, equal by their numbers, frozen."""
+"""Motions are values: checked when created, equal by their numbers, frozen."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.values.frames import BASE
 from heptarm.values.motion.dynamics import Blending, Dynamics
 from heptarm.values.motion.line import Lin, LinRel, lin, lin_rel
-from heptarm.values.motion.motion import Hold, Motion, hold, limited_to
+from heptarm.values.motion.motion import Hold, Motion, hold
 from heptarm.values.motion.ptp import Ptp, PtpPose, ptp, ptp_home
 from heptarm.values.motion.spline import spl
 from heptarm.values.pose import Pose, Redundancy, deg
@@ -120,12 +120,12 @@ def test_a_ceiling_only_slows_down(speed: float | None, ceiling: float) -> None:
     joints = (ptp(Q, speed=speed), ptp_home(speed=speed))
     for motion in (*joints, lin(POSE, joint_speed=speed), lin_rel(z=0.1, joint_speed=speed)):
         expected = ceiling if speed is None else min(speed, ceiling)
-        limited = limited_to(motion, ceiling)
+        limited = motion.limited_to(ceiling)
         assert not isinstance(limited, Hold)
         if ceiling < 1.0:
             assert limited.dynamics.joint_speed.tolist() == [expected] * 7
         assert type(limited) is type(motion)
-    assert limited_to(hold(1.0), ceiling) == hold(1.0)
+    assert hold(1.0).limited_to(ceiling) == hold(1.0)
 
 
 @pytest.mark.parametrize(
@@ -177,7 +177,7 @@ def test_a_ceiling_only_slows_down(speed: float | None, ceiling: float) -> None:
         (lambda: hold(2e6), LimitError, "seconds must .*got 2e"),
         (lambda: hold("long"), ShapeError, "must be a number"),
         (lambda: ptp(Q).limited_to(0.0), LimitError, r"speed must be in \(0, 1\], got 0"),
-        (lambda: limited_to(hold(), 2.0), LimitError, "speed must .*got 2"),
+        (lambda: hold().limited_to(2.0), LimitError, "speed must .*got 2"),
         (lambda: Dynamics(speed_mps=11.0), LimitError, "speed_mps must .*got 11"),
         (lambda: Dynamics(joint_speed=Q), LimitError, r"joint_speed\[0\] must .*got 0"),
         (lambda: Blending(relative=2.0), LimitError, "relative must .*got 2"),

@@ -7,8 +7,9 @@ import pytest
 
 import heptarm as ha
 from heptarm.do import notify, set_output
-from heptarm.values.condition.signals import force, path
-from heptarm.values.motion.motion import Motion, limited_to
+from heptarm.values.condition.force import force
+from heptarm.values.condition.signals import path
+from heptarm.values.motion.motion import Motion
 from heptarm.values.result import MotionEvent
 
 HERE = ha.Pose.at(0.5, 0.0, 0.4)
@@ -33,7 +34,7 @@ def test_every_motion_takes_triggers_and_stays_what_it_was(motion: Motion) -> No
     assert [trigger.action for trigger in two.triggers] == [notify("touch"), set_output("LEDBlue")]
     assert two == motion.trigger(force > 10, notify("touch")).trigger(path.after(0.1), set_output("LEDBlue"))
     assert one not in (motion, two) and hash(one) != hash(two)
-    assert limited_to(two, 0.5).triggers == two.triggers
+    assert two.limited_to(0.5).triggers == two.triggers
 
 
 def test_sixteen_are_enough() -> None:

@@ -1,8 +1,8 @@
-"""A client and a cabinet session, joined by hand."""
+"""A client session and a cabinet session, connected by hand."""
 
 from __future__ import annotations
 
-from heptarm.wire.messages import Groups, RobotInfo, Welcome
+from heptarm.wire.messages import MAJOR, Groups, RobotInfo, Welcome
 from heptarm.wire.session import Received, Session, Side, StateReceived
 
 ROBOT = RobotInfo(
@@ -15,9 +15,9 @@ ROBOT = RobotInfo(
 )
 
 
-def welcome(session: Session, **changes: object) -> Welcome:
+def welcome(**changes: object) -> Welcome:
     fields: dict[str, object] = {
-        "major": 1,
+        "major": MAJOR,
         "minor": 0,
         "session": 7,
         "software": "0",
@@ -32,7 +32,6 @@ def welcome(session: Session, **changes: object) -> Welcome:
         "max_rate": 1000.0,
         "heartbeat": 0.4,
         "controller": "",
-        "mac": session.welcome_mac(),
     }
     return Welcome(**(fields | changes))  # type: ignore[arg-type]
 
@@ -42,8 +41,11 @@ def pour(data: bytes, into: Session) -> list[Received | StateReceived]:
     return list(into.events())
 
 
-def open_pair() -> tuple[Session, Session]:
-    client, cabinet = Session(Side.CLIENT), Session(Side.CABINET)
+def open_pair(key: bytes | None = None) -> tuple[Session, Session]:
+    client, cabinet = Session(Side.CLIENT, key=key), Session(Side.CABINET, key=key)
     pour(client.send(client.hello(name="t")), cabinet)
-    pour(cabinet.send(welcome(cabinet)), client)
+    if key is not None:
+        pour(cabinet.send(cabinet.challenge()), client)
+        pour(client.send(client.proof()), cabinet)
+    pour(cabinet.send(welcome()), client)
     return client, cabinet

@@ -24,7 +24,7 @@ from heptarm.arm.motion import program
 from heptarm.arm.motion.handle import BreakRule, MotionHandle, check_timeout
 from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
-from heptarm.arm.motion.servo import JointServo, PoseServo, ServoKeywords, ServoRequest
+from heptarm.arm.motion.servo import JointServo, PoseServo, ServoKeywords, ServoRequest, documented
 from heptarm.arm.translate.conditions import condition_message
 from heptarm.arm.translate.modes import mode_message
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
@@ -164,6 +164,11 @@ class Arm:
         return f"<Arm {link.title}, {state}, {'in control' if link.in_control else 'observing'}>"
 
     @property
+    def connection(self) -> Connection:
+        """The connection beneath this arm: messages, clock and events. Tools and tests use it, programs need not."""
+        return self._connection
+
+    @property
     def connected(self) -> bool:
         """Whether it is connected to the cabinet."""
         return self._connection.is_connected
@@ -206,9 +211,9 @@ class Arm:
         return self._connection.welcome.cabinet
 
     @property
-    def pace(self) -> float:
-        """Seconds of the robot's time per second of ours: 1 on a robot, N on a simulator that runs N times faster."""
-        return self._connection.pace
+    def real_time_factor(self) -> float:
+        """Seconds of the robot's clock per second of this computer's: N for a simulator N times as fast."""
+        return self._connection.real_time_factor
 
     @property
     def operator(self) -> Operator:
@@ -363,7 +368,7 @@ class Arm:
             check_timeout(timeout)
         self._connection.check_may_wait("arm.move()")
         self._connection.check_no_block("arm.move()")
-        if timeout is None and program.is_endless(motions):
+        if timeout is None and program.is_endless(motions, self._connection.robot):
             raise ShapeError(
                 "this program ends only when it is cancelled, so that move() would never return",
                 parameter="timeout",
@@ -473,6 +478,7 @@ class Arm:
     def servo(self, kind: Literal["joint"] = "joint", **settings: Unpack[ServoKeywords]) -> JointServo: ...
     @overload
     def servo(self, kind: Literal["pose", "lin"], **settings: Unpack[ServoKeywords]) -> PoseServo: ...
+    @documented
     def servo(
         self, kind: Literal["joint", "pose", "lin"] = "joint", **settings: Unpack[ServoKeywords]
     ) -> JointServo | PoseServo:
@@ -481,29 +487,7 @@ class Arm:
         Args:
             kind: what the targets are: "joint" positions; "pose" of the motion frame, reached by the joints; or "lin":
                 the same, reached on straight lines.
-            **settings: rate: ticks of the loop per second [Hz]; 100.
-                watchdog: longest gap between two targets; a longer one stops the arm [s], 0.005 to 2; None: five
-                periods, at least 0.2 s.
-                engine: of joints and poses: "smart" plans a limited trajectory to each target; "direct" moves straight
-                to it, for targets that are close and smooth.
-                mode: control mode; None: that of `using`, otherwise position. Its parameters can change while the arm
-                follows.
-                speed: of joints and poses: ceiling, a fraction of each axis' maximum in (0, 1]; None: 0.2. The lower
-                one of this and `arm.speed` applies.
-                acceleration: likewise, of the acceleration and the jerk.
-                speed_mps: of "lin": largest speed along each axis of the base [m/s], up to 10; None: 0.25. `arm.speed`
-                scales it, since the joints' own limits are not checked.
-                acceleration_mps2: likewise [m/s²], up to 100; None: 1. Not scaled.
-                speed_radps: largest angular velocity about each axis of the base [rad/s], up to 20; None: 0.5. Scaled.
-                acceleration_radps2: likewise [rad/s²], up to 200; None: 2. Not scaled.
-                min_trajectory_time: shortest trajectory to a target [s]; None: a period and 5 ms.
-                goal_timeout: time at its target without another one after which the cabinet's servo motion ends [s];
-                300. The next target begins a new one.
-                speed_timeout: of joints with the engine "smart": how long the arm keeps the velocity of a target after
-                passing it, before it brakes [s], 0.001 to 10; None: 0.1.
-                moving: motion frame: "tool" (of the attached tool, or the flange), "flange" or the name of a frame.
-                until: break condition; the cabinet's application checks it up to 250 times a second, as fast as its
-                robot answers. See `move`.
+            **settings: as follows.
 
         Raises:
             LimitError: a value outside its range.

@@ -6,16 +6,20 @@ import itertools
 import logging
 import os
 import socket
+from pathlib import Path
 from typing import Literal
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.link.connection import STATE_RATE, TIMEOUT, WATCHDOG, Connection, Options
+from heptarm.arm.link.connection import STATE_RATE, TIMEOUT, Connection, Options
 from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.arm.link.state_stream import GROUPS
 from heptarm.arm.link.target import parse_target, target_from_env
+from heptarm.arm.translate.text import printable
+from heptarm.arm.watchdog import CONNECTION
 from heptarm.errors import ShapeError
 from heptarm.io import tcp
 from heptarm.io.clock import RealClock
+from heptarm.io.keys import find_key
 from heptarm.io.transport import Transport
 from heptarm.values.arrays import within
 
@@ -33,7 +37,8 @@ def _default_name() -> str:
     """Name of a client: user, host and process, and from the second client of this process on its number."""
     number = next(_unnamed)
     name = f"{os.environ.get('USER', 'python')}@{socket.gethostname()}:{os.getpid()}"
-    return name if number == 1 else f"{name}#{number}"
+    name = printable(name) if number == 1 else f"{printable(name)}#{number}"
+    return name.encode()[-_MAX_NAME:].decode(errors="ignore")
 
 
 def connect(
@@ -41,12 +46,13 @@ def connect(
     *,
     name: str | None = None,
     key: str | None = None,
+    key_file: str | Path | None = None,
     control: bool = True,
     timeout: float = TIMEOUT,
     state_rate: float = STATE_RATE,
     groups: tuple[str, ...] = GROUPS,
     on_disconnect: Literal["stop", "finish"] = "stop",
-    watchdog: float = WATCHDOG,
+    watchdog: float = CONNECTION.default,
 ) -> Arm:
     """Connect to an arm.
 
@@ -55,7 +61,9 @@ def connect(
             ends with the arm; "sim://HOST:PORT" for a running one. None: the environment variable HEPTARM_TARGET.
         name: name of this client, shown to other clients, up to 64 bytes; None: user, host and process, and
             a number from the second client of a process on.
-        key: pre-shared key of the cabinet; None: it has none.
+        key: pre-shared key of the cabinet; "": none. None: it is looked up in `key_file`, the environment variable
+            HEPTARM_KEY, and the key stored for the target. A private simulator takes the key that is found.
+        key_file: file with the key as its only line, readable by its owner only.
         control: take control; otherwise only observe (and stop). One client at a time is in control.
         timeout: longest wait for the connection and for the answer to each request [s].
         state_rate: pushed states per second [Hz]; 0: none.
@@ -70,6 +78,7 @@ def connect(
         ConnectFailed: no answer, or the session is refused; for a wrong target the text shows examples.
         VersionMismatch: client and cabinet speak different versions of the protocol.
         NotInControl: another client controls the robot; the text names it.
+        CommandRejected: an argument is not allowed: the key is too weak, or other users can read its file.
     """
     if on_disconnect not in ("stop", "finish"):
         raise ShapeError(
@@ -85,17 +94,22 @@ def connect(
             value=name,
             allowed=f"at most {_MAX_NAME} bytes",
         )
+    if name is not None and name != printable(name):
+        raise ShapeError(
+            f"name must have printable characters only, got {name!a}", code=3, parameter="name", value=name
+        )
+    chosen = parse_target(target_from_env() if target is None else target)
+    found = find_key(key=key, key_file=key_file, host=chosen.host, port=chosen.port)
     options = Options(
         name=name or _default_name(),
-        key=key.encode() if key else None,
+        key=None if found is None else found.encode(),
         timeout=within(timeout, "timeout", 0.0, 3600.0, above=True, unit="s"),
         rate=within(state_rate, "state_rate", 0.0, 1000.0, unit="Hz"),
         groups=groups,
         finishes=on_disconnect == "finish",
-        watchdog=within(watchdog, "watchdog", 0.1, 10.0, unit="s"),
+        watchdog=CONNECTION.time(watchdog),
     )
-    chosen = parse_target(target_from_env() if target is None else target)
-    private = PrivateCabinet.start(chosen) if chosen.is_private else None
+    private = PrivateCabinet.start(chosen, key=found) if chosen.is_private else None
     host, port = (chosen.host, chosen.port) if private is None else (private.host, private.port)
 
     def dial() -> Transport:

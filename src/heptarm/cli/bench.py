@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,12 +12,11 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from cyclopts import Parameter
 
-from heptarm.arm.connect import connect
 from heptarm.arm.fri.diagnosis import cause
 from heptarm.arm.fri.settings import PORTS
-from heptarm.arm.link.target import VARIABLE
 from heptarm.cli.options import (
     FRI,
+    NO_TARGET,
     FriListen,
     FriPeriod,
     FriPort,
@@ -82,14 +80,12 @@ def bench(
     duration: Annotated[float, Parameter(help="How long to measure [s].")] = 10.0,
     plot: Annotated[Path | None, Parameter(help="Save a histogram and the time series as a picture.")] = None,
     yes: Yes = False,
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Measure how fast and how reliably FRI messages are answered, and name the main disturbance."""
     if not fri:
-        raise CommandRejected(
-            "--fri is missing: FRI is what this command measures", hint="heptarm bench --fri"
-        )
+        raise CommandRejected("--fri is required: this command measures FRI", hint="heptarm bench --fri")
     seconds = within(duration, "duration", 0.1, 86400.0, unit="s")
     if plot is not None:
         require("matplotlib", extra="viz")
@@ -98,8 +94,7 @@ def bench(
     if listen:
         source = _heard(settings, seconds)
     else:
-        chosen = target or os.environ.get(VARIABLE, "").strip() or "sim://iiwa14"
-        source = _asked(chosen, fri_command, fri_period, settings, yes=yes)
+        source = _asked(target.or_else("sim://iiwa14"), fri_command, fri_period, settings, yes=yes)
     with source as client:
         before = client.stats
         _wait(client, seconds)
@@ -113,7 +108,7 @@ def bench(
 
 @contextmanager
 def _asked(
-    target: str,
+    target: Target,
     command: Literal["monitor", "position"],
     period_ms: int,
     settings: dict[str, Any],
@@ -121,7 +116,7 @@ def _asked(
     yes: bool,
 ) -> Iterator[Client]:
     """A session of heptarm's application."""
-    with connect(target) as arm:
+    with target.connect() as arm:
         real = command != "monitor" and not arm.is_virtual
         if real and not (yes or confirm(f"Hold the real {arm.robot.title} by FRI commands?")):
             raise NotReady("nothing was started", hint="confirm the question, or give --yes")

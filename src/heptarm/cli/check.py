@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -12,9 +11,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from heptarm import testing
-from heptarm.arm.connect import connect
-from heptarm.arm.link.target import VARIABLE
+from heptarm.arm.watchdog import CHECK
 from heptarm.cli.options import (
+    NO_TARGET,
     Json,
     Target,
     Yes,
@@ -22,8 +21,8 @@ from heptarm.cli.options import (
 from heptarm.cli.output import confirm, emit
 from heptarm.testing import Outcome, Report, Scenario, Verdict
 
-#: Time limits of the link [s]: a machine that also simulates may answer late.
-_WATCHDOG, _TIMEOUT = 5.0, 20.0
+#: Longest wait for an answer [s]: a machine that also simulates may be late.
+_TIMEOUT = 20.0
 _STYLES = {Verdict.SHOWN: "green", Verdict.FAILED: "red", Verdict.LEFT_OUT: "yellow"}
 
 
@@ -41,7 +40,7 @@ def check(
     sim_speed: Annotated[float, Parameter(help="Without a target: simulated seconds per second.")] = 2.0,
     junit: Annotated[Path | None, Parameter(help="Write a report for CI systems, JUnit XML.")] = None,
     yes: Yes = False,
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Show what a robot can do, scenario by scenario, by measurement; exit code 1 if one fails.
@@ -53,9 +52,10 @@ def check(
     if list_only:
         _list(chosen, as_json)
         return 0
-    target = target or os.environ.get(VARIABLE, "").strip() or testing.stage(speed=sim_speed)
     console = Console()
-    with connect(target, watchdog=_WATCHDOG, timeout=_TIMEOUT) as arm:
+    with target.or_else(testing.stage(speed=sim_speed)).connect(
+        watchdog=CHECK.default, timeout=_TIMEOUT
+    ) as arm:
         if not as_json:
             console.print(
                 f"{len(chosen)} scenarios on {arm.robot.title}{' (virtual)' if arm.is_virtual else ''}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,8 +15,8 @@ from rich.console import Console
 from rich.table import Table
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.connect import connect
 from heptarm.cli.options import (
+    NO_TARGET,
     Json,
     Target,
 )
@@ -70,13 +70,14 @@ class _Recorder:
 def demo(
     *,
     plot: Annotated[Path, Parameter(help="Where to save the plot.")] = Path("heptarm-demo.png"),
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Move a virtual arm through the whole stack; a table and a plot show the result."""
     logging.getLogger("heptarm").setLevel(logging.ERROR)
     began = time.monotonic()
-    with connect(target or "sim://iiwa14", state_rate=_RATE) as arm:
+    chosen = target if target.text else replace(target, text="sim://iiwa14")  # a robot only if it is named
+    with chosen.connect(state_rate=_RATE) as arm:
         ready = time.monotonic() - began
         recorder = _Recorder(arm)
         steps = [step(arm) for step in (_ptp, _lin, _lin_rel, _cancelled, _refused, _home)]

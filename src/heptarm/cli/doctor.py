@@ -19,12 +19,13 @@ from rich.table import Table
 
 from heptarm import __version__, _resources
 from heptarm.arm.arm import Arm
-from heptarm.arm.connect import connect
 from heptarm.arm.fri.diagnosis import cause, silence, strangers
 from heptarm.arm.fri.settings import PORTS
-from heptarm.arm.link.target import VARIABLE, parse_target
+from heptarm.arm.link.target import parse_target
+from heptarm.arm.translate.text import printable
 from heptarm.cli.options import (
     FRI,
+    NO_TARGET,
     FriListen,
     FriPeriod,
     FriPort,
@@ -46,12 +47,14 @@ _OLD_MS = 20.0
 #: A larger fraction of lost messages or answers is reported.
 _LOST_FRACTION = 0.001
 _LONGEST = 3600.0
+#: Addresses that mean every interface.
+_ALL = ("0.0.0.0", "::")
 _KINDS = ("position", "torque", "wrench", "pose")
 _VERSION = (
     "leave --fri-version (version= in a program) out: heptarm takes it from the first message; a client that is built "
     "with KUKA's SDK has to be built for the cabinet's version"
 )
-_UNKNOWN = "look at the messages on the smartPAD and at the log of the cabinet's application"
+_UNKNOWN = "read the messages on the smartPAD and the log of the cabinet application"
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +94,7 @@ def doctor(
     fri_period: FriPeriod = 1,
     fri_version: FriVersion = None,
     seconds: Annotated[float, Parameter(group=FRI, help="How long to check FRI [s].")] = 5.0,
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Check the installation, and a target if one is given: one verdict and one remedy per line.
@@ -99,14 +102,14 @@ def doctor(
     With --fri also check FRI: a session of the target, or with --listen the messages of another application on
     the cabinet.
     """
-    listens = listen or (target is None and not os.environ.get(VARIABLE))
+    target = target.or_else(None)
+    listens = listen or target.text is None
     look = Look(listens, fri_port, fri_period, fri_version, seconds) if fri else None
-    target = target or os.environ.get(VARIABLE, "").strip() or None
     verdicts = [check() for check in (_python, _extras, _java, _jars, _priority)]
-    if target is None or (look is not None and look.listens):
+    if target.text is None or (look is not None and look.listens):
         verdicts.append(_port())
     else:
-        verdicts += _target(target)
+        verdicts += _target(target, target.text)
     if look is not None:
         verdicts += _fri(look, target=None if look.listens else target)
     if as_json:
@@ -200,20 +203,22 @@ def _port() -> CheckResult:
     return CheckResult("port", "ok", f"{PORT} is free for heptarm sim")
 
 
-def _target(target: str) -> Iterator[CheckResult]:
-    parsed = parse_target(target)
+def _target(target: Target, text: str) -> Iterator[CheckResult]:
+    parsed = parse_target(text)
     if not parsed.is_private:
         try:
             socket.create_connection((parsed.host, parsed.port), timeout=3).close()
             yield CheckResult("network", "ok", f"{parsed.host}:{parsed.port} accepts connections")
         except OSError as error:
-            remedy = "is the cabinet application (or heptarm sim) running? is this machine in its network?"
+            remedy = (
+                "start the cabinet application or heptarm sim, and check that this machine is in its network"
+            )
             yield CheckResult(
                 "network", "bad", f"{parsed.host}:{parsed.port} does not answer ({error})", remedy
             )
             return
     try:
-        arm = connect(target, control=False)
+        arm = target.connect(control=False)
     except HeptarmError as error:
         yield CheckResult("session", "bad", error.text, error.hint)
         return
@@ -223,9 +228,39 @@ def _target(target: str) -> Iterator[CheckResult]:
             "ok",
             f"{arm.robot.title}{' (virtual)' if arm.is_virtual else ''}, cabinet application {arm.software}",
         )
+        yield _protection(arm, keyed=target.find_key() is not None)
         yield _round_trip(arm)
         yield _age(arm)
         yield _safety(arm)
+
+
+def _protection(arm: Arm, *, keyed: bool) -> CheckResult:
+    if keyed:
+        return CheckResult(
+            "protection",
+            "ok",
+            "both sides have proved that they know the key",
+        )
+    address, allowed = _setting(arm, "heptarm.bind", "0.0.0.0"), _setting(arm, "heptarm.allow", "").strip()
+    if allowed:
+        return CheckResult(
+            "protection", "ok", f"without a key; only these addresses may connect: {printable(allowed)}"
+        )
+    if address in _ALL:
+        return CheckResult(
+            "protection",
+            "note",
+            "any program in the network can move the robot: neither a key nor an allow-list is set",
+            "make a key with `heptarm key new --target ADDRESS` and set it in the process data heptarm.key",
+        )
+    return CheckResult("protection", "ok", f"without a key; the cabinet listens on {printable(address)} only")
+
+
+def _setting(arm: Arm, name: str, default: str) -> str:
+    try:
+        return arm.pad.process_data(name)
+    except CommandRejected:  # the project does not have it
+        return default
 
 
 def _timed(call: Callable[[], object]) -> float:
@@ -248,7 +283,7 @@ def _round_trip(arm: Arm) -> CheckResult:
 def _age(arm: Arm) -> CheckResult:
     ages = [state.age * 1e3 for state in arm.states(duration=1.0)]
     if not ages:
-        return CheckResult("state", "bad", "no state came within a second", "look at the cabinet's log")
+        return CheckResult("state", "bad", "no state received within 1 s", "read the log of the cabinet")
     found = f"{len(ages)} states in 1 s, {np.median(ages):.2f} ms old, 99 % below {np.percentile(ages, 99):.2f} ms"
     how = "note" if np.median(ages) > _OLD_MS else "ok"
     return CheckResult("state", how, found, "subscribe at a lower rate" if how == "note" else "")
@@ -267,7 +302,7 @@ def _safety(arm: Arm) -> CheckResult:
     return CheckResult("safety", "note", found, remedy)
 
 
-def _fri(settings: Look, *, target: str | None) -> Iterator[CheckResult]:
+def _fri(settings: Look, *, target: Target | None) -> Iterator[CheckResult]:
     """Check FRI of a target; without one, of any controller that sends to this machine."""
     if not 0.1 <= settings.seconds <= _LONGEST:
         raise CommandRejected(
@@ -337,10 +372,10 @@ def _names_version(text: str) -> bool:
     return "speaks FRI" in text
 
 
-def _opened(settings: Look, target: str) -> Iterator[CheckResult]:
+def _opened(settings: Look, target: Target) -> Iterator[CheckResult]:
     """Open a monitoring session of heptarm's application, beside any running motion."""
     try:
-        arm = connect(target)
+        arm = target.connect()
     except HeptarmError as error:
         yield CheckResult(
             "FRI session", "bad", error.text, error.hint or "end the client that controls the robot"

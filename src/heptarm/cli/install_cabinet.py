@@ -2,43 +2,98 @@
 
 from __future__ import annotations
 
+import re
 import shutil
+import sys
 from pathlib import Path
 from typing import Annotated
+from xml.sax.saxutils import escape
 
 from cyclopts import Parameter
 
 from heptarm import __version__, _resources
-from heptarm.cli.options import (
-    Json,
-)
+from heptarm.cli.key import locate
+from heptarm.cli.options import COMMON, Json
 from heptarm.cli.output import emit
-from heptarm.errors import CommandRejected
+from heptarm.errors import CommandRejected, HeptarmError
+from heptarm.io.keys import new_key, read_key_file, write_key_file
 from heptarm.wire.messages import MAJOR, MINOR
+
+_PROJECT = "RoboticsAPI.data.xml"
+_KEY = re.compile(r'(id="heptarm\.key" [^>]*? value=)""')
 
 
 def install_cabinet(
     *,
     out: Annotated[Path, Parameter(help="Folder to write; must be new or empty.")],
+    target: Annotated[
+        str,
+        Parameter(
+            name="--target",
+            group=COMMON,
+            help="Address of the cabinet: the key stored for it is used, or a new one is stored.",
+        ),
+    ] = "",
+    no_key: Annotated[
+        bool,
+        Parameter(
+            name="--no-key",
+            negative="",
+            help="Make no key: any program that reaches the cabinet's port can move the robot.",
+        ),
+    ] = False,
     as_json: Json = False,
 ) -> int:
-    """Write the cabinet application for a Sunrise project, with the steps."""
+    """Write the cabinet application for a Sunrise project, with a key and the steps."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise CommandRejected(
             f"--out must be a new or empty folder, got {out}",
             parameter="out",
             hint="name a new folder with --out",
         )
+    if target and no_key:
+        raise CommandRejected(
+            "--target and --no-key cannot be combined: the target is whose key is used", parameter="target"
+        )
+    stored = locate(target).file if target else None
+    key = "" if no_key else new_key() if stored is None or not stored.exists() else read_key_file(stored)
     sources = _resources.cabinet_sources()
     for part in ("core", "app"):
         shutil.copytree(sources / part / "src", out / "src", dirs_exist_ok=True)
     shutil.copytree(sources / "project", out, dirs_exist_ok=True)
+    file = out / "heptarm.key" if stored is None else stored
+    if key:
+        _set_key(out / _PROJECT, key)
+        if not file.exists():
+            write_key_file(file, key)
     files = sorted(str(path.relative_to(out)) for path in out.rglob("*.java"))
     protocol = f"{MAJOR}.{MINOR}"
     if as_json:
-        emit({"out": str(out), "files": len(files), "protocol": protocol, "version": __version__})
+        data = {"out": str(out), "files": len(files), "protocol": protocol, "version": __version__}
+        emit(data | {"key_file": str(file) if key else ""})
+        return 0
+    print(f"{len(files)} Java sources and the project's data are in {out}.")
+    print(f"They speak protocol {protocol} and pair with heptarm {__version__}.")
+    if not key:
+        risk = "without a key, any program that reaches the cabinet's port can move the robot"
+        print(
+            f"heptarm: {risk}; set an allow-list, or keep the cabinet in a network of its own",
+            file=sys.stderr,
+        )
     else:
-        print(f"{len(files)} Java sources and the project's data are in {out}.")
-        print(f"They speak protocol {protocol} and pair with heptarm {__version__}.")
-        print(f"Go on with the steps in {out / 'INSTALL.md'}.")
+        print(f"A key is in {out / _PROJECT}; this machine's copy is {file}.")
+        if stored is None:
+            print(f"Store it for the cabinet: heptarm key set --target ADDRESS --key-file {file}")
+    print(f"Continue with the steps in {out / 'INSTALL.md'}.")
     return 0
+
+
+def _set_key(project: Path, key: str) -> None:
+    """Write the key into the process data, which only their owner can read from then on."""
+    value = escape(key, {'"': "&quot;"})
+    text, count = _KEY.subn(lambda found: f'{found[1]}"{value}"', project.read_text(encoding="utf-8"))
+    if count != 1:
+        raise HeptarmError(f"{project} has no empty process data heptarm.key", hint="reinstall heptarm")
+    project.unlink()
+    project.touch(mode=0o600)
+    project.write_text(text, encoding="utf-8")

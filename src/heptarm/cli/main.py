@@ -1,13 +1,15 @@
 """`heptarm`: the table of commands, and the entry point.
 
 Each command is one function with its options and its help, in the module named here; the module is imported when
-the command runs.
+the command runs. A list of commands reads their summaries from the sources, and imports none.
 """
 
 from __future__ import annotations
 
+import ast
 import os
 import sys
+from pathlib import Path
 
 from cyclopts import App
 
@@ -19,7 +21,7 @@ COMMANDS = {
     "demo": "demo:demo",
     "sim": "sim:sim",
     "state": "state:state",
-    "stop": "motion:stop",
+    "stop": "stop:stop",
     "recover": "motion:recover",
     "servo": "motion:servo",
     "teach": "motion:teach",
@@ -30,6 +32,7 @@ COMMANDS = {
     "install-cabinet": "install_cabinet:install_cabinet",
 }
 MOVES = {"ptp": "motion:move_ptp", "lin": "motion:move_lin", "lin_rel": "motion:move_lin_rel"}
+KEYS = {"new": "key:new", "set": "key:store", "list": "key:show", "forget": "key:forget"}
 LEARNING = {"train": "rl:train", "eval": "rl:evaluate", "deploy": "rl:deploy"}
 
 app = App(
@@ -37,18 +40,31 @@ app = App(
 )
 
 
-def _add(group: App, commands: dict[str, str]) -> App:
+def _summary(place: str) -> str:
+    """First line of a command's docstring, read from its source."""
+    module, function = place.split(":")
+    tree = ast.parse(Path(__file__).with_name(f"{module}.py").read_bytes())
+    (found,) = (one for one in tree.body if isinstance(one, ast.FunctionDef) and one.name == function)
+    return (ast.get_docstring(found) or "").partition("\n")[0]
+
+
+def _add(group: App, commands: dict[str, str], *, listed: bool) -> App:
     for name, place in commands.items():
-        group.command(f"heptarm.cli.{place}", name=name)
-        if _ASKS_FOR_HELP:
-            group[name]  # imported now: the summary of its docstring is listed
+        # the help of a command that runs is its whole docstring, so only a list has summaries
+        more = {"help": _summary(place)} if listed else {}
+        group.command(f"heptarm.cli.{place}", name=name, **more)
     return group
 
 
-_ASKS_FOR_HELP = len(sys.argv) == 1 or bool({"-h", "--help"} & set(sys.argv))
-_add(app, COMMANDS)
-app.command(_add(App(name="move", help="Move the arm and wait until it is at rest."), MOVES))
-app.command(_add(App(name="rl", help="Train, evaluate and deploy a policy that reaches targets."), LEARNING))
+#: The commands on the command line: a list is printed of those below the last one that is a group.
+_words = [one for one in sys.argv[1:] if not one.startswith("-")]
+_add(app, COMMANDS, listed=not _words)
+_move = App(name="move", help="Move the arm and wait until it is at rest.")
+_keys = App(name="key", help="Make, store and list the pre-shared keys of cabinets.")
+_learn = App(name="rl", help="Train, evaluate and deploy a policy that reaches targets.")
+app.command(_add(_move, MOVES, listed=_words == ["move"]))
+app.command(_add(_keys, KEYS, listed=_words == ["key"]))
+app.command(_add(_learn, LEARNING, listed=_words == ["rl"]))
 
 
 def main() -> None:
@@ -56,9 +72,11 @@ def main() -> None:
     try:
         code = app()
     except HeptarmError as error:
+        from heptarm.arm.translate.text import printable
+
         if os.environ.get("HEPTARM_DEBUG"):
             raise
-        print(f"heptarm: {error}", file=sys.stderr)
+        print(f"heptarm: {printable(str(error), lines=True)}", file=sys.stderr)
         sys.exit(1)
     except KeyboardInterrupt:
         sys.exit(130)

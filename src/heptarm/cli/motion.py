@@ -1,4 +1,4 @@
-"""Commands that move an arm: `heptarm move`, `servo`, `teach`, `replay`; and `stop` and `recover`."""
+"""Commands that move an arm: `heptarm move`, `servo`, `teach`, `replay`; and `recover`."""
 
 from __future__ import annotations
 
@@ -10,17 +10,9 @@ from typing import Annotated, Literal
 import numpy as np
 from cyclopts import Parameter
 
-from heptarm.arm.connect import connect
 from heptarm.arm.motion.servo import ServoStats
 from heptarm.arm.translate.motions import items
-from heptarm.cli.options import (
-    Degrees,
-    DryRun,
-    Json,
-    Speed,
-    Target,
-    Yes,
-)
+from heptarm.cli.options import NO_TARGET, Access, Json, MoveOptions, Speed, Target
 from heptarm.cli.output import confirm, emit, state_data
 from heptarm.errors import CommandRejected, NotReady
 from heptarm.values.arrays import within
@@ -31,6 +23,8 @@ from heptarm.values.motion.motion import Motion, hold
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.motion.trajectory import Trajectory
 from heptarm.values.pose import Pose
+
+_ACCESS, _MOVE = Access(), MoveOptions()
 
 
 def move_ptp(
@@ -43,16 +37,11 @@ def move_ptp(
     a7: float,
     /,
     *,
-    degrees: Degrees = False,
-    speed: Speed = 0.1,
-    yes: Yes = False,
-    dry_run: DryRun = False,
-    target: Target = None,
-    as_json: Json = False,
+    options: MoveOptions = _MOVE,
 ) -> int:
     """Point to point, to seven joint positions [rad]."""
-    motion = ptp(_angles((a1, a2, a3, a4, a5, a6, a7), degrees=degrees))
-    return _move(motion, target=target, speed=speed, yes=yes, dry_run=dry_run, as_json=as_json)
+    motion = ptp(_angles((a1, a2, a3, a4, a5, a6, a7), degrees=options.degrees))
+    return _move(motion, options)
 
 
 def move_lin(
@@ -64,16 +53,11 @@ def move_lin(
     c: float,
     /,
     *,
-    degrees: Degrees = False,
-    speed: Speed = 0.1,
-    yes: Yes = False,
-    dry_run: DryRun = False,
-    target: Target = None,
-    as_json: Json = False,
+    options: MoveOptions = _MOVE,
 ) -> int:
     """Straight line to a pose in the base frame: x y z [m], a b c about z y x [rad]."""
-    motion = lin(Pose.xyz_abc(x, y, z, *_angles((a, b, c), degrees=degrees)))
-    return _move(motion, target=target, speed=speed, yes=yes, dry_run=dry_run, as_json=as_json)
+    motion = lin(Pose.xyz_abc(x, y, z, *_angles((a, b, c), degrees=options.degrees)))
+    return _move(motion, options)
 
 
 def move_lin_rel(
@@ -85,41 +69,36 @@ def move_lin_rel(
     b: float = 0.0,
     c: float = 0.0,
     frame: Annotated[str, Parameter(help='Whose axes: "tool" or "base".')] = "tool",
-    degrees: Degrees = False,
-    speed: Speed = 0.1,
-    yes: Yes = False,
-    dry_run: DryRun = False,
-    target: Target = None,
-    as_json: Json = False,
+    options: MoveOptions = _MOVE,
 ) -> int:
     """Straight line by an offset [m], [rad]."""
-    motion = lin_rel(x, y, z, *_angles((a, b, c), degrees=degrees), frame=frame)
-    return _move(motion, target=target, speed=speed, yes=yes, dry_run=dry_run, as_json=as_json)
+    motion = lin_rel(x, y, z, *_angles((a, b, c), degrees=options.degrees), frame=frame)
+    return _move(motion, options)
 
 
 def _angles(values: tuple[float, ...], *, degrees: bool) -> list[float]:
     return [float(v) for v in (np.radians(values) if degrees else values)]
 
 
-def _move(
-    motion: Motion, *, target: str | None, speed: float, yes: bool, dry_run: bool, as_json: bool
-) -> int:
+def _move(motion: Motion, options: MoveOptions) -> int:
     """Carry out a motion; return the exit code.
 
     Raises:
         HeptarmError: refused, or ended under way.
     """
-    with connect(target, control=not dry_run) as arm:
-        items((motion,), arm.robot, speed)  # a motion outside the limits is refused here, before any question
-        if dry_run:
-            text = f"{motion} at {speed:.0%} speed is within the limits of the {arm.robot.title}; nothing was moved"
-            emit({"ok": True, "text": text}) if as_json else print(text)
+    with options.target.connect(control=not options.dry_run) as arm:
+        # a motion outside the limits is refused here, before any question
+        items((motion,), arm.robot, options.speed)
+        title, percent = arm.robot.title, f"{options.speed:.0%}"
+        if options.dry_run:
+            text = f"{motion} at {percent} speed is within the limits of the {title}; nothing was moved"
+            emit({"ok": True, "text": text}) if options.as_json else print(text)
             return 0
-        if not (arm.is_virtual or yes or confirm(f"Move the real {arm.robot.title} at {speed:.0%} speed?")):
+        if not (arm.is_virtual or options.yes or confirm(f"Move the real {title} at {percent} speed?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
-        result = arm.move(motion, speed=speed)
+        result = arm.move(motion, speed=options.speed)
         state = arm.wait_for_rest()
-    if as_json:
+    if options.as_json:
         emit(
             {"cause": result.cause.value, "duration_s": result.duration, "residual_rad": result.residual}
             | state_data(state)
@@ -140,17 +119,17 @@ def servo(
     duration: Annotated[float, Parameter(help="How long [s].")] = 5.0,
     speed: Speed = 0.3,
     engine: Annotated[Literal["smart", "direct"], Parameter(help="Servo motion of the cabinet.")] = "smart",
-    yes: Yes = False,
-    target: Target = None,
-    as_json: Json = False,
+    access: Access = _ACCESS,
 ) -> int:
     """Swing an axis with a stream of targets and report the stream's quality."""
     index = int(within(axis, "axis", 1, 7)) - 1
     turn = radians(within(amplitude, "amplitude", 0.0, 45.0, unit="deg"))
     hertz = within(frequency, "frequency", 0.0, 5.0, above=True, unit="Hz")
     seconds = within(duration, "duration", 0.0, 86400.0, above=True, unit="s")
-    with connect(target) as arm:
-        if not (arm.is_virtual or yes or confirm(f"Swing A{index + 1} of the real {arm.robot.title}?")):
+    with access.target.connect() as arm:
+        if not (
+            arm.is_virtual or access.yes or confirm(f"Swing A{index + 1} of the real {arm.robot.title}?")
+        ):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
         direction, lag = np.eye(7)[index], 0.0
         with arm.servo("joint", rate=rate, engine=engine, speed=speed, acceleration=1.0) as sv:
@@ -162,7 +141,7 @@ def servo(
                 sv.set(goal)
                 lag = max(lag, abs(float(arm.state.q[index] - goal[index])))
         stats = sv.stats
-    emit(asdict(stats) | {"largest_lag_rad": lag}) if as_json else print(report(stats, lag))
+    emit(asdict(stats) | {"largest_lag_rad": lag}) if access.as_json else print(report(stats, lag))
     return 0
 
 
@@ -192,27 +171,25 @@ def teach(
     ] = "",
     seconds: Annotated[float, Parameter(help="Time limit [s].")] = 60.0,
     tolerance: Annotated[float, Parameter(help="Largest deviation of the reduced trajectory [rad].")] = 2e-3,
-    yes: Yes = False,
-    target: Target = None,
-    as_json: Json = False,
+    access: Access = _ACCESS,
 ) -> int:
     """Record a trajectory while a person guides the arm by hand."""
     limit = within(seconds, "seconds", 0.0, 86400.0, above=True, unit="s")
     mode = compliance(free, frame="base") if free else None
-    with connect(target) as arm:
-        asked = free and not (arm.is_virtual or yes)
+    with access.target.connect() as arm:
+        asked = free and not (arm.is_virtual or access.yes)
         if asked and not confirm(
             f"The real {arm.robot.title} becomes compliant for {limit:g} s. Does a person hold it?"
         ):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
-        if not as_json:
+        if not access.as_json:
             how = "it is compliant now" if free else "hold the enabling switch of the hand guiding device"
             print(f"guide the arm: {how}")
         motion = hold(limit) if free else hand_guide()
-        whole = arm.teach(motion, mode=mode, timeout=limit / min(arm.pace, 1.0) + 1.0)
+        whole = arm.teach(motion, mode=mode, timeout=limit / min(arm.real_time_factor, 1.0) + 1.0)
     trajectory = whole.trimmed().thinned(tolerance=tolerance)
     file = trajectory.save(out)
-    if as_json:
+    if access.as_json:
         emit(
             {
                 "file": str(file),
@@ -236,24 +213,22 @@ def replay(
         Literal["servo", "spline"],
         Parameter(help="With the recorded timing, or as one smooth spline motion of the cabinet."),
     ] = "servo",
-    pace: Annotated[
+    speed_scaling: Annotated[
         float,
         Parameter(help="By servo: factor on the recorded speed; by spline: fraction of the full speed."),
     ] = 0.5,
-    yes: Yes = False,
-    target: Target = None,
-    as_json: Json = False,
+    access: Access = _ACCESS,
 ) -> int:
     """Move to the start of a recorded trajectory and replay it."""
     try:
         trajectory = Trajectory.load(file)
     except OSError as error:
         raise CommandRejected(f"{file}: {error.strerror}", parameter="file", value=str(file)) from error
-    with connect(target) as arm:
-        if not (arm.is_virtual or yes or confirm(f"Move the real {arm.robot.title} along {file}?")):
+    with access.target.connect() as arm:
+        if not (arm.is_virtual or access.yes or confirm(f"Move the real {arm.robot.title} along {file}?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
-        done = arm.replay(trajectory, by=by, pace=pace)
-    if as_json:
+        done = arm.replay(trajectory, by=by, speed_scaling=speed_scaling)
+    if access.as_json:
         emit({"cause": done.result.cause.value, "deviation_rad": done.deviation, "lag_s": done.lag})
     else:
         off = np.degrees(done.deviation)
@@ -261,23 +236,14 @@ def replay(
     return 0
 
 
-def stop(*, target: Target = None, as_json: Json = False) -> int:
-    """Stop the arm; needs no control."""
-    with connect(target, control=False) as arm:
-        arm.stop()
-        arm.wait_for_rest()
-    emit({"stopped": True}) if as_json else print("the arm is at rest")
-    return 0
-
-
 def recover(
     *,
     timeout: Annotated[float, Parameter(help="How long to wait for a person to do the rest [s].")] = 0.0,
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Make the robot ready again after a stop; exit code 1 if a person has to do the rest, which is printed."""
-    with connect(target) as arm:
+    with target.connect() as arm:
         recovery = arm.recover(timeout=timeout)
         if as_json:
             emit({"done": recovery.done, "did": list(recovery.did), "remaining": list(recovery.remaining)})

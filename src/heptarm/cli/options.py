@@ -2,21 +2,102 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Group, Parameter
+
+from heptarm.errors import CommandRejected
+from heptarm.values.robot import ROBOTS, robot
+
+if TYPE_CHECKING:
+    from heptarm.arm.arm import Arm
 
 COMMON = Group("Common options")
 FRI = Group("FRI")
 
-Target = Annotated[
-    str | None,
+
+def _check_model(_: object, name: str) -> None:
+    """Refuse a robot that heptarm does not know, in the way that cyclopts reports."""
+    try:
+        robot(name)
+    except CommandRejected as error:
+        raise ValueError(error.text) from None
+
+
+Model = Annotated[str, Parameter(validator=_check_model, help=f"Robot: {', '.join(ROBOTS)}.")]
+KeyFile = Annotated[
+    Path | None,
     Parameter(
-        name="--target",
+        name="--key-file",
         group=COMMON,
-        help="What to connect to: ADDRESS[:PORT], sim://HOST:PORT or sim://iiwa14. Default: HEPTARM_TARGET.",
+        help="File with the pre-shared key. Default: HEPTARM_KEY, then the key stored for the target (heptarm key).",
     ),
 ]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Target:
+    """What a command connects to. Every command connects by `connect`, so that none can forget the key.
+
+    Attributes:
+        text: as in `heptarm.connect`; None: not given.
+        key_file: file with the key; None: the key is looked up elsewhere.
+    """
+
+    text: Annotated[
+        str | None,
+        Parameter(
+            name="--target",
+            group=COMMON,
+            help="What to connect to: ADDRESS[:PORT], sim://HOST:PORT or sim://iiwa14. Default: HEPTARM_TARGET.",
+        ),
+    ] = None
+    key_file: KeyFile = None
+
+    def or_else(self, default: str | None) -> Target:
+        """Complete it: as given, else HEPTARM_TARGET, else this default."""
+        from heptarm.arm.link.target import VARIABLE
+
+        return replace(self, text=self.text or os.environ.get(VARIABLE, "").strip() or default)
+
+    def connect(
+        self,
+        *,
+        control: bool = True,
+        state_rate: float | None = None,
+        watchdog: float | None = None,
+        timeout: float | None = None,
+    ) -> Arm:
+        """Connect, see `heptarm.connect`; None: its default."""
+        from heptarm.arm.connect import connect
+        from heptarm.arm.link.connection import STATE_RATE, TIMEOUT
+        from heptarm.arm.watchdog import CONNECTION
+
+        return connect(
+            self.text,
+            key_file=self.key_file,
+            control=control,
+            state_rate=STATE_RATE if state_rate is None else state_rate,
+            watchdog=CONNECTION.default if watchdog is None else watchdog,
+            timeout=TIMEOUT if timeout is None else timeout,
+        )
+
+    def find_key(self) -> str | None:
+        """Find the key that `connect` uses; None: there is none."""
+        from heptarm.arm.link.target import parse_target, target_from_env
+        from heptarm.io import keys
+
+        parsed = parse_target(target_from_env() if self.text is None else self.text)
+        return keys.find_key(key_file=self.key_file, host=parsed.host, port=parsed.port)
+
+
+#: No target was given on the command line.
+NO_TARGET = Target()
+
 Json = Annotated[
     bool, Parameter(name="--json", group=COMMON, negative="", help="Print one JSON object per line.")
 ]
@@ -26,6 +107,27 @@ Yes = Annotated[bool, Parameter(name="--yes", negative="", help="Do not ask befo
 DryRun = Annotated[
     bool, Parameter(name="--dry-run", negative="", help="Check and show the motion, move nothing.")
 ]
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Access:
+    """Options of every command that moves the arm."""
+
+    yes: Yes = False
+    target: Target = NO_TARGET
+    as_json: Json = False
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MoveOptions(Access):
+    """Options of every `heptarm move`."""
+
+    degrees: Degrees = False
+    speed: Speed = 0.1
+    dry_run: DryRun = False
+
 
 FriPort = Annotated[
     int | None, Parameter(group=FRI, help="Own UDP port. Default: the first free one of 30200 to 30209.")

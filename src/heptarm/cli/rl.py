@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from cyclopts import Parameter
 
-from heptarm.arm.connect import connect
 from heptarm.cli.options import (
+    NO_TARGET,
     Json,
+    Model,
     Speed,
     Target,
     Yes,
@@ -47,7 +48,7 @@ AnyPolicy = Annotated[
 def train(
     *,
     out: PolicyFile = Path("reach.npz"),
-    robot: Annotated[Literal["iiwa7", "iiwa14"], Parameter(help="Robot.")] = "iiwa14",
+    robot: Model = "iiwa14",
     action: Annotated[Literal["joint", "cartesian"], Parameter(help="What the policy decides.")] = "joint",
     feature: Annotated[
         bool, Parameter(negative="", help="Let the policy also observe the direction to the target.")
@@ -165,7 +166,7 @@ def deploy(
         bool, Parameter(negative="", help="With --out: also a film of the first episodes.")
     ] = False,
     yes: Yes = False,
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Let a policy control an arm at 30 Hz with a servo motion; needs no torch."""
@@ -173,7 +174,7 @@ def deploy(
     settings = DeploySettings(
         mode=None if stiffness is None else JointImpedance(stiffness), latency=latency, speed=speed
     )
-    with connect(target) as arm:
+    with target.connect() as arm:
         if not (arm.is_virtual or yes or confirm(f"Let the policy control the real {arm.robot.title}?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
         if ask:

@@ -18,9 +18,12 @@ from cyclopts import Group, Parameter
 from heptarm.cli.options import (
     FRI,
     Json,
+    KeyFile,
+    Model,
 )
 from heptarm.cli.output import emit, is_silent, lines
 from heptarm.errors import CommandRejected, ConnectFailed
+from heptarm.io.keys import environment, find_key
 from heptarm.sim.runtime.operator import WORDS
 from heptarm.values.simulator_options import SimulatorOptions
 
@@ -36,13 +39,14 @@ _NOT_HERE_HINT = (
 
 def sim(
     *,
-    model: Annotated[Literal["iiwa7", "iiwa14", "med7", "med14"], Parameter(help="Robot.")] = "iiwa14",
+    model: Model = "iiwa14",
     host: Annotated[str, Parameter(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, Parameter(help="Port; 0 takes a free one.")] = 30001,
-    speed: Annotated[float, Parameter(help="Simulated seconds per second.")] = 1.0,
+    speed: Annotated[float, Parameter(help="Simulated seconds per second of real time.")] = 1.0,
     view: Annotated[bool, Parameter(negative="", help="Open a live 3D view in the browser.")] = False,
     view_port: Annotated[int, Parameter(help="Port of the view; 0 takes a free one.")] = 8080,
-    key: Annotated[str, Parameter(help="Pre-shared key that clients must know.")] = "",
+    key_file: KeyFile = None,
+    key: Annotated[str, Parameter(show=False)] = "",
     fault: Annotated[
         tuple[str, ...],
         Parameter(
@@ -81,7 +85,7 @@ def sim(
         str,
         Parameter(
             group=_APP,
-            help="Its class, where there are several applications; only what it needs is compiled.",
+            help="Its class, if there are several applications; only this class and what it needs are compiled.",
         ),
     ] = "",
     app_data: Annotated[
@@ -100,7 +104,7 @@ def sim(
         Path | None,
         Parameter(
             group=_APP,
-            help="File of such buttons, one per line; # begins a comment. They come before --answer.",
+            help="File of such buttons, one per line; # starts a comment. They are used before those of --answer.",
         ),
     ] = None,
     addresses: Annotated[
@@ -182,13 +186,19 @@ def sim(
     as_json: Json = False,
 ) -> int:
     """Run a virtual cabinet until Ctrl-C; with --fri, a bare FRI controller; with --app, your own application."""
+    if key:
+        raise CommandRejected(
+            "--key is not accepted: every user of this machine can read a command line",
+            parameter="key",
+            hint="put the key into a file of mode 0600 and use --key-file, or set HEPTARM_KEY",
+        )
     if application is not None:
         defaults = {
             "--view": (view, False),
             "--view-port": (view_port, 8080),
             "--host": (host, "127.0.0.1"),
             "--port": (port, 30001),
-            "--key": (key, ""),
+            "--key-file": (key_file, None),
             "--fri": (fri, None),
             "--fri-command": (fri_command, "position"),
             "--fri-client": (fri_client, "127.0.0.1:30200"),
@@ -266,7 +276,7 @@ def sim(
         speed=speed,
         view=view,
         view_port=view_port,
-        key=key,
+        key_file=key_file,
         faults=fault,
         payload=payload,
         project=project,
@@ -283,7 +293,7 @@ def _cabinet(
     speed: float,
     view: bool,
     view_port: int,
-    key: str,
+    key_file: Path | None,
     faults: tuple[str, ...],
     payload: str,
     project: Path | None,
@@ -294,13 +304,14 @@ def _cabinet(
 
     Raises:
         ConnectFailed: the cabinet or the view does not start; the text gives the reason.
+        CommandRejected: the key cannot be used.
     """
+    key = find_key(key_file=key_file, host=host, port=port)
     options = SimulatorOptions(
         model=model,
         host=host,
         port=port,
         speed=speed,
-        key=key,
         fault=faults,
         payload=payload,
         project=project,
@@ -309,7 +320,7 @@ def _cabinet(
     )
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ExitStack() as stack:
-        cabinet = stack.enter_context(_child(_command(options)))
+        cabinet = stack.enter_context(_child(_command(options), key))
         ready = _ready(cabinet, f"the virtual cabinet does not start on {host}:{port}")
         target = f"sim://{host}:{ready['port']}"
         if view:
@@ -323,7 +334,8 @@ def _cabinet(
                         target,
                         "--port",
                         str(view_port),
-                    ]
+                    ],
+                    key,
                 )
             )
             ready["view"] = _ready(viewer, "the view does not start")["url"]
@@ -451,7 +463,7 @@ def _application(
             verbose=verbose,
         )
         failure = ""
-        with _child(_command(options)) as cabinet:
+        with _child(_command(options), None) as cabinet:
             try:
                 ready = _first(cabinet, "the virtual cabinet does not start")
                 if not ready.get("ready"):
@@ -533,12 +545,22 @@ def _answer(cabinet: subprocess.Popen[str], as_json: bool) -> str:
 
 
 class _child(subprocess.Popen[str]):
-    """A process that ends when its standard input is closed, and therefore with this process."""
+    """A process that ends when its standard input is closed, and therefore with this process.
 
-    def __init__(self, command: list[str]) -> None:
+    Args:
+        command: to start.
+        key: pre-shared key that it uses, in its environment; None: none.
+    """
+
+    def __init__(self, command: list[str], key: str | None) -> None:
         # a session of its own: Ctrl-C reaches this process only, which then ends its children in order
         super().__init__(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            env=environment(key),
         )
 
     def __exit__(self, *_: Any) -> None:

@@ -12,8 +12,8 @@ from rich.table import Table
 from rich.text import Text
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.connect import connect
 from heptarm.cli.options import (
+    NO_TARGET,
     Json,
     Target,
 )
@@ -26,11 +26,11 @@ def state(
     watch: Annotated[bool, Parameter(negative="", help="Repeat until Ctrl-C.")] = False,
     rate: Annotated[float, Parameter(help="States per second.")] = 10.0,
     duration: Annotated[float | None, Parameter(help="Watch for this long [s].")] = None,
-    target: Target = None,
+    target: Target = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Show the state of the arm."""
-    with connect(target, control=False, state_rate=max(rate, 10.0)) as arm:
+    with target.connect(control=False, state_rate=max(rate, 10.0)) as arm:
         if not watch and duration is None:
             _show_once(arm, as_json=as_json)
             return 0

@@ -150,3 +150,22 @@ def own_address(peer: str) -> str:
                 hint="pass the address under which the cabinet reaches this machine",
             ) from error
         return str(probe.getsockname()[0])
+
+
+#: Address that means every interface of this machine.
+ALL_INTERFACES = "0.0.0.0"
+
+
+def address_to_bind(host: str) -> str:
+    """Find the address on which datagrams sent to `host`, an address of this machine, are received.
+
+    Returns:
+        That address, so that nobody in another network can send to the port. If no interface has it, because
+        a router or a container translates addresses: all interfaces.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.bind((host, 0))
+        except OSError:
+            return ALL_INTERFACES
+        return str(probe.getsockname()[0])

@@ -58,14 +58,6 @@ class OrientationReference(enum.IntEnum):
     PATH = 1
 
 
-class Axis(enum.IntEnum):
-    """A coordinate axis."""
-
-    X = 0
-    Y = 1
-    Z = 2
-
-
 class PathReference(enum.IntEnum):
     """Which end of a path a distance counts from."""
 
@@ -118,6 +110,17 @@ class TargetKind(enum.IntEnum):
 
     POSITION = 1
     POSITION_WITH_VELOCITY = 2
+
+
+class WrenchComponents(enum.IntFlag):
+    """Components of a wrench."""
+
+    FORCE_X = 1
+    FORCE_Y = 2
+    FORCE_Z = 4
+    TORQUE_X = 8
+    TORQUE_Y = 16
+    TORQUE_Z = 32
 
 
 class SafetyFlags(enum.IntFlag):
@@ -339,7 +342,6 @@ class JointImpedance:
 
     #: [Nm/rad]
     stiffness: tuple[float, ...]
-    #: Damping ratios
     damping: tuple[float, ...]
 
     def _write(self, out: list[bytes]) -> None:
@@ -363,21 +365,18 @@ class CartesianImpedance:
 
     #: [N/m, Nm/rad]
     stiffness: tuple[float, ...]
-    #: Damping ratios
     damping: tuple[float, ...]
     #: [Nm/rad]
     nullspace_stiffness: float
-    #: Damping ratio
     nullspace_damping: float
     #: [N, Nm]
     additional_force: tuple[float, ...]
-    #: NaN: unlimited [N, Nm]
+    #: NaN: off [N, Nm]
     max_force: tuple[float, ...] = (nan,) * 6
-    #: Whether reaching max_force ends the motion
     max_force_stops: bool = False
-    #: NaN: unlimited [m/s, rad/s]
+    #: exceeding it stops; NaN: off [m/s, rad/s]
     max_velocity: tuple[float, ...] = (nan,) * 6
-    #: NaN: unlimited [m, rad]
+    #: exceeding it stops; NaN: off [m, rad]
     max_deviation: tuple[float, ...] = (nan,) * 6
     #: Quaternion of the directions in the base; none: axes of the motion frame
     axes: tuple[float, ...] | None = None
@@ -425,19 +424,19 @@ class SineImpedance:
     phase: tuple[float, ...]
     #: [N, Nm]
     bias: tuple[float, ...]
-    #: NaN: unlimited [N, Nm]
+    #: [N, Nm]
     force_limit: tuple[float, ...] = (nan,) * 6
-    #: NaN: unlimited [m, rad]
+    #: [m, rad]
     position_limit: tuple[float, ...] = (nan,) * 6
-    #: NaN: not given [s]
+    #: [s]
     total_time: float = nan
     #: [s]
-    rise_time: float
-    #: NaN: not given [s]
+    rise_time: float = 0.0
+    #: [s]
     hold_time: float = nan
     #: [s]
-    fall_time: float
-    #: Whether the motion waits for the end of the pattern
+    fall_time: float = 0.0
+    #: the motion ends only after the pattern has finished
     stay_active: bool = False
 
     def _write(self, out: list[bytes]) -> None:
@@ -517,134 +516,59 @@ class JointTorqueOutside:
         high = v[2]
         return cls(joint=joint, low=low, high=high), pos
 
-_ForceAbove_0 = Struct(">d")
+_WrenchAbove_0 = Struct(">Bd")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ForceAbove:
-    """The magnitude of the external force is above a threshold."""
+class WrenchAbove:
+    """The magnitude of some components of the external wrench is above a threshold."""
 
     frame: MeasuringFrame
-    #: [N]
+    components: WrenchComponents
+    #: [N, Nm]
     threshold: float
 
     def _write(self, out: list[bytes]) -> None:
         self.frame._write(out)
-        out.append(_ForceAbove_0.pack(self.threshold))
+        out.append(_WrenchAbove_0.pack(self.components, self.threshold))
 
     @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[ForceAbove, int]:
+    def _read(cls, data: bytes, pos: int) -> tuple[WrenchAbove, int]:
         frame, pos = MeasuringFrame._read(data, pos)
-        v = codec.unpack(_ForceAbove_0, data, pos)
-        pos += _ForceAbove_0.size
-        threshold = v[0]
-        return cls(frame=frame, threshold=threshold), pos
-
-_NormalForceAbove_0 = Struct(">Bd")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NormalForceAbove:
-    """The external force along an axis is above a threshold."""
-
-    frame: MeasuringFrame
-    axis: Axis = Axis.X
-    #: [N]
-    threshold: float
-
-    def _write(self, out: list[bytes]) -> None:
-        self.frame._write(out)
-        out.append(_NormalForceAbove_0.pack(self.axis, self.threshold))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[NormalForceAbove, int]:
-        frame, pos = MeasuringFrame._read(data, pos)
-        v = codec.unpack(_NormalForceAbove_0, data, pos)
-        pos += _NormalForceAbove_0.size
-        axis = codec.read_enum(Axis, v[0])
+        v = codec.unpack(_WrenchAbove_0, data, pos)
+        pos += _WrenchAbove_0.size
+        components = WrenchComponents(v[0])
         threshold = v[1]
-        return cls(frame=frame, axis=axis, threshold=threshold), pos
+        return cls(frame=frame, components=components, threshold=threshold), pos
 
-_ShearForceAbove_0 = Struct(">Bd")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ShearForceAbove:
-    """The external force across an axis is above a threshold."""
-
-    frame: MeasuringFrame
-    axis: Axis = Axis.X
-    #: [N]
-    threshold: float
-
-    def _write(self, out: list[bytes]) -> None:
-        self.frame._write(out)
-        out.append(_ShearForceAbove_0.pack(self.axis, self.threshold))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[ShearForceAbove, int]:
-        frame, pos = MeasuringFrame._read(data, pos)
-        v = codec.unpack(_ShearForceAbove_0, data, pos)
-        pos += _ShearForceAbove_0.size
-        axis = codec.read_enum(Axis, v[0])
-        threshold = v[1]
-        return cls(frame=frame, axis=axis, threshold=threshold), pos
-
-_ForceOutside_0 = Struct(">Bdd")
+_WrenchOutside_0 = Struct(">Bdd")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class ForceOutside:
-    """A component of the external force is outside a band."""
+class WrenchOutside:
+    """A component of the external wrench is outside a band."""
 
     frame: MeasuringFrame
-    axis: Axis = Axis.X
-    #: [N]
+    #: 0 to 2: forces along x y z; 3 to 5: torques about x y z
+    component: int
+    #: [N, Nm]
     low: float
-    #: [N]
+    #: [N, Nm]
     high: float
 
     def _write(self, out: list[bytes]) -> None:
         self.frame._write(out)
-        out.append(_ForceOutside_0.pack(self.axis, self.low, self.high))
+        out.append(_WrenchOutside_0.pack(self.component, self.low, self.high))
 
     @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[ForceOutside, int]:
+    def _read(cls, data: bytes, pos: int) -> tuple[WrenchOutside, int]:
         frame, pos = MeasuringFrame._read(data, pos)
-        v = codec.unpack(_ForceOutside_0, data, pos)
-        pos += _ForceOutside_0.size
-        axis = codec.read_enum(Axis, v[0])
+        v = codec.unpack(_WrenchOutside_0, data, pos)
+        pos += _WrenchOutside_0.size
+        component = v[0]
         low = v[1]
         high = v[2]
-        return cls(frame=frame, axis=axis, low=low, high=high), pos
-
-_TorqueOutside_0 = Struct(">Bdd")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TorqueOutside:
-    """A component of the external torque is outside a band."""
-
-    frame: MeasuringFrame
-    axis: Axis = Axis.X
-    #: [Nm]
-    low: float
-    #: [Nm]
-    high: float
-
-    def _write(self, out: list[bytes]) -> None:
-        self.frame._write(out)
-        out.append(_TorqueOutside_0.pack(self.axis, self.low, self.high))
-
-    @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[TorqueOutside, int]:
-        frame, pos = MeasuringFrame._read(data, pos)
-        v = codec.unpack(_TorqueOutside_0, data, pos)
-        pos += _TorqueOutside_0.size
-        axis = codec.read_enum(Axis, v[0])
-        low = v[1]
-        high = v[2]
-        return cls(frame=frame, axis=axis, low=low, high=high), pos
+        return cls(frame=frame, component=component, low=low, high=high), pos
 
 _SignalIs_0 = Struct(">HB")
 
@@ -893,24 +817,24 @@ _ServoTiming_0 = Struct(">ddd")
 class ServoTiming:
     """Timing of a servo motion."""
 
-    #: Shortest trajectory to a target [s]
-    minimum_time: float = 0.02
-    #: The motion ends this long after its target was reached [s]
-    goal_timeout: float = 30.0
-    #: How long the velocity of a passed target is kept [s]
+    #: shortest trajectory to a target [s]
+    min_trajectory_time: float = 0.02
+    #: the motion ends this long after its target was reached [s]
+    goal_timeout: float = 300.0
+    #: of the smart engine: how long a target's velocity is kept after the target was passed [s]
     speed_timeout: float = 0.1
 
     def _write(self, out: list[bytes]) -> None:
-        out.append(_ServoTiming_0.pack(self.minimum_time, self.goal_timeout, self.speed_timeout))
+        out.append(_ServoTiming_0.pack(self.min_trajectory_time, self.goal_timeout, self.speed_timeout))
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[ServoTiming, int]:
         v = codec.unpack(_ServoTiming_0, data, pos)
         pos += _ServoTiming_0.size
-        minimum_time = v[0]
+        min_trajectory_time = v[0]
         goal_timeout = v[1]
         speed_timeout = v[2]
-        return cls(minimum_time=minimum_time, goal_timeout=goal_timeout, speed_timeout=speed_timeout), pos
+        return cls(min_trajectory_time=min_trajectory_time, goal_timeout=goal_timeout, speed_timeout=speed_timeout), pos
 
 _StraightLimits_0 = Struct(">6d6d")
 
@@ -1352,20 +1276,17 @@ def encode_impedance_mode(value: ImpedanceMode) -> bytes:
     return b"".join(out)
 
 
-Condition: TypeAlias = JointTorqueOutside | ForceAbove | NormalForceAbove | ShearForceAbove | ForceOutside | TorqueOutside | SignalIs | SignalOutside | PathReached | AllOf | AnyOf | Inverted
+Condition: TypeAlias = JointTorqueOutside | WrenchAbove | WrenchOutside | SignalIs | SignalOutside | PathReached | AllOf | AnyOf | Inverted
 _Condition_TAGS = {
     JointTorqueOutside: 1,
-    ForceAbove: 2,
-    NormalForceAbove: 3,
-    ShearForceAbove: 4,
-    ForceOutside: 5,
-    TorqueOutside: 6,
-    SignalIs: 7,
-    SignalOutside: 8,
-    PathReached: 9,
-    AllOf: 10,
-    AnyOf: 11,
-    Inverted: 12,
+    WrenchAbove: 2,
+    WrenchOutside: 3,
+    SignalIs: 4,
+    SignalOutside: 5,
+    PathReached: 6,
+    AllOf: 7,
+    AnyOf: 8,
+    Inverted: 9,
 }
 
 
@@ -1379,28 +1300,22 @@ def _read_Condition(data: bytes, pos: int) -> tuple[Condition, int]:
     if tag == 1:
         return JointTorqueOutside._read(data, pos)
     if tag == 2:
-        return ForceAbove._read(data, pos)
+        return WrenchAbove._read(data, pos)
     if tag == 3:
-        return NormalForceAbove._read(data, pos)
+        return WrenchOutside._read(data, pos)
     if tag == 4:
-        return ShearForceAbove._read(data, pos)
-    if tag == 5:
-        return ForceOutside._read(data, pos)
-    if tag == 6:
-        return TorqueOutside._read(data, pos)
-    if tag == 7:
         return SignalIs._read(data, pos)
-    if tag == 8:
+    if tag == 5:
         return SignalOutside._read(data, pos)
-    if tag == 9:
+    if tag == 6:
         return PathReached._read(data, pos)
-    if tag == 10:
+    if tag == 7:
         return AllOf._read(data, pos)
-    if tag == 11:
+    if tag == 8:
         return AnyOf._read(data, pos)
-    if tag == 12:
+    if tag == 9:
         return Inverted._read(data, pos)
-    raise DecodeError(f"Condition has tag {tag}; legal are [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]")
+    raise DecodeError(f"Condition has tag {tag}; legal are [1, 2, 3, 4, 5, 6, 7, 8, 9]")
 
 
 def decode_condition(data: bytes) -> Condition:

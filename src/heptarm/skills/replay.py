@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from heptarm.arm.watchdog import REPLAY
 from heptarm.errors import CommandRejected, LimitError, MotionAborted, ShapeError, StaleState
 from heptarm.values.arrays import Array, Value, within
 from heptarm.values.condition.condition import Condition
@@ -20,8 +21,6 @@ from heptarm.values.robot import RobotModel
 if TYPE_CHECKING:
     from heptarm.arm.arm import Arm
 
-#: Default of the longest gap between two targets [s]: longer than that of `Arm.servo`, since each target is computed.
-WATCHDOG = 0.3
 #: Longest time that the arm may need to settle at the end of a trajectory after its last target [s].
 _SETTLE = 2.0
 #: The arm has settled when no joint deviates more than this [rad].
@@ -52,10 +51,10 @@ def replay(
     trajectory: Trajectory,
     *,
     by: Literal["servo", "spline"] = "servo",
-    pace: float = 1.0,
+    speed_scaling: float = 1.0,
     approach: float = 0.2,
     rate: float = 100.0,
-    watchdog: float = WATCHDOG,
+    watchdog: float | None = None,
     mode: Mode | None = None,
     until: Condition | None = None,
     on_progress: Callable[[float], None] | None = None,
@@ -67,10 +66,11 @@ def replay(
         trajectory: the taught trajectory; best trimmed and thinned.
         by: "servo": with the taught timing, as a stream of targets; "spline": as one smooth motion with the cabinet's
             timing, which needs no stream and stops on its path.
-        pace: by servo: factor on the taught speed; by spline: fraction of each axis' maximum, (0, 1].
+        speed_scaling: by servo: factor on the taught speed; by spline: fraction of each axis' maximum, (0, 1].
         approach: speed of the motion to its start, a fraction of each axis' maximum in (0, 1].
         rate: targets per second [Hz].
-        watchdog: by servo: longest gap between two targets; a longer one stops the arm [s].
+        watchdog: by servo: longest gap between two targets; a longer one stops the arm [s]; None: five periods, at
+            least 0.3 s.
         mode: control mode; None: that of `using`, otherwise position.
         until: break condition that ends it.
         on_progress: called with the completed fraction, [0, 1], repeatedly once the start is reached.
@@ -87,12 +87,14 @@ def replay(
     if by not in ("servo", "spline"):
         raise ShapeError(f"by must be 'servo' or 'spline', got {by!r}", parameter="by", value=by)
     if by == "spline":
-        within(pace, "pace", 0.0, 1.0, above=True)
-    elif within(pace, "pace", 0.0, 100.0, above=True):
-        _check_speed(trajectory, pace, arm.robot.dq_max * arm.speed)
+        within(speed_scaling, "speed_scaling", 0.0, 1.0, above=True)
+    elif within(speed_scaling, "speed_scaling", 0.0, 100.0, above=True):
+        _check_speed(trajectory, speed_scaling, arm.robot.dq_max * arm.speed)
+        period = 1.0 / within(rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
+        watchdog = REPLAY.time(watchdog, period=period)
     if float(np.abs(arm.wait_for_rest().q - trajectory.q[0]).max()) > _AT_START:
         arm.move(ptp(trajectory.q[0]), speed=approach)
-    run = _Run(arm, trajectory, pace, mode, until, on_progress)
+    run = _Run(arm, trajectory, speed_scaling, mode, until, on_progress)
     return run.by_spline() if by == "spline" else run.by_servo(rate, watchdog)
 
 
@@ -102,7 +104,7 @@ class _Run:
 
     arm: Arm
     trajectory: Trajectory
-    pace: float
+    speed_scaling: float
     mode: Mode | None
     until: Condition | None
     on_progress: Callable[[float], None] | None
@@ -110,7 +112,11 @@ class _Run:
     def by_spline(self) -> Replay:
         """Follow it as one spline."""
         handle = self.arm.start(
-            self.trajectory.spline(), mode=self.mode, speed=self.pace, until=self.until, when="reject"
+            self.trajectory.spline(),
+            mode=self.mode,
+            speed=self.speed_scaling,
+            until=self.until,
+            when="reject",
         )
         seen: list[Array] = []
         try:
@@ -124,9 +130,9 @@ class _Run:
         deviation = max((_nearest(self.trajectory, q)[0] for q in seen), default=0.0)
         return Replay(handle.wait(), deviation)
 
-    def by_servo(self, rate: float, watchdog: float) -> Replay:
+    def by_servo(self, rate: float, watchdog: float | None) -> Replay:
         """Follow it by a stream of targets."""
-        trajectory, per_second = self.trajectory, self.pace * self.arm.pace
+        trajectory, per_second = self.trajectory, self.speed_scaling * self.arm.real_time_factor
         seen: list[tuple[float, Array]] = []
         due = 0
         with self.arm.servo(
@@ -175,21 +181,21 @@ def _nearest(trajectory: Trajectory, q: Array) -> tuple[float, float]:
     return float(distances[nearest]), float(times[nearest])
 
 
-def _check_speed(trajectory: Trajectory, pace: float, allowed: Array) -> None:
-    """Refuse a pace at which an axis exceeds the allowed speeds, shape (7,) [rad/s]."""
-    fraction = trajectory.fastest * pace / allowed
+def _check_speed(trajectory: Trajectory, speed_scaling: float, allowed: Array) -> None:
+    """Refuse a speed scaling at which an axis exceeds the allowed speeds, shape (7,) [rad/s]."""
+    fraction = trajectory.fastest * speed_scaling / allowed
     if (fraction > 1.0).any():
         axis = int(fraction.argmax())
-        most = pace / float(fraction[axis])
+        most = speed_scaling / float(fraction[axis])
         raise LimitError(
-            f"pace must be in (0, {most:.3g}], got {pace:g}: A{axis + 1} would turn at "
-            f"{np.degrees(trajectory.fastest[axis] * pace):.0f} deg/s, allowed are "
+            f"speed_scaling must be in (0, {most:.3g}], got {speed_scaling:g}: A{axis + 1} would turn at "
+            f"{np.degrees(trajectory.fastest[axis] * speed_scaling):.0f} deg/s, allowed are "
             f"{np.degrees(allowed[axis]):.0f} deg/s",
             code=2,
-            parameter="pace",
-            value=pace,
+            parameter="speed_scaling",
+            value=speed_scaling,
             allowed=f"(0, {most:.3g}]",
-            hint=f"replay it at pace {most:.2g}, or by spline",
+            hint=f"give speed_scaling={most:.2g}, or replay it by spline",
         )
 
 

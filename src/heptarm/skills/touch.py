@@ -13,7 +13,7 @@ from heptarm.skills.taps import TapWatch
 from heptarm.values.arrays import Array, within
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.contact import Contact, direction_of
-from heptarm.values.condition.signals import force as force_signal
+from heptarm.values.condition.force import force as force_signal
 from heptarm.values.frames import TOOL
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.line import lin_rel

@@ -25,7 +25,7 @@ def _about(
 class SimulatorOptions:
     """Options of a virtual cabinet; a new one is declared here and used in `heptarm.sim.runtime.cabinet`."""
 
-    model: str = field(default="iiwa14", metadata=_about("iiwa7, iiwa14, med7 or med14"))
+    model: str = field(default="iiwa14", metadata=_about("name of the robot"))
     host: str = field(default="127.0.0.1", metadata=_about("address to listen on"))
     port: int = field(default=30001, metadata=_about("TCP port; 0: any free port"))
     speed: float = field(
@@ -34,7 +34,12 @@ class SimulatorOptions:
             "simulated seconds per second; 0: as fast as possible", in_target=True, allowed=(0.01, 100.0)
         ),
     )
-    key: str = field(default="", metadata=_about("pre-shared key that clients must know"))
+    key_file: Path | None = field(
+        default=None,
+        metadata=_about(
+            "file with the pre-shared key that clients must know; default: the environment variable HEPTARM_KEY"
+        ),
+    )
     application: str = field(
         default="", metadata=_about("class of another application; the process ends with it")
     )
@@ -98,7 +103,10 @@ class SimulatorOptions:
     )
     stats: Path | None = field(
         default=None,
-        metadata=_about("file for the statistics of the realtime loop, at the end and on SIGUSR1"),
+        metadata=_about("file for statistics of the realtime loop and of memory, at the end and on SIGUSR1"),
+    )
+    trace: Path | None = field(
+        default=None, metadata=_about("file for the state of the plant after each tick (0.5 MB/s)")
     )
     parent_pipe: bool = field(
         default=False,

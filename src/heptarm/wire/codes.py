@@ -25,6 +25,7 @@ class Code(enum.IntEnum):
     TOO_SLOW = 18
     SILENT = 19
     SHUTTING_DOWN = 20
+    FORGED_FRAME = 21
     NOT_IN_CONTROL = 30
     CONTROL_TAKEN = 31
     UNSUPPORTED = 40
@@ -70,6 +71,7 @@ MEANINGS: dict[int, Meaning] = {
     18: Meaning('ConnectionLost', 'the client does not read its subscribed state fast enough', 'subscribe at a lower rate or read faster'),
     19: Meaning('ConnectionLost', 'nothing was received from the other side within the heartbeat time', 'check the network and the load of both machines'),
     20: Meaning('ConnectionLost', 'the cabinet application ends', 'start it again on the smartPAD'),
+    21: Meaning('ConnectionLost', 'a frame was forged, changed, repeated, reordered or lost between the two sides', 'check who else is on the network, then connect again'),
     30: Meaning('NotInControl', 'this client does not control the robot', 'take control first'),
     31: Meaning('NotInControl', 'another client controls the robot', 'wait until it releases control, or observe'),
     40: Meaning('CommandRejected', 'this cabinet cannot do that', 'see the capabilities of the cabinet, and install the option that is missing'),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hmac
 from collections.abc import Callable
 from functools import partial
 from struct import Struct
@@ -9,12 +10,15 @@ from typing import NamedTuple
 
 from heptarm.errors import LocalProtocolError, RemoteProtocolError
 from heptarm.wire.codes import Code
-from heptarm.wire.messages import HEADER, MAGIC, MAJOR, MAX_BODY, OneWay
+from heptarm.wire.key import FrameTag
+from heptarm.wire.messages import HEADER, MAGIC, MAJOR, MAX_BODY, TAG, OneWay
 
 #: Largest number of unread bytes; feeding more is a bug of the caller.
 MAX_UNREAD = 2 * MAX_BODY
 #: Consumed bytes are deleted from the front once there are this many.
 _COMPACT_AT = 65536
+#: Flag of a frame that ends with a tag.
+_TAGGED = 1
 
 
 class Frame(NamedTuple):
@@ -37,30 +41,47 @@ class Frame(NamedTuple):
     body: bytes
 
 
-def pack(type: int, body: bytes, *, seq: int, request: int = 0, time: int = 0) -> bytes:
-    """Pack one frame.
+def pack(
+    type: int, body: bytes, *, seq: int, request: int = 0, time: int = 0, tag: FrameTag | None = None
+) -> bytes:
+    """Pack one frame; with `tag` it ends with its tag.
 
     Raises:
         LocalProtocolError: the body is longer than the protocol allows.
     """
     if len(body) > MAX_BODY:
         raise LocalProtocolError(f"a body must have at most {MAX_BODY} bytes, got {len(body)}")
-    return HEADER.pack(MAGIC, MAJOR, 0, type, len(body), seq, request, time) + body
+    flags = 0 if tag is None else _TAGGED
+    frame = HEADER.pack(MAGIC, MAJOR, flags, type, len(body), seq, request, time) + body
+    return frame if tag is None else frame + tag.of(frame)
 
 
-def packer(kind: type[OneWay]) -> Callable[..., bytes]:
+def packer(kind: type[OneWay], tag: FrameTag | None) -> Callable[..., bytes]:
     """Make a function that packs frames of a oneway message from seq, 0, time [ns] and the numbers of its body."""
     body = kind.LAYOUT
     frame = Struct(HEADER.format + body.format.removeprefix(">"))
-    return partial(frame.pack, MAGIC, MAJOR, 0, kind.TYPE, body.size)
+    if tag is None:
+        return partial(frame.pack, MAGIC, MAJOR, 0, kind.TYPE, body.size)
+    pack, of = partial(frame.pack, MAGIC, MAJOR, _TAGGED, kind.TYPE, body.size), tag.of
+
+    def tagged(*numbers: float) -> bytes:
+        data = pack(*numbers)
+        return data + of(data)
+
+    return tagged
 
 
 class FrameReader:
-    """Split a stream of bytes into frames, in bounded memory."""
+    """Split a stream of bytes into frames, in bounded memory.
 
-    __slots__ = ("_buffer", "_start")
+    Attributes:
+        tag: of the other side's frames from the next one on; None: they have none.
+    """
+
+    __slots__ = ("_buffer", "_start", "tag")
 
     def __init__(self) -> None:
+        self.tag: FrameTag | None = None
         self._buffer = bytearray()
         self._start = 0
 
@@ -96,14 +117,22 @@ class FrameReader:
         magic, version, flags, type_, length, seq, request, time = HEADER.unpack_from(buffer, start)
         if magic != MAGIC:
             raise _bad(f"a frame must begin with {MAGIC:04x}, got {magic:04x}")
-        if flags != 0:
-            raise _bad(f"the flags of a frame must be 0, got {flags:#04x}")
+        if flags > _TAGGED:
+            raise _bad(f"the flags of a frame must be 0 or 1, got {flags:#04x}")
         if length > MAX_BODY:
             raise _bad(f"a frame announces {length} bytes; at most {MAX_BODY} are allowed")
-        end = body + length
+        tag = self.tag
+        if (tag is not None) != (flags == _TAGGED):
+            raise forged(
+                "a frame has no tag" if tag is not None else "a frame has a tag, but the session no key"
+            )
+        rest = body + length
+        end = rest if tag is None else rest + TAG
         if len(buffer) < end:
             return None
-        content = bytes(buffer[body:end])
+        if tag is not None and not hmac.compare_digest(tag.of(buffer[start:rest]), buffer[rest:end]):
+            raise forged("a frame has a wrong tag")
+        content = bytes(buffer[body:rest])
         if end == len(buffer):
             buffer.clear()
             self._start = 0
@@ -113,6 +142,15 @@ class FrameReader:
         else:
             self._start = end
         return Frame(version, type_, seq, request, time, content)
+
+
+def forged(text: str) -> RemoteProtocolError:
+    """The error of a frame that is not the next one of the other side."""
+    return RemoteProtocolError(
+        f"{text}: it was forged, changed, repeated, reordered or lost on its way",
+        code=int(Code.FORGED_FRAME),
+        hint="check who else is on the network, then connect again",
+    )
 
 
 def _bad(text: str) -> RemoteProtocolError:

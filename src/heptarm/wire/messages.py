@@ -17,10 +17,12 @@ from heptarm.wire.codec import DecodeError
 inf = float("inf")
 nan = float("nan")
 
-MAJOR = 1
+MAJOR = 2
 MINOR = 0
 PORT = 30001
 MAGIC = 0x4837
+NONCE = 32
+TAG = 16
 MAX_BODY = 1048576
 HEADER = Struct(">HBBHIIIq")
 _MASK = Struct(">H")
@@ -42,7 +44,7 @@ class When(enum.IntEnum):
 
 
 class OnLost(enum.IntEnum):
-    """What a lost controller means for a program."""
+    """What happens to a program when its controller is lost."""
 
     STOP = 0
     FINISH = 1
@@ -112,7 +114,7 @@ class Plane(enum.IntEnum):
 
 
 class PathReference(enum.IntEnum):
-    """What a point on the path is counted from."""
+    """Reference of a point on the path."""
 
     START = 0
     DESTINATION = 1
@@ -181,7 +183,7 @@ class KeyLed(enum.IntEnum):
 
 
 class Severity(enum.IntEnum):
-    """Weight of a message."""
+    """Severity of a message."""
 
     INFO = 0
     WARNING = 1
@@ -255,6 +257,8 @@ _Redundancy_0 = Struct(">dii")
 class Redundancy:
     """KUKA's redundancy of an LBR pose."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"e1": (-1000.0, 1000.0)}
+
     e1: float
     status: int
     turn: int
@@ -284,6 +288,8 @@ _JointDynamics_0 = Struct(">7d7d7d")
 class JointDynamics:
     """Fractions of each axis' maximum; NaN keeps the cabinet's default (1)."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"velocity": (0.0, 1.0), "acceleration": (0.0, 1.0), "jerk": (0.0, 1.0)}
+
     velocity: tuple[float, ...] = (nan,) * 7
     acceleration: tuple[float, ...] = (nan,) * 7
     jerk: tuple[float, ...] = (nan,) * 7
@@ -312,6 +318,8 @@ _CartesianDynamics_0 = Struct(">dddddd")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CartesianDynamics:
     """Limits along a Cartesian path; NaN keeps the cabinet's default."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"velocity": (0.0, 10.0), "acceleration": (0.0, 100.0), "jerk": (0.0, 10000.0), "orientation_velocity": (0.0, 20.0), "orientation_acceleration": (0.0, 200.0), "orientation_jerk": (0.0, 20000.0)}
 
     velocity: float = nan
     acceleration: float = nan
@@ -349,7 +357,9 @@ _Blending_0 = Struct(">ddd")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blending:
-    """Where the motion may begin to turn into its follower; 0: exact stop."""
+    """Where the motion may start to blend into the next one; 0: exact stop."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"relative": (0.0, 1.0), "distance": (0.0, 2.0), "orientation": (0.0, 6.3)}
 
     relative: float = 0.0
     distance: float = 0.0
@@ -433,7 +443,7 @@ class Ptp:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PtpHome:
-    """Point to point in joint space, to the home position that the cabinet's project has; all zeros if it has none."""
+    """Point to point in joint space, to the home position of the cabinet's project; all zeros without one."""
 
     dynamics: JointDynamics = JointDynamics()
     blending: Blending = Blending()
@@ -529,7 +539,7 @@ class Lin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinRel:
-    """Straight line relative to where the motion frame is when the motion starts."""
+    """Straight line relative to the pose of the motion frame at the start."""
 
     offset: Pose
     reference: str = ""
@@ -825,6 +835,8 @@ _Hold_0 = Struct(">d")
 class Hold:
     """Holds the position (under the item's control mode)."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"duration": (0.0, 1000000.0)}
+
     duration: float
 
     def _write(self, out: list[bytes]) -> None:
@@ -847,6 +859,8 @@ _HandGuide_0 = Struct(">7d7dddBB")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HandGuide:
     """Hand guiding while the enabling switch of the hand guiding device is held; ends when it is released."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"joint_velocity": (0.0, 10.0), "cartesian_velocity": (0.0, 10.0)}
 
     q_min: tuple[float, ...] = (nan,) * 7
     q_max: tuple[float, ...] = (nan,) * 7
@@ -877,6 +891,37 @@ class HandGuide:
         codec.check(self.cartesian_velocity, path + "cartesian_velocity", 0.0, 10.0, True, True)
 
 
+_ServoTiming_0 = Struct(">ddd")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServoTiming:
+    """Timing of a servo motion."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"min_trajectory_time": (0.001, 1.0), "goal_timeout": (0.1, 3600.0), "speed_timeout": (0.001, 10.0)}
+
+    min_trajectory_time: float = 0.02
+    goal_timeout: float = 300.0
+    speed_timeout: float = 0.1
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_ServoTiming_0.pack(self.min_trajectory_time, self.goal_timeout, self.speed_timeout))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[ServoTiming, int]:
+        v = codec.unpack(_ServoTiming_0, data, pos)
+        pos += _ServoTiming_0.size
+        min_trajectory_time = v[0]
+        goal_timeout = v[1]
+        speed_timeout = v[2]
+        return cls(min_trajectory_time=min_trajectory_time, goal_timeout=goal_timeout, speed_timeout=speed_timeout), pos
+
+    def _check(self, path: str) -> None:
+        codec.check(self.min_trajectory_time, path + "min_trajectory_time", 0.001, 1.0, False, False)
+        codec.check(self.goal_timeout, path + "goal_timeout", 0.1, 3600.0, False, False)
+        codec.check(self.speed_timeout, path + "speed_timeout", 0.001, 10.0, False, False)
+
+
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -901,6 +946,8 @@ _JointImpedance_0 = Struct(">7d7d")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointImpedance:
     """Spring and damper in every joint."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"stiffness": (0.0, 5000.0), "damping": (0.0, 1.0)}
 
     stiffness: tuple[float, ...]
     damping: tuple[float, ...]
@@ -927,6 +974,8 @@ _CartesianImpedance_0 = Struct(">6d6ddd6d6dB6d6d")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CartesianImpedance:
     """Spring and damper at the motion frame; order x y z, then about x y z."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"stiffness": (0.0, 5000.0), "damping": (0.1, 1.0), "nullspace_stiffness": (0.0, 5000.0), "nullspace_damping": (0.3, 1.0), "additional_force": (-500.0, 500.0), "max_force": (0.0, 1000000.0), "max_velocity": (0.0, 100.0), "max_deviation": (0.0, 100.0)}
 
     stiffness: tuple[float, ...]
     damping: tuple[float, ...]
@@ -977,6 +1026,8 @@ _SineImpedance_0 = Struct(">6d6d6d6d6d6dddddB")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SineImpedance:
     """Cartesian impedance with an overlaid force pattern per direction."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"amplitude": (0.0, 500.0), "frequency": (0.0, 15.0), "phase": (0.0, 6.3), "bias": (-500.0, 500.0), "force_limit": (0.0, 1000000.0), "position_limit": (0.0, 100.0), "total_time": (0.0, 1000000.0), "rise_time": (0.0, 1000000.0), "hold_time": (0.0, 1000000.0), "fall_time": (0.0, 1000000.0)}
 
     base: CartesianImpedance
     amplitude: tuple[float, ...]
@@ -1034,6 +1085,8 @@ _SpiralPattern_0 = Struct(">Bdddd")
 class SpiralPattern:
     """Spiral force pattern in a plane."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"frequency": (0.0, 15.0), "amplitude": (0.0, 500.0), "stiffness": (0.0, 5000.0), "total_time": (0.0, 1000000.0)}
+
     plane: Plane
     frequency: float
     amplitude: float
@@ -1068,6 +1121,8 @@ _ForceAbove_0 = Struct(">dd")
 class ForceAbove:
     """Magnitude of the external force above a threshold."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"threshold": (0.0, 1000.0), "tolerance": (0.0, 1000.0)}
+
     frame: str = ""
     threshold: float
     tolerance: float = nan
@@ -1097,6 +1152,8 @@ _NormalForceAbove_0 = Struct(">Bdd")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NormalForceAbove:
     """Force along an axis above a threshold."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"threshold": (0.0, 1000.0), "tolerance": (0.0, 1000.0)}
 
     frame: str = ""
     axis: Axis
@@ -1130,6 +1187,8 @@ _ShearForceAbove_0 = Struct(">Bdd")
 class ShearForceAbove:
     """Force across an axis above a threshold."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"threshold": (0.0, 1000.0), "tolerance": (0.0, 1000.0)}
+
     frame: str = ""
     axis: Axis
     threshold: float
@@ -1161,6 +1220,8 @@ _ForceOutside_0 = Struct(">Bddd")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceOutside:
     """Component of the force outside a band."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"low": (-1000.0, 1000.0), "high": (-1000.0, 1000.0), "tolerance": (0.0, 1000.0)}
 
     frame: str = ""
     axis: Axis
@@ -1197,6 +1258,8 @@ _TorqueOutside_0 = Struct(">Bddd")
 class TorqueOutside:
     """Component of the Cartesian torque outside a band."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"low": (-1000.0, 1000.0), "high": (-1000.0, 1000.0), "tolerance": (0.0, 1000.0)}
+
     frame: str = ""
     axis: Axis
     low: float
@@ -1231,6 +1294,8 @@ _JointTorqueOutside_0 = Struct(">Bdd")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JointTorqueOutside:
     """External torque of a joint outside a band."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"low": (-500.0, 500.0), "high": (-500.0, 500.0)}
 
     joint: int
     low: float
@@ -1316,6 +1381,8 @@ _PathReached_0 = Struct(">Bdd")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PathReached:
     """A point on the path, by distance and by time."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"distance": (-100.0, 100.0), "delay": (-1000.0, 1000.0)}
 
     reference: PathReference
     distance: float
@@ -1554,7 +1621,7 @@ def _read_Action(data: bytes, pos: int) -> tuple[Action, int]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trigger:
-    """Does something, without stopping, when a condition fires."""
+    """Executes an action when a condition fires; the motion continues."""
 
     condition: Condition = Condition()
     action: Action
@@ -1653,7 +1720,7 @@ def _read_Mode(data: bytes, pos: int) -> tuple[Mode, int]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Item:
-    """One motion of a program with all that belongs to it."""
+    """A motion of a program with its control mode, break condition and triggers."""
 
     motion: Motion
     frame: str = ""
@@ -1770,6 +1837,8 @@ _ToolInfo_0 = Struct(">d3d6d")
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToolInfo:
     """A tool or a workpiece."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"mass": (0.0, 50.0), "com": (-2.0, 2.0)}
 
     name: str
     mass: float
@@ -1987,6 +2056,8 @@ _MotionState_0 = Struct(">qIHHddd")
 class MotionState:
     """Running motion."""
 
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"progress": (0.0, 1.0), "override": (0.0, 1.0)}
+
     stamp: int
     motion: int
     item: int
@@ -2154,7 +2225,7 @@ class Hello:
     minor: int
     name: str = ""
     version: str = ""
-    nonce: bytes = b""
+    nonce: bytes
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Hello_0.pack(self.major, self.minor))
@@ -2176,7 +2247,7 @@ class Hello:
     def _check(self, path: str) -> None:
         codec.check_length(len(self.name.encode()), path + "name", 0, 64)
         codec.check_length(len(self.version.encode()), path + "version", 0, 32)
-        codec.check_length(len(self.nonce), path + "nonce", 0, 32)
+        codec.check_length(len(self.nonce), path + "nonce", 32, 32)
 
     def encode(self) -> bytes:
         """The body."""
@@ -2207,7 +2278,7 @@ class Challenge:
     SOURCE: ClassVar[str] = "cabinet"
     ROLE: ClassVar[str] = "any"
 
-    nonce: bytes = b""
+    nonce: bytes
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_bytes(self.nonce))
@@ -2218,7 +2289,7 @@ class Challenge:
         return cls(nonce=nonce), pos
 
     def _check(self, path: str) -> None:
-        codec.check_length(len(self.nonce), path + "nonce", 0, 32)
+        codec.check_length(len(self.nonce), path + "nonce", 32, 32)
 
     def encode(self) -> bytes:
         """The body."""
@@ -2242,14 +2313,14 @@ class Challenge:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proof:
-    """HMAC-SHA-256 with the key over the cabinet's nonce, then the client's."""
+    """The client proves that it knows the key; see [the key](#the-key)."""
 
     TYPE: ClassVar[int] = 3
     KIND: ClassVar[str] = "handshake"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "any"
 
-    mac: bytes = b""
+    mac: bytes
 
     def _write(self, out: list[bytes]) -> None:
         out.append(codec.put_bytes(self.mac))
@@ -2260,7 +2331,7 @@ class Proof:
         return cls(mac=mac), pos
 
     def _check(self, path: str) -> None:
-        codec.check_length(len(self.mac), path + "mac", 0, 32)
+        codec.check_length(len(self.mac), path + "mac", 32, 32)
 
     def encode(self) -> bytes:
         """The body."""
@@ -2287,7 +2358,7 @@ _Welcome_2 = Struct(">Hdd")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Welcome:
-    """The session is open. With a key set, the mac proves the cabinet to the client: over the client's nonce, then the cabinet's."""
+    """The session is open. With a key set, its mac proves the cabinet to the client; see [the key](#the-key)."""
 
     TYPE: ClassVar[int] = 4
     KIND: ClassVar[str] = "handshake"
@@ -2605,6 +2676,91 @@ class Goodbye:
         self._check("")
 
 
+_Halt_0 = Struct(">B")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Halt:
+    """Stops all motions, as the first and only frame of a connection: it needs no session, no place among the clients and no key."""
+
+    TYPE: ClassVar[int] = 9
+    KIND: ClassVar[str] = "handshake"
+    SOURCE: ClassVar[str] = "client"
+    ROLE: ClassVar[str] = "any"
+
+    kind: StopKind = StopKind.PATH
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_Halt_0.pack(self.kind))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Halt, int]:
+        v = codec.unpack(_Halt_0, data, pos)
+        pos += _Halt_0.size
+        kind = codec.read_enum(StopKind, v[0])
+        return cls(kind=kind), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> Halt:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "Halt")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Halted:
+    """The stop was commanded; the connection closes."""
+
+    TYPE: ClassVar[int] = 10
+    KIND: ClassVar[str] = "handshake"
+    SOURCE: ClassVar[str] = "cabinet"
+    ROLE: ClassVar[str] = "any"
+
+
+    def _write(self, out: list[bytes]) -> None:
+        pass
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Halted, int]:
+        return cls(), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> Halted:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "Halted")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
 _Accepted_0 = Struct(">I")
 
 
@@ -2718,6 +2874,7 @@ class TakeControl:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "any"
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"watchdog": (0.1, 10.0)}
 
     watchdog: float = 0.5
     on_lost: OnLost = OnLost.STOP
@@ -2805,6 +2962,7 @@ class Subscribe:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "any"
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"rate": (0.0, 1000.0)}
 
     groups: Groups
     rate: float
@@ -3079,6 +3237,7 @@ class SetOverride:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"value": (0.0, 1.0)}
 
     value: float
 
@@ -3117,7 +3276,7 @@ class SetOverride:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recover:
-    """Does what software may do to make the robot ready again; rejected with the operator's steps otherwise."""
+    """Makes the robot ready again as far as software may; otherwise rejected with the steps for the operator."""
 
     TYPE: ClassVar[int] = 42
     KIND: ClassVar[str] = "request"
@@ -3157,7 +3316,7 @@ class Recover:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DefineTool:
-    """Defines or redefines a tool; one that is attached stays so. Refused while anything runs or waits."""
+    """Defines or redefines a tool; an attached tool stays attached. Refused while any motion runs or is queued."""
 
     TYPE: ClassVar[int] = 48
     KIND: ClassVar[str] = "request"
@@ -3199,7 +3358,7 @@ class DefineTool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttachTool:
-    """Attaches a tool to the flange in place of another; an empty name detaches. A workpiece goes with its tool. Refused while anything runs or waits."""
+    """Attaches a tool to the flange instead of the current one; an empty name only detaches. A workpiece is detached with its tool. Refused while any motion runs or is queued."""
 
     TYPE: ClassVar[int] = 49
     KIND: ClassVar[str] = "request"
@@ -3246,7 +3405,7 @@ _AttachLoad_0 = Struct(">B")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AttachLoad:
-    """Attaches a workpiece to the motion frame of the tool, or detaches it. Refused while anything runs or waits."""
+    """Attaches a workpiece to the motion frame of the tool, or detaches it. Refused while any motion runs or is queued."""
 
     TYPE: ClassVar[int] = 50
     KIND: ClassVar[str] = "request"
@@ -3580,7 +3739,7 @@ class ProcessData:
 
 _ServoOpen_0 = Struct(">B")
 _ServoOpen_1 = Struct(">dd")
-_ServoOpen_2 = Struct(">dddd")
+_ServoOpen_2 = Struct(">d")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -3591,6 +3750,7 @@ class ServoOpen:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"velocity": (0.0, 1.0), "acceleration": (0.0, 1.0), "watchdog": (0.005, 2.0)}
 
     engine: ServoEngine = ServoEngine.SMART
     frame: str = ""
@@ -3598,9 +3758,7 @@ class ServoOpen:
     velocity: float = 0.2
     acceleration: float = 0.2
     linear: CartesianDynamics = CartesianDynamics()
-    min_trajectory_time: float = 0.02
-    goal_timeout: float = 300.0
-    speed_timeout: float = 0.1
+    timing: ServoTiming = ServoTiming()
     watchdog: float = 0.2
     until: Condition = Condition()
 
@@ -3614,7 +3772,8 @@ class ServoOpen:
             _write_Mode(self.mode, out)
         out.append(_ServoOpen_1.pack(self.velocity, self.acceleration))
         self.linear._write(out)
-        out.append(_ServoOpen_2.pack(self.min_trajectory_time, self.goal_timeout, self.speed_timeout, self.watchdog))
+        self.timing._write(out)
+        out.append(_ServoOpen_2.pack(self.watchdog))
         self.until._write(out)
 
     @classmethod
@@ -3632,14 +3791,12 @@ class ServoOpen:
         velocity = v[0]
         acceleration = v[1]
         linear, pos = CartesianDynamics._read(data, pos)
+        timing, pos = ServoTiming._read(data, pos)
         v = codec.unpack(_ServoOpen_2, data, pos)
         pos += _ServoOpen_2.size
-        min_trajectory_time = v[0]
-        goal_timeout = v[1]
-        speed_timeout = v[2]
-        watchdog = v[3]
+        watchdog = v[0]
         until, pos = Condition._read(data, pos)
-        return cls(engine=engine, frame=frame, mode=mode, velocity=velocity, acceleration=acceleration, linear=linear, min_trajectory_time=min_trajectory_time, goal_timeout=goal_timeout, speed_timeout=speed_timeout, watchdog=watchdog, until=until), pos
+        return cls(engine=engine, frame=frame, mode=mode, velocity=velocity, acceleration=acceleration, linear=linear, timing=timing, watchdog=watchdog, until=until), pos
 
     def _check(self, path: str) -> None:
         codec.check_length(len(self.frame.encode()), path + "frame", 0, 128)
@@ -3648,9 +3805,7 @@ class ServoOpen:
         codec.check(self.velocity, path + "velocity", 0.0, 1.0, True, False)
         codec.check(self.acceleration, path + "acceleration", 0.0, 1.0, True, False)
         self.linear._check(path + "linear.")
-        codec.check(self.min_trajectory_time, path + "min_trajectory_time", 0.001, 1.0, False, False)
-        codec.check(self.goal_timeout, path + "goal_timeout", 0.1, 3600.0, False, False)
-        codec.check(self.speed_timeout, path + "speed_timeout", 0.001, 10.0, False, False)
+        self.timing._check(path + "timing.")
         codec.check(self.watchdog, path + "watchdog", 0.005, 2.0, False, False)
         self.until._check(path + "until.")
 
@@ -3684,6 +3839,7 @@ class ServoJoints:
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
     LAYOUT: ClassVar[Struct] = _ServoJoints_0
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"watchdog": (0.005, 2.0)}
 
     servo: int
     watchdog: float
@@ -3735,6 +3891,7 @@ class ServoJointsVelocity:
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
     LAYOUT: ClassVar[Struct] = _ServoJointsVelocity_0
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"watchdog": (0.005, 2.0)}
 
     servo: int
     watchdog: float
@@ -3789,6 +3946,7 @@ class ServoPose:
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
     LAYOUT: ClassVar[Struct] = _ServoPose_0
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"watchdog": (0.005, 2.0)}
 
     servo: int
     watchdog: float
@@ -4000,6 +4158,7 @@ class FriOpen:
     KIND: ClassVar[str] = "request"
     SOURCE: ClassVar[str] = "client"
     ROLE: ClassVar[str] = "controller"
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"period": (0.001, 0.1), "timeout": (0.1, 60.0)}
 
     host: str
     port: int = 30200
@@ -4846,7 +5005,7 @@ class State:
         self._check("")
 
 
-Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Accepted | Rejected | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
+Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
 OneWay: TypeAlias = ServoJoints | ServoJointsVelocity | ServoPose
 
 #: Message classes by id.
@@ -4859,6 +5018,8 @@ MESSAGES: dict[int, type[Message]] = {
     6: Ping,
     7: Pong,
     8: Goodbye,
+    9: Halt,
+    10: Halted,
     16: Accepted,
     17: Rejected,
     32: TakeControl,

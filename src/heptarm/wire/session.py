@@ -15,18 +15,23 @@ import enum
 import hmac
 import secrets
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 from heptarm.errors import LocalProtocolError, RemoteProtocolError
 from heptarm.wire.codec import DecodeError
 from heptarm.wire.codes import Code
-from heptarm.wire.frames import Frame, FrameReader, pack, packer
+from heptarm.wire.frames import Frame, FrameReader, forged, pack, packer
+from heptarm.wire.key import FrameTag, KeyExchange, without_mac
 from heptarm.wire.messages import (
     MAJOR,
     MESSAGES,
     MINOR,
+    NONCE,
     ONE_WAY,
     Challenge,
+    Halt,
+    Halted,
     Hello,
     Message,
     OneWay,
@@ -40,9 +45,9 @@ from heptarm.wire.states import TRANSITIONS, SessionState, symbol
 
 _WRAP = 0xFFFFFFFF
 _SYMBOLS = {kind: symbol(kind) for kind in MESSAGES.values()}
-_PACKERS = {kind: packer(kind) for kind in ONE_WAY}
-#: Messages that are the same in every major version, so that an error can name both versions.
-_FROZEN = (Hello.TYPE, Refusal.TYPE)
+_PACKERS = {kind: packer(kind, None) for kind in ONE_WAY}
+#: Messages that are the same in every major version: an error can name both versions, and a stop needs no version.
+_FROZEN = (Hello.TYPE, Refusal.TYPE, Halt.TYPE, Halted.TYPE)
 
 
 class Side(enum.Enum):
@@ -95,17 +100,23 @@ class Session:
     Args:
         side: end of the connection.
         key: pre-shared key; None for none.
-        nonce: random bytes for the proof of the key; None generates them.
+        nonce: random bytes for the proof of the key [32 bytes]; None generates them.
+
+    Attributes:
+        is_proven: the other side has proved that it knows the key; False without a key.
     """
 
     def __init__(self, side: Side, *, key: bytes | None = None, nonce: bytes | None = None) -> None:
         self._side = side
         self._source = side.value
-        self._key = key
-        self._nonce = secrets.token_bytes(32) if nonce is None else nonce
+        self._exchange = None if key is None else KeyExchange(key)
+        self._nonce = secrets.token_bytes(NONCE) if nonce is None else nonce
         self._other_nonce = b""
-        self._enter(SessionState.START)
+        self.is_proven = False
         self._reader = FrameReader()
+        self._tag: FrameTag | None = None
+        self._one_way = _PACKERS
+        self._enter(SessionState.START)
         self._sent = 0
         self._received = 0
         self._last_request = 0
@@ -151,9 +162,12 @@ class Session:
             raise LocalProtocolError(f"request id {request} is in use")
         if kind.KIND == "answer" and is_numbered and request not in self._waiting:
             raise LocalProtocolError(f"no request {request} waits for an answer")
-        data = pack(kind.TYPE, message.encode(), seq=self._sent, request=request, time=time)
-        self._sent = (self._sent + 1) & _WRAP
-        self._after(kind, after, request)
+        if kind is Welcome and self._exchange is not None:
+            message = self._with_mac(message)
+        body = message.encode()
+        data = pack(kind.TYPE, body, seq=self._sent, request=request, time=time, tag=self._tag)
+        self._count_sent()
+        self._after(kind, after, request, body)
         return data
 
     def send_numbers(self, kind: type[OneWay], numbers: Iterable[float], *, time: int) -> bytes:
@@ -170,7 +184,7 @@ class Session:
             LocalProtocolError: the message is illegal in this state; nothing has changed.
         """
         data = self.pack_numbers(kind, numbers, time=time)
-        self._sent = (self._sent + 1) & _WRAP
+        self._count_sent()
         return data
 
     def pack_numbers(self, kind: type[OneWay], numbers: Iterable[float], *, time: int) -> bytes:
@@ -195,17 +209,22 @@ class Session:
         Raises:
             LocalProtocolError: this side has no key.
         """
-        return Proof(mac=self._mac(self._other_nonce, self._nonce))
+        if self._exchange is None:
+            raise LocalProtocolError("a proof needs a key, but this side has none")
+        return Proof(mac=self._exchange.client_mac())
 
-    def welcome_mac(self) -> bytes:
-        """Make the cabinet's proof of the key for its Welcome; empty without a key."""
-        return self._mac(self._other_nonce, self._nonce) if self._key is not None else b""
+    def _with_mac(self, message: Message) -> Welcome:
+        """The Welcome with the proof of this cabinet."""
+        assert isinstance(message, Welcome) and self._exchange is not None
+        if not self.is_proven:
+            raise LocalProtocolError("no Welcome before the client has proved that it knows the key")
+        bare = replace(message, mac=b"")
+        return replace(bare, mac=self._exchange.cabinet_mac(Welcome.TYPE, bare.encode()))
 
-    def is_proven(self, mac: bytes) -> bool:
-        """Whether the mac of the other side proves that it knows the key; True without a key."""
-        if self._key is None:
-            return True
-        return hmac.compare_digest(mac, self._mac(self._nonce, self._other_nonce))
+    def _count_sent(self) -> None:
+        self._sent = (self._sent + 1) & _WRAP
+        if self._sent == 0 and self._tag is not None:
+            self._tag.begin_round()
 
     # ----------------------------------------------------------------------------------- receiving
 
@@ -240,7 +259,7 @@ class Session:
                 Code.WRONG_VERSION, f"a frame has protocol version {frame.version}, this side has {MAJOR}"
             )
         if frame.seq != self._received:
-            raise _broken(Code.BAD_FRAME, f"expected frame {self._received}, got frame {frame.seq}")
+            raise forged(f"expected frame {self._received}, got frame {frame.seq}")
         kind = MESSAGES.get(frame.type)
         if kind is None:
             raise _broken(Code.UNKNOWN_MESSAGE, f"message id {frame.type} is not known")
@@ -258,28 +277,51 @@ class Session:
         if kind.KIND == "request" and frame.request in self._waiting:
             raise _broken(Code.UNEXPECTED_MESSAGE, f"request id {frame.request} is in use")
         self._received = (self._received + 1) & _WRAP
+        if self._received == 0 and self._reader.tag is not None:
+            self._reader.tag.begin_round()
         if kind is State:
             return StateReceived(frame.body, frame.time)
         try:
             message = kind.decode(frame.body)
         except DecodeError as error:
             raise _broken(Code.BAD_BODY, f"{kind.__name__}: {error}") from error
-        if isinstance(message, Hello | Challenge):
-            self._other_nonce = message.nonce
-        elif isinstance(message, Welcome) and not self.is_proven(message.mac):
-            raise _broken(Code.WRONG_KEY, "the cabinet failed to prove that it knows the key")
-        self._after(kind, after, frame.request)
+        if kind.KIND == "handshake":
+            self._check_handshake(message, frame.body)
+        self._after(kind, after, frame.request, frame.body)
         return Received(message, frame.request, frame.time)
+
+    def _check_handshake(self, message: Message, body: bytes) -> None:
+        """Check what a message of the handshake says about the key."""
+        exchange = self._exchange
+        if isinstance(message, Hello | Challenge):
+            if len(message.nonce) != NONCE:
+                raise _broken(Code.BAD_LENGTH, f"a nonce must have {NONCE} bytes, got {len(message.nonce)}")
+            if message.nonce == self._nonce:
+                raise _broken(Code.WRONG_KEY, "the other side sent the nonce of this side back")
+            self._other_nonce = message.nonce
+        elif exchange is None:
+            return
+        elif isinstance(message, Proof):
+            self.is_proven = hmac.compare_digest(message.mac, exchange.client_mac())
+        elif isinstance(message, Welcome):
+            mac = exchange.cabinet_mac(Welcome.TYPE, without_mac(body))
+            self.is_proven = self._state is SessionState.PROVED and hmac.compare_digest(message.mac, mac)
+            if not self.is_proven:
+                raise _broken(Code.WRONG_KEY, "the cabinet failed to prove that it knows the key")
 
     def _enter(self, state: SessionState) -> None:
         self._state, self._legal = state, TRANSITIONS[state]
         self._packers = {
             kind: pack
-            for kind, pack in _PACKERS.items()
+            for kind, pack in self._one_way.items()
             if kind.SOURCE in (self._source, "both") and _SYMBOLS[kind] in self._legal
         }
 
-    def _after(self, kind: type[Message], after: SessionState, request: int) -> None:
+    def _after(self, kind: type[Message], after: SessionState, request: int, body: bytes) -> None:
+        if kind.KIND == "handshake" and self._exchange is not None:
+            self._exchange.add(kind.TYPE, body)
+            if kind is Welcome:
+                self._begin_tags(self._exchange)
         if after is not self._state:
             self._enter(after)
         if kind.KIND == "request":
@@ -287,15 +329,18 @@ class Session:
         elif kind.KIND == "answer":
             self._waiting.pop(request, None)
 
+    def _begin_tags(self, exchange: KeyExchange) -> None:
+        """Tag every frame from here on, in both directions."""
+        if self._side is Side.CLIENT:
+            self._tag, self._reader.tag = exchange.tags(self._nonce, self._other_nonce)
+        else:
+            self._reader.tag, self._tag = exchange.tags(self._other_nonce, self._nonce)
+        self._one_way = {kind: packer(kind, self._tag) for kind in ONE_WAY}
+
     def _illegal(self, kind: type[Message]) -> LocalProtocolError:
         if kind.SOURCE not in (self._source, "both"):
             return LocalProtocolError(f"the {self._source} may not send a {kind.__name__}")
         return LocalProtocolError(f"a {kind.__name__} may not be sent in state {self._state.value!r}")
-
-    def _mac(self, first: bytes, second: bytes) -> bytes:
-        if self._key is None:
-            raise LocalProtocolError("a proof needs a key, but this side has none")
-        return hmac.digest(self._key, first + second, "sha256")
 
 
 def _broken(code: Code, text: str) -> RemoteProtocolError:

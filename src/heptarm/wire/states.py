@@ -15,6 +15,7 @@ class SessionState(enum.Enum):
 
     START = "start"  # connected, nothing sent
     HELLO = "hello"  # the client has identified itself
+    HALTING = "halting"  # the client requests a stop, without a session
     CHALLENGED = "challenged"  # the cabinet requires a proof of the key
     PROVED = "proved"  # the client has sent its proof
     OPEN = "open"  # requests, events and states flow
@@ -28,12 +29,18 @@ _S = SessionState
 TRANSITIONS: dict[SessionState, dict[str, SessionState]] = {
     _S.START: {
         "Hello": _S.HELLO,
+        "Halt": _S.HALTING,
         "Refusal": _S.CLOSED,
         "Goodbye": _S.CLOSED,
     },
     _S.HELLO: {
         "Challenge": _S.CHALLENGED,
         "Welcome": _S.OPEN,
+        "Refusal": _S.CLOSED,
+        "Goodbye": _S.CLOSED,
+    },
+    _S.HALTING: {
+        "Halted": _S.CLOSED,
         "Refusal": _S.CLOSED,
         "Goodbye": _S.CLOSED,
     },

@@ -44,7 +44,7 @@ from heptarm.fri.loop.user_api import Params, Stats
 from heptarm.fri.loop.user_api import State as FriState
 from heptarm.fri.protocol.messages import Quality, SessionState
 from heptarm.fri.session.session import Event, Kind
-from heptarm.io.udp import own_address
+from heptarm.io.udp import address_to_bind, own_address
 from heptarm.values.arrays import within
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
@@ -106,7 +106,7 @@ class Fri(Block):
         self._connection.check_may_wait("the with block of arm.fri()")
         link = self._connection.link
         self._host = self._host or own_address(link.peer.rpartition(":")[0])
-        client = self._client = self._request.make()
+        client = self._client = self._request.make(address_to_bind(self._host))
         message = replace(self._request.message, host=self._host, port=client.port)
         try:
             if self.kind == "monitor":

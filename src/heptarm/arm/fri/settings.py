@@ -77,13 +77,13 @@ class FriRequest:
     Attributes:
         kind: the commanded quantity, or "monitor".
         message: to the cabinet; host may be empty, and the port is set once the client listens.
-        make: makes the client, which then listens.
+        make: makes the client, which then listens on an address of this machine.
         has_law: a law commands.
     """
 
     kind: str
     message: wire.FriOpen
-    make: Callable[[], Client]
+    make: Callable[[str], Client]
     has_law: bool
 
 
@@ -146,11 +146,13 @@ def request(
         io=_signals(io, connection),
     )
 
-    def make() -> Client:
+    def make(address: str) -> Client:
         return _listening(
             port,
+            address,
             lambda chosen: Client(
                 chosen,
+                host=address,
                 version=version,
                 model=connection.robot,
                 limits=limits,
@@ -306,12 +308,12 @@ def check_command(kind: str, given: Mapping[str, object]) -> None:
             )
 
 
-def _listening(port: int | None, make: Callable[[int], Client]) -> Client:
-    """Make a client on a port; None: the first free one of FRI's ports."""
+def _listening(port: int | None, address: str, make: Callable[[int], Client]) -> Client:
+    """Make a client on a port of an address; None: the first free one of FRI's ports."""
     if port is not None:
         return make(port)
     for candidate in PORTS:
-        if not _is_free(candidate):
+        if not _is_free(candidate, address):
             continue
         try:
             return make(candidate)
@@ -327,9 +329,9 @@ def _listening(port: int | None, make: Callable[[int], Client]) -> Client:
     )
 
 
-def _is_free(port: int) -> bool:
+def _is_free(port: int, address: str) -> bool:
     try:
-        UdpSocket(port).close()
+        UdpSocket(port, host=address).close()
     except ConnectFailed:
         return False
     return True

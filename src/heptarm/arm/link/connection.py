@@ -15,12 +15,15 @@ from typing import Protocol
 import numpy as np
 
 from heptarm import __version__
+from heptarm.arm.link.halt import BUSY, PAUSE, halt
 from heptarm.arm.link.link import Link
 from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.arm.link.state_stream import GROUPS, StateFeed, States, StateSample, groups_of
 from heptarm.arm.translate.state import read_firing, read_result, read_robot, read_signals, read_state
+from heptarm.arm.watchdog import CONNECTION
 from heptarm.errors import (
     CommandRejected,
+    ConnectFailed,
     ConnectionLost,
     HeptarmError,
     LocalProtocolError,
@@ -40,8 +43,6 @@ from heptarm.wire.messages import Message
 
 _log = logging.getLogger("heptarm.arm")
 
-#: Silence after which the cabinet counts a controller as lost, unless the client chooses another [s].
-WATCHDOG: float = wire.TakeControl().watchdog
 #: Time for the connection and for the answer to a request, unless the client chooses another [s].
 TIMEOUT = 5.0
 #: States per second, unless the client chooses another rate [Hz].
@@ -68,7 +69,7 @@ class Options:
     rate: float = STATE_RATE
     groups: tuple[str, ...] = GROUPS
     finishes: bool = False
-    watchdog: float = WATCHDOG
+    watchdog: float = CONNECTION.default
 
 
 #: FRI sessions whose last change is kept.
@@ -325,14 +326,24 @@ class Connection:
         return self._link is not None and self._link.error is None
 
     @property
-    def pace(self) -> float:
-        """Cabinet seconds per second of our clock."""
+    def real_time_factor(self) -> float:
+        """Seconds of the cabinet's clock per second of this computer's."""
         return max(self.link.offset.rate, 0.001)
 
     def open(self) -> None:
-        """Make a link and subscribe to states."""
-        link = self._new_link(self.events.dispatch, self.feed.push, self._on_lost)
-        self._welcome = link.open(name=self.options.name, version=__version__, timeout=self.options.timeout)
+        """Make a link and subscribe to states; a cabinet that is too busy is asked again."""
+        deadline = self.clock.nanos() + round(self.options.timeout * 1e9)
+        while True:
+            link = self._new_link(self.events.dispatch, self.feed.push, self._on_lost)
+            try:
+                self._welcome = link.open(
+                    name=self.options.name, version=__version__, timeout=self.options.timeout
+                )
+                break
+            except ConnectFailed as error:
+                if error.code not in BUSY or self.clock.nanos() > deadline:
+                    raise
+            self.clock.sleep(PAUSE)
         self.controller = self._welcome.controller
         self.in_control = False
         self.events.forget_unclaimed()
@@ -454,7 +465,7 @@ class Connection:
         chosen = groups_of(groups, self.welcome.groups)
         within(rate, "rate", 0.0, self.welcome.max_rate, unit="Hz")
         self.request(wire.Subscribe(groups=chosen, rate=rate))
-        self.link.expect_states(rate * self.pace)
+        self.link.expect_states(rate * self.real_time_factor)
         self.options = replace(self.options, rate=rate, groups=tuple(groups))
 
     def run(self, message: wire.Run | wire.ServoOpen | wire.FriOpen, program: SentProgram) -> None:
@@ -512,22 +523,14 @@ class Connection:
                 raise
 
     def stop(self, kind: wire.StopKind) -> None:
-        """Stop the arm; through a new link if the old one was lost, since the arm may still move."""
-        message = wire.Stop(kind=kind)
+        """Stop the arm; without a session if this one was lost, since the arm may still move."""
         try:
-            self.request(message)
-        except ConnectionLost:
+            self.request(wire.Stop(kind=kind))
+        except (ConnectionLost, Timeout):
             if self.closed.is_set():
                 raise
             _log.warning("the connection is lost; stopping the arm through a new connection")
-            link = self._new_link(lambda _: None, lambda *_: None, lambda _: None)
-            try:
-                link.open(
-                    name=f"{self.options.name} (stop)", version=__version__, timeout=self.options.timeout
-                )
-                link.request(message, timeout=self.options.timeout)
-            finally:
-                link.close()
+            halt(self._dial, kind, clock=self.clock, timeout=self.options.timeout)
 
     @contextlib.contextmanager
     def stopping_on_interrupt(self) -> Iterator[None]:
@@ -559,7 +562,7 @@ class Connection:
         sample, rate = self.feed.newest, self.options.rate
         if rate <= 0:
             raise StaleState("no states are subscribed", hint="arm.subscribe(rate=100)")
-        limit = max(_STALE, _STALE_PERIODS / (rate * self.pace))
+        limit = max(_STALE, _STALE_PERIODS / (rate * self.real_time_factor))
         age = float("inf") if sample is None else (self.clock.nanos() - sample.received) * 1e-9
         if sample is not None and age <= limit:
             return self.build(sample)

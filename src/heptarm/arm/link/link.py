@@ -15,6 +15,7 @@ from types import FrameType
 from typing import Any
 
 from heptarm.arm.translate.errors import farewell, refusal, rejection
+from heptarm.arm.translate.text import printable_message
 from heptarm.errors import ConnectFailed, ConnectionLost, HeptarmError, RemoteProtocolError, Timeout
 from heptarm.io.clock import Clock
 from heptarm.io.transport import Transport
@@ -123,7 +124,7 @@ class Heartbeat:
     Attributes:
         timeout: silence after which the cabinet ends the session [s].
         watchdog: silence after which the cabinet counts a controller as lost [s]; infinite: not in control.
-        received: our clock when bytes last arrived [ns].
+        received: our clock when a frame last arrived [ns].
     """
 
     __slots__ = ("received", "timeout", "watchdog")
@@ -267,7 +268,8 @@ class Link:
                 raise ConnectFailed(
                     f"the cabinet at {self.peer} asks for a pre-shared key, none was given",
                     code=int(Code.WRONG_KEY),
-                    hint='use connect(..., key="...") with the key in the process data of the cabinet\'s project',
+                    hint="give it as a file (--key-file, connect(..., key_file=...)), in HEPTARM_KEY, or store it: "
+                    f"heptarm key set --target {self.peer}",
                 )
             self._send(self._session.proof())
         elif isinstance(message, Refusal):
@@ -415,6 +417,7 @@ class Link:
         try:
             self._reader = get_ident()
             self._read(wait=False)
+            self._heartbeat.check(self._clock.nanos(), self.peer)
         finally:
             self._reader = 0
             self._reading.release()
@@ -427,10 +430,11 @@ class Link:
             size = self._transport.receive_into(view, wait=wait)
             if size == 0:
                 return
-            now = self._heartbeat.received = self._clock.nanos()
+            now = self._clock.nanos()
             session = self._session
             session.receive_data(view[:size])
             for event in session.events():
+                self._heartbeat.received = now  # only a whole frame is a sign of life
                 if type(event) is StateReceived:
                     self._on_state(event.body, now)
                 elif type(event) is Received:
@@ -443,7 +447,7 @@ class Link:
             raise
 
     def _dispatch(self, event: Received, now: int) -> None:
-        message = event.message
+        message = printable_message(event.message)
         kind = message.KIND
         if kind == "answer":
             pending = self._pending.pop(event.request, None)
@@ -505,6 +509,10 @@ class Link:
         self._fail(ConnectionLost(f"the connection to {self.peer} is closed"))
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(5.0)
+
+    def cut(self) -> None:
+        """End the connection at once and without a Goodbye, as a broken cable does."""
+        self._transport.close()
 
     def abandon(self, error: HeptarmError) -> None:
         """Give up the copy that a fork of the process has, without any message to the cabinet.

@@ -20,6 +20,7 @@ from collections import deque
 
 from heptarm.arm.link.target import Target
 from heptarm.errors import ConnectFailed, ConnectionLost
+from heptarm.io.keys import environment
 from heptarm.values.simulator_options import flag
 
 _log = logging.getLogger("heptarm.sim")
@@ -72,8 +73,15 @@ class PrivateCabinet:
             os.close(nothing)
 
     @classmethod
-    def start(cls, target: Target, *, timeout: float = READY_TIMEOUT) -> PrivateCabinet:
+    def start(
+        cls, target: Target, *, key: str | None = None, timeout: float = READY_TIMEOUT
+    ) -> PrivateCabinet:
         """Start a virtual cabinet and wait until it accepts clients.
+
+        Args:
+            target: which one.
+            key: pre-shared key that it asks its clients for; None: none.
+            timeout: longest wait [s].
 
         Raises:
             ConnectFailed: it does not start; the text has its last output.
@@ -89,6 +97,8 @@ class PrivateCabinet:
         ]
         for name, value in target.options:
             command += [flag(name), value]
+        if key is None:
+            command += ["--data", "heptarm.key="]  # a key in a project's file is that of the real cabinet
         command.append("--parent-pipe")
         # a session of its own: Ctrl-C in the terminal reaches only this process, which then stops the arm
         process = subprocess.Popen(
@@ -98,6 +108,7 @@ class PrivateCabinet:
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
+            env=environment(key),  # never an argument, which all users of the machine can read
         )
         output: deque[str] = deque(maxlen=20)
         ready: queue.SimpleQueue[int | None] = queue.SimpleQueue()

@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from math import inf, isnan
-from typing import cast
-
-import numpy as np
+from math import isinf
 
 from heptarm.arm.devices.tools import Tooling
 from heptarm.arm.link.connection import Connection
@@ -19,14 +16,8 @@ from heptarm.arm.translate.motions import items
 from heptarm.arm.translate.triggers import trigger_messages
 from heptarm.errors import HeptarmError, ShapeError
 from heptarm.values.condition.condition import Condition, condition_nodes
-from heptarm.values.condition.trigger import triggers_of
 from heptarm.values.mode.mode import Mode
-from heptarm.values.motion.circle import Circ
-from heptarm.values.motion.dynamics import DynamicMotion, Dynamics
-from heptarm.values.motion.hand_guiding import HandGuide
-from heptarm.values.motion.line import Lin, LinRel
-from heptarm.values.motion.motion import MOTIONS, Hold, Motion, limited_to
-from heptarm.values.motion.spline import JointSpline, Segment, Spline
+from heptarm.values.motion.motion import Motion, triggers_of
 from heptarm.values.robot import RobotModel
 from heptarm.wire import messages as wire
 
@@ -34,10 +25,6 @@ _WHEN = {"queue": wire.When.QUEUE, "replace": wire.When.REPLACE, "reject": wire.
 _DAY = 86400.0
 #: A motion may take this much longer than its slowest plausible estimate, and this much more [s].
 _GENEROUS, _AND_MORE = 3.0, 15.0
-#: The longest straight line and the longest arc inside the workspace of the largest arm [m].
-_LONGEST_LINE, _LONGEST_ARC = 2.0, 6.0
-#: Cartesian speed assumed where none is given [m/s].
-_SLOW_LINE = 0.1
 
 
 def listed(motion: Motion | Sequence[Motion]) -> tuple[Motion, ...]:
@@ -46,7 +33,7 @@ def listed(motion: Motion | Sequence[Motion]) -> tuple[Motion, ...]:
     Raises:
         ShapeError: something else, or none at all.
     """
-    motions = cast("Sequence[Motion]", (motion,) if isinstance(motion, MOTIONS) else motion)
+    motions = (motion,) if isinstance(motion, Motion) else motion
     if not isinstance(motions, Sequence) or isinstance(motions, str) or not 1 <= len(motions) <= 1000:
         raise ShapeError(
             f"motion must be a motion or a list of 1 to 1000 motions, got {_text(motions)}",
@@ -55,7 +42,7 @@ def listed(motion: Motion | Sequence[Motion]) -> tuple[Motion, ...]:
             hint="make motions with ptp, lin, lin_rel, circ, spline and hold",
         )
     for index, one in enumerate(motions):
-        if not isinstance(one, MOTIONS):
+        if not isinstance(one, Motion):
             raise ShapeError(
                 f"motions[{index}] must be a motion, got {one!r}",
                 parameter=f"motions[{index}]",
@@ -142,48 +129,22 @@ def _limit(connection: Connection, motions: tuple[Motion, ...], ceiling: float) 
     """Time after which waiting for them makes no sense [s], with what is before them in the queue."""
     newest = connection.newest()
     override = newest.motion.override if newest is not None and newest.motion is not None else 1.0
-    own = longest(motions, connection.robot, ceiling) / max(override, 0.01) / min(connection.pace, 1.0)
+    own = (
+        longest(motions, connection.robot, ceiling)
+        / max(override, 0.01)
+        / min(connection.real_time_factor, 1.0)
+    )
     total = own + connection.events.pending()
     return total if total < _DAY else _DAY
 
 
 def longest(motions: Sequence[Motion], robot: RobotModel, ceiling: float) -> float:
     """Upper bound of the duration of a healthy program [s]; infinite if it holds until it is cancelled."""
-    return _AND_MORE + _GENEROUS * sum(_slowest(limited_to(motion, ceiling), robot) for motion in motions)
-
-
-def _slowest(motion: Motion, robot: RobotModel) -> float:
-    if isinstance(motion, Hold):
-        return motion.duration
-    if isinstance(motion, JointSpline):
-        return sum(_turn(point.dynamics, robot) for point in motion.points)
-    if isinstance(motion, Spline):
-        turn = _turn(motion.dynamics, robot) * len(motion.segments)
-        return turn + sum(_along(one, motion.dynamics) for one in motion.segments)
-    if isinstance(motion, Lin | LinRel | Circ):
-        return _turn(motion.dynamics, robot) + _along(motion) + 1.0
-    return _turn(motion.dynamics, robot) if isinstance(motion, DynamicMotion) else inf
-
-
-def _along(one: Segment | LinRel, *whole: Dynamics) -> float:
-    """Time for the longest line or arc at its speed [s]."""
-    speeds = (*(dynamics.speed_mps for dynamics in (one.dynamics, *whole)), _SLOW_LINE)
-    speed = next(speed for speed in speeds if not isnan(speed))
-    return (_LONGEST_ARC if isinstance(one, Circ) else _LONGEST_LINE) / speed
-
-
-def _turn(dynamics: Dynamics, robot: RobotModel) -> float:
-    """Time for every joint to move through its whole range, with ramps [s]."""
-    limits = (dynamics.joint_speed, dynamics.joint_acceleration, dynamics.joint_jerk)
-    speed, acceleration, jerk = (np.nan_to_num(limit, nan=1.0) for limit in limits)
-    cruise = (robot.q_max - robot.q_min) / (robot.dq_max * speed)
-    ramps = robot.dq_max * speed / (robot.ddq_max * acceleration) + robot.ddq_max / (robot.dddq_max * jerk)
-    return float(np.max(cruise + ramps))
-
-
-def is_endless(motions: Sequence[Motion]) -> bool:
-    """Whether it ends only when it is cancelled."""
-    return any(
-        isinstance(motion, HandGuide) or (isinstance(motion, Hold) and motion.duration == inf)
-        for motion in motions
+    return _AND_MORE + _GENEROUS * sum(
+        motion.limited_to(ceiling).longest_duration(robot) for motion in motions
     )
+
+
+def is_endless(motions: Sequence[Motion], robot: RobotModel) -> bool:
+    """Whether it ends only when it is cancelled."""
+    return any(isinf(motion.longest_duration(robot)) for motion in motions)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, replace
 from math import nan
 from operator import le
-from typing import Literal, TypedDict
+from typing import Any, Literal, TypedDict, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,8 @@ import numpy.typing as npt
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.handle import Block, BreakRule, MotionHandle
 from heptarm.arm.translate.modes import mode_message
-from heptarm.errors import CommandRejected, HeptarmError, LimitError, LocalProtocolError, ShapeError, Timeout
+from heptarm.arm.watchdog import FIRST_TARGET, TARGETS
+from heptarm.errors import CommandRejected, HeptarmError, LocalProtocolError, ShapeError, Timeout
 from heptarm.io.tcp import WarmUpConnection
 from heptarm.values.arrays import Array, array, within
 from heptarm.values.condition.condition import Condition
@@ -26,16 +28,12 @@ from heptarm.values.result import Result
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
 
+_Method = TypeVar("_Method", bound=Callable[..., Any])
+
 KINDS = ("joint", "pose", "lin")
 ENGINES = {"smart": wire.ServoEngine.SMART, "direct": wire.ServoEngine.DIRECT}
-#: The protocol's defaults; `schema/protocol.toml` is their one place.
-_DEFAULT = wire.ServoOpen()
-#: The default watchdog is this many periods long, but at least this long [s].
-_WATCHDOG_PERIODS, _MIN_DEFAULT_WATCHDOG = 5.0, _DEFAULT.watchdog
-#: Range of the watchdog [s].
-_MIN_WATCHDOG, _MAX_WATCHDOG = 0.005, 2.0
-#: Longest time until the first target [s].
-_FIRST_TARGET = 2.0
+#: The protocol's defaults and ranges; `schema/protocol.toml` is their one place.
+_DEFAULT, _RANGES = wire.ServoOpen(), wire.ServoTiming.RANGES
 #: Added to the period for the default of min_trajectory_time, so that the next target comes before its end [s].
 _OVERLAP = 0.005
 #: Limits along and about each axis of the base for straight lines: default, largest value, unit.
@@ -45,11 +43,6 @@ _LINE_LIMITS = {
     "speed_radps": (0.5, 20.0, "rad/s"),
     "acceleration_radps2": (2.0, 200.0, "rad/s²"),
 }
-
-
-def default_watchdog(period: float) -> float:
-    """Default servo watchdog for a period [s]: max(5 periods, 0.2 s), at most 2 s."""
-    return min(max(_WATCHDOG_PERIODS * period, _MIN_DEFAULT_WATCHDOG), _MAX_WATCHDOG)
 
 
 class ServoKeywords(TypedDict, total=False):
@@ -74,11 +67,33 @@ class ServoKeywords(TypedDict, total=False):
 
 @dataclass(frozen=True, slots=True)
 class ServoRequest:
-    """A checked request for a servo motion; `Arm.servo` documents its fields.
+    """A checked request for a servo motion: its keywords, as `documented` lists them in `Arm.servo`.
 
     Attributes:
-        period: time between two ticks [s].
-        watchdog_time: longest gap between two targets [s].
+        kind: what the targets are: "joint", "pose" or "lin".
+        rate: ticks of the loop per second [Hz]; 100.
+        watchdog: longest gap between two targets; a longer one stops the arm [s], 0.005 to 2; None: five
+            periods, at least 0.2 s.
+        engine: of joints and poses: "smart" plans a limited trajectory to each target; "direct" moves straight
+            to it, for targets that are close and smooth.
+        mode: control mode; None: that of `using`, otherwise position. Its parameters can change while the arm
+            follows.
+        speed: of joints and poses: ceiling, a fraction of each axis' maximum in (0, 1]; None: 0.2. The lower
+            one of this and `arm.speed` applies.
+        acceleration: likewise, of the acceleration and the jerk.
+        speed_mps: of "lin": largest speed along each axis of the base [m/s], up to 10; None: 0.25. `arm.speed`
+            scales it, since the joints' own limits are not checked.
+        acceleration_mps2: likewise [m/s²], up to 100; None: 1. Not scaled.
+        speed_radps: largest angular velocity about each axis of the base [rad/s], up to 20; None: 0.5. Scaled.
+        acceleration_radps2: likewise [rad/s²], up to 200; None: 2. Not scaled.
+        min_trajectory_time: shortest trajectory to a target [s]; None: a period and 5 ms.
+        goal_timeout: time at its target without another one after which the cabinet's servo motion ends [s];
+            300. The next target begins a new one.
+        speed_timeout: of joints with the engine "smart": how long the arm keeps the velocity of a target after
+            passing it, before it brakes [s], 0.001 to 10; None: 0.1.
+        moving: motion frame: "tool" (of the attached tool, or the flange), "flange" or the name of a frame.
+        until: break condition; the cabinet's application checks it up to 250 times a second, as fast as its
+            robot answers. See `move`.
 
     Raises:
         ShapeError: no such kind or engine.
@@ -99,7 +114,7 @@ class ServoRequest:
     speed_radps: float | None = None
     acceleration_radps2: float | None = None
     min_trajectory_time: float | None = None
-    goal_timeout: float = _DEFAULT.goal_timeout
+    goal_timeout: float = _DEFAULT.timing.goal_timeout
     speed_timeout: float | None = None
     moving: str = TOOL
     until: Condition | None = None
@@ -120,16 +135,7 @@ class ServoRequest:
             )
         self._refuse_foreign_limits()
         within(self.rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
-        within(self.watchdog, "watchdog", _MIN_WATCHDOG, _MAX_WATCHDOG, unit="s")
-        if self.watchdog_time < self.period:
-            raise LimitError(
-                f"watchdog must not be shorter than the period of {self.period:g} s, got {self.watchdog_time:g} s",
-                code=2,
-                parameter="watchdog",
-                value=self.watchdog_time,
-                allowed=f"[{self.period:g}, {_MAX_WATCHDOG:g}] s",
-                hint="give a longer watchdog or a higher rate",
-            )
+        TARGETS.time(self.watchdog, period=self.period)
 
     @property
     def period(self) -> float:
@@ -139,7 +145,7 @@ class ServoRequest:
     @property
     def watchdog_time(self) -> float:
         """Longest gap between two targets [s]."""
-        return default_watchdog(self.period) if self.watchdog is None else self.watchdog
+        return TARGETS.time(self.watchdog, period=self.period)
 
     def message(self, ceiling: float) -> wire.ServoOpen:
         """The message that opens the servo motion, without its break condition.
@@ -152,15 +158,19 @@ class ServoRequest:
         """
         shortest = self.min_trajectory_time
         if shortest is None:
-            shortest = min(max(self.period + _OVERLAP, 0.001), 1.0)
-        kept = _DEFAULT.speed_timeout if self.speed_timeout is None else self.speed_timeout
+            shortest = float(np.clip(self.period + _OVERLAP, *_RANGES["min_trajectory_time"]))
+        given = {
+            "min_trajectory_time": shortest,
+            "goal_timeout": self.goal_timeout,
+            "speed_timeout": _DEFAULT.timing.speed_timeout if self.speed_timeout is None else self.speed_timeout,
+        }
         message = wire.ServoOpen(
             frame="" if self.moving == TOOL else self.moving,
             mode=mode_message(self.mode),
-            min_trajectory_time=within(shortest, "min_trajectory_time", 0.001, 1.0, unit="s"),
-            goal_timeout=within(self.goal_timeout, "goal_timeout", 0.1, 3600.0, unit="s"),
-            speed_timeout=within(kept, "speed_timeout", 0.001, 10.0, unit="s"),
-            watchdog=_FIRST_TARGET,
+            timing=wire.ServoTiming(
+                **{name: within(value, name, *_RANGES[name], unit="s") for name, value in given.items()}
+            ),
+            watchdog=FIRST_TARGET.default,
         )
         if self.kind == "lin":
             return replace(
@@ -223,6 +233,15 @@ class ServoRequest:
                 parameter="speed_timeout",
                 hint="leave it out",
             )
+
+
+def documented(method: _Method) -> _Method:
+    """Decorator: list the keywords of a servo motion in the docstring of a method after "as follows."."""
+    listed = (ServoRequest.__doc__ or "").partition("        rate:")[1:]
+    lines = "".join(listed).partition("\n\n")[0].splitlines()
+    text = "\n".join(f"    {line}" for line in lines)
+    method.__doc__ = (method.__doc__ or "").replace("as follows.", f"as follows.\n{text}", 1)
+    return method
 
 
 #: Longest wait for the start, and for rest at the end [s].

@@ -17,12 +17,11 @@ import numpy as np
 from heptarm.arm.translate.fields import NAMES, frame_message, hints, message_of
 from heptarm.errors import HeptarmError
 from heptarm.model.inverse_kinematics import redundancy
-from heptarm.values.motion.circle import Circ
 from heptarm.values.motion.dynamics import DynamicMotion, Dynamics
 from heptarm.values.motion.hand_guiding import HandGuide
-from heptarm.values.motion.line import Lin, LinRel
-from heptarm.values.motion.motion import Hold, Motion, limited_to
-from heptarm.values.motion.ptp import Ptp, PtpPose
+from heptarm.values.motion.line import LinRel
+from heptarm.values.motion.motion import Hold, Motion
+from heptarm.values.motion.ptp import Ptp
 from heptarm.values.motion.spline import JointSpline, Segment, Spl, Spline
 from heptarm.values.robot import RobotModel
 from heptarm.wire import messages as wire
@@ -63,7 +62,7 @@ def _item(
     until: wire.Condition,
 ) -> wire.Item:
     try:
-        message = _message(type(motion).__name__, limited_to(motion, speed), robot)
+        message = _message(type(motion).__name__, motion.limited_to(speed), robot)
     except HeptarmError as error:
         if index is not None:  # name the motion
             error.text = f"motions[{index}]: {error.text}"
@@ -78,7 +77,9 @@ def _message(name: str, motion: Motion | Segment, robot: RobotModel) -> Any:
     kind = NAMES[name]
     given = _fields(motion, robot)
     if isinstance(motion, DynamicMotion | Spl):
-        given = dynamics_fields(kind, motion.dynamics) | given
+        given |= dynamics_fields(kind, motion.dynamics)
+    if "redundancy" in hints(kind):
+        given |= {"redundancy": _redundancy(motion, robot)}
     return message_of(kind, motion, **given)
 
 
@@ -103,6 +104,16 @@ def dynamics_fields(kind: type, dynamics: Dynamics) -> dict[str, object]:
     return {name: types[hint] for name, hint in hints(kind).items() if hint in types}
 
 
+def _redundancy(motion: Any, robot: RobotModel) -> wire.Redundancy:
+    """The redundancy of a motion's target: as given, as at the joint positions `near` it, or the current one."""
+    if motion.near is not None:
+        robot.check(motion.near, "near")
+        return replace(message_of(wire.Redundancy, redundancy(robot, motion.near.tolist())), turn=-1)
+    if motion.redundancy is not None:
+        return message_of(wire.Redundancy, motion.redundancy)
+    return wire.Redundancy(e1=nan, status=-1, turn=-1)
+
+
 # ------------------------------------------------------------- what a motion's message has under other names
 
 
@@ -116,22 +127,6 @@ def _fields(motion: object, robot: RobotModel) -> dict[str, Any]:
 def _(motion: Ptp, robot: RobotModel) -> dict[str, Any]:
     robot.check(motion.q)
     return {}
-
-
-@_fields.register(PtpPose)
-@_fields.register(Lin)
-@_fields.register(Circ)
-def _(motion: PtpPose | Lin | Circ, robot: RobotModel) -> dict[str, Any]:
-    if motion.near is not None:
-        robot.check(motion.near, "near")
-        return {"redundancy": replace(_redundancy(redundancy(robot, motion.near.tolist())), turn=-1)}
-    if motion.redundancy is not None:
-        return {"redundancy": _redundancy(motion.redundancy)}
-    return {"redundancy": wire.Redundancy(e1=nan, status=-1, turn=-1)}
-
-
-def _redundancy(value: object) -> wire.Redundancy:
-    return message_of(wire.Redundancy, value)
 
 
 @_fields.register

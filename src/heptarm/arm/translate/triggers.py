@@ -8,10 +8,11 @@ from math import isfinite
 from heptarm.arm.translate.conditions import condition_message
 from heptarm.errors import CommandRejected, HeptarmError, LimitError
 from heptarm.values.arrays import scalar, within
-from heptarm.values.condition.condition import Condition, PathReached, SignalOutside
-from heptarm.values.condition.trigger import Action, SetOutput, triggers_of
+from heptarm.values.condition.condition import Condition
+from heptarm.values.condition.signals import PathReached, SignalOutside
+from heptarm.values.condition.trigger import Action, SetOutput
 from heptarm.values.io import Signal, SignalValue, find_signal
-from heptarm.values.motion.motion import Hold, Motion
+from heptarm.values.motion.motion import Hold, Motion, triggers_of
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 

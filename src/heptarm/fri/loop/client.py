@@ -28,6 +28,7 @@ from heptarm.fri.loop.telemetry import Reader
 from heptarm.fri.loop.user_api import Params
 from heptarm.fri.protocol.version import Version
 from heptarm.io.shared import MemoryBlock
+from heptarm.io.udp import ALL_INTERFACES, own_address
 from heptarm.values.arrays import array, scalar
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
@@ -44,7 +45,7 @@ class Client(Reader):
 
     Args:
         port: UDP port to bind.
-        host: address to bind; "0.0.0.0" for all.
+        host: own address to bind; "0.0.0.0" for all. None: the one that routes to `remote`; all without a remote.
         remote: address of the controller; None accepts any.
         version: FRI release such as "1.15"; None recognises it from the first datagram.
         model: robot, for the limits.
@@ -72,7 +73,7 @@ class Client(Reader):
         self,
         port: int = PORT,
         *,
-        host: str = "0.0.0.0",
+        host: str | None = None,
         remote: str | None = None,
         version: str | None = None,
         model: str | RobotModel = "iiwa14",
@@ -106,7 +107,7 @@ class Client(Reader):
             json.dumps(
                 {
                     "port": port,
-                    "host": host,
+                    "host": _own(remote) if host is None else host,
                     "remote": remote,
                     "version": wire,
                     "limits": asdict(self._limits),
@@ -136,9 +137,17 @@ class Client(Reader):
     def _wait_for_loop(self, timeout: float) -> None:
         deadline = time.monotonic() + timeout
         while self._header[at.STATUS] == at.Status.STARTING:
-            if not self._worker.is_alive() or time.monotonic() > deadline:
+            if not self._worker.is_alive():
+                raise ConnectFailed(
+                    f"the loop's process ended while it started: {self._worker.printed() or 'it printed nothing'}"
+                )
+            if time.monotonic() > deadline:
                 self._worker.kill()
-                raise ConnectFailed(f"the loop's process did not start within {timeout:g} s")
+                printed = self._worker.printed()
+                raise ConnectFailed(
+                    f"the loop's process did not start within {timeout:g} s"
+                    + (f": {printed}" if printed else "")
+                )
             time.sleep(2e-3)
         if (status := self._header[at.STATUS]) in (at.Status.FAILED, at.Status.NO_PORT):
             self._worker.join(1.0)
@@ -291,6 +300,11 @@ def _seven(pose: Pose | npt.ArrayLike) -> npt.NDArray[np.float64]:
     if not np.isnan(values[3:]).any():
         Pose.of((0.0, 0.0, 0.0), values[3:])  # raises the error about its norm
     return values
+
+
+def _own(remote: str | None) -> str:
+    """Address to bind: datagrams of the controller arrive there."""
+    return ALL_INTERFACES if remote is None else own_address(remote)
 
 
 def _plain(policy: Policy) -> dict[str, Any]:

@@ -15,10 +15,10 @@
 
 #include "native_layout.h"
 
-enum { STATE_ARRAYS = (S_WRENCH - S_Q) / AXES };
+enum { STATE_ARRAYS = (S_WRENCH - S_ARRAYS) / AXES };
 /* Place of an array of a state in t_arrays, and its bit in t_known. */
-#define ARRAY(word) (l->t_arrays + ((word) - S_Q))
-#define KNOWN(word) ((int64_t)1 << ((word) - S_Q) / AXES)
+#define ARRAY(word) (l->t_arrays + ((word) - S_ARRAYS))
+#define KNOWN(word) ((int64_t)1 << ((word) - S_ARRAYS) / AXES)
 
 word hf_size(void) { return sizeof(struct loop); }
 
@@ -124,7 +124,7 @@ static uint32_t crc(const uint8_t *data, int size) {
 }
 
 /* Places of the joint arrays of MonitoringData, by field number. */
-static const int monitored[6] = {0, S_Q, S_TAU, S_Q_CMD, S_TAU_CMD, S_TAU_EXT};
+static const int monitored[16] = MONITORED;
 
 struct seen {
     uint64_t sequence, reflected;
@@ -169,7 +169,7 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
             } else if (tag == 3) {
                 int at = (int)(key >> 3);
                 if ((key & 7) != 2) return 0;
-                if (at <= 5) {
+                if (monitored[at]) {
                     if (!doubles(leaf, 1, AXES, 0, ARRAY(monitored[at]))) return 0;
                     l->t_known |= KNOWN(monitored[at]);
                 } else if (at == 6) {
@@ -503,7 +503,7 @@ static void fill_state(struct loop *l, word *slot) {
     slot[S_TICKS] = active && l->ticks > 0 ? l->ticks : 0;
     numbers[S_TRACKING] = l->t_tracking;
     for (int array = 0; array < STATE_ARRAYS; array++)
-        for (int i = 0; i < AXES; i++) numbers[S_Q + AXES * array + i] = l->t_known >> array & 1 ? l->t_arrays[AXES * array + i] : NAN;
+        for (int i = 0; i < AXES; i++) numbers[S_ARRAYS + AXES * array + i] = l->t_known >> array & 1 ? l->t_arrays[AXES * array + i] : NAN;
     for (int i = 0; i < 6; i++) numbers[S_WRENCH + i] = isnan(l->t_wrench[0]) ? NAN : l->t_wrench[i];
     for (int i = 0; i < AXES; i++) numbers[S_POSE + i] = isnan(l->t_pose[0]) ? NAN : l->t_pose[i];
     numbers[S_E1] = l->t_e1;

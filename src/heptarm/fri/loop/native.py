@@ -77,10 +77,10 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     # output of the user's law
     ("real", AXES, "out_q out_tau"),
     ("real", 6, "out_wrench"),
-    # this cycle; t_known has one bit for each array of t_arrays, which are those of a state from S_Q on
+    # this cycle; t_known has one bit for each array of t_arrays, which are those of a state from S_ARRAYS on
     ("word", 1, "t_flags t_received t_answer t_size t_stamp t_known"),
     ("real", 1, "t_tracking"),
-    ("real", at.S_WRENCH - at.S_Q, "t_arrays"),
+    ("real", at.S_WRENCH - at.S_ARRAYS, "t_arrays"),
     ("real", 6, "t_wrench"),
     ("real", AXES, "t_pose"),
     ("real", 1, "t_e1"),

@@ -118,12 +118,7 @@ enum {
     S_SENT = 17,
     S_TICKS = 18,
     S_TRACKING = 19,
-    S_Q = 20,
-    S_TAU = 27,
-    S_TAU_CMD = 34,
-    S_TAU_EXT = 41,
-    S_Q_CMD = 48,
-    S_Q_IPO = 55,
+    S_ARRAYS = 20,
     S_WRENCH = 62,
     S_POSE = 68,
     S_E1 = 75,
@@ -135,8 +130,16 @@ enum {
     S_E1_IPO = 110,
     S_E1_SENT = 111,
     S_IO = 112,
+    S_Q = 20,
+    S_TAU = 27,
+    S_Q_CMD = 34,
+    S_TAU_CMD = 41,
+    S_TAU_EXT = 48,
+    S_Q_IPO = 55,
     STATE_WORDS = 122,
 };
+
+#define MONITORED {[1] = S_Q, [2] = S_TAU, [3] = S_Q_CMD, [4] = S_TAU_CMD, [5] = S_TAU_EXT} /* by number of the field in a message */
 
 /* words of a command */
 enum {

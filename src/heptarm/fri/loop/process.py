@@ -17,7 +17,9 @@ import signal
 import struct
 import subprocess
 import sys
+import threading
 import time
+from collections import deque
 from importlib.machinery import PathFinder
 from typing import Any
 
@@ -153,10 +155,31 @@ class Worker:
             [sys.executable, "-m", "heptarm.fri.loop.process", path],
             env={**os.environ, "PYTHONPATH": folders, "OPENBLAS_NUM_THREADS": "1"},
             stdin=subprocess.PIPE,
+            stderr=subprocess.PIPE,
         )
+        self._printed: deque[str] = deque(maxlen=20)
+        self._reader = threading.Thread(target=self._pass_on, name="heptarm-fri-log", daemon=True)
+        self._reader.start()
         assert self._process.stdin is not None
         with contextlib.suppress(BrokenPipeError), self._process.stdin as pipe:  # it may have ended already
             pipe.write(_SIZE.pack(len(law)) + law)
+
+    def _pass_on(self) -> None:
+        """Pass on what the process prints to its standard error, and keep the last lines."""
+        assert self._process.stderr is not None
+        with self._process.stderr as pipe:
+            for line in pipe:
+                text = line.decode(errors="replace")
+                self._printed.append(text.rstrip())
+                with contextlib.suppress(
+                    OSError, ValueError, AttributeError
+                ):  # there may be none, or a closed one
+                    sys.stderr.write(text)
+
+    def printed(self) -> str:
+        """The last lines that it printed to its standard error, once it has ended."""
+        self._reader.join(1.0)
+        return " | ".join(self._printed)
 
     def is_alive(self) -> bool:
         """Whether it runs."""
@@ -168,11 +191,13 @@ class Worker:
             self._process.wait(seconds)
         except subprocess.TimeoutExpired:
             return
+        self._reader.join(1.0)
 
     def kill(self) -> None:
         """Kill it."""
         self._process.kill()
         self._process.wait()
+        self._reader.join(1.0)
 
 
 class Loop:

@@ -9,7 +9,7 @@ import enum
 
 from heptarm.fri.guard.joint_guard import AXES, JointReport
 from heptarm.fri.guard.pose_guard import PARTS, PoseReport
-from heptarm.fri.protocol.messages import MAX_IO
+from heptarm.fri.protocol.messages import JOINTS, MAX_IO, MONITORED
 from heptarm.fri.session.statistics import BINS, COUNTERS
 from heptarm.io.shared import MemoryBlock, Note, Ring
 
@@ -48,11 +48,23 @@ assert COUNTS + len(COUNTERS) <= LIMITED_COUNTS
     S_TICKS,
 ) = range(19)
 S_TRACKING = 19
-S_Q, S_TAU, S_TAU_CMD, S_TAU_EXT, S_Q_CMD, S_Q_IPO = range(20, 62, 7)
-S_WRENCH, S_POSE, S_E1 = 62, 68, 75
-S_Q_SENT, S_TAU_SENT, S_WRENCH_SENT = 76, 83, 90
-S_POSE_IPO, S_POSE_SENT, S_E1_IPO, S_E1_SENT = 96, 103, 110, 111
-S_IO = 112
+#: The joint arrays: those that FRI monitors, then the interpolator's position.
+S_ARRAYS = 20
+ARRAYS = {
+    name: slice(S_ARRAYS + JOINTS * i, S_ARRAYS + JOINTS * (i + 1))
+    for i, name in enumerate((*MONITORED, "q_ipo"))
+}
+S_WRENCH = S_ARRAYS + JOINTS * len(ARRAYS)
+S_POSE = S_WRENCH + 6
+S_E1 = S_POSE + 7
+S_Q_SENT = S_E1 + 1
+S_TAU_SENT = S_Q_SENT + 7
+S_WRENCH_SENT = S_TAU_SENT + 7
+S_POSE_IPO = S_WRENCH_SENT + 6
+S_POSE_SENT = S_POSE_IPO + 7
+S_E1_IPO = S_POSE_SENT + 7
+S_E1_SENT = S_E1_IPO + 1
+S_IO = S_E1_SENT + 1
 STATE_WORDS = S_IO + MAX_IO
 #: Value of an enumeration that the controller did not send.
 ABSENT = -1

@@ -11,6 +11,7 @@ import struct
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from heptarm.values.io import SignalValue
 
 NAN7, NAN6 = (math.nan,) * 7, (math.nan,) * 6
 _ROW = struct.Struct(f"=18q{at.STATE_WORDS - 19}d")
+_ARRAYS = attrgetter(*at.ARRAYS)
 _KINDS = list(Kind)
 _NO_SIGNALS = (math.nan,) * m.MAX_IO
 
@@ -127,12 +129,7 @@ class Record:
             session.sent,
             max(0, self.ticks) if is_commanding else 0,
             sample.tracking,
-            *(sample.q or NAN7),
-            *(sample.tau or NAN7),
-            *(sample.tau_cmd or NAN7),
-            *(sample.tau_ext or NAN7),
-            *(sample.q_cmd or NAN7),
-            *(sample.q_ipo or NAN7),
+            *(number for array in _ARRAYS(sample) for number in array or NAN7),
             *wrench,
             *pose,
             e1,

@@ -307,32 +307,32 @@ class State:
     @property
     def q(self) -> Floats:
         """Measured position, shape (7,) [rad]."""
-        return self._floats[at.S_Q : at.S_Q + 7]
+        return self._floats[at.ARRAYS["q"]]
 
     @property
     def tau(self) -> Floats:
         """Measured torques, shape (7,) [Nm]."""
-        return self._floats[at.S_TAU : at.S_TAU + 7]
+        return self._floats[at.ARRAYS["tau"]]
 
     @property
     def tau_cmd(self) -> Floats:
         """Torques commanded by the controller, shape (7,) [Nm]."""
-        return self._floats[at.S_TAU_CMD : at.S_TAU_CMD + 7]
+        return self._floats[at.ARRAYS["tau_cmd"]]
 
     @property
     def tau_ext(self) -> Floats:
         """External torques, shape (7,) [Nm]."""
-        return self._floats[at.S_TAU_EXT : at.S_TAU_EXT + 7]
+        return self._floats[at.ARRAYS["tau_ext"]]
 
     @property
     def q_cmd(self) -> Floats:
         """Position commanded by the controller, shape (7,) [rad]; FRI 1.x only."""
-        return self._floats[at.S_Q_CMD : at.S_Q_CMD + 7]
+        return self._floats[at.ARRAYS["q_cmd"]]
 
     @property
     def q_ipo(self) -> Floats:
         """Interpolator's position, to which the overlay is added, shape (7,) [rad]."""
-        return self._floats[at.S_Q_IPO : at.S_Q_IPO + 7]
+        return self._floats[at.ARRAYS["q_ipo"]]
 
     @property
     def wrench(self) -> Floats:

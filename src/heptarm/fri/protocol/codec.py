@@ -130,8 +130,7 @@ def encode_monitoring(message: m.Monitoring, version: Version) -> bytes:
         _refuse(data.q_cmd is not None and traits.quaternions, "a commanded joint position", version)
         _refuse((data.pose or data.redundancy) and not traits.quaternions, "a Cartesian pose", version)
         _refuse(data.wrench is not None and not traits.framed, "an external force", version)
-        joints = zip((1, 2, 3, 4, 5), (data.q, data.tau, data.q_cmd, data.tau_cmd, data.tau_ext), strict=True)
-        body = b"".join(_put_joints(tag, values) for tag, values in joints)
+        body = b"".join(_put_joints(tag, getattr(data, name)) for name, (tag, _) in m.MONITORED.items())
         body += _put(6, None if data.wrench is None else put_packed(1, data.wrench))
         body += _join(_few(data.io, MAX_IO, "IO values"), lambda value: _put_io(8, value))
         body += (
@@ -366,11 +365,7 @@ def _monitor(sub: _Collected) -> m.MonitorData:
     pose = _sub(sub, 9, "measured pose")
     wrench = _sub(sub, 6, "external force")
     return m.MonitorData(
-        q=_joints(sub, 1, "measured position"),
-        tau=_joints(sub, 2, "measured torque"),
-        q_cmd=_joints(sub, 3, "commanded position"),
-        tau_cmd=_joints(sub, 4, "commanded torque"),
-        tau_ext=_joints(sub, 5, "external torque"),
+        **{name: _joints(sub, tag, text) for name, (tag, text) in m.MONITORED.items()},
         wrench=None if wrench is None else doubles(wrench.get(1, []), "external force", exactly=6),
         io=tuple(_io(one) for one in _subs(sub, 8, "IO values", MAX_IO)),
         pose=None if pose is None else _transformation(pose, quaternion=True),

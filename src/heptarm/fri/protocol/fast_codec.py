@@ -81,7 +81,7 @@ class CommandTemplate:
 class Sample:
     """Values of a monitoring message that a control law needs, without the cost of decoding all of it.
 
-    Joint arrays are tuples of 7, None where the message has none: `q`, `tau`, `q_cmd`, `tau_cmd`, `tau_ext`, `q_ipo`.
+    Joint arrays are tuples of 7, None where the message has none: those of `messages.MONITORED`, and `q_ipo`.
 
     Attributes:
         sequence: the controller's counter.
@@ -96,16 +96,12 @@ class Sample:
         "_full",
         "_version",
         "connection",
-        "q",
-        "q_cmd",
         "q_ipo",
         "robot",
         "sequence",
         "stamp",
-        "tau",
-        "tau_cmd",
-        "tau_ext",
         "tracking",
+        *m.MONITORED,
     )
 
     q: m.Joints | None
@@ -142,8 +138,9 @@ def _sample(datagram: bytes, version: Version, full: m.Monitoring) -> Sample:
     monitor, ipo = full.monitor or m.MonitorData(), full.ipo or m.IpoData()
     sample._datagram, sample._version, sample._full = datagram, version, full
     sample.sequence, sample.robot, sample.connection = full.header.sequence, full.robot, full.connection
-    sample.q, sample.tau, sample.q_cmd = monitor.q, monitor.tau, monitor.q_cmd
-    sample.tau_cmd, sample.tau_ext, sample.q_ipo = monitor.tau_cmd, monitor.tau_ext, ipo.q
+    for name in m.MONITORED:
+        setattr(sample, name, getattr(monitor, name))
+    sample.q_ipo = ipo.q
     sample.stamp = (monitor.stamp.seconds, monitor.stamp.nanoseconds) if monitor.stamp else (0, 0)
     sample.tracking = math.nan if ipo.tracking is None else ipo.tracking
     return sample
@@ -162,8 +159,6 @@ class _Layout:
     array and enumerations. Messages with IO, poses or transformations have no layout and are decoded in full.
     """
 
-    _ARRAYS = ((1, "q"), (2, "tau"), (3, "q_cmd"), (4, "tau_cmd"), (5, "tau_ext"))
-
     def __init__(self, datagram: bytes, full: m.Monitoring, version: Version) -> None:
         self._version = version
         self._robot, self._connection = full.robot, full.connection
@@ -173,9 +168,8 @@ class _Layout:
         if monitor is None or monitor.stamp is None or set(sections) - {1, 2, 3, 4, 5} or 4 not in sections:
             raise MalformedMessage("no fixed layout")
         self._before = (put_bytes(2, sections[2]) if 2 in sections else b"") + b"\x1a"
-        names = [name for _, name in self._ARRAYS]
-        present = [tag for tag, name in self._ARRAYS if getattr(monitor, name) is not None]
-        arrays = b"".join(put_bytes(tag, put_unpacked(1, _ZERO)) for tag in present)
+        present = {name: tag for name, (tag, _) in m.MONITORED.items() if getattr(monitor, name) is not None}
+        arrays = b"".join(put_bytes(tag, put_unpacked(1, _ZERO)) for tag in present.values())
         if monitor.io or monitor.wrench or monitor.pose or monitor.redundancy:  # variable positions
             raise MalformedMessage("no fixed layout")
         tracked = ipo is not None and ipo.tracking is not None
@@ -192,8 +186,8 @@ class _Layout:
             )
         self._front, self._front_runs = _struct_of(arrays, len(present) * 7)
         self._back, self._back_runs = _struct_of(after, 7 * bool(ipo_array) + tracked)
-        self._slots = [(names[tag - 1], 7 * index) for index, tag in enumerate(present)]
-        self._absent = [name for name in names if getattr(monitor, name) is None]
+        self._slots = [(name, 7 * index) for index, name in enumerate(present)]
+        self._absent = [name for name in m.MONITORED if name not in present]
         self._has_ipo, self._tracked = bool(ipo_array), tracked
 
     def read(self, message: bytes, datagram: bytes) -> Sample | None:

@@ -7,7 +7,7 @@ arrays have 7 entries.
 from __future__ import annotations
 
 import enum
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 
 Joints = tuple[float, ...]
 
@@ -175,20 +175,34 @@ class ConnectionInfo:
     multiplier: int | None = None
 
 
+def _array(tag: int, text: str) -> dict[str, object]:
+    """What codecs know of a joint array: the number of its field in a message, and what it is."""
+    return {"tag": tag, "text": text}
+
+
 @dataclass(frozen=True, slots=True)
 class MonitorData:
     """Measured values. `q_cmd` exists in 1.x only, `pose` and `redundancy` in 2.x, `wrench` in 2.7."""
 
-    q: Joints | None = None
-    tau: Joints | None = None
-    q_cmd: Joints | None = None
-    tau_cmd: Joints | None = None
-    tau_ext: Joints | None = None
+    q: Joints | None = field(default=None, metadata=_array(1, "measured position"))
+    tau: Joints | None = field(default=None, metadata=_array(2, "measured torque"))
+    q_cmd: Joints | None = field(default=None, metadata=_array(3, "commanded position"))
+    tau_cmd: Joints | None = field(default=None, metadata=_array(4, "commanded torque"))
+    tau_ext: Joints | None = field(default=None, metadata=_array(5, "external torque"))
     wrench: tuple[float, ...] | None = None
     io: tuple[IoValue, ...] = ()
     pose: Transformation | None = None
     redundancy: Redundancy | None = None
     stamp: TimeStamp | None = None
+
+
+#: The joint arrays of `MonitorData` by name: number of the field in a message, and what it is. The codecs, the shared
+#: memory and the simulator's messages follow this table.
+MONITORED: dict[str, tuple[int, str]] = {
+    one.name: (one.metadata["tag"], one.metadata["text"])
+    for one in fields(MonitorData)
+    if "tag" in one.metadata
+}
 
 
 @dataclass(frozen=True, slots=True)

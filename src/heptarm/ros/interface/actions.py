@@ -338,7 +338,7 @@ class _ReplayGoal:
             context.arm.replay,
             _trajectory(context, goal),
             by=goal.by or "servo",
-            pace=goal.pace or 1.0,
+            speed_scaling=goal.speed_scaling or 1.0,
             until=driver.guard if until is None else until,
             watchdog=driver.configuration.values["servo.watchdog"],
             on_progress=self._on_progress,

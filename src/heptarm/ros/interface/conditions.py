@@ -11,18 +11,9 @@ from collections.abc import Callable
 from typing import Any
 
 from heptarm.errors import CommandRejected, HeptarmError
-from heptarm.values.condition.condition import Condition, SignalIs, check_condition
-from heptarm.values.condition.signals import (
-    Component,
-    Force,
-    IoSignals,
-    Path,
-    Torque,
-    force,
-    io,
-    path,
-    torque,
-)
+from heptarm.values.condition.condition import Condition, check_condition
+from heptarm.values.condition.force import Component, Force, Torque, force, torque
+from heptarm.values.condition.signals import IoSignals, Path, SignalIs, io, path
 
 #: Most characters of a text.
 _LONGEST = 2000

@@ -9,8 +9,8 @@ from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.ros.interface.conditions import condition_of
 from heptarm.ros.interface.messages import RosAdapter, class_of, put
 from heptarm.values.condition.collision import Collision
-from heptarm.values.condition.trigger import Notify, SetOutput, Triggered
-from heptarm.values.motion.motion import Motion
+from heptarm.values.condition.trigger import Notify, SetOutput
+from heptarm.values.motion.motion import Motion, Triggered
 from heptarm.values.result import MotionEvent
 
 

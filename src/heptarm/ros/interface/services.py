@@ -177,7 +177,7 @@ def info(context: NodeContext, request: Any) -> ServiceResponse:
         "cabinet": arm.cabinet,
         "software": arm.software,
         "is_virtual": arm.is_virtual,
-        "pace": float(arm.pace),
+        "real_time_factor": float(arm.real_time_factor),
         "controller": arm.controller,
     }
     limits = {name: getattr(robot, name).tolist() for name in ("q_min", "q_max", "dq_max", "tau_max")}

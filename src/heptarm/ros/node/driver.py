@@ -95,7 +95,7 @@ class Driver:
         self._task: ArmTask | None = None
         self._arm = connect(
             values["target"] or None,
-            key=values["key"] or None,
+            key_file=values["key_file"] or None,
             state_rate=values["state_rate"],
             name=_name(),
             groups=(*GROUPS, "io") if values["publish_signals"] else GROUPS,

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from heptarm.arm.watchdog import ROS_NODE, TARGETS
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.ros.trajectory.check import GoalRules
 from heptarm.ros.trajectory.fri_execution import FriOptions
@@ -77,13 +78,17 @@ PARAMETERS = (
         "",
         'target of the connection, as in heptarm.connect; "": the environment variable HEPTARM_TARGET',
     ),
-    Parameter("key", "", "pre-shared key of the cabinet, if it has one"),
+    Parameter(
+        "key_file",
+        "",
+        'file with the pre-shared key of the cabinet; "": HEPTARM_KEY, or the key stored for the target',
+    ),
     Parameter(
         "watchdog",
-        1.0,
+        ROS_NODE.default,
         "the cabinet stops the arm after this time without a message of the node [s]",
-        0.1,
-        10.0,
+        ROS_NODE.low,
+        ROS_NODE.high,
     ),
     Parameter("autostart", True, "configure and activate automatically, retrying until it works"),
     Parameter("prefix", "", "prefix of the names of joints and frames, for several arms in one scene"),
@@ -112,8 +117,8 @@ PARAMETERS = (
         "servo.watchdog",
         ServoOptions().watchdog,
         "the cabinet brakes the arm after this time without a target [s]",
-        0.005,
-        2.0,
+        TARGETS.low,
+        TARGETS.high,
     ),
     Parameter(
         "servo.engine",

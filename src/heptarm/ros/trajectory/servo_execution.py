@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.motion.servo import JointServo, default_watchdog
+from heptarm.arm.motion.servo import JointServo
+from heptarm.arm.watchdog import TARGETS
 from heptarm.io.clock import Clock
 from heptarm.ros.trajectory.execution import GoalListener
 from heptarm.ros.trajectory.runner import ControlStep, ExecutionSettings
@@ -35,7 +36,7 @@ class ServoOptions:
     """
 
     rate: float = 100.0
-    watchdog: float = default_watchdog(1.0 / rate)
+    watchdog: float = TARGETS.time(period=1.0 / rate)
     engine: Literal["smart", "direct"] = "direct"
     horizon: float = 0.1
     speed: float = 1.0

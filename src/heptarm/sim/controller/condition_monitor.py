@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from math import hypot, inf, sqrt
-from typing import Protocol, TypeAlias
+from math import hypot, inf
+from typing import Protocol
 
 import numpy as np
 
@@ -63,8 +63,8 @@ class ConditionInputs:
         """Value of a signal."""
         return float(self._signals[index])
 
-    def wrench(self, frame: WrenchFrame) -> tuple[Vec, Vec]:
-        """Force and torque at a frame's origin, in its axes."""
+    def wrench(self, frame: WrenchFrame) -> tuple[float, ...]:
+        """Force and torque at a frame's origin, in its axes, 6 entries."""
         fx, fy, fz, tx, ty, tz = self._wrench.tolist()
         if self._pose is None:
             self._pose = flange(self._robot, self._q.tolist())
@@ -78,7 +78,7 @@ class ConditionInputs:
         torque = (tx + dy * fz - dz * fy, ty + dz * fx - dx * fz, tz + dx * fy - dy * fx)
         if frame.are_axes_carried:
             force, torque = _turned(columns, force), _turned(columns, torque)
-        return _turned(frame.axes, force), _turned(frame.axes, torque)
+        return *_turned(frame.axes, force), *_turned(frame.axes, torque)
 
 
 def _turned(columns: tuple[Vec, Vec, Vec], v: Vec) -> Vec:
@@ -112,9 +112,6 @@ class WrenchFrame:
 
 
 Predicate = Callable[[ConditionInputs], bool]
-WrenchCondition: TypeAlias = (
-    seam.ForceAbove | seam.NormalForceAbove | seam.ShearForceAbove | seam.ForceOutside | seam.TorqueOutside
-)
 
 
 @dataclass(slots=True, eq=False)
@@ -318,17 +315,8 @@ def _predicate(one: seam.Condition, points: list[PathPoint]) -> Predicate:
         return lambda inputs: not one.low <= inputs.signal(one.place) <= one.high
     if isinstance(one, seam.JointTorqueOutside):
         return lambda inputs: not one.low <= float(inputs.external[one.joint]) <= one.high
-    return _of_wrench(one)
-
-
-def _of_wrench(one: WrenchCondition) -> Predicate:
     frame = WrenchFrame.of(one.frame)
-    if isinstance(one, seam.ForceAbove):
-        return lambda inputs: hypot(*inputs.wrench(frame)[0]) > one.threshold
-    if isinstance(one, seam.NormalForceAbove):
-        return lambda inputs: abs(inputs.wrench(frame)[0][one.axis]) > one.threshold
-    if isinstance(one, seam.ShearForceAbove):
-        others = [i for i in range(3) if i != one.axis]
-        return lambda inputs: sqrt(sum(inputs.wrench(frame)[0][i] ** 2 for i in others)) > one.threshold
-    which = 0 if isinstance(one, seam.ForceOutside) else 1
-    return lambda inputs: not one.low <= inputs.wrench(frame)[which][one.axis] <= one.high
+    if isinstance(one, seam.WrenchAbove):
+        chosen = [i for i, component in enumerate(seam.WrenchComponents) if component in one.components]
+        return lambda inputs: hypot(*(inputs.wrench(frame)[i] for i in chosen)) > one.threshold
+    return lambda inputs: not one.low <= inputs.wrench(frame)[one.component] <= one.high

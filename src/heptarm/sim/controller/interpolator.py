@@ -477,7 +477,7 @@ class Interpolator:
         except Unreachable as error:
             self._fail(run, f"the path is not reachable: {error.text}")
             return nan, nan
-        run.ended = follower.is_still if run.braking else follower.resting > order.goal_timeout
+        run.ended = follower.is_still if run.braking else follower.resting > order.servo_timing.goal_timeout
         axis = self.command.beyond(there)
         if axis is not None:
             self._fail(run, f"Command Position violates limit A{axis + 1}")

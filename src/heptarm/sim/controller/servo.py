@@ -13,10 +13,10 @@ import numpy as np
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
 
 from heptarm.model.kinematics import forward
-from heptarm.sim.planning.command import Order
+from heptarm.sim.planning.command import DEFAULT_TIMING, Order
 from heptarm.sim.planning.path import TcpInverseKinematics
 from heptarm.sim.planning.targets import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT
-from heptarm.sim.seam import StraightLimits
+from heptarm.sim.seam import ServoTiming, StraightLimits
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose, multiply, rotation
 from heptarm.values.robot import RobotModel
@@ -134,25 +134,25 @@ class StraightServoLimits:
         acceleration: shape (6,) [m/s², rad/s²].
         jerk: shape (6,) [m/s³, rad/s³].
         axes: that frame's axes as columns in the base, shape (3, 3).
-        minimum_time: least duration of a trajectory to a target [s].
+        timing: times of the motion.
     """
 
     velocity: Array
     acceleration: Array
     jerk: Array
     axes: Array
-    minimum_time: float
+    timing: ServoTiming
 
     @staticmethod
     def of(order: Order) -> StraightServoLimits:
         """Limits of a command; defaults are those of a linear motion, and jerk scales with acceleration."""
         default = np.repeat((CARTESIAN_DEFAULT, ORIENTATION_DEFAULT), 3, axis=0).T
-        given = order.straight or StraightLimits()
+        given = order.straight_limits or StraightLimits()
         velocity = np.where(np.isnan(given.velocity), default[0], given.velocity)
         acceleration = np.where(np.isnan(given.acceleration), default[1], given.acceleration)
         axes = np.eye(3) if order.reference is None else rotation(order.reference)
         return StraightServoLimits(
-            velocity, acceleration, acceleration * default[2] / default[1], axes, order.minimum_time
+            velocity, acceleration, acceleration * default[2] / default[1], axes, order.servo_timing
         )
 
     @property
@@ -204,7 +204,7 @@ class StraightFollower:
         (velocity, acceleration, jerk), speed, change = _along(distance, free, speed, change)
         self._otg.limit(acceleration, jerk, velocity=velocity)
         start = (_unrotated(place), speed, change)
-        if self._otg.aim(start, target, speed=np.zeros(6), minimum=self._limits.minimum_time):
+        if self._otg.aim(start, target, speed=np.zeros(6), minimum=self._limits.timing.min_trajectory_time):
             self._centre, self.resting = centre, 0.0
 
     def advance(self, dt: float) -> Array:
@@ -335,15 +335,13 @@ class ServoLimits:
         velocity: largest speed of each axis, shape (7,) [rad/s].
         acceleration: shape (7,) [rad/s²].
         jerk: shape (7,) [rad/s³].
-        minimum_time: least duration of a trajectory to a target [s].
-        speed_timeout: how long the velocity of a target is held after it was passed [s].
+        timing: times of the motion.
     """
 
     velocity: Array
     acceleration: Array
     jerk: Array
-    minimum_time: float
-    speed_timeout: float
+    timing: ServoTiming
 
     @staticmethod
     def of(
@@ -351,16 +349,14 @@ class ServoLimits:
         *,
         velocity: tuple[float, ...],
         acceleration: tuple[float, ...],
-        minimum_time: float = 0.02,
-        speed_timeout: float = 0.1,
+        timing: ServoTiming = DEFAULT_TIMING,
     ) -> ServoLimits:
         """From fractions of a robot's limits, seven each; jerk scales with acceleration."""
         return ServoLimits(
             np.array(velocity) * robot.dq_max,
             np.array(acceleration) * robot.ddq_max,
             np.array(acceleration) * robot.dddq_max,
-            minimum_time,
-            speed_timeout,
+            timing,
         )
 
 
@@ -398,7 +394,7 @@ class SmartFollower:
             if dq is None
             else np.clip(dq, -MARGIN * self._limits.velocity, MARGIN * self._limits.velocity)
         )
-        if self._otg.aim(self._state(), q, speed=pass_at, minimum=self._limits.minimum_time):
+        if self._otg.aim(self._state(), q, speed=pass_at, minimum=self._limits.timing.min_trajectory_time):
             self._passes = bool(pass_at.any())
             self.resting = 0.0
 
@@ -410,7 +406,7 @@ class SmartFollower:
         self._otg.time += dt
         over = self._otg.over
         if over >= 0.0:
-            if self._passes and over > self._limits.speed_timeout:
+            if self._passes and over > self._limits.timing.speed_timeout:
                 self._halt(self._state())
             elif not self._passes:
                 self.resting = over
@@ -469,7 +465,7 @@ class DirectFollower:
         """Set the target, shape (7,) [rad]; its velocity follows from the next targets."""
         self._target = q.copy()
         least = float((np.abs(q - self._q) / self._limits.velocity).max())
-        self._left = max(self._limits.minimum_time, least)
+        self._left = max(self._limits.timing.min_trajectory_time, least)
         self.resting = 0.0
 
     def advance(self, dt: float) -> Array:
@@ -513,7 +509,6 @@ def follower(robot: RobotModel, order: Order, here: Array) -> Follower:
         robot,
         velocity=order.joint_velocity,
         acceleration=order.joint_acceleration,
-        minimum_time=order.minimum_time,
-        speed_timeout=order.speed_timeout,
+        timing=order.servo_timing,
     )
     return (DirectFollower if order.kind == "direct" else SmartFollower)(limits, here)

@@ -44,11 +44,11 @@ def report(
             7, reading.safety, (reading.drives,) * 7, reading.operation_mode, reading.control_mode
         ),
         monitor=m.MonitorData(
-            q=reading.q,
-            tau=reading.tau,
-            q_cmd=None if traits.quaternions else reading.q_cmd,
-            tau_cmd=reading.tau_cmd,
-            tau_ext=reading.tau_ext,
+            **{
+                name: getattr(reading, name)
+                for name in m.MONITORED
+                if name != "q_cmd" or not traits.quaternions
+            },
             wrench=reading.wrench if traits.framed else None,
             io=signals,
             pose=cartesian.transformation(robot, reading.q) if traits.quaternions else None,
@@ -168,11 +168,7 @@ class MonitoringEncoder:
                 signals = self._section(3, data.io, only, inside=True)
         return put_bytes(
             3,
-            _array(1, data.q)
-            + _array(2, data.tau)
-            + _array(3, data.q_cmd)
-            + _array(4, data.tau_cmd)
-            + _array(5, data.tau_ext)
+            b"".join(_array(tag, getattr(data, name)) for name, (tag, _) in m.MONITORED.items())
             + (b"" if data.wrench is None else put_bytes(6, put_packed(1, data.wrench)))
             + signals
             + _pose(9, data.pose)

@@ -14,6 +14,7 @@ from dataclasses import replace
 from heptarm.errors import ConnectFailed
 from heptarm.fri.protocol.messages import DriveState
 from heptarm.fri.protocol.version import MAX_DATAGRAM
+from heptarm.io.udp import own_address
 from heptarm.sim.fri.controller import MOST_REFUSALS, Controller
 from heptarm.sim.fri.faults import FaultScenario, FaultyLink
 from heptarm.sim.fri.overlay import MotionOverlay, OverlayTarget, Reading
@@ -66,7 +67,7 @@ class Server:
         arm: the arm under the overlays.
         client: destination of the messages, IPv4.
         port: source port; None, or the client's own on this machine: see `source_port`; 0: any free one.
-        bind: own address; empty: all.
+        bind: own address; empty: the one that routes to the client.
         speed: seconds of the arm's time per second; 0: the arm's time does not depend on the clock.
         clock: monotonic time [ns].
         scenario: faults to inject.
@@ -99,6 +100,7 @@ class Server:
         self._client = _resolved(client)
         self._is_client_here = is_here(self._client[0])
         self._peers = {self._client}
+        bind = bind or _towards(self._client)
         shared = port == client[1] and self._is_client_here
         self._socket = _beside(bind, client) if port is None or shared else _bound(bind, port)
         self.port: int = self._socket.getsockname()[1]
@@ -242,6 +244,14 @@ def _resolved(client: Address) -> Address:
         return socket.gethostbyname(host), port
     except (OSError, UnicodeError) as error:
         raise ConnectFailed(f"the FRI client {host!r} has no IPv4 address: {error}") from error
+
+
+def _towards(client: Address) -> str:
+    """Own address from which the client is reached; empty, which means all, while there is no route to it."""
+    try:
+        return own_address(client[0])
+    except ConnectFailed:
+        return ""
 
 
 def _bound(bind: str, port: int) -> socket.socket:

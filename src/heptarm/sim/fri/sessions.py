@@ -52,20 +52,16 @@ class PlantArm:
         return self.plant.robot
 
     @property
-    def ring(self) -> SharedState:
+    def shared(self) -> SharedState:
         """The plant's shared memory."""
-        return self.plant.ring
+        return self.plant.shared
 
     def reading(self) -> Reading:
         """The state after the last tick."""
         state, safety = self.plant.snapshot, self.plant.safety
         return Reading(
-            tuple(state.q.tolist()),
-            tuple(state.q_cmd.tolist()),
-            tuple(self.plant.interpolated.tolist()),
-            tau=tuple(state.tau.tolist()),
-            tau_cmd=tuple(state.tau_cmd.tolist()),
-            tau_ext=tuple(state.tau_ext.tolist()),
+            **{name: tuple(getattr(state, name).tolist()) for name in m.MONITORED},
+            q_ipo=tuple(self.plant.interpolated.tolist()),
             wrench=tuple(state.wrench.tolist()),
             safety=m.Safety.STOP_1
             if safety.stop_requested
@@ -187,7 +183,7 @@ class Sessions:
         Raises:
             HeptarmError: an illegal configuration, a port in use, an address that does not resolve.
         """
-        image = self._plant.ring.signals
+        image = self._plant.shared.signals
         configuration = SessionConfiguration(
             self._version,
             period_ms=period_ms,

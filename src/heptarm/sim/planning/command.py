@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from math import nan
 from typing import Protocol
 
-from heptarm.sim.seam import TICK_NS, Condition, StraightLimits
+from heptarm.sim.seam import TICK_NS, Condition, ServoTiming, StraightLimits
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.motion.orientation import VARIABLE, Orientation
@@ -17,6 +17,7 @@ TICK = TICK_NS / 1e9
 
 Seven = tuple[float, ...]
 _FULL: Seven = (1.0,) * 7
+DEFAULT_TIMING = ServoTiming()
 
 
 class MotionListener(Protocol):
@@ -92,10 +93,8 @@ class Order:
         duration: of a hold [s]; NaN: until cancelled.
         mode: control mode; None: position.
         axes: of the mode's frame as a quaternion in the base; None: as in the mode, "tool" or "base".
-        minimum_time: least duration of a trajectory to a servo target [s].
-        goal_timeout: a servo motion ends this long after it reached its target, without a new one [s].
-        speed_timeout: how long the velocity of a servo target is held after it was passed [s].
-        straight: limits of a straight servo motion; None: the defaults.
+        servo_timing: times of a servo motion.
+        straight_limits: limits of a straight servo motion; None: the defaults.
         listener: receives start and end.
         part_listener: receives the parts of a batch or a spline.
         watches: break conditions and triggers, of the parts as well.
@@ -126,10 +125,8 @@ class Order:
     duration: float = nan
     mode: Mode | None = None
     axes: Seven | None = None
-    minimum_time: float = 0.02
-    goal_timeout: float = 30.0
-    speed_timeout: float = 0.1
-    straight: StraightLimits | None = None
+    servo_timing: ServoTiming = DEFAULT_TIMING
+    straight_limits: StraightLimits | None = None
     listener: MotionListener | None = field(default=None, compare=False)
     part_listener: PartListener | None = field(default=None, compare=False)
     watches: tuple[ConditionWatch, ...] = field(default=(), compare=False)

@@ -17,7 +17,7 @@ from heptarm.sim.control.controller import ActiveLaw
 from heptarm.sim.control.laws import MeasuredState, PositionLaw, Superposition
 from heptarm.sim.controller.interpolator import Interpolator
 from heptarm.sim.controller.safety import SafetyController, StopRequest
-from heptarm.sim.planning.command import TICK, Order
+from heptarm.sim.planning.command import TICK
 from heptarm.sim.plant.drive_monitor import DriveMonitor
 from heptarm.sim.plant.external_load import ExternalLoad
 from heptarm.sim.plant.io_image import IoImage
@@ -112,8 +112,8 @@ class Snapshot:
 class _Inputs:
     """What the controller reads from the shared state; see `ControllerInputs`."""
 
-    def __init__(self, ring: SharedState) -> None:
-        self._header, self.signals, self.target = ring.reals, ring.signals, ring.target
+    def __init__(self, shared: SharedState) -> None:
+        self._header, self.signals, self.target = shared.reals, shared.signals, shared.target
 
     @property
     def override(self) -> float:
@@ -129,6 +129,9 @@ class Plant:
         q: joint positions at the start, shape (7,) [rad].
         boxes: fixed boxes around it.
         monitored: whether drives trip; see `heptarm.sim.plant.drive_monitor`.
+
+    Attributes:
+        submit: plans a command and queues it; see `heptarm.sim.controller.queue.MotionQueue.submit`.
     """
 
     def __init__(
@@ -144,7 +147,7 @@ class Plant:
         self.data = mujoco.MjData(self.model)
         self.data.qpos[:7] = q
         mujoco.mj_forward(self.model, self.data)
-        self.ring = SharedState()
+        self.shared = SharedState()
         self.tick_count = 0
         self.on_wake: Callable[[int], None] | None = None
         self._views()
@@ -154,7 +157,7 @@ class Plant:
             deque()
         )  # to take effect in the next tick
         self._control = ActiveLaw(self.robot, self.model, self.data)
-        self.signals = IoImage(self.ring.signals)
+        self.signals = IoImage(self.shared.signals)
         self._sensed = MeasuredState(
             self._q, self._dq, self._mass[:7, :7], self._bias, self._passive, self._q, self._q, self._q
         )
@@ -167,9 +170,10 @@ class Plant:
         self._monitor = DriveMonitor(self.robot) if monitored else None
         self._tripped = False  # by a drive's own supervision
         self.interpolator = Interpolator(
-            self.robot, _Inputs(self.ring), self._sensed, self._load, self._control, self.safety
+            self.robot, _Inputs(self.shared), self._sensed, self._load, self._control, self.safety
         )
         self.condition_monitor = self.interpolator.condition_monitor
+        self.submit = self.interpolator.queue.submit
         self._write(0, 0.0, nan)
 
     def _views(self) -> None:
@@ -192,27 +196,16 @@ class Plant:
     @property
     def override(self) -> float:
         """Factor on every programmed speed, 0 to 1; Java writes it directly into the shared state."""
-        return float(self.ring.reals[HeaderWords.OVERRIDE])
+        return float(self.shared.reals[HeaderWords.OVERRIDE])
 
     @override.setter
     def override(self, value: float) -> None:
-        self.ring.reals[HeaderWords.OVERRIDE] = value
+        self.shared.reals[HeaderWords.OVERRIDE] = value
 
     @property
     def idle(self) -> bool:
         """Whether no command is running or waiting."""
         return self.interpolator.queue.idle
-
-    def submit(self, order: Order) -> None:
-        """Plan a command from the end of the queue and append it.
-
-        While the arm brakes, its final position is not known; then the command is planned when its turn comes, and
-        its listener receives a planning error.
-
-        Raises:
-            PlanError: it cannot be planned; nothing has changed.
-        """
-        self.interpolator.queue.submit(order)
 
     def cancel(self, order_id: int | None = None) -> None:
         """Cancel a command (None: all): the running one brakes on its path, waiting ones are dropped."""
@@ -365,7 +358,7 @@ class Plant:
         self._brakes = PositionLaw.continuing(self._tau_cmd, self._braked)
 
     def _write(self, order: int, progress: float, remaining: float) -> None:
-        k, r = self.tick_count, self.ring
+        k, r = self.tick_count, self.shared
         slot = k % SLOTS
         words, reals = r.ints[slot], r.floats[slot]
         words[StateWords.SEQ] = 2 * k + 1
@@ -421,7 +414,7 @@ class Plant:
     @property
     def snapshot(self) -> Snapshot:
         """The newest state, copied."""
-        slot = self.ring.floats[self.tick_count % SLOTS]
+        slot = self.shared.floats[self.tick_count % SLOTS]
         return Snapshot(
             self.tick_count * TICK,
             self._q.copy(),

@@ -6,6 +6,7 @@ reader recognises a torn one; so is the servo target, which Java writes. The lay
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -95,3 +96,30 @@ class SharedState:
             return None
         self._target_seen = seq
         return NewestTarget(order, q, dq if kind == TargetKind.POSITION_WITH_VELOCITY else None)
+
+
+class Trace:
+    """Writes the state after each tick to a file, with which readings of the state can be compared.
+
+    Args:
+        shared: where the states are.
+        path: of the file, which is replaced.
+    """
+
+    def __init__(self, shared: SharedState, path: Path) -> None:
+        self._shared = shared
+        self._file = path.open("wb", buffering=1 << 18)
+
+    def append(self) -> None:
+        """Write the newest state; called after each tick."""
+        self._file.write(self._shared.ints[int(self._shared.header[HeaderWords.NEWEST]) % SLOTS].data)
+
+    def close(self) -> None:
+        """Write what is left."""
+        self._file.close()
+
+    @staticmethod
+    def read(path: Path) -> np.ndarray:
+        """States of a file as floats, shape (ticks, StateWords.SIZE); a last state that is not complete is left out."""
+        words = np.fromfile(path, dtype=np.float64)
+        return words[: len(words) - len(words) % StateWords.SIZE].reshape(-1, StateWords.SIZE)

@@ -9,6 +9,7 @@ standard input is closed, which also happens when its parent is killed.
 from __future__ import annotations
 
 import argparse
+import gc
 import json
 import logging
 import os
@@ -23,9 +24,11 @@ from typing import Any, get_args, get_type_hints
 
 from heptarm.errors import HeptarmError
 from heptarm.fri.protocol.version import Version
+from heptarm.io.keys import find_key
 from heptarm.sim.fri.sessions import Sessions
 from heptarm.sim.plant.payload import parse_payload
 from heptarm.sim.plant.plant import Plant
+from heptarm.sim.plant.shared_state import Trace
 from heptarm.sim.plant.world import Box
 from heptarm.sim.runtime import project
 from heptarm.sim.runtime.addresses import AddressMap
@@ -73,7 +76,7 @@ def process_data(options: SimulatorOptions) -> dict[str, project.Value]:
     """Process data of the project, overridden by the command line; a value keeps its type in the project.
 
     Raises:
-        ValueError: a value does not fit its type, or the file is not a project file.
+        ValueError: a value does not fit its type, the file is not a project file, or the key cannot be used.
     """
     data: dict[str, project.Value] = {"heptarm.max_rate": 1000.0, "heptarm.key": ""}
     if options.project is not None:
@@ -81,8 +84,8 @@ def process_data(options: SimulatorOptions) -> dict[str, project.Value]:
         for name, value in project.read_process_data(options.project).items():
             data[name] = addresses.apply(value) if isinstance(value, str) else value
     data |= {"heptarm.bind": options.host, "heptarm.port": options.port}
-    if options.key:
-        data["heptarm.key"] = options.key
+    if key := find_key(key_file=options.key_file):
+        data["heptarm.key"] = key
     for pair in options.data:
         name, equals, text = pair.partition("=")
         if not equals:
@@ -113,13 +116,15 @@ class VirtualCabinet:
         self.operator = SimulatedOperator(self.plant)
         for fault in options.fault:
             self.operator.schedule(fault)
-        self.loop = RealtimeLoop(self.plant.ring, self.tick, speed=options.speed)
+        self.loop = RealtimeLoop(self.plant.shared, self.tick, speed=options.speed)
         jvm.start(options.classpath, foreign=self.is_foreign)
         import jpype
 
         self._system = jpype.JClass("java.lang.System")
         if not options.verbose and not self.is_foreign:
             jpype.JClass("java.util.logging.LogManager").getLogManager().reset()
+        self._java_memory = java_plant.java_memory
+        self._trace = None if options.trace is None else Trace(self.plant.shared, options.trace)
         self._station = java_plant.open_station(self.plant, self.sessions)
         for name, value in data.items():
             self._station.setProcessData(name, java_plant.boxed(value))
@@ -151,6 +156,8 @@ class VirtualCabinet:
         self.sessions.tick()
         self.loop.answer_gap = ANSWER_GAP if self.sessions.is_any_open else 0.0
         self.plant.tick()
+        if self._trace is not None:
+            self._trace.append()
 
     @property
     def is_foreign(self) -> bool:
@@ -175,10 +182,18 @@ class VirtualCabinet:
             f"the cabinet application did not start: {self.host.failure() or 'no reason given'}"
         )
 
+    def close(self) -> None:
+        """Write the statistics for the last time, and what is left of the trace."""
+        self.write_stats()
+        if self._trace is not None:
+            self._trace.close()
+
     def write_stats(self) -> None:
-        """Write the statistics of the realtime loop to the file of the option `stats`."""
+        """Write statistics of the realtime loop and of memory to the file of the option `stats`."""
         if self.options.stats is not None:
-            text = json.dumps(asdict(self.loop.statistics))
+            java, objects = self._java_memory(), gc.get_objects()
+            counts = {"objects": len(objects), "types": sum(isinstance(one, type) for one in objects)}
+            text = json.dumps(asdict(self.loop.statistics) | {"memory": counts | java})
             partial = self.options.stats.with_suffix(".part")
             partial.write_text(text, encoding="utf-8")
             partial.replace(self.options.stats)
@@ -272,7 +287,7 @@ def main(argv: list[str] | None = None) -> int:
             raise ValueError(f"drive_monitoring must be on or off, got {options.drive_monitoring!r}")
         if options.project is not None:
             project.read_project(options.project)
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError) as error:  # a CommandRejected is a ValueError
         print(json.dumps({"ready": False, "error": str(error)}), flush=True)
         return 2
     try:
@@ -333,7 +348,7 @@ def _end(cabinet: VirtualCabinet) -> None:
     while not done.is_set():
         cabinet.tick()
         time.sleep(0.0005)
-    cabinet.write_stats()
+    cabinet.close()
 
 
 if __name__ == "__main__":

@@ -1,17 +1,21 @@
 """The plant as Java sees it: motion orders, conditions, FRI sessions, and the project's templates.
 
-Java reads states from the shared memory without asking Python; only commands cross into Python, where they are planned
-in the calling thread. They come as the bytes that `heptarm.sim.seam` decodes.
+Java reads states from the shared memory without asking Python; only commands cross into Python. Threads of Python take
+them from a queue of Java: JPype makes a type for the Java objects of each thread state of Python, a Java thread has a
+new thread state in each call, and the types are never freed (1.6 kB for each call with JPype 1.7). Orders and
+conditions come as the bytes that `heptarm.sim.seam` decodes.
 """
 
 from __future__ import annotations
 
+import logging
+import threading
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from enum import IntEnum
 from functools import partial
 from math import isnan
-from typing import Any, TypeVar
+from typing import Any
 
 import jpype
 import jpype.nio
@@ -34,7 +38,10 @@ from heptarm.values.motion.orientation import Orientation
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body
 
-T = TypeVar("T")
+log = logging.getLogger("heptarm.sim")
+
+#: Calls of Java that are carried out at the same time; a stop never waits for a motion that is being planned.
+_CALLS_AT_ONCE = 4
 
 
 class JavaListener:
@@ -114,6 +121,14 @@ def _word(value: IntEnum | None, default: IntEnum) -> str:
     return (default if value is None else value).name.lower()
 
 
+#: Fields of an order that are those of the message from Java, besides the ones that `order_of` converts.
+_SAME = tuple(
+    name
+    for name in (one.name for one in fields(Order))
+    if name in seam.MotionOrder.__slots__ and name not in ("kind", "redundancy", "blending", "parts", "mode")
+)
+
+
 def order_of(one: seam.MotionOrder, java: Any = None) -> Order:
     """The order of a motion.
 
@@ -121,29 +136,17 @@ def order_of(one: seam.MotionOrder, java: Any = None) -> Order:
         one: as Java describes it.
         java: its listener; None for a part of another motion, which has the listener and conditions of the whole.
     """
-    joints, path, blending, timing = (
-        one.joint_dynamics,
-        one.cartesian_dynamics,
-        one.blending,
-        one.servo_timing,
-    )
+    joints, path, blending = one.joint_dynamics, one.cartesian_dynamics, one.blending
     relative, distance, angle = _filled((blending.relative, blending.distance, blending.angle), 0.0)
     listener = None if java is None else JavaListener(java)
     mode, axes = mode_of(one.mode)
     return Order(
-        one.id,
-        one.kind.name.lower(),
-        joints=one.joints,
-        pose=one.pose,
-        via=one.via,
+        kind=one.kind.name.lower(),
         orientation=Orientation(
             _word(one.orientation_type, seam.OrientationType.VARIABLE),
             _word(one.orientation_reference, seam.OrientationReference.BASE),
         ),
         redundancy=(one.redundancy.e1, one.redundancy.status, one.redundancy.turn),
-        tcp=one.tcp,
-        offset=one.offset,
-        reference=one.reference,
         joint_velocity=_filled(joints.velocity, 1.0),
         joint_acceleration=_filled(joints.acceleration, 1.0),
         joint_jerk=_filled(joints.jerk, 1.0),
@@ -156,16 +159,12 @@ def order_of(one: seam.MotionOrder, java: Any = None) -> Order:
         blending=(relative, distance, angle),
         parts=tuple(order_of(part) for part in one.parts),
         guide=None if one.hand_guiding is None else HandGuide(**_keywords(one.hand_guiding)),
-        duration=one.duration,
         mode=mode,
         axes=axes,
-        minimum_time=timing.minimum_time,
-        goal_timeout=timing.goal_timeout,
-        speed_timeout=timing.speed_timeout,
-        straight=one.straight_limits,
         listener=listener,
         watches=() if java is None else _watches(one, java.fired),
         part_listener=listener,
+        **{name: getattr(one, name) for name in _SAME},
     )
 
 
@@ -203,17 +202,8 @@ def _numbers(values: Any) -> list[float]:
     return [float(value) for value in values[:]]
 
 
-def _translated(java_error: str, call: Callable[[], T]) -> T:
-    """The result of a call; an error becomes one that Java can read, instead of a proxy without text."""
-    try:
-        return call()
-    except (HeptarmError, ValueError) as error:
-        raise jpype.JClass(java_error)(str(error)) from error
-
-
-@jpype.JImplements("heptarm.doubles.plant.Plant", deferred=True)
 class JavaPlant:
-    """The plant of the Java interface heptarm.doubles.plant.Plant.
+    """The methods of the Java interface heptarm.doubles.plant.Plant.
 
     Args:
         plant: the plant.
@@ -223,7 +213,6 @@ class JavaPlant:
     def __init__(self, plant: Plant, sessions: Sessions) -> None:
         self._plant, self._sessions = plant, sessions
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def describe(self) -> Any:
         """Name, limits and dimensions of the robot."""
         robot = self._plant.robot
@@ -232,7 +221,6 @@ class JavaPlant:
             seam.RobotDescription(**{name: getattr(robot, name) for name in names}).encode()
         )
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def submit(self, order: Any, listener: Any) -> str | None:
         """Plan and queue a motion; the text of a refusal, or None."""
         given = seam.MotionOrder.decode(bytes(order.encode()))
@@ -249,42 +237,34 @@ class JavaPlant:
             return str(error)
         return None
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def cancel(self, order_id: int) -> None:
         """Cancel a motion."""
         self._plant.cancel(int(order_id))
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def cancelAll(self) -> None:
         """Cancel every motion."""
         self._plant.cancel(None)
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def stopFast(self) -> None:
         """Brake every axis with full deceleration."""
         self._plant.stop_fast()
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def acknowledge(self) -> None:
         """Acknowledge errors whose cause is gone."""
         self._plant.acknowledge()
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def clipManualOverride(self, limit: float) -> None:
         """Limit the manual override."""
         self._plant.safety.manual = min(self._plant.safety.manual, float(limit))
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def pause(self) -> None:
         """Pause execution."""
         self._plant.pause()
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def resume(self) -> None:
         """Resume execution."""
         self._plant.resume()
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def changeMode(self, order_id: int, mode: Any) -> None:
         """Change the parameters of a running motion's control mode."""
         if mode is not None:
@@ -292,24 +272,19 @@ class JavaPlant:
             if changed is not None:
                 self._plant.change_mode(int(order_id), changed)
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def watch(self, condition: Any, at_once: bool, listener: Any) -> int:
         """Monitor a condition; returns its number."""
         decoded = seam.decode_condition(bytes(condition.encode()))
         return self._plant.condition_monitor.observe(decoded, listener.changed, at_once=bool(at_once))
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def unwatch(self, number: int) -> None:
         """Stop monitoring a condition."""
         self._plant.condition_monitor.forget(int(number))
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def signal(self, name: Any, output: bool) -> int:
         """Place of a signal in the IO image."""
-        place = partial(self._plant.signals.place, str(name), is_output=bool(output))
-        return _translated("java.lang.IllegalStateException", place)
+        return self._plant.signals.place(str(name), is_output=bool(output))
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def inverse(self, pose: Any, e1: float, status: int, near: Any) -> Any:
         """Inverse kinematics; None where there is no solution."""
         place = _numbers(pose)
@@ -325,44 +300,61 @@ class JavaPlant:
             return None
         return _doubles(found.tolist())
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def friOpen(self, settings: Any, channel: Any) -> int:
         """Open an FRI session; returns its number."""
         given = seam.FriSessionSettings.decode(bytes(settings.encode()))
-        return _translated(
-            "java.lang.IllegalStateException",
-            lambda: self._sessions.open(
-                (given.host, given.remote_port),
-                period_ms=given.send_period,
-                multiplier=given.receive_multiplier,
-                port=given.local_port or None,
-                transformations=given.transformations,
-                signals=tuple(SessionSignal.of(one) for one in given.signals),
-                channel=channel.changed,
-            ),
+        return self._sessions.open(
+            (given.host, given.remote_port),
+            period_ms=given.send_period,
+            multiplier=given.receive_multiplier,
+            port=given.local_port or None,
+            transformations=given.transformations,
+            signals=tuple(SessionSignal.of(one) for one in given.signals),
+            channel=channel.changed,
         )
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def friClose(self, number: int) -> None:
         """Close an FRI session."""
         self._sessions.close(int(number))
 
-    @jpype.JOverride  # type: ignore[untyped-decorator]
     def setAttachedLoad(self, load: Any) -> None:
         """Set the load data of everything attached to the flange."""
         given = seam.AttachedLoad.decode(bytes(load.encode()))
-        _translated(
-            "java.lang.IllegalArgumentException",
-            lambda: self._plant.set_load_data(
-                Body(given.mass, np.array(given.centre), inertia=np.array(given.inertia))
-            ),
-        )
+        self._plant.set_load_data(Body(given.mass, np.array(given.centre), inertia=np.array(given.inertia)))
+
+
+def java_memory() -> dict[str, int]:
+    """Used bytes of the heap, and number of threads of Java."""
+    factory = jpype.JClass("java.lang.management.ManagementFactory")
+    heap = factory.getMemoryMXBean().getHeapMemoryUsage()
+    return {"java_heap": int(heap.getUsed()), "java_threads": int(factory.getThreadMXBean().getThreadCount())}
+
+
+#: Methods whose errors concern their argument; those of the others concern the state of the plant.
+_ARGUMENT_ERRORS = ("setAttachedLoad",)
+
+
+def _carry_out(calls: Any, plant: JavaPlant) -> None:
+    """Carry out calls of Java for ever."""
+    while True:
+        call = calls.next()
+        method = str(call.method)
+        try:
+            call.returned(getattr(plant, method)(*call.arguments))
+        except Exception as error:
+            if not isinstance(error, (HeptarmError, ValueError)):
+                log.exception("%s failed", method)
+            call.failed(str(error) or repr(error), method in _ARGUMENT_ERRORS)
 
 
 def open_station(plant: Plant, sessions: Sessions) -> Any:
     """Give the plant and its FRI sessions to Java; returns heptarm.doubles.runtime.Station."""
-    memory = jpype.nio.convertToDirectBuffer(plant.ring.memory)
-    station = jpype.JClass("heptarm.doubles.runtime.Station").open(memory, JavaPlant(plant, sessions))
+    memory = jpype.nio.convertToDirectBuffer(plant.shared.memory)
+    calls, given = jpype.JClass("heptarm.doubles.plant.PlantCalls")(), JavaPlant(plant, sessions)
+    for number in range(_CALLS_AT_ONCE):
+        name = f"plant-calls-{number}"
+        threading.Thread(target=_carry_out, args=(calls, given), name=name, daemon=True).start()
+    station = jpype.JClass("heptarm.doubles.runtime.Station").open(memory, calls.plant())
     plant.on_wake = station.timers.tick
     plant.on_safety = station.safetyChanged
     return station

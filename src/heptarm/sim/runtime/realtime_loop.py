@@ -5,6 +5,8 @@ tick costs a tenth of a millisecond; after more than 20 missed ticks it re-bases
 FRI session open it leaves `answer_gap` between two ticks, however late they are, and re-bases after one missed tick:
 no client could answer ticks that follow each other without a pause, and a machine that was suspended kept its client
 from answering as well.
+Python's garbage collector does not run by itself: what exists at the start is frozen, and the loop collects the rest
+every few seconds, in the pause between two ticks.
 Real-time priority and a short timer slack are requested; a refusal is named in the statistics. Memory is not locked:
 that would commit all the memory that the JVM has only reserved.
 """
@@ -40,6 +42,11 @@ REAL_TIME_SPEED = 5.0
 #: A loop that cannot keep up sleeps this long whenever it re-bases [s], so that other threads run.
 YIELD_TIME = 2e-4
 PRIORITY = 50
+#: Time between two collections of reference cycles [ns], and at the latest [ns]. One takes 0.1 ms.
+COLLECT_EVERY = 5_000_000_000
+COLLECT_LATEST = 20_000_000_000
+#: A collection needs this pause before the next tick, as a fraction of a period, unless it is overdue.
+COLLECT_PAUSE = 0.5
 
 _PR_SET_TIMERSLACK = 29
 _HISTORY = 1 << 17
@@ -89,7 +96,7 @@ class RealtimeLoop:
     """Call `tick` once per millisecond of plant time.
 
     Args:
-        ring: shared state; its anchor word is the wall time of plant time zero, for Java.
+        shared: shared state; its anchor word is the wall time of plant time zero, for Java.
         tick: one tick.
         speed: plant seconds per second; 0: as fast as possible.
 
@@ -98,8 +105,8 @@ class RealtimeLoop:
             answer each of them, else 0; may be set at any time.
     """
 
-    def __init__(self, ring: SharedState, tick: Callable[[], None], *, speed: float = 1.0) -> None:
-        self._ring = ring
+    def __init__(self, shared: SharedState, tick: Callable[[], None], *, speed: float = 1.0) -> None:
+        self._shared = shared
         self._tick = tick
         self._period = int(TICK_NS / speed) if speed > 0 else 0
         self._speed = speed
@@ -139,13 +146,14 @@ class RealtimeLoop:
             gc.unfreeze()
 
     def _loop(self) -> None:
-        self._ring.reals[HeaderWords.RATE] = self._speed
-        now_ns, period, header = time.monotonic_ns, self._period, self._ring.header
+        self._shared.reals[HeaderWords.RATE] = self._speed
+        now_ns, period, header = time.monotonic_ns, self._period, self._shared.header
         spin = min(SPIN_NS, int(SPIN_FRACTION * period))
         done = int(header[HeaderWords.NEWEST])  # ticks of plant time that have passed before the loop
         due = now_ns() + period
         header[HeaderWords.ANCHOR] = due - (done + 1) * period
         end, is_second = now_ns(), False
+        collected = end
         while not self._stop:
             now, gap = now_ns(), int(self.answer_gap * period)
             if period == 0:
@@ -174,6 +182,10 @@ class RealtimeLoop:
             self._cost[at] = end - begin
             self._count += 1
             due += period
+            waited = end - collected
+            if waited > COLLECT_EVERY and (due - end >= COLLECT_PAUSE * period or waited > COLLECT_LATEST):
+                gc.collect()
+                collected = end
 
     @property
     def statistics(self) -> LoopStatistics:

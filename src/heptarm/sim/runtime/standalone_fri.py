@@ -48,7 +48,7 @@ class SimulatedArm(HoldingTarget, Protocol):
     """An arm that can be ticked, with a shared state that has the time."""
 
     @property
-    def ring(self) -> SharedState:
+    def shared(self) -> SharedState:
         """The shared state, see heptarm.sim.plant.shared_state."""
 
     def tick(self) -> None:
@@ -168,7 +168,7 @@ class Standalone:
             scenario=settings.scenario,
             listener=self._on_event,
         )
-        self.loop = RealtimeLoop(arm.ring, self.tick, speed=settings.speed)
+        self.loop = RealtimeLoop(arm.shared, self.tick, speed=settings.speed)
         self.loop.answer_gap = ANSWER_GAP
 
     def tick(self) -> None:

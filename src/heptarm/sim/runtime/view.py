@@ -19,6 +19,7 @@ import numpy as np
 
 from heptarm.errors import require
 from heptarm.sim.plant.world import compiled
+from heptarm.sim.runtime.view_guard import ViewGuard
 from heptarm.values.arrays import Array
 
 _RATE = 30.0
@@ -101,15 +102,17 @@ def main(argv: list[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with connect(options.target, control=False, name="view", state_rate=_RATE) as arm:
-        with contextlib.redirect_stdout(sys.stderr):  # standard output is for the line with the URL
+        guard = ViewGuard(options.host)
+        # standard output is for the line with the URL
+        with contextlib.redirect_stdout(sys.stderr), guard.installed():
             server = viser.ViserServer(host=options.host, port=options.port, verbose=False)
+        guard.port = server.get_port()
         scene = Scene(server, arm.robot.name)
         server.scene.set_up_direction("+z")
         server.initial_camera.position = (1.25, -1.1, 1.0)
         server.initial_camera.look_at = (0.15, 0.0, 0.5)
         text = server.gui.add_markdown("")
-        url = f"http://{options.host}:{server.get_port()}"
-        print(json.dumps({"ready": True, "url": url}), flush=True)
+        print(json.dumps({"ready": True, "url": guard.url}), flush=True)
         title = f"{arm.robot.title}{' (virtual)' if arm.is_virtual else ''}"
         try:
             for state in arm.states(rate=_RATE):

@@ -8,7 +8,6 @@ from typing import NoReturn
 
 from heptarm.errors import LimitError, ShapeError
 from heptarm.values.arrays import Value, within
-from heptarm.values.frames import check_name
 
 
 def check_band(low: float, high: float, limit: float, unit: str) -> None:
@@ -37,11 +36,6 @@ def band_text(low: float, high: float, limit: float, unit: str) -> str:
         return f"< {low:g} {unit}"
     return f"outside [{low:g}, {high:g}] {unit}"
 
-
-#: Longest path [m] and delay [s].
-PATH, DELAY = 100.0, 1000.0
-#: Represents "no bound" in the band of a signal.
-UNBOUNDED = 1e300
 
 #: Most nodes of a condition that the cabinet accepts.
 MOST_NODES = 64
@@ -133,97 +127,6 @@ def condition_nodes(condition: Condition) -> Iterator[tuple[Condition, Condition
     for part in parts:
         yield from condition_nodes(part)
     yield condition, condition
-
-
-# ------------------------------------------------------------------------------------- signals and the path
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SignalIs(Condition):
-    """A boolean signal has a value; `>` and `<` make a condition of a number signal.
-
-    Attributes:
-        signal: its name, as `arm.io` lists it.
-        value: the value.
-    """
-
-    signal: str
-    value: bool = True
-
-    def __post_init__(self) -> None:
-        check_name(self.signal, "signal")
-        if not isinstance(self.value, bool):
-            raise ShapeError(f"value must be True or False, got {self.value!r}", parameter="value")
-
-    def __gt__(self, other: float) -> SignalOutside:
-        return SignalOutside(self.signal, -UNBOUNDED, other)
-
-    def __lt__(self, other: float) -> SignalOutside:
-        return SignalOutside(self.signal, other, UNBOUNDED)
-
-    def outside(self, low: float, high: float) -> SignalOutside:
-        """The number signal is outside [low, high]."""
-        return SignalOutside(self.signal, low, high)
-
-    def __invert__(self) -> Condition:
-        return SignalIs(self.signal, not self.value)
-
-    def __str__(self) -> str:
-        return f"{self.signal} is {str(self.value).lower()}"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SignalOutside(Condition):
-    """A number signal is outside a band.
-
-    Attributes:
-        signal: its name, as `arm.io` lists it.
-        low: lower bound, in the signal's unit.
-        high: upper bound.
-    """
-
-    signal: str
-    low: float
-    high: float
-
-    def __post_init__(self) -> None:
-        check_name(self.signal, "signal")
-        check_band(self.low, self.high, UNBOUNDED, "")
-
-    def __str__(self) -> str:
-        return f"{self.signal} {band_text(self.low, self.high, UNBOUNDED, '').rstrip()}"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PathReached(Condition):
-    """A point on the path of the motion is reached.
-
-    Attributes:
-        distance: from the start, positive, or to the destination, negative [m].
-        delay: time after that point, or before it if negative [s].
-        reference: "start" or "destination": where the distance counts from.
-    """
-
-    distance: float
-    delay: float = 0.0
-    reference: str = "start"
-
-    def __post_init__(self) -> None:
-        if self.reference not in ("start", "destination"):
-            raise ShapeError(
-                f"reference must be 'start' or 'destination', got {self.reference!r}",
-                parameter="reference",
-                value=self.reference,
-            )
-        low, high = (0.0, PATH) if self.reference == "start" else (-PATH, 0.0)
-        within(self.distance, "distance", low, high, unit="m")
-        within(self.delay, "delay", -DELAY, DELAY, unit="s")
-
-    def __str__(self) -> str:
-        where = (
-            f"{abs(self.distance):g} m {'after the start' if self.reference == 'start' else 'before the end'}"
-        )
-        return where if self.delay == 0 else f"{where} and {self.delay:+g} s"
 
 
 # --------------------------------------------------------------------------------------------- composed ones

@@ -1,9 +1,18 @@
-"""Conditions on the external forces and torques."""
+"""Conditions on the external forces and torques, and the names that users compare to make them.
+
+::
+
+    from heptarm.when import force, torque
+
+    (force.along("z") > 15) | (abs(torque[3]) > 8)
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from math import isnan, nan
+from typing import ClassVar
 
 from heptarm.errors import LimitError, ShapeError
 from heptarm.values.arrays import within
@@ -16,134 +25,130 @@ FORCE, TORQUE, JOINT = 1000.0, 1000.0, 500.0
 _AXES = ("x", "y", "z")
 
 
-def _check_estimate(axis: str | None, frame: str, tolerance: float, unit: str) -> None:
-    if axis is not None and axis not in _AXES:
-        raise ShapeError(f"axis must be 'x', 'y' or 'z', got {axis!r}", parameter="axis", value=axis)
-    check_name(frame, "frame")
-    if not (isinstance(tolerance, float) and isnan(tolerance)):
-        within(tolerance, "tolerance", 0.0, FORCE, above=True, unit=unit)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Estimated(Condition):
+    """Base of conditions on the cabinet's estimate of the external force and torque.
+
+    Attributes:
+        frame: where it is measured and in whose axes; see `heptarm.when.force`.
+        tolerance: largest inaccuracy of the estimate that is accepted [N], of a torque [Nm]; NaN: any.
+    """
+
+    UNIT: ClassVar[str] = "N"
+
+    frame: str = field(default=TOOL, kw_only=True)
+    tolerance: float = field(default=nan, kw_only=True)
+
+    def __post_init__(self) -> None:
+        self._check()
+        check_name(self.frame, "frame")
+        if not (isinstance(self.tolerance, float) and isnan(self.tolerance)):
+            within(self.tolerance, "tolerance", 0.0, FORCE, above=True, unit=self.UNIT)
+
+    def _check(self) -> None:
+        """Check the fields of the subclass."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ForceAbove(Condition):
+class ForceAbove(_Estimated):
     """The external force's magnitude is above a threshold.
 
     Attributes:
         threshold: [N], up to 1000.
-        frame: where it is measured and in whose axes; see `heptarm.when.force`.
-        tolerance: largest inaccuracy of the estimate that is accepted [N]; NaN: any.
     """
 
     threshold: float
-    frame: str = TOOL
-    tolerance: float = nan
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         within(self.threshold, "threshold", 0.0, FORCE, unit="N")
-        _check_estimate(None, self.frame, self.tolerance, "N")
 
     def __str__(self) -> str:
         return f"force > {self.threshold:g} N"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NormalForceAbove(Condition):
-    """The external force along an axis, in either direction, is above a threshold; see `ForceAbove`.
+class _AxisAbove(_Estimated):
+    """Base of thresholds for a part of the external force.
 
     Attributes:
         axis: "x", "y" or "z" of the frame.
-        threshold: [N].
-        frame: see `ForceAbove`.
-        tolerance: see `ForceAbove`.
+        threshold: [N], up to 1000.
     """
+
+    PART: ClassVar[str]
 
     axis: str
     threshold: float
-    frame: str = TOOL
-    tolerance: float = nan
 
-    def __post_init__(self) -> None:
+    def _check(self) -> None:
         within(self.threshold, "threshold", 0.0, FORCE, unit="N")
-        _check_estimate(self.axis, self.frame, self.tolerance, "N")
+        _check_axis(self.axis)
 
     def __str__(self) -> str:
-        return f"force normal to {self.axis} of {self.frame} > {self.threshold:g} N"
+        return f"force {self.PART} {self.axis} of {self.frame} > {self.threshold:g} N"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ShearForceAbove(Condition):
-    """The external force across an axis is above a threshold; see `NormalForceAbove`.
+class NormalForceAbove(_AxisAbove):
+    """The external force along an axis, in either direction, is above a threshold."""
 
-    Attributes:
-        axis: "x", "y" or "z" of the frame.
-        threshold: [N].
-        frame: see `ForceAbove`.
-        tolerance: see `ForceAbove`.
-    """
-
-    axis: str
-    threshold: float
-    frame: str = TOOL
-    tolerance: float = nan
-
-    def __post_init__(self) -> None:
-        within(self.threshold, "threshold", 0.0, FORCE, unit="N")
-        _check_estimate(self.axis, self.frame, self.tolerance, "N")
-
-    def __str__(self) -> str:
-        return f"force across {self.axis} of {self.frame} > {self.threshold:g} N"
+    PART: ClassVar[str] = "normal to"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ForceOutside(Condition):
-    """A component of the external force is outside a band.
+class ShearForceAbove(_AxisAbove):
+    """The external force across an axis is above a threshold."""
+
+    PART: ClassVar[str] = "across"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _AxisOutside(_Estimated):
+    """Base of bands for a component of the external force or torque.
 
     Attributes:
         axis: "x", "y" or "z" of the frame.
-        low: [N], from -1000.
-        high: [N], to 1000.
-        frame: see `ForceAbove`.
-        tolerance: see `ForceAbove`.
+        low: [N] or [Nm], from -1000.
+        high: [N] or [Nm], to 1000.
     """
+
+    COMPONENT: ClassVar[str]
+    LIMIT: ClassVar[float]
 
     axis: str
     low: float
     high: float
-    frame: str = TOOL
-    tolerance: float = nan
 
-    def __post_init__(self) -> None:
-        check_band(self.low, self.high, FORCE, "N")
-        _check_estimate(self.axis, self.frame, self.tolerance, "N")
+    def _check(self) -> None:
+        check_band(self.low, self.high, self.LIMIT, self.UNIT)
+        _check_axis(self.axis)
 
     def __str__(self) -> str:
-        return f"force along {self.axis} of {self.frame} {band_text(self.low, self.high, FORCE, 'N')}"
+        band = band_text(self.low, self.high, self.LIMIT, self.UNIT)
+        return f"{self.COMPONENT} {self.axis} of {self.frame} {band}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TorqueOutside(Condition):
-    """A component of the external torque at the motion frame is outside a band.
+class ForceOutside(_AxisOutside):
+    """A component of the external force is outside a band [N]."""
 
-    Attributes:
-        axis: "x", "y" or "z" of the frame.
-        low: [Nm], from -1000.
-        high: [Nm], to 1000.
-        frame: see `ForceAbove`.
-        tolerance: see `ForceAbove` [Nm].
-    """
+    COMPONENT: ClassVar[str] = "force along"
+    LIMIT: ClassVar[float] = FORCE
 
-    axis: str
-    low: float
-    high: float
-    frame: str = TOOL
-    tolerance: float = nan
 
-    def __post_init__(self) -> None:
-        check_band(self.low, self.high, TORQUE, "Nm")
-        _check_estimate(self.axis, self.frame, self.tolerance, "Nm")
+@dataclass(frozen=True, slots=True, eq=False)
+class TorqueOutside(_AxisOutside):
+    """A component of the external torque at the motion frame is outside a band [Nm]."""
 
-    def __str__(self) -> str:
-        return f"torque about {self.axis} of {self.frame} {band_text(self.low, self.high, TORQUE, 'Nm')}"
+    COMPONENT: ClassVar[str] = "torque about"
+    LIMIT: ClassVar[float] = TORQUE
+    UNIT: ClassVar[str] = "Nm"
+
+
+def _check_axis(axis: str) -> None:
+    if axis not in _AXES:
+        raise ShapeError(f"axis must be 'x', 'y' or 'z', got {axis!r}", parameter="axis", value=axis)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,3 +178,117 @@ class JointTorqueOutside(Condition):
 
     def __str__(self) -> str:
         return f"external torque of A{self.joint + 1} {band_text(self.low, self.high, JOINT, 'Nm')}"
+
+
+# ------------------------------------------------------------------------------------------------ expressions
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Magnitude:
+    """A number that is never negative: `> threshold` makes a condition."""
+
+    _above: Callable[[float], Condition]
+
+    def __gt__(self, threshold: float) -> Condition:
+        return self._above(threshold)
+
+    def __lt__(self, threshold: float) -> Condition:
+        return ~self._above(threshold)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Component:
+    """A number with a sign: `>`, `<`, `abs(...) >`, `outside` and `inside` make conditions."""
+
+    _band: Callable[[float, float], Condition]
+    _limit: float
+
+    def __gt__(self, bound: float) -> Condition:
+        return self._band(-self._limit, bound)
+
+    def __lt__(self, bound: float) -> Condition:
+        return self._band(bound, self._limit)
+
+    def __abs__(self) -> Magnitude:
+        return Magnitude(lambda bound: self._band(-bound, bound))
+
+    def outside(self, low: float, high: float) -> Condition:
+        """It is outside [low, high]."""
+        return self._band(low, high)
+
+    def inside(self, low: float, high: float) -> Condition:
+        """It is inside [low, high]."""
+        return ~self._band(low, high)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Force:
+    """External force that the cabinet estimates at the motion frame [N]; `> threshold` compares its magnitude.
+
+    Attributes:
+        frame: the frame whose axes count: "tool" (the motion frame), "flange" or "base".
+        tolerance: largest inaccuracy of the estimate that is accepted [N]; NaN: any. A worse estimate, as near a
+            singularity, counts as above the threshold.
+    """
+
+    frame: str = TOOL
+    tolerance: float = nan
+
+    def __call__(self, *, frame: str = TOOL, tolerance: float = nan) -> Force:
+        """The same force with other axes, or with a tolerance."""
+        return Force(frame, tolerance)
+
+    def __gt__(self, threshold: float) -> Condition:
+        return ForceAbove(threshold, frame=self.frame, tolerance=self.tolerance)
+
+    def __lt__(self, threshold: float) -> Condition:
+        return ~ForceAbove(threshold, frame=self.frame, tolerance=self.tolerance)
+
+    def along(self, axis: str) -> Component:
+        """Its component along an axis, with sign."""
+        return Component(
+            lambda low, high: ForceOutside(axis, low, high, frame=self.frame, tolerance=self.tolerance), FORCE
+        )
+
+    def normal(self, axis: str) -> Magnitude:
+        """Its magnitude along an axis, in either direction."""
+        return Magnitude(
+            lambda threshold: NormalForceAbove(axis, threshold, frame=self.frame, tolerance=self.tolerance)
+        )
+
+    def shear(self, axis: str) -> Magnitude:
+        """Its magnitude across an axis."""
+        return Magnitude(
+            lambda threshold: ShearForceAbove(axis, threshold, frame=self.frame, tolerance=self.tolerance)
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Torque:
+    """The external torque: `torque[3]` that of joint A4, `torque.about("z")` a component at the motion frame [Nm].
+
+    Attributes:
+        frame: the frame whose axes `about` refers to; see `Force`.
+        tolerance: see `Force`; for `about` [Nm].
+    """
+
+    frame: str = TOOL
+    tolerance: float = nan
+
+    def __call__(self, *, frame: str = TOOL, tolerance: float = nan) -> Torque:
+        """The same torque with other axes, or with a tolerance."""
+        return Torque(frame, tolerance)
+
+    def __getitem__(self, joint: int) -> Component:
+        """External torque of a joint, 0 for A1 to 6 for A7."""
+        return Component(lambda low, high: JointTorqueOutside(joint, low, high), JOINT)
+
+    def about(self, axis: str) -> Component:
+        """Its component about an axis of the frame."""
+        return Component(
+            lambda low, high: TorqueOutside(axis, low, high, frame=self.frame, tolerance=self.tolerance), TORQUE
+        )
+
+
+force = Force()
+torque = Torque()

@@ -1,131 +1,106 @@
-"""The names that users compare to make conditions.
-
-::
-
-    from heptarm.when import force, io, torque
-
-    (force.along("z") > 15) | (abs(torque[3]) > 8) | io.user_button
-"""
+"""Conditions on signals and on points of the path, and the names that users compare to make them: `io`, `path`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from math import nan
 
 from heptarm.errors import ShapeError
-from heptarm.values.condition.condition import Condition, PathReached, SignalIs
-from heptarm.values.condition.force import (
-    FORCE,
-    JOINT,
-    TORQUE,
-    ForceAbove,
-    ForceOutside,
-    JointTorqueOutside,
-    NormalForceAbove,
-    ShearForceAbove,
-    TorqueOutside,
-)
-from heptarm.values.frames import TOOL
+from heptarm.values.arrays import within
+from heptarm.values.condition.condition import Condition, band_text, check_band
+from heptarm.values.frames import check_name
+
+#: Longest path [m] and delay [s].
+PATH, DELAY = 100.0, 1000.0
+#: Represents "no bound" in the band of a signal.
+UNBOUNDED = 1e300
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Magnitude:
-    """A number that is never negative: `> threshold` makes a condition."""
-
-    _above: Callable[[float], Condition]
-
-    def __gt__(self, threshold: float) -> Condition:
-        return self._above(threshold)
-
-    def __lt__(self, threshold: float) -> Condition:
-        return ~self._above(threshold)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Component:
-    """A number with a sign: `>`, `<`, `abs(...) >`, `outside` and `inside` make conditions."""
-
-    _band: Callable[[float, float], Condition]
-    _limit: float
-
-    def __gt__(self, bound: float) -> Condition:
-        return self._band(-self._limit, bound)
-
-    def __lt__(self, bound: float) -> Condition:
-        return self._band(bound, self._limit)
-
-    def __abs__(self) -> Magnitude:
-        return Magnitude(lambda bound: self._band(-bound, bound))
-
-    def outside(self, low: float, high: float) -> Condition:
-        """It is outside [low, high]."""
-        return self._band(low, high)
-
-    def inside(self, low: float, high: float) -> Condition:
-        """It is inside [low, high]."""
-        return ~self._band(low, high)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Force:
-    """External force that the cabinet estimates at the motion frame [N]; `> threshold` compares its magnitude.
+class SignalIs(Condition):
+    """A boolean signal has a value; `>` and `<` make a condition of a number signal.
 
     Attributes:
-        frame: the frame whose axes count: "tool" (the motion frame), "flange" or "base".
-        tolerance: largest inaccuracy of the estimate that is accepted [N]; NaN: any. A worse estimate, as near a
-            singularity, counts as above the threshold.
+        signal: its name, as `arm.io` lists it.
+        value: the value.
     """
 
-    frame: str = TOOL
-    tolerance: float = nan
+    signal: str
+    value: bool = True
 
-    def __call__(self, *, frame: str = TOOL, tolerance: float = nan) -> Force:
-        """The same force with other axes, or with a tolerance."""
-        return Force(frame, tolerance)
+    def __post_init__(self) -> None:
+        check_name(self.signal, "signal")
+        if not isinstance(self.value, bool):
+            raise ShapeError(f"value must be True or False, got {self.value!r}", parameter="value")
 
-    def __gt__(self, threshold: float) -> Condition:
-        return ForceAbove(threshold, self.frame, self.tolerance)
+    def __gt__(self, other: float) -> SignalOutside:
+        return SignalOutside(self.signal, -UNBOUNDED, other)
 
-    def __lt__(self, threshold: float) -> Condition:
-        return ~ForceAbove(threshold, self.frame, self.tolerance)
+    def __lt__(self, other: float) -> SignalOutside:
+        return SignalOutside(self.signal, other, UNBOUNDED)
 
-    def along(self, axis: str) -> Component:
-        """Its component along an axis, with sign."""
-        return Component(lambda low, high: ForceOutside(axis, low, high, self.frame, self.tolerance), FORCE)
+    def outside(self, low: float, high: float) -> SignalOutside:
+        """The number signal is outside [low, high]."""
+        return SignalOutside(self.signal, low, high)
 
-    def normal(self, axis: str) -> Magnitude:
-        """Its magnitude along an axis, in either direction."""
-        return Magnitude(lambda threshold: NormalForceAbove(axis, threshold, self.frame, self.tolerance))
+    def __invert__(self) -> Condition:
+        return SignalIs(self.signal, not self.value)
 
-    def shear(self, axis: str) -> Magnitude:
-        """Its magnitude across an axis."""
-        return Magnitude(lambda threshold: ShearForceAbove(axis, threshold, self.frame, self.tolerance))
+    def __str__(self) -> str:
+        return f"{self.signal} is {str(self.value).lower()}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Torque:
-    """The external torque: `torque[3]` that of joint A4, `torque.about("z")` a component at the motion frame [Nm].
+class SignalOutside(Condition):
+    """A number signal is outside a band.
 
     Attributes:
-        frame: the frame whose axes `about` refers to; see `Force`.
-        tolerance: see `Force`; for `about` [Nm].
+        signal: its name, as `arm.io` lists it.
+        low: lower bound, in the signal's unit.
+        high: upper bound.
     """
 
-    frame: str = TOOL
-    tolerance: float = nan
+    signal: str
+    low: float
+    high: float
 
-    def __call__(self, *, frame: str = TOOL, tolerance: float = nan) -> Torque:
-        """The same torque with other axes, or with a tolerance."""
-        return Torque(frame, tolerance)
+    def __post_init__(self) -> None:
+        check_name(self.signal, "signal")
+        check_band(self.low, self.high, UNBOUNDED, "")
 
-    def __getitem__(self, joint: int) -> Component:
-        """External torque of a joint, 0 for A1 to 6 for A7."""
-        return Component(lambda low, high: JointTorqueOutside(joint, low, high), JOINT)
+    def __str__(self) -> str:
+        return f"{self.signal} {band_text(self.low, self.high, UNBOUNDED, '').rstrip()}"
 
-    def about(self, axis: str) -> Component:
-        """Its component about an axis of the frame."""
-        return Component(lambda low, high: TorqueOutside(axis, low, high, self.frame, self.tolerance), TORQUE)
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PathReached(Condition):
+    """A point on the path of the motion is reached.
+
+    Attributes:
+        distance: from the start, positive, or to the destination, negative [m].
+        delay: time after that point, or before it if negative [s].
+        reference: "start" or "destination": where the distance counts from.
+    """
+
+    distance: float
+    delay: float = 0.0
+    reference: str = "start"
+
+    def __post_init__(self) -> None:
+        if self.reference not in ("start", "destination"):
+            raise ShapeError(
+                f"reference must be 'start' or 'destination', got {self.reference!r}",
+                parameter="reference",
+                value=self.reference,
+            )
+        low, high = (0.0, PATH) if self.reference == "start" else (-PATH, 0.0)
+        within(self.distance, "distance", low, high, unit="m")
+        within(self.delay, "delay", -DELAY, DELAY, unit="s")
+
+    def __str__(self) -> str:
+        where = (
+            f"{abs(self.distance):g} m {'after the start' if self.reference == 'start' else 'before the end'}"
+        )
+        return where if self.delay == 0 else f"{where} and {self.delay:+g} s"
 
 
 class IoSignals:
@@ -169,7 +144,5 @@ class Path:
         return PathReached(-metres if metres else 0.0, -seconds if seconds else 0.0, "destination")
 
 
-force = Force()
-torque = Torque()
 io = IoSignals()
 path = Path()

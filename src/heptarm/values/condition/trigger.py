@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import TypeAlias, TypeVar
+from dataclasses import dataclass
+from typing import TypeAlias
 
 from heptarm.errors import ShapeError
 from heptarm.values.arrays import Value, scalar
@@ -11,10 +11,6 @@ from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.frames import check_name
 from heptarm.values.io import SignalValue
 
-_Motion = TypeVar("_Motion", bound="Triggered")
-
-#: Most triggers of a motion that the cabinet accepts.
-MOST = 16
 _LONGEST_LABEL = 128
 
 
@@ -83,39 +79,3 @@ class Trigger(Value):
                 value=self.action,
                 hint="make one with heptarm.do, for example notify('half way') or set_output('LEDBlue', True)",
             )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Triggered(Value):
-    """Base of motions: each may have triggers.
-
-    Attributes:
-        triggers: up to 16.
-    """
-
-    triggers: tuple[Trigger, ...] = field(default=(), kw_only=True)
-
-    def trigger(self: _Motion, condition: Condition, action: Action) -> _Motion:
-        """The same motion with one more trigger.
-
-        Args:
-            condition: when; see heptarm.when. Points of the path count from the ends of this motion.
-            action: what the cabinet does then; see heptarm.do.
-
-        Raises:
-            ShapeError: no condition, no action, or one trigger too many.
-        """
-        if len(self.triggers) >= MOST:
-            raise ShapeError(
-                f"a motion has at most {MOST} triggers",
-                code=3,
-                parameter="triggers",
-                allowed=f"[0, {MOST}]",
-                hint="spread them over several motions",
-            )
-        return replace(self, triggers=(*self.triggers, Trigger(condition, action)))
-
-
-def triggers_of(motion: object) -> tuple[Trigger, ...]:
-    """The triggers of a motion; hand guiding has none."""
-    return motion.triggers if isinstance(motion, Triggered) else ()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import cos, sin
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.values.arrays import Array, array, within
 from heptarm.values.frames import TOOL, check_name
-from heptarm.values.motion.dynamics import Blended, PathSettings, keywords, settings
+from heptarm.values.motion.dynamics import PathMotion, PathSettings, keywords, settings
 from heptarm.values.motion.orientation import VARIABLE, Orientation, orientation_of
 from heptarm.values.pose import Pose, Redundancy, check_pose, multiply, near_of, rotation
 
@@ -27,7 +27,7 @@ _PLANES = {"xy": (0.0, 0.0, 1.0), "yz": (1.0, 0.0, 0.0), "xz": (0.0, -1.0, 0.0)}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Circ(Blended):
+class Circ(PathMotion):
     """Circular arc of the motion frame through a point to a pose.
 
     Attributes:
@@ -41,6 +41,9 @@ class Circ(Blended):
     Raises:
         CommandRejected: via and end are the same point.
     """
+
+    #: The longest arc inside the workspace of the largest arm.
+    longest_path: ClassVar[float] = 6.0
 
     via: Pose
     end: Pose

@@ -10,14 +10,15 @@ import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import isnan, nan
-from typing import TYPE_CHECKING, Any, TypedDict, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypedDict, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.values.arrays import Array, Value, fractions, frozen, within
-from heptarm.values.condition.trigger import Triggered
+from heptarm.values.motion.motion import Triggered
+from heptarm.values.robot import RobotModel
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -26,6 +27,10 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 _Limited = TypeVar("_Limited", bound="DynamicMotion")
 
 _OPEN = frozen(np.full(7, nan))
+#: The longest straight line inside the workspace of the largest arm [m].
+LONGEST_LINE = 2.0
+#: Cartesian speed assumed where none is given [m/s].
+_SLOW_LINE = 0.1
 #: Limits along the path: the highest value that a cabinet accepts, and the unit.
 _PATH = {
     "speed_mps": (10.0, "m/s"),
@@ -210,6 +215,20 @@ class Dynamics(Value):
         limits = {name: (getattr(self, name), getattr(whole, name)) for name in (*_PATH, *_JOINTS)}
         return Dynamics(**{name: np.where(np.isnan(a), b, a)[()] for name, (a, b) in limits.items()})
 
+    def turn_time(self, robot: RobotModel) -> float:
+        """Time for every joint to move through its whole range, with ramps [s]."""
+        limits = (self.joint_speed, self.joint_acceleration, self.joint_jerk)
+        speed, acceleration, jerk = (np.nan_to_num(limit, nan=1.0) for limit in limits)
+        cruise = (robot.q_max - robot.q_min) / (robot.dq_max * speed)
+        ramps = robot.dq_max * speed / (robot.ddq_max * acceleration) + robot.ddq_max / (
+            robot.dddq_max * jerk
+        )
+        return float(np.max(cruise + ramps))
+
+    def path_time(self, length: float) -> float:
+        """Time for a path of a length [m] at its speed, or at a slow one if it has none [s]."""
+        return length / (_SLOW_LINE if isnan(self.speed_mps) else self.speed_mps)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Blending(Value):
@@ -252,6 +271,10 @@ class DynamicMotion(Triggered):
         """The same motion, no joint faster than a fraction of its maximum in (0, 1]."""
         return replace(self, dynamics=self.dynamics.limited_to(speed))
 
+    def longest_duration(self, robot: RobotModel) -> float:
+        """Slowest plausible estimate of its duration [s]."""
+        return self.dynamics.turn_time(robot)
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Blended(DynamicMotion):
@@ -262,6 +285,21 @@ class Blended(DynamicMotion):
     """
 
     blending: Blending = EXACT
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PathMotion(Blended):
+    """Base of motions along a Cartesian path.
+
+    Attributes:
+        longest_path: upper bound of the length of its path [m].
+    """
+
+    longest_path: ClassVar[float] = LONGEST_LINE
+
+    def longest_duration(self, robot: RobotModel) -> float:
+        """Slowest plausible estimate of its duration [s]."""
+        return self.dynamics.turn_time(robot) + self.dynamics.path_time(self.longest_path) + 1.0
 
 
 # ------------------------------------------------------------------------------------- from keywords to values

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, frozen, within
+from heptarm.values.arrays import Array, array, frozen, within
+from heptarm.values.motion.motion import Motion
 
 #: What stops at a limit; what happens to a joint that is beyond its limit at the start.
 AT_LIMIT = ("axis", "all")
@@ -22,7 +23,7 @@ def _open() -> Array:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class HandGuide(Value):
+class HandGuide(Motion):
     """A person moves the arm; made by `hand_guide`.
 
     Attributes:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from heptarm.errors import ShapeError
 from heptarm.values.arrays import Array, array
 from heptarm.values.frames import TOOL, check_name
-from heptarm.values.motion.dynamics import Blended, PathSettings, keywords, settings
+from heptarm.values.motion.dynamics import PathMotion, PathSettings, keywords, settings
 from heptarm.values.motion.orientation import VARIABLE, Orientation, orientation_of
 from heptarm.values.pose import Pose, Redundancy, check_pose, near_of
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Lin(Blended):
+class Lin(PathMotion):
     """Straight line of the motion frame to a pose.
 
     Attributes:
@@ -43,7 +43,7 @@ class Lin(Blended):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LinRel(Blended):
+class LinRel(PathMotion):
     """Straight line of the motion frame by an offset from its pose when the motion starts.
 
     Attributes:

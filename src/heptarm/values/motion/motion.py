@@ -1,25 +1,85 @@
-"""Every kind of motion: frozen values that say where to move and how, to be reused and composed.
+"""What all motions have in common, and the motion that only holds.
 
-They are checked when they are made, against everything that does not need the robot; limits of the robot itself are
-checked when they are sent. What is not given keeps the cabinet's default.
+Motions are frozen values that say where to move and how, to be reused and composed. They are checked when they are
+made, against everything that does not need the robot; limits of the robot itself are checked when they are sent. What
+is not given keeps the cabinet's default.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from math import inf
-from typing import TypeAlias, get_args
+from typing import TypeVar
 
-from heptarm.values.arrays import within
-from heptarm.values.condition.trigger import Triggered
-from heptarm.values.motion.circle import Circ
-from heptarm.values.motion.dynamics import DynamicMotion
-from heptarm.values.motion.hand_guiding import HandGuide
-from heptarm.values.motion.line import Lin, LinRel
-from heptarm.values.motion.ptp import Ptp, PtpHome, PtpPose
-from heptarm.values.motion.spline import JointSpline, Spline
+from heptarm.errors import ShapeError
+from heptarm.values.arrays import Value, within
+from heptarm.values.condition.condition import Condition
+from heptarm.values.condition.trigger import Action, Trigger
+from heptarm.values.robot import RobotModel
 
+_Motion = TypeVar("_Motion", bound="Motion")
+_Triggered = TypeVar("_Triggered", bound="Triggered")
+
+#: Most triggers of a motion that the cabinet accepts.
+MOST_TRIGGERS = 16
 _LONGEST_HOLD = 1e6
+
+
+class Motion(Value):
+    """Base of motions: what `arm.move` and `arm.start` accept."""
+
+    __slots__ = ()
+
+    def limited_to(self: _Motion, speed: float) -> _Motion:
+        """The same motion, no joint faster than a fraction of its maximum in (0, 1].
+
+        A hold has no speed, and in hand guiding the person chooses it, within the limits of the motion itself.
+
+        Raises:
+            LimitError: the fraction is outside its range.
+        """
+        within(speed, "speed", 0.0, 1.0, above=True)
+        return self
+
+    def longest_duration(self, robot: RobotModel) -> float:
+        """Slowest plausible estimate of its duration [s]; infinite: it ends only when it is cancelled."""
+        return inf
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Triggered(Motion):
+    """Base of motions that may have triggers.
+
+    Attributes:
+        triggers: up to 16.
+    """
+
+    triggers: tuple[Trigger, ...] = field(default=(), kw_only=True)
+
+    def trigger(self: _Triggered, condition: Condition, action: Action) -> _Triggered:
+        """The same motion with one more trigger.
+
+        Args:
+            condition: when; see heptarm.when. Points of the path count from the ends of this motion.
+            action: what the cabinet does then; see heptarm.do.
+
+        Raises:
+            ShapeError: no condition, no action, or one trigger too many.
+        """
+        if len(self.triggers) >= MOST_TRIGGERS:
+            raise ShapeError(
+                f"a motion has at most {MOST_TRIGGERS} triggers",
+                code=3,
+                parameter="triggers",
+                allowed=f"[0, {MOST_TRIGGERS}]",
+                hint="spread them over several motions",
+            )
+        return replace(self, triggers=(*self.triggers, Trigger(condition, action)))
+
+
+def triggers_of(motion: Motion) -> tuple[Trigger, ...]:
+    """The triggers of a motion; hand guiding has none."""
+    return motion.triggers if isinstance(motion, Triggered) else ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,22 +98,9 @@ class Hold(Triggered):
                 self, "duration", within(self.duration, "seconds", 0.0, _LONGEST_HOLD, above=True, unit="s")
             )
 
-
-Motion: TypeAlias = Ptp | PtpHome | PtpPose | Lin | LinRel | Circ | Spline | JointSpline | Hold | HandGuide
-#: The same as classes, for isinstance.
-MOTIONS: tuple[type, ...] = get_args(Motion)
-
-
-def limited_to(motion: Motion, speed: float) -> Motion:
-    """The same motion, no joint faster than a fraction of its maximum in (0, 1].
-
-    A hold has no speed, and in hand guiding the person chooses it, within the limits of the motion itself.
-
-    Raises:
-        LimitError: the fraction is outside its range.
-    """
-    within(speed, "speed", 0.0, 1.0, above=True)
-    return motion.limited_to(speed) if isinstance(motion, DynamicMotion) else motion
+    def longest_duration(self, robot: RobotModel) -> float:
+        """Its duration [s]."""
+        return self.duration
 
 
 def hold(seconds: float = inf) -> Hold:

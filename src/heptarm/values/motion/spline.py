@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, pi, sin
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ from heptarm.values.motion.circle import Circ, normal_of
 from heptarm.values.motion.dynamics import (
     DEFAULT,
     EXACT,
+    LONGEST_LINE,
     DynamicMotion,
     Dynamics,
     JointSplineSettings,
@@ -29,6 +30,7 @@ from heptarm.values.motion.line import Lin
 from heptarm.values.motion.orientation import VARIABLE, Orientation, orientation_of
 from heptarm.values.motion.ptp import Ptp
 from heptarm.values.pose import Pose, check_pose
+from heptarm.values.robot import RobotModel
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -48,6 +50,8 @@ class Spl(Value):
         orientation: how the orientation changes along the path.
         dynamics: limits along this segment; those not given are the spline's.
     """
+
+    longest_path: ClassVar[float] = LONGEST_LINE
 
     target: Pose
     orientation: Orientation = VARIABLE
@@ -75,6 +79,12 @@ class Spline(DynamicMotion):
     def __post_init__(self) -> None:
         check_name(self.moving, "moving")
 
+    def longest_duration(self, robot: RobotModel) -> float:
+        """Slowest plausible estimate of its duration [s]."""
+        limits = [one.dynamics.filled_from(self.dynamics) for one in self.segments]
+        paths = (each.path_time(one.longest_path) for each, one in zip(limits, self.segments, strict=True))
+        return self.dynamics.turn_time(robot) * len(self.segments) + sum(paths)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointSpline(DynamicMotion):
@@ -93,6 +103,10 @@ class JointSpline(DynamicMotion):
             for point in self.points
         )
         return replace(self, points=points, dynamics=self.dynamics.limited_to(speed))
+
+    def longest_duration(self, robot: RobotModel) -> float:
+        """Slowest plausible estimate of its duration [s]."""
+        return sum(point.dynamics.turn_time(robot) for point in self.points)
 
 
 @keywords(SegmentSettings)

@@ -21,6 +21,7 @@ public class HeptarmApplication extends RoboticsAPIApplication {
 
     private final CountDownLatch stopping = new CountDownLatch(1);
     private CabinetServer server;
+    private String keyWeakness = "";
 
     @Override
     public void initialize() {
@@ -30,6 +31,7 @@ public class HeptarmApplication extends RoboticsAPIApplication {
                 (int) settings.number("heptarm.port", Protocol.PORT), settings.text("heptarm.key", ""),
                 settings.text("heptarm.allow", ""), settings.number("heptarm.heartbeat", 0.5),
                 settings.number("heptarm.max_rate", 200.0));
+        keyWeakness = config.keyWeakness();
         SunrisePanel panel = new SunrisePanel(getApplicationData(), log);
         server = new CabinetServer(SunriseRobot.of(lbr, this, panel, settings, log), config, Clocks.find(), log);
         try {
@@ -43,6 +45,9 @@ public class HeptarmApplication extends RoboticsAPIApplication {
 
     @Override
     public void run() throws Exception {
+        if (keyWeakness.length() > 0) {
+            throw new IllegalStateException(keyWeakness);
+        }
         System.setProperty("heptarm.port.bound", Integer.toString(server.start()));
         try {
             stopping.await();

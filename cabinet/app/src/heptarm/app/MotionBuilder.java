@@ -31,7 +31,6 @@ import heptarm.wire.Blending;
 import heptarm.wire.CartesianDynamics;
 import heptarm.wire.Circ;
 import heptarm.wire.Code;
-import heptarm.wire.HandGuide;
 import heptarm.wire.Hold;
 import heptarm.wire.Item;
 import heptarm.wire.JointDynamics;
@@ -76,21 +75,14 @@ final class MotionBuilder {
         modes.check(item.mode, tools.motionFrame(item.frame), path + "mode.");
         Motion motion = item.motion;
         String at = path + "motion.";
-        if (motion instanceof PtpPose) {
-            checkRedundancy(((PtpPose) motion).redundancy, at);
-        } else if (motion instanceof Lin) {
-            checkRedundancy(((Lin) motion).redundancy, at);
-            checkOrientation(((Lin) motion).orientation, at);
-        } else if (motion instanceof Circ) {
-            checkRedundancy(((Circ) motion).redundancy, at);
-            checkOrientation(((Circ) motion).orientation, at);
-        } else if (motion instanceof LinRel) {
-            checkOrientation(((LinRel) motion).orientation, at);
-        } else if (motion instanceof Spline) {
+        if (motion.redundancy() != null) {
+            checkRedundancy(motion.redundancy(), at);
+        }
+        if (motion.orientation() != null) {
+            checkOrientation(motion.orientation(), at);
+        }
+        if (motion instanceof Spline) {
             SplineBuilder.check((Spline) motion, at);
-        } else if (!(motion instanceof Ptp || motion instanceof PtpHome || motion instanceof JointSpline || motion instanceof Hold
-                || motion instanceof HandGuide)) {
-            throw unsupported(path + "motion", motion.getClass().getSimpleName());
         }
     }
 
@@ -193,6 +185,9 @@ final class MotionBuilder {
             cartesian(line, one.dynamics);
             orientation(line, one.orientation);
             return blended(line, one.blending);
+        }
+        if (!(motion instanceof Hold)) {
+            throw unsupported("motion", motion.getClass().getSimpleName());
         }
         double duration = ((Hold) motion).duration;
         long millis = Double.isNaN(duration) ? -1 : Math.max(1, Math.round(duration * 1000));

@@ -15,8 +15,10 @@ import com.kuka.roboticsAPI.sensorModel.ForceSensorData;
 import heptarm.core.CommandRejected;
 import heptarm.core.robot.Sensors;
 import heptarm.core.robot.SimulatorProbe;
+import heptarm.wire.JointState;
 import heptarm.wire.PoseState;
 import heptarm.wire.Redundancy;
+import heptarm.wire.TorqueState;
 import heptarm.wire.WrenchState;
 
 /** Sensors of Sunrise behind the core's port. */
@@ -32,19 +34,24 @@ final class SunriseSensors implements Sensors {
         this.probe = probe;
     }
 
-    public void readJoints(double[] q, double[] commanded) {
-        System.arraycopy(lbr.getCurrentJointPosition().getInternalArray(), 0, q, 0, q.length);
-        System.arraycopy(lbr.getCommandedJointPosition().getInternalArray(), 0, commanded, 0, q.length);
+    public JointState readJoints(long stamp) {
+        double[] measured = lbr.getCurrentJointPosition().getInternalArray().clone();
+        return new JointState(stamp, measured, lbr.getCommandedJointPosition().getInternalArray().clone(), unknown());
     }
 
-    public void readTorques(double[] measured, double[] external, double[] commanded) {
-        System.arraycopy(lbr.getMeasuredTorque().getTorqueValues(), 0, measured, 0, measured.length);
-        System.arraycopy(lbr.getExternalTorque().getTorqueValues(), 0, external, 0, external.length);
+    public TorqueState readTorques(long stamp) {
+        double[] commanded = unknown();
         if (probe != null) {
             probe.readTorques(commanded);
-        } else {
-            Arrays.fill(commanded, Double.NaN);
         }
+        return new TorqueState(stamp, lbr.getMeasuredTorque().getTorqueValues().clone(),
+                lbr.getExternalTorque().getTorqueValues().clone(), commanded);
+    }
+
+    private double[] unknown() {
+        double[] values = new double[lbr.getJointCount()];
+        Arrays.fill(values, Double.NaN);
+        return values;
     }
 
     public PoseState readPose(long stamp) {

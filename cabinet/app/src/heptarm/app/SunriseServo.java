@@ -43,10 +43,10 @@ final class SunriseServo implements ServoJob {
     /** Build a servo motion at the current position. */
     static SunriseServo of(ServoOpen open, LBR robot, SunriseTools tools, ControlModes modes, SunriseJob job) throws CommandRejected {
         ServoMotion<?> motion = open.engine == ServoEngine.LIN ? SunriseServoLin.of(open, robot, tools) : joints(open, robot);
-        motion.setMinimumTrajectoryExecutionTime(open.min_trajectory_time);
-        motion.setTimeoutAfterGoalReach(open.goal_timeout);
+        motion.setMinimumTrajectoryExecutionTime(open.timing.min_trajectory_time);
+        motion.setTimeoutAfterGoalReach(open.timing.goal_timeout);
         if (open.engine == ServoEngine.SMART) {
-            motion.setSpeedTimeoutAfterGoalReach(open.speed_timeout);
+            motion.setSpeedTimeoutAfterGoalReach(open.timing.speed_timeout);
         }
         if (open.mode != null && !(open.mode instanceof PositionMode)) {
             if (!ServoMotion.validateForImpedanceMode(tools.carrier())) {

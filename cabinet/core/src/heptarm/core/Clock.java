@@ -12,6 +12,20 @@ public interface Clock {
      */
     long sleepUntil(long nanos) throws InterruptedException;
 
+    /**
+     * Fixes the instant that the calling thread reads from the robot, until {@link #release}. A real robot has no past: what
+     * is read there is always of the present.
+     *
+     * @param nanos time of the instant, at the latest the present
+     */
+    void hold(long nanos);
+
+    /** Ends {@link #hold}. */
+    void release();
+
+    /** Time of what the calling thread reads from now on [ns]: of the instant that it holds, or the present. */
+    long stamp();
+
     /** Cabinet seconds per wall-clock second; scales time-outs of the link. */
     double rate();
 }

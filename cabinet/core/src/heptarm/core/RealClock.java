@@ -15,6 +15,18 @@ public final class RealClock implements Clock {
         return System.nanoTime();
     }
 
+    public void hold(long nanos) {
+        // a real robot shows the present
+    }
+
+    public void release() {
+        // see hold
+    }
+
+    public long stamp() {
+        return nanos();
+    }
+
     public double rate() {
         return 1.0;
     }

@@ -3,6 +3,7 @@ package heptarm.wire;
 
 /** The cabinet has a key: prove that you know it. */
 public final class Challenge extends Message {
+    /** random; never the client's */
     public final byte[] nonce;
 
     public Challenge(byte[] nonce) {
@@ -25,6 +26,6 @@ public final class Challenge extends Message {
     }
 
     public void validate(String path) throws Violation {
-        Check.length(nonce.length, path + "nonce", 0, 32);
+        Check.length(nonce.length, path + "nonce", 32, 32);
     }
 }

@@ -25,6 +25,21 @@ public final class Circ extends Motion {
         return 5;
     }
 
+    @Override
+    public Redundancy redundancy() {
+        return redundancy;
+    }
+
+    @Override
+    public Blending blending() {
+        return blending;
+    }
+
+    @Override
+    public Orientation orientation() {
+        return orientation;
+    }
+
     public void write(Encoder out) {
         via.write(out);
         end.write(out);

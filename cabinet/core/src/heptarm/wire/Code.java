@@ -35,6 +35,8 @@ public final class Code {
     public static final int SILENT = 19;
     /** the cabinet application ends: start it again on the smartPAD. */
     public static final int SHUTTING_DOWN = 20;
+    /** a frame was forged, changed, repeated, reordered or lost between the two sides: check who else is on the network, then connect again. */
+    public static final int FORGED_FRAME = 21;
     /** this client does not control the robot: take control first. */
     public static final int NOT_IN_CONTROL = 30;
     /** another client controls the robot: wait until it releases control, or observe. */

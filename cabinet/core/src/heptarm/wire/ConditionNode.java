@@ -3,6 +3,21 @@ package heptarm.wire;
 
 /** Node of a condition in postfix order. */
 public abstract class ConditionNode {
+    /** The field of this name; "" where there is none. */
+    public String frame() {
+        return "";
+    }
+
+    /** The field of this name; Double.NaN where there is none. */
+    public double low() {
+        return Double.NaN;
+    }
+
+    /** The field of this name; Double.NaN where there is none. */
+    public double high() {
+        return Double.NaN;
+    }
+
     public abstract int tag();
 
     public abstract void write(Encoder out);

@@ -3,10 +3,10 @@ package heptarm.wire;
 
 /** The controlling client has changed. */
 public final class ControlChanged extends Message {
-    /** empty: nobody */
+    /** name of the client; empty: none */
     public final String controller;
     public final long session;
-    /** why */
+    /** reason */
     public final String text;
 
     public ControlChanged(String controller, long session, String text) {

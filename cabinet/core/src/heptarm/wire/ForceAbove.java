@@ -19,6 +19,11 @@ public final class ForceAbove extends ConditionNode {
         return 1;
     }
 
+    @Override
+    public String frame() {
+        return frame;
+    }
+
     public void write(Encoder out) {
         out.putStr(frame);
         out.putF64(threshold);

@@ -24,6 +24,21 @@ public final class ForceOutside extends ConditionNode {
         return 4;
     }
 
+    @Override
+    public String frame() {
+        return frame;
+    }
+
+    @Override
+    public double low() {
+        return low;
+    }
+
+    @Override
+    public double high() {
+        return high;
+    }
+
     public void write(Encoder out) {
         out.putStr(frame);
         out.putU8(axis.value());

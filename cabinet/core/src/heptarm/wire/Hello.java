@@ -9,6 +9,7 @@ public final class Hello extends Message {
     public final String name;
     /** version of the client's software */
     public final String version;
+    /** random */
     public final byte[] nonce;
 
     public Hello(int major, int minor, String name, String version, byte[] nonce) {
@@ -45,6 +46,6 @@ public final class Hello extends Message {
     public void validate(String path) throws Violation {
         Check.length(Encoder.utf8(name).length, path + "name", 0, 64);
         Check.length(Encoder.utf8(version).length, path + "version", 0, 32);
-        Check.length(nonce.length, path + "nonce", 0, 32);
+        Check.length(nonce.length, path + "nonce", 32, 32);
     }
 }

@@ -20,6 +20,16 @@ public final class JointTorqueOutside extends ConditionNode {
         return 6;
     }
 
+    @Override
+    public double low() {
+        return low;
+    }
+
+    @Override
+    public double high() {
+        return high;
+    }
+
     public void write(Encoder out) {
         out.putU8(joint);
         out.putF64(low);

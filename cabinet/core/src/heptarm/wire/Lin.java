@@ -23,6 +23,21 @@ public final class Lin extends Motion {
         return 3;
     }
 
+    @Override
+    public Redundancy redundancy() {
+        return redundancy;
+    }
+
+    @Override
+    public Blending blending() {
+        return blending;
+    }
+
+    @Override
+    public Orientation orientation() {
+        return orientation;
+    }
+
     public void write(Encoder out) {
         target.write(out);
         redundancy.write(out);

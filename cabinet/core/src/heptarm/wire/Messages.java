@@ -35,6 +35,12 @@ public final class Messages {
             case 8:
                 message = Goodbye.read(in);
                 break;
+            case 9:
+                message = Halt.read(in);
+                break;
+            case 10:
+                message = Halted.read(in);
+                break;
             case 16:
                 message = Accepted.read(in);
                 break;
@@ -239,6 +245,7 @@ public final class Messages {
             case 6:
             case 7:
             case 8:
+            case 9:
             case 32:
             case 33:
             case 34:

@@ -3,6 +3,21 @@ package heptarm.wire;
 
 /** A motion. */
 public abstract class Motion {
+    /** The field of this name; null where there is none. */
+    public Redundancy redundancy() {
+        return null;
+    }
+
+    /** The field of this name; null where there is none. */
+    public Blending blending() {
+        return null;
+    }
+
+    /** The field of this name; null where there is none. */
+    public Orientation orientation() {
+        return null;
+    }
+
     public abstract int tag();
 
     public abstract void write(Encoder out);

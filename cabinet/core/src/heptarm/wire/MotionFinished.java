@@ -4,7 +4,7 @@ package heptarm.wire;
 /** A program has ended. */
 public final class MotionFinished extends Message {
     public final long id;
-    /** the last one that ran */
+    /** item that ran last */
     public final int item;
     public final Cause cause;
     /** index of the node that fired; -1: none */

@@ -21,6 +21,11 @@ public final class NormalForceAbove extends ConditionNode {
         return 2;
     }
 
+    @Override
+    public String frame() {
+        return frame;
+    }
+
     public void write(Encoder out) {
         out.putStr(frame);
         out.putU8(axis.value());

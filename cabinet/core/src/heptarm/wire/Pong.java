@@ -3,9 +3,9 @@ package heptarm.wire;
 
 /** Answer to a Ping, at once. */
 public final class Pong extends Message {
-    /** the Ping's [ns] */
+    /** of the Ping [ns] */
     public final long sent;
-    /** answerer's clock when the Ping came [ns] */
+    /** responder's clock at the receipt of the Ping [ns] */
     public final long received;
 
     public Pong(long sent, long received) {

@@ -3,11 +3,13 @@ package heptarm.wire;
 
 /** Constants of the protocol. */
 public final class Protocol {
-    public static final int MAJOR = 1;
+    public static final int MAJOR = 2;
     public static final int MINOR = 0;
     public static final int PORT = 30001;
     public static final int MAGIC = 18487;
     public static final int MAX_BODY = 1048576;
+    public static final int NONCE = 32;
+    public static final int TAG = 16;
     public static final int HEADER = 26;
 
     private Protocol() {

@@ -18,6 +18,11 @@ public final class Ptp extends Motion {
         return 1;
     }
 
+    @Override
+    public Blending blending() {
+        return blending;
+    }
+
     public void write(Encoder out) {
         out.putF64s(q, 7);
         dynamics.write(out);

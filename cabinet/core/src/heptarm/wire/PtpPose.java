@@ -19,6 +19,16 @@ public final class PtpPose extends Motion {
         return 2;
     }
 
+    @Override
+    public Redundancy redundancy() {
+        return redundancy;
+    }
+
+    @Override
+    public Blending blending() {
+        return blending;
+    }
+
     public void write(Encoder out) {
         target.write(out);
         redundancy.write(out);

@@ -11,26 +11,19 @@ public final class ServoOpen extends Message {
     public final double acceleration;
     /** for the lin engine */
     public final CartesianDynamics linear;
-    /** [s] */
-    public final double min_trajectory_time;
-    /** [s] */
-    public final double goal_timeout;
-    /** of the smart engine: how long a target's velocity is kept after the target was passed [s] */
-    public final double speed_timeout;
+    public final ServoTiming timing;
     /** until the first target [s] */
     public final double watchdog;
     public final Condition until;
 
-    public ServoOpen(ServoEngine engine, String frame, Mode mode, double velocity, double acceleration, CartesianDynamics linear, double min_trajectory_time, double goal_timeout, double speed_timeout, double watchdog, Condition until) {
+    public ServoOpen(ServoEngine engine, String frame, Mode mode, double velocity, double acceleration, CartesianDynamics linear, ServoTiming timing, double watchdog, Condition until) {
         this.engine = engine;
         this.frame = frame;
         this.mode = mode;
         this.velocity = velocity;
         this.acceleration = acceleration;
         this.linear = linear;
-        this.min_trajectory_time = min_trajectory_time;
-        this.goal_timeout = goal_timeout;
-        this.speed_timeout = speed_timeout;
+        this.timing = timing;
         this.watchdog = watchdog;
         this.until = until;
     }
@@ -52,9 +45,7 @@ public final class ServoOpen extends Message {
         out.putF64(velocity);
         out.putF64(acceleration);
         linear.write(out);
-        out.putF64(min_trajectory_time);
-        out.putF64(goal_timeout);
-        out.putF64(speed_timeout);
+        timing.write(out);
         out.putF64(watchdog);
         until.write(out);
     }
@@ -66,12 +57,10 @@ public final class ServoOpen extends Message {
         double velocity = in.getF64();
         double acceleration = in.getF64();
         CartesianDynamics linear = CartesianDynamics.read(in);
-        double min_trajectory_time = in.getF64();
-        double goal_timeout = in.getF64();
-        double speed_timeout = in.getF64();
+        ServoTiming timing = ServoTiming.read(in);
         double watchdog = in.getF64();
         Condition until = Condition.read(in);
-        return new ServoOpen(engine, frame, mode, velocity, acceleration, linear, min_trajectory_time, goal_timeout, speed_timeout, watchdog, until);
+        return new ServoOpen(engine, frame, mode, velocity, acceleration, linear, timing, watchdog, until);
     }
 
     public void validate(String path) throws Violation {
@@ -82,9 +71,7 @@ public final class ServoOpen extends Message {
         Check.number(velocity, path + "velocity", 0.0, 1.0, true, false);
         Check.number(acceleration, path + "acceleration", 0.0, 1.0, true, false);
         linear.validate(path + "linear.");
-        Check.number(min_trajectory_time, path + "min_trajectory_time", 0.001, 1.0, false, false);
-        Check.number(goal_timeout, path + "goal_timeout", 0.1, 3600.0, false, false);
-        Check.number(speed_timeout, path + "speed_timeout", 0.001, 10.0, false, false);
+        timing.validate(path + "timing.");
         Check.number(watchdog, path + "watchdog", 0.005, 2.0, false, false);
         until.validate(path + "until.");
     }

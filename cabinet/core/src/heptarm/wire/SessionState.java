@@ -7,6 +7,8 @@ public enum SessionState {
     START,
     /** The client has identified itself. */
     HELLO,
+    /** The client requests a stop, without a session. */
+    HALTING,
     /** The cabinet requires a proof of the key. */
     CHALLENGED,
     /** The client has sent its proof. */

@@ -13,6 +13,8 @@ public final class SessionTransitions {
                 switch (type) {
                     case 1:
                         return SessionState.HELLO;
+                    case 9:
+                        return SessionState.HALTING;
                     case 5:
                     case 8:
                         return SessionState.CLOSED;
@@ -27,6 +29,15 @@ public final class SessionTransitions {
                         return SessionState.OPEN;
                     case 5:
                     case 8:
+                        return SessionState.CLOSED;
+                    default:
+                        return null;
+                }
+            case HALTING:
+                switch (type) {
+                    case 5:
+                    case 8:
+                    case 10:
                         return SessionState.CLOSED;
                     default:
                         return null;

@@ -21,6 +21,11 @@ public final class ShearForceAbove extends ConditionNode {
         return 3;
     }
 
+    @Override
+    public String frame() {
+        return frame;
+    }
+
     public void write(Encoder out) {
         out.putStr(frame);
         out.putU8(axis.value());

@@ -17,6 +17,16 @@ public final class SignalOutside extends ConditionNode {
         return 8;
     }
 
+    @Override
+    public double low() {
+        return low;
+    }
+
+    @Override
+    public double high() {
+        return high;
+    }
+
     public void write(Encoder out) {
         out.putStr(signal);
         out.putF64(low);

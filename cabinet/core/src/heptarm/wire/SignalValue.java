@@ -3,7 +3,7 @@ package heptarm.wire;
 
 /** Value of a signal. */
 public final class SignalValue {
-    /** place in the Welcome's list of signals */
+    /** index in the list of signals of Welcome */
     public final int index;
     /** 0 and 1 for a boolean */
     public final double value;

@@ -24,7 +24,7 @@ public final class SineImpedance extends Mode {
     public final double hold_time;
     /** [s] */
     public final double fall_time;
-    /** hold on until the pattern has finished */
+    /** the motion ends only after the pattern has finished */
     public final boolean stay_active;
 
     public SineImpedance(CartesianImpedance base, double[] amplitude, double[] frequency, double[] phase, double[] bias, double[] force_limit, double[] position_limit, double total_time, double rise_time, double hold_time, double fall_time, boolean stay_active) {

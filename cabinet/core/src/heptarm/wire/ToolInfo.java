@@ -10,7 +10,7 @@ public final class ToolInfo {
     public final double[] com;
     /** xx yy zz xy xz yz about the centre of mass [kg m²] */
     public final double[] inertia;
-    /** in the same frame; the first is the default motion frame; no name is tool, flange or base, none has a / */
+    /** in the same frame; the first is the default motion frame; a name contains no / and is not tool, flange or base */
     public final FrameInfo[] frames;
 
     public ToolInfo(String name, double mass, double[] com, double[] inertia, FrameInfo[] frames) {

@@ -5,9 +5,9 @@ package heptarm.wire;
 public final class TriggerFired extends Message {
     public final long id;
     public final int item;
-    /** its place among those of the item */
+    /** index among the triggers of the item */
     public final int trigger;
-    /** that of a Notify */
+    /** label of a Notify */
     public final String label;
     /** cabinet time since the program's start [s] */
     public final double time;

@@ -1,13 +1,18 @@
 package heptarm.fake;
 
+import java.util.concurrent.Semaphore;
+import java.util.concurrent.TimeUnit;
+
 import heptarm.core.Clock;
 
 /** Faults and delays to order: slow getters, failing readings, failing commands. */
 final class FakeFaults {
     private static final long FAULT_NS = 1500000000L;
+    private static final long LONGEST_PLANNING_S = 60;
 
     final Clock clock;
     private final long getterNanos;
+    private final Semaphore planned = new Semaphore(0);
     private volatile long blindUntil;
     private volatile long jammedUntil;
 
@@ -21,6 +26,7 @@ final class FakeFaults {
         switch (text) {
             case "blind" -> blindUntil = clock.nanos() + FAULT_NS;
             case "jammed" -> jammedUntil = clock.nanos() + FAULT_NS;
+            case "planned" -> planned.release();
             case "lacking" -> throw new NoClassDefFoundError("com/kuka/Option");
             case "crash" -> throw new IllegalStateException("an error of the cabinet's API");
             default -> { }
@@ -43,6 +49,15 @@ final class FakeFaults {
     private void failUntil(long until) {
         if (clock.nanos() < until) {
             throw new IllegalStateException("the controller did not respond");
+        }
+    }
+
+    /** Plan until the operator orders that it is planned. */
+    void plan() {
+        try {
+            planned.tryAcquire(LONGEST_PLANNING_S, TimeUnit.SECONDS);
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
         }
     }
 

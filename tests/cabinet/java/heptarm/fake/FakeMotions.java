@@ -37,8 +37,8 @@ import heptarm.wire.Trigger;
 /**
  * Seven axes without dynamics: each motion runs at one speed, a cancelled one stops at once.
  *
- * <p>The target of A7 orders failures of a PTP: 1.25 rad fails at planning, 1.5 rad fails during the motion, 1.0 rad takes two
- * seconds to plan, 0.75 rad needs an option that the cabinet lacks. A servo motion jumps to its targets; it refuses more than
+ * <p>The target of A7 orders failures of a PTP: 1.25 rad fails at planning, 1.5 rad fails during the motion, 1.0 rad is
+ * planned until the operator orders "planned", 0.75 rad needs an option that the cabinet lacks. A servo motion jumps to its targets; it refuses more than
  * 2 rad of A7, and ends 0.3 s after the last target. Only the engine lin follows poses, and turns A7 by their x.
  */
 final class FakeMotions implements MotionPort, Runnable {
@@ -53,7 +53,6 @@ final class FakeMotions implements MotionPort, Runnable {
     private static final double NEVER_ANSWERS = 0.1;
     private static final double FAILS_COMMANDING = 0.009;
     private static final double ENDLESS = 1e9;
-    private static final long PLANNING_NS = 2000000000L;
     private static final long TICK_NS = 2000000L;
     private static final Conditions.Tree[] NONE = {};
 
@@ -252,7 +251,7 @@ final class FakeMotions implements MotionPort, Runnable {
         } else if (order == LACKS_A_CLASS) {
             throw new NoClassDefFoundError("com/kuka/Option");
         } else if (order == PLANS_SLOWLY) {
-            faults.sleep(PLANNING_NS);
+            faults.plan();
         }
         double seconds = item.motion instanceof Hold hold ? hold.duration : ENDLESS;
         FakeJob job = new FakeJob(target, Double.isNaN(seconds) ? ENDLESS : seconds, listener);

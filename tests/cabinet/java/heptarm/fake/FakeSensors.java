@@ -3,8 +3,10 @@ package heptarm.fake;
 import java.util.Arrays;
 
 import heptarm.core.robot.Sensors;
+import heptarm.wire.JointState;
 import heptarm.wire.PoseState;
 import heptarm.wire.Redundancy;
+import heptarm.wire.TorqueState;
 import heptarm.wire.WrenchState;
 
 /** Readings of the fake axes. A spring pushes A7: the further it turns, the more. */
@@ -22,19 +24,23 @@ final class FakeSensors implements Sensors {
     }
 
     @Override
-    public void readJoints(double[] measured, double[] commanded) {
+    public JointState readJoints(long stamp) {
         faults.read(2);
         synchronized (q) {
-            System.arraycopy(q, 0, measured, 0, 7);
-            System.arraycopy(q, 0, commanded, 0, 7);
+            return new JointState(stamp, q.clone(), q.clone(), unknown());
         }
     }
 
     @Override
-    public void readTorques(double[] measured, double[] external, double[] commanded) {
+    public TorqueState readTorques(long stamp) {
         faults.read(2);
-        Arrays.fill(commanded, Double.NaN);
-        external[6] = torque();
+        return new TorqueState(stamp, new double[7], new double[] {0, 0, 0, 0, 0, 0, torque()}, unknown());
+    }
+
+    private static double[] unknown() {
+        double[] values = new double[7];
+        Arrays.fill(values, Double.NaN);
+        return values;
     }
 
     private double torque() {

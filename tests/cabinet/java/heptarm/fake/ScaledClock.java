@@ -28,6 +28,19 @@ final class ScaledClock implements Clock {
     }
 
     @Override
+    public void hold(long nanos) {
+    }
+
+    @Override
+    public void release() {
+    }
+
+    @Override
+    public long stamp() {
+        return nanos();
+    }
+
+    @Override
     public double rate() {
         return rate;
     }

@@ -3,6 +3,7 @@ package heptarm.core.api;
 import java.util.HashMap;
 import java.util.Map;
 
+import heptarm.core.Clock;
 import heptarm.core.Clocks;
 import heptarm.core.CommandRejected;
 import heptarm.core.EventBus;
@@ -33,6 +34,7 @@ import heptarm.wire.SafetyState;
 import heptarm.wire.ServoClose;
 import heptarm.wire.ServoEngine;
 import heptarm.wire.ServoOpen;
+import heptarm.wire.ServoTiming;
 import heptarm.wire.ServoSettings;
 import heptarm.wire.SetOverride;
 import heptarm.wire.SetSignal;
@@ -54,12 +56,7 @@ public final class Arm implements EventBus.Listener {
     private static final double NAN = Double.NaN;
     private static final CartesianDynamics UNBOUNDED = new CartesianDynamics(NAN, NAN, NAN, NAN, NAN, NAN);
     private static final Condition NEVER = new Condition(new ConditionNode[0]);
-    /** Shortest time to reach a servo target [s]. */
-    private static final double MIN_TRAJECTORY_TIME = 0.02;
-    /** Time without a target after which the servo motion ends [s]. */
-    private static final double GOAL_TIMEOUT = 300.0;
-    /** How long the velocity of a target is kept after reaching it [s]. */
-    private static final double SPEED_TIMEOUT = 0.1;
+    private static final ServoTiming TIMING = new ServoTiming(0.02, 300.0, 0.1);
 
     private final RobotService service;
     private final boolean isOwner;
@@ -89,6 +86,10 @@ public final class Arm implements EventBus.Listener {
         if (isOwner) {
             service.close();
         }
+    }
+
+    Clock clock() {
+        return service.clock;
     }
 
     // --------------------------------------------------------------------------------------------- motions
@@ -125,7 +126,7 @@ public final class Arm implements EventBus.Listener {
      * @param mode control mode; null: position control
      */
     public ServoHandle servo(double speed, double acceleration, double watchdog, Mode mode) throws CommandRejected {
-        return servo(new ServoOpen(ServoEngine.SMART, "", mode, speed, acceleration, UNBOUNDED, MIN_TRAJECTORY_TIME, GOAL_TIMEOUT, SPEED_TIMEOUT, watchdog, NEVER));
+        return servo(new ServoOpen(ServoEngine.SMART, "", mode, speed, acceleration, UNBOUNDED, TIMING, watchdog, NEVER));
     }
 
     /**
@@ -136,7 +137,7 @@ public final class Arm implements EventBus.Listener {
      * @param mode control mode; null: position control
      */
     public ServoHandle servoLin(CartesianDynamics limits, double watchdog, Mode mode) throws CommandRejected {
-        return servo(new ServoOpen(ServoEngine.LIN, "", mode, 1.0, 1.0, limits, MIN_TRAJECTORY_TIME, GOAL_TIMEOUT, SPEED_TIMEOUT, watchdog, NEVER));
+        return servo(new ServoOpen(ServoEngine.LIN, "", mode, 1.0, 1.0, limits, TIMING, watchdog, NEVER));
     }
 
     /** Open a servo motion with all its parameters. */
@@ -301,9 +302,7 @@ public final class Arm implements EventBus.Listener {
 
     /** Measured joint positions [rad]. */
     public double[] joints() {
-        double[] q = new double[7];
-        service.robot.sensors.readJoints(q, new double[7]);
-        return q;
+        return service.reader.joints().q;
     }
 
     /** Torques [Nm]. */
@@ -324,10 +323,10 @@ public final class Arm implements EventBus.Listener {
     /** External wrench in the axes of another frame: "" (the motion frame), "flange", or a frame's name. */
     public WrenchState wrench(String axes) throws CommandRejected {
         service.tools.checkReference(axes, "axes");
-        return service.robot.sensors.readWrench(axes, service.clock.nanos());
+        return service.reader.wrench(axes);
     }
 
     public SafetyState safety() {
-        return service.robot.safety.read(service.clock.nanos());
+        return service.safety.read();
     }
 }

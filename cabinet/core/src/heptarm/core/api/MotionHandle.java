@@ -1,5 +1,7 @@
 package heptarm.core.api;
 
+import heptarm.core.Clock;
+import heptarm.core.Clocks;
 import heptarm.core.CommandRejected;
 import heptarm.wire.Code;
 import heptarm.wire.MotionFinished;
@@ -32,15 +34,14 @@ public final class MotionHandle {
         return result;
     }
 
-    /** Wait at most this long [s]; null: it has not ended by then. */
+    /** Wait at most this long, in the cabinet's time [s]; null: it has not ended by then. */
     public synchronized MotionFinished await(double seconds) throws InterruptedException {
-        long deadline = System.nanoTime() + (long) (seconds * 1e9);
+        Clock clock = arm.clock();
+        long deadline = clock.nanos() + (long) (seconds * 1e9);
         while (result == null) {
-            long left = deadline - System.nanoTime();
-            if (left <= 0) {
+            if (!Clocks.await(this, clock, deadline)) {
                 return null;
             }
-            java.util.concurrent.TimeUnit.NANOSECONDS.timedWait(this, left);
         }
         return result;
     }

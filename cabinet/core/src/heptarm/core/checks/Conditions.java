@@ -10,19 +10,13 @@ import heptarm.wire.AnyOf;
 import heptarm.wire.Code;
 import heptarm.wire.Condition;
 import heptarm.wire.ConditionNode;
-import heptarm.wire.ForceAbove;
-import heptarm.wire.ForceOutside;
 import heptarm.wire.Inverted;
 import heptarm.wire.IoType;
-import heptarm.wire.JointTorqueOutside;
-import heptarm.wire.NormalForceAbove;
 import heptarm.wire.PathReached;
 import heptarm.wire.PathReference;
-import heptarm.wire.ShearForceAbove;
 import heptarm.wire.SignalInfo;
 import heptarm.wire.SignalIs;
 import heptarm.wire.SignalOutside;
-import heptarm.wire.TorqueOutside;
 
 /** Conditions as trees, and checks between their fields; the generated code checks the range of each field. */
 public final class Conditions {
@@ -114,32 +108,12 @@ public final class Conditions {
         }
     }
 
-    /** Name of the frame whose axes a leaf uses; empty for the motion frame's, or for none. */
-    public static String frame(ConditionNode node) {
-        if (node instanceof ForceAbove) {
-            return ((ForceAbove) node).frame;
-        }
-        if (node instanceof NormalForceAbove) {
-            return ((NormalForceAbove) node).frame;
-        }
-        if (node instanceof ShearForceAbove) {
-            return ((ShearForceAbove) node).frame;
-        }
-        if (node instanceof ForceOutside) {
-            return ((ForceOutside) node).frame;
-        }
-        return node instanceof TorqueOutside ? ((TorqueOutside) node).frame : "";
-    }
-
     private static void check(ConditionNode node, String at, SignalInfo[] signals) throws CommandRejected {
-        if (node instanceof ForceOutside) {
-            band(((ForceOutside) node).low, ((ForceOutside) node).high, at);
-        } else if (node instanceof TorqueOutside) {
-            band(((TorqueOutside) node).low, ((TorqueOutside) node).high, at);
-        } else if (node instanceof JointTorqueOutside) {
-            band(((JointTorqueOutside) node).low, ((JointTorqueOutside) node).high, at);
-        } else if (node instanceof SignalOutside) {
-            band(((SignalOutside) node).low, ((SignalOutside) node).high, at);
+        if (node.low() >= node.high()) {
+            throw new CommandRejected(Code.OUT_OF_RANGE, at + ".low", Double.toString(node.low()), "below " + node.high(),
+                    "low must be below high (" + node.high() + "), got " + node.low());
+        }
+        if (node instanceof SignalOutside) {
             SignalTable.index(((SignalOutside) node).signal, signals, at + ".signal");
         } else if (node instanceof SignalIs) {
             SignalInfo info = signals[SignalTable.index(((SignalIs) node).signal, signals, at + ".signal")];
@@ -156,13 +130,6 @@ public final class Conditions {
                         "distance must be " + (fromStart ? "0 m or more from the start" : "0 m or less from the destination") + ", got "
                                 + point.distance + " m");
             }
-        }
-    }
-
-    private static void band(double low, double high, String at) throws CommandRejected {
-        if (!(low < high)) {
-            throw new CommandRejected(Code.OUT_OF_RANGE, at + ".low", Double.toString(low), "below " + high,
-                    "low must be below high (" + high + "), got " + low);
         }
     }
 }

@@ -109,7 +109,7 @@ public final class ProgramChecks {
     private void checkCondition(Condition condition, String path) throws CommandRejected {
         Conditions.check(condition, path, robot.signals.signals());
         for (int i = 0; i < condition.nodes.length; i++) {
-            tools.checkReference(Conditions.frame(condition.nodes[i]), path + ".nodes[" + i + "].frame");
+            tools.checkReference(condition.nodes[i].frame(), path + ".nodes[" + i + "].frame");
         }
     }
 

@@ -16,8 +16,8 @@ public final class ServoChecks {
     /** Refuses limits that the servo engine does not support. */
     public static void check(ServoOpen open) throws CommandRejected {
         CartesianDynamics line = open.linear;
-        if (open.engine != ServoEngine.SMART && open.speed_timeout != DEFAULT_SPEED_TIMEOUT) {
-            throw new CommandRejected(Code.UNSUPPORTED, "speed_timeout", Double.toString(open.speed_timeout),
+        if (open.engine != ServoEngine.SMART && open.timing.speed_timeout != DEFAULT_SPEED_TIMEOUT) {
+            throw new CommandRejected(Code.UNSUPPORTED, "timing.speed_timeout", Double.toString(open.timing.speed_timeout),
                     Double.toString(DEFAULT_SPEED_TIMEOUT), "only the servo engine smart supports speed_timeout; leave it out");
         }
         if (open.engine == ServoEngine.LIN) {

@@ -4,19 +4,13 @@ import java.util.Arrays;
 
 import heptarm.core.checks.Conditions;
 import heptarm.wire.Blending;
-import heptarm.wire.Circ;
 import heptarm.wire.Condition;
 import heptarm.wire.Encoder;
 import heptarm.wire.Item;
-import heptarm.wire.Lin;
-import heptarm.wire.LinRel;
 import heptarm.wire.Mode;
 import heptarm.wire.Motion;
 import heptarm.wire.PathReached;
 import heptarm.wire.PositionMode;
-import heptarm.wire.Ptp;
-import heptarm.wire.PtpHome;
-import heptarm.wire.PtpPose;
 
 /** Decides which items of a program go to the robot as one batch, because each is blended into the next. */
 final class BlendedBatches {
@@ -33,33 +27,13 @@ final class BlendedBatches {
     }
 
     private static boolean isBlended(Motion motion) {
-        Blending blending = of(motion);
+        Blending blending = motion.blending();
         return blending != null && (blending.relative > 0 || blending.distance > 0 || blending.orientation > 0);
-    }
-
-    /** Null for a motion without blending. */
-    private static Blending of(Motion motion) {
-        if (motion instanceof Ptp) {
-            return ((Ptp) motion).blending;
-        }
-        if (motion instanceof PtpHome) {
-            return ((PtpHome) motion).blending;
-        }
-        if (motion instanceof PtpPose) {
-            return ((PtpPose) motion).blending;
-        }
-        if (motion instanceof Lin) {
-            return ((Lin) motion).blending;
-        }
-        if (motion instanceof LinRel) {
-            return ((LinRel) motion).blending;
-        }
-        return motion instanceof Circ ? ((Circ) motion).blending : null;
     }
 
     /** A motion with another break condition, motion frame or control mode starts and ends at rest. */
     private static boolean canBlend(Item one, Item next) {
-        return of(next.motion) != null && one.frame.equals(next.frame) && canEndTogether(one.until, next.until)
+        return next.motion.blending() != null && one.frame.equals(next.frame) && canEndTogether(one.until, next.until)
                 && Arrays.equals(bytes(one.mode), bytes(next.mode));
     }
 

@@ -76,9 +76,9 @@ public final class ConditionWatcher {
             try {
                 while (!closed && program.cause() == null) {
                     next = Math.max(next + PERIOD_NS, clock.nanos());
-                    clock.sleepUntil(next);
+                    clock.hold(clock.sleepUntil(next));
                     try {
-                        Conditions.Tree fired = new ConditionReadings(sensors, signals, clock.nanos()).first(trees);
+                        Conditions.Tree fired = new ConditionReadings(sensors, signals, clock.stamp()).first(trees);
                         failures = 0;
                         if (fired != null && !closed) {
                             program.fired(item, fired.index);

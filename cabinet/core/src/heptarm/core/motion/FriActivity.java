@@ -1,7 +1,7 @@
 package heptarm.core.motion;
 
-import java.util.concurrent.TimeUnit;
-
+import heptarm.core.Clock;
+import heptarm.core.Clocks;
 import heptarm.core.CommandRejected;
 import heptarm.core.Log;
 import heptarm.core.robot.FriSession;
@@ -19,6 +19,7 @@ final class FriActivity implements Activity, FriSession.Listener {
     private final FriOpen open;
     private final MotionPort port;
     private final MotionReporter reporter;
+    private final Clock clock;
     private final Log log;
     private long deadline;
     private long id;
@@ -28,17 +29,18 @@ final class FriActivity implements Activity, FriSession.Listener {
     private boolean wasReady;
     private boolean closed;
 
-    FriActivity(FriOpen open, MotionPort port, MotionReporter reporter, Log log) {
+    FriActivity(FriOpen open, MotionPort port, MotionReporter reporter, Clock clock, Log log) {
         this.open = open;
         this.port = port;
         this.reporter = reporter;
+        this.clock = clock;
         this.log = log;
         this.deadline = newDeadline();
     }
 
-    /** When the client must have answered; in the client's seconds, not a simulator's. */
+    /** When the client must have answered. */
     private long newDeadline() {
-        return System.nanoTime() + (long) (open.timeout * 1e9);
+        return Clocks.afterClientSeconds(clock, open.timeout);
     }
 
     public void number(long accepted) {
@@ -91,11 +93,9 @@ final class FriActivity implements Activity, FriSession.Listener {
 
     private synchronized boolean awaitReady() throws InterruptedException {
         while (!closed && state != FriSessionState.MONITORING_READY) {
-            long left = deadline - System.nanoTime();
-            if (left <= 0) {
+            if (!Clocks.await(this, clock, deadline)) {
                 return false;
             }
-            TimeUnit.NANOSECONDS.timedWait(this, left);
         }
         return !closed;
     }
@@ -106,7 +106,7 @@ final class FriActivity implements Activity, FriSession.Listener {
             if (closed) {
                 return false;
             }
-            if (state != FriSessionState.MONITORING_WAIT || System.nanoTime() < deadline) {
+            if (state != FriSessionState.MONITORING_WAIT || clock.nanos() < deadline) {
                 return true;
             }
         }

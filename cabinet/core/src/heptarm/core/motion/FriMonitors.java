@@ -5,6 +5,7 @@ import java.util.List;
 import java.util.Map;
 import java.util.concurrent.ConcurrentHashMap;
 
+import heptarm.core.Clock;
 import heptarm.core.CommandRejected;
 import heptarm.core.Log;
 import heptarm.core.robot.MotionPort;
@@ -18,12 +19,14 @@ public final class FriMonitors implements Watchdog.Check {
 
     private final MotionPort port;
     private final MotionReporter reporter;
+    private final Clock clock;
     private final Log log;
     private final Map<Long, FriActivity> sessions = new ConcurrentHashMap<Long, FriActivity>();
 
-    public FriMonitors(MotionPort port, MotionReporter reporter, Log log) {
+    public FriMonitors(MotionPort port, MotionReporter reporter, Clock clock, Log log) {
         this.port = port;
         this.reporter = reporter;
+        this.clock = clock;
         this.log = log;
     }
 
@@ -32,7 +35,7 @@ public final class FriMonitors implements Watchdog.Check {
             throw new CommandRejected(Code.QUEUE_FULL, "command", "monitor", "",
                     "at most " + MAX_SESSIONS + " FRI sessions may be open; close one of them");
         }
-        FriActivity session = new FriActivity(open, port, reporter, log);
+        FriActivity session = new FriActivity(open, port, reporter, clock, log);
         session.number(id);
         session.start();
         sessions.put(id, session);

@@ -122,7 +122,7 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
 
     /** Start an FRI session that commands the robot; returns its id. */
     public long open(FriOpen open) throws CommandRejected {
-        return open(new FriActivity(open, port, reporter, log));
+        return open(new FriActivity(open, port, reporter, clock, log));
     }
 
     /** No other motion may be running or waiting, since an activity starts at the current position. */

@@ -6,13 +6,14 @@ import heptarm.core.Clock;
 import heptarm.core.EventBus;
 import heptarm.core.Log;
 import heptarm.core.robot.MotionJob;
-import heptarm.core.robot.Sensors;
 import heptarm.core.state.StateReader;
 import heptarm.wire.Cause;
 import heptarm.wire.ConditionFired;
+import heptarm.wire.Groups;
 import heptarm.wire.JointState;
 import heptarm.wire.Message;
 import heptarm.wire.MotionFinished;
+import heptarm.wire.State;
 import heptarm.wire.TriggerFired;
 
 /** Publishes the events of motions, with the robot's state at that moment. An event goes out even if a reading fails. */
@@ -20,14 +21,12 @@ public final class MotionReporter {
     private static final int JOINTS = 7;
 
     private final EventBus events;
-    private final Sensors sensors;
     private final StateReader reader;
     private final Clock clock;
     private final Log log;
 
-    public MotionReporter(EventBus events, Sensors sensors, StateReader reader, Clock clock, Log log) {
+    public MotionReporter(EventBus events, StateReader reader, Clock clock, Log log) {
         this.events = events;
-        this.sensors = sensors;
         this.reader = reader;
         this.clock = clock;
         this.log = log;
@@ -39,7 +38,8 @@ public final class MotionReporter {
 
     void conditionFired(long id, int item, int node) {
         try {
-            events.publish(new ConditionFired(id, item, node, reader.joints(), reader.torques(), reader.pose(), reader.wrench()));
+            State now = reader.read(Groups.JOINTS | Groups.TORQUES | Groups.POSE | Groups.WRENCH);
+            events.publish(new ConditionFired(id, item, node, now.joints, now.torques, now.pose, now.wrench));
         } catch (RuntimeException e) { // the end is reported in any case
             log.error("reading the robot when a condition of motion " + id + " fired", e);
         }
@@ -59,12 +59,12 @@ public final class MotionReporter {
     /** A program has ended; {@code moved}: it had reached the robot. */
     void finished(Program program, boolean moved) {
         double[] q = new double[JOINTS];
-        double[] commanded = new double[JOINTS];
         double residual = moved ? 0.0 : Double.NaN;
         try {
-            sensors.readJoints(q, commanded);
+            JointState last = reader.joints();
+            q = last.q;
             for (int i = 0; moved && i < JOINTS; i++) {
-                residual = Math.max(residual, Math.abs(q[i] - commanded[i]));
+                residual = Math.max(residual, Math.abs(q[i] - last.q_cmd[i]));
             }
         } catch (RuntimeException e) {
             log.error("reading the joints at the end of motion " + program.id, e);

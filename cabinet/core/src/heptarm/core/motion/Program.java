@@ -147,13 +147,17 @@ final class Program {
         return new MotionJob.Listener() {
             public void started() {
                 moved = true;
+                boolean isOver; // it was handed over while the program ended, and is cancelled at once
                 synchronized (Program.this) {
-                    item = index;
+                    isOver = cause != null;
+                    item = isOver ? item : index;
                 }
                 if (activity != null) {
                     activity.started(); // before the event: a client that reacts to it finds the activity running
                 }
-                reporter.publish(new MotionStarted(id, index));
+                if (!isOver) {
+                    reporter.publish(new MotionStarted(id, index));
+                }
             }
 
             public void reached(int segment) {

@@ -1,9 +1,9 @@
 package heptarm.core.motion;
 
 import java.util.Arrays;
-import java.util.concurrent.TimeUnit;
 
 import heptarm.core.Clock;
+import heptarm.core.Clocks;
 import heptarm.core.CommandRejected;
 import heptarm.core.checks.ModeChecks;
 import heptarm.core.checks.ServoChecks;
@@ -252,20 +252,16 @@ public final class ServoStream implements Activity {
 
     /** Under the lock: wait for the next target; null when the watchdog expires, or the motion or the program has ended. */
     private Target await() throws InterruptedException {
-        long period = (long) (watchdog * 1e9); // the client's seconds, not a simulator's
-        long deadline = System.nanoTime() + period;
+        long deadline = Clocks.afterClientSeconds(clock, watchdog);
         boolean overslept = false;
         while (pending == null && outcome == null && !closed) {
-            long left = deadline - System.nanoTime();
-            if (left < -OVERSLEPT_NS && !overslept) { // this machine stood still; what arrived meanwhile is not read yet
-                overslept = true;
-                left = period;
-                deadline = System.nanoTime() + period;
+            if (clock.nanos() - deadline > OVERSLEPT_NS * clock.rate() && !overslept) {
+                overslept = true; // this machine stood still; what arrived meanwhile is not read yet
+                deadline = Clocks.afterClientSeconds(clock, watchdog);
             }
-            if (left <= 0) {
+            if (!Clocks.await(this, clock, deadline)) {
                 return null;
             }
-            TimeUnit.NANOSECONDS.timedWait(this, left);
         }
         return pending;
     }

@@ -1,15 +1,17 @@
 package heptarm.core.robot;
 
+import heptarm.wire.JointState;
 import heptarm.wire.PoseState;
+import heptarm.wire.TorqueState;
 import heptarm.wire.WrenchState;
 
 /** Measured and commanded state of the robot, in SI units. A reading may take milliseconds; any thread may make one. */
 public interface Sensors {
-    /** Read measured and commanded joint positions [rad]. */
-    void readJoints(double[] q, double[] commanded);
+    /** Read the joint positions; the velocities are NaN, the robot provides none. */
+    JointState readJoints(long stamp);
 
-    /** Read measured, external and commanded torques [Nm]; NaN where the robot provides none. */
-    void readTorques(double[] measured, double[] external, double[] commanded);
+    /** Read the joint torques; NaN where the robot provides none. */
+    TorqueState readTorques(long stamp);
 
     /** Read the pose of the motion frame in the robot's base. */
     PoseState readPose(long stamp);

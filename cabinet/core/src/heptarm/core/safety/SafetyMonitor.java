@@ -10,6 +10,7 @@ import heptarm.core.robot.SafetyPort;
 import heptarm.wire.Code;
 import heptarm.wire.SafetyBits;
 import heptarm.wire.SafetyChanged;
+import heptarm.wire.SafetyState;
 
 /**
  * Monitors the robot's safety state: reports what a stop interrupts, refuses motions that cannot begin, and names the steps that
@@ -70,8 +71,18 @@ public final class SafetyMonitor implements Watchdog.Check {
         }
     }
 
+    /** The current safety state. Any thread. */
+    public SafetyState read() {
+        clock.hold(clock.nanos());
+        try {
+            return port.read(clock.stamp());
+        } finally {
+            clock.release();
+        }
+    }
+
     private SafetyAssessment update() {
-        SafetyAssessment now = new SafetyAssessment(port.read(clock.nanos()));
+        SafetyAssessment now = new SafetyAssessment(read());
         SafetyAssessment before;
         synchronized (this) {
             before = seen;

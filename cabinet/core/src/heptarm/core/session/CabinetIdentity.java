@@ -6,7 +6,7 @@ import heptarm.wire.Groups;
 import heptarm.wire.Protocol;
 import heptarm.wire.Welcome;
 
-/** How this cabinet introduces itself: its pre-shared key and the Welcome. */
+/** How this cabinet introduces itself. */
 final class CabinetIdentity {
     private static final int ALL_GROUPS = Groups.JOINTS | Groups.TORQUES | Groups.POSE | Groups.WRENCH | Groups.MOTION
             | Groups.SAFETY | Groups.IO | Groups.MODE;
@@ -23,14 +23,10 @@ final class CabinetIdentity {
         this.authority = authority;
     }
 
-    /** Pre-shared key; empty: none. */
-    String key() {
-        return settings.key;
-    }
-
-    Welcome welcome(int session, byte[] proof) {
+    /** The Welcome, without a proof of the key. */
+    Welcome welcome(int session) {
         return new Welcome(Protocol.MAJOR, Protocol.MINOR, session, ServerSettings.VERSION, robot.cabinet, robot.isVirtual, robot.info,
                 robot.capabilities, tools.known(), robot.tools.frames(), robot.signals.signals(), ALL_GROUPS, settings.maxRate,
-                settings.heartbeat, authority.name(), proof);
+                settings.heartbeat, authority.name(), new byte[0]);
     }
 }

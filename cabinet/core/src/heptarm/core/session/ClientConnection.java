@@ -9,12 +9,14 @@ import java.util.ArrayDeque;
 import heptarm.core.Clock;
 import heptarm.core.Log;
 import heptarm.core.Threads;
+import heptarm.core.key.FrameTag;
 import heptarm.core.state.StateSampler;
 import heptarm.wire.Code;
 import heptarm.wire.Goodbye;
 import heptarm.wire.Message;
 import heptarm.wire.Protocol;
 import heptarm.wire.State;
+import heptarm.wire.Welcome;
 
 /**
  * One connection: a reader thread that answers requests, and a writer thread with an outbox for everything else.
@@ -23,6 +25,7 @@ import heptarm.wire.State;
  * the oldest are dropped; a connection whose events pile up is closed.
  */
 final class ClientConnection implements ControlAuthority.Controller, StateSampler.Subscriber {
+    private static final int BUFFER = 16384;
     private static final int MAX_EVENTS = 4096;
     private static final int MAX_STATES = 64;
     private static final long LINGER_MS = 500;
@@ -32,6 +35,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     private final int session;
     private final Socket socket;
     private final Handshake handshake;
+    private final CabinetIdentity identity;
     private final RequestDispatcher dispatcher;
     private final Owner owner;
     private final FrameEncoder frames;
@@ -44,13 +48,20 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     private final ArrayDeque<byte[]> events = new ArrayDeque<byte[]>();
     private final ArrayDeque<byte[]> states = new ArrayDeque<byte[]>();
     private boolean writing;
+    private volatile boolean open;
     private volatile boolean ending;
     private long dropped;
 
     private int seq;
+    private int expected;
+    /** Tags of the client's frames and of ours; null without a key. */
+    private FrameTag theirs;
+    private FrameTag ours;
+    private byte[] tagged = new byte[0];
+    private byte[] unread;
+    private long arrived;
     private Thread reader;
     private Thread writer;
-    private final long connected;
     private volatile boolean gone;
     private volatile long lastReceived;
     private long silenceBefore;
@@ -59,28 +70,31 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
 
     /** Receives the end of a connection. */
     interface Owner {
-        /** The client receives no more states and events, and controls nothing any more. */
-        void ending(ClientConnection client, String why);
+        /** The client receives no more states and events, and controls nothing any more; code: of the Goodbye, 0: none. */
+        void ending(ClientConnection client, int code, String why);
 
         /** The connection is closed. */
         void closed(ClientConnection client, String why);
     }
 
-    ClientConnection(Socket socket, int session, CabinetIdentity identity, RequestDispatcher dispatcher, Owner owner, FrameEncoder frames,
-            Clock clock, Log log) throws IOException {
+    ClientConnection(Newcomer newcomer, int session, CabinetIdentity identity, RequestDispatcher dispatcher, Owner owner,
+            FrameEncoder frames, Clock clock, Log log) throws IOException {
+        this.identity = identity;
         this.dispatcher = dispatcher;
         this.owner = owner;
         this.frames = frames;
         this.clock = clock;
         this.log = log;
-        this.socket = socket;
+        this.socket = newcomer.socket;
         this.session = session;
         this.in = socket.getInputStream();
         this.out = socket.getOutputStream();
-        this.handshake = new Handshake(identity, this);
-        this.connected = clock.nanos();
-        this.lastReceived = connected;
-        this.lastSent = connected;
+        this.handshake = newcomer.handshake;
+        this.expected = newcomer.received();
+        this.seq = newcomer.sent();
+        this.unread = newcomer.unread();
+        this.lastReceived = clock.nanos();
+        this.lastSent = lastReceived;
     }
 
     void start() {
@@ -113,17 +127,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     }
 
     public boolean isOpen() {
-        return handshake.isOpen() && !ending && !gone;
-    }
-
-    /** Whether the handshake is not complete yet. */
-    boolean isNew() {
-        return !handshake.isOpen() && !ending;
-    }
-
-    /** Cabinet time at which the client connected. */
-    long connected() {
-        return connected;
+        return open && !ending && !gone;
     }
 
     /** Cabinet time of the last bytes from the client. */
@@ -160,13 +164,18 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     // ------------------------------------------------------------------------------------------- reading
 
     private void readAll() {
-        byte[] buffer = new byte[65536];
-        int filled = 0;
+        byte[] buffer = new byte[BUFFER];
+        System.arraycopy(unread, 0, buffer, 0, unread.length);
+        int filled = unread.length;
+        unread = null;
         String why = "the connection was closed";
         try {
+            welcome();
+            arrived = lastReceived;
+            filled -= handleFrames(buffer, filled); // a client without a key may say more than Hello at once
             while (!gone) {
                 if (filled == buffer.length) {
-                    byte[] larger = new byte[Math.min(buffer.length * 4, Protocol.HEADER + Protocol.MAX_BODY)];
+                    byte[] larger = new byte[Math.min(buffer.length * 4, Protocol.HEADER + Protocol.MAX_BODY + Protocol.TAG)];
                     System.arraycopy(buffer, 0, larger, 0, filled);
                     buffer = larger;
                 }
@@ -174,7 +183,10 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
                 if (count < 0) {
                     break;
                 }
-                lastReceived = clock.nanos();
+                arrived = clock.nanos();
+                if (theirs == null) {
+                    lastReceived = arrived; // with a key only whole frames of the client are a sign of life
+                }
                 filled += count;
                 int used = handleFrames(buffer, filled);
                 filled -= used;
@@ -201,30 +213,51 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     private int handleFrames(byte[] data, int filled) {
         int pos = 0;
         while (filled - pos >= Protocol.HEADER && !ending && !gone) {
-            int length = int32(data, pos + 6);
+            int length = FrameEncoder.getInt(data, pos + 6);
             if (((data[pos] & 0xFF) << 8 | data[pos + 1] & 0xFF) != Protocol.MAGIC || length < 0 || length > Protocol.MAX_BODY) {
                 goodbye(Code.BAD_FRAME, "it sent bytes that are not a heptarm frame");
                 return filled;
             }
-            if (filled - pos < Protocol.HEADER + length) {
+            int rest = pos + Protocol.HEADER + length;
+            int end = theirs == null ? rest : rest + Protocol.TAG;
+            if (data[pos + FrameEncoder.FLAGS] != (theirs == null ? 0 : FrameEncoder.TAGGED)) {
+                forged(theirs == null ? "a frame has flags that this session does not have" : "a frame has no tag");
+                return filled;
+            }
+            if (filled < end) {
                 break;
             }
-            int version = data[pos + 2] & 0xFF;
-            int type = (data[pos + 4] & 0xFF) << 8 | data[pos + 5] & 0xFF;
-            long request = int32(data, pos + 14) & 0xFFFFFFFFL;
-            if (handshake.isOpen()) {
-                long stamp = (long) int32(data, pos + 18) << 32 | int32(data, pos + 22) & 0xFFFFFFFFL;
-                dispatcher.handle(this, type, request, stamp, data, pos + Protocol.HEADER, length);
-            } else {
-                handshake.handle(version, type, data, pos + Protocol.HEADER, length);
+            if (theirs != null && !theirs.fits(data, pos, rest)) {
+                forged("a frame has a wrong tag");
+                return filled;
             }
-            pos += Protocol.HEADER + length;
+            int type = (data[pos + 4] & 0xFF) << 8 | data[pos + 5] & 0xFF;
+            long request = FrameEncoder.getInt(data, pos + 14) & 0xFFFFFFFFL;
+            if (FrameEncoder.getInt(data, pos + FrameEncoder.SEQUENCE) != expected) {
+                forged("frame " + (expected & 0xFFFFFFFFL) + " was expected, frame "
+                        + (FrameEncoder.getInt(data, pos + FrameEncoder.SEQUENCE) & 0xFFFFFFFFL) + " came");
+                return filled;
+            }
+            expected++;
+            if (expected == 0 && theirs != null) {
+                theirs.beginRound();
+            }
+            lastReceived = arrived;
+            if ((data[pos + 2] & 0xFF) != Protocol.MAJOR) {
+                goodbye(Code.WRONG_VERSION, "a frame has protocol version " + (data[pos + 2] & 0xFF) + ", this cabinet has "
+                        + Protocol.MAJOR);
+                return filled;
+            }
+            long stamp = (long) FrameEncoder.getInt(data, pos + 18) << 32 | FrameEncoder.getInt(data, pos + 22) & 0xFFFFFFFFL;
+            dispatcher.handle(this, type, request, stamp, data, pos + Protocol.HEADER, length);
+            pos = end;
         }
         return ending ? filled : pos;
     }
 
-    private static int int32(byte[] data, int at) {
-        return (data[at] & 0xFF) << 24 | (data[at + 1] & 0xFF) << 16 | (data[at + 2] & 0xFF) << 8 | data[at + 3] & 0xFF;
+    /** End a session in which a frame is not the next one of the client. */
+    private void forged(String what) {
+        goodbye(Code.FORGED_FRAME, what + ": it was forged, changed, repeated, reordered or lost on its way");
     }
 
     // ------------------------------------------------------------------------------------------- writing
@@ -253,28 +286,27 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
             leave("it does not read its answers");
             return;
         }
-        writeFrame(frame);
+        writeFrame(frame, ours);
     }
 
-    /** Claim the connection: other frames wait until {@link #writeClaimed}. False: the connection is ending. */
-    boolean claim() {
+    /** Open the session: the Welcome goes out first, and reflects all events before it; every later frame has a tag. */
+    private void welcome() {
         synchronized (outbox) {
-            if (writing || ending) {
-                return false;
+            if (ending || gone) {
+                return;
             }
             writing = true;
-            return true;
         }
+        theirs = handshake.clientTag(); // before the Welcome, after which the client sends tagged frames
+        open = true; // events are queued from here on
+        byte[] body = handshake.prove(identity.welcome(session).body());
+        writeFrame(frames.frame(Welcome.TYPE, body), handshake.cabinetTag());
     }
 
-    /** Write a message over the claimed connection and free it. */
-    void writeClaimed(Message message) {
-        writeFrame(frames.frame(message, 0));
-    }
-
-    private void writeFrame(byte[] frame) {
+    private void writeFrame(byte[] frame, FrameTag next) {
         try {
             write(frame);
+            ours = next;
         } catch (IOException e) {
             leave("the connection broke (" + e.getMessage() + ")");
         } finally {
@@ -325,21 +357,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
             ending = true;
             outbox.notify();
         }
-        owner.ending(this, text);
-    }
-
-    /** Refuse a connection. */
-    void refuse(int code, String text) {
-        start(); // the writer sends the refusal, then closes
-        handshake.refuse(code, text);
-    }
-
-    /** End the connection after the outbox is written. */
-    void endAfterWriting() {
-        synchronized (outbox) {
-            ending = true;
-            outbox.notify();
-        }
+        owner.ending(this, code, text);
     }
 
     private void writeAll() {
@@ -390,11 +408,31 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
 
     private void write(byte[] frame) throws IOException {
         FrameEncoder.putInt(frame, FrameEncoder.SEQUENCE, seq++); // only the thread that holds `writing` gets here
+        byte[] data = frame;
+        int length = frame.length;
+        if (ours != null) {
+            data = withTag(frame);
+            length += Protocol.TAG;
+        }
         long now = clock.nanos();
         writeBegan = now;
-        out.write(frame);
+        out.write(data, 0, length);
         lastSent = now;
         writeBegan = 0;
+    }
+
+    /** The frame with its tag, in a buffer that the next one overwrites. */
+    private byte[] withTag(byte[] frame) {
+        if (tagged.length < frame.length + Protocol.TAG) {
+            tagged = new byte[2 * frame.length + Protocol.TAG];
+        }
+        System.arraycopy(frame, 0, tagged, 0, frame.length);
+        tagged[FrameEncoder.FLAGS] = FrameEncoder.TAGGED;
+        ours.write(tagged, 0, frame.length);
+        if (seq == 0) {
+            ours.beginRound();
+        }
+        return tagged;
     }
 
     // ------------------------------------------------------------------------------------------- the end

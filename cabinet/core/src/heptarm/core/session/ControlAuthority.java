@@ -104,11 +104,22 @@ public final class ControlAuthority {
     void lost(Controller client, String why) {
         OnLost action;
         synchronized (this) {
+            action = onLost;
+        }
+        lose(client, action, why);
+    }
+
+    /** What arrives from the controller is not what it sent: the arm stops, whatever the controller chose for its loss. */
+    void distrust(Controller client, String why) {
+        lose(client, OnLost.STOP, why);
+    }
+
+    private void lose(Controller client, OnLost action, String why) {
+        synchronized (this) {
             if (controller != client || leaving) {
                 return;
             }
             leaving = true;
-            action = onLost;
         }
         log.warn(client.name() + " lost control: " + why);
         try {

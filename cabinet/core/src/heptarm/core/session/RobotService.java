@@ -27,6 +27,7 @@ public final class RobotService {
     public final EventBus events = new EventBus();
     public final ToolTable tools;
     public final StateReader reader;
+    public final SafetyMonitor safety;
     public final MotionExecutor executor;
     public final ControlAuthority authority;
     public final CommandHandler commands;
@@ -40,14 +41,14 @@ public final class RobotService {
         this.clock = clock;
         this.log = log;
         SignalTable signals = new SignalTable(robot.signals);
-        SafetyMonitor safety = new SafetyMonitor(robot.safety, events, clock);
+        safety = new SafetyMonitor(robot.safety, events, clock);
         tools = new ToolTable(robot.tools);
         reader = new StateReader(robot.sensors, clock);
-        MotionReporter reporter = new MotionReporter(events, robot.sensors, reader, clock, log);
+        MotionReporter reporter = new MotionReporter(events, reader, clock, log);
         executor = new MotionExecutor(robot.motion, new ConditionWatcher(robot.sensors, robot.signals, clock, log), reporter,
                 new TriggerActions(signals, reporter, clock), safety, clock, log);
         safety.add(executor);
-        monitors = new FriMonitors(robot.motion, reporter, log);
+        monitors = new FriMonitors(robot.motion, reporter, clock, log);
         authority = new ControlAuthority(robot.motion, executor, monitors, safety, events, log);
         sampler = new StateSampler(robot, reader, executor, signals, tools, clock, log);
         commands = new CommandHandler(robot, executor, monitors, safety, tools, new ProgramChecks(robot, tools, signals),

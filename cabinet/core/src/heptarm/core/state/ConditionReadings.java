@@ -110,8 +110,7 @@ public final class ConditionReadings {
 
     private double[] external() {
         if (external == null) {
-            external = new double[7];
-            sensors.readTorques(new double[7], external, new double[7]);
+            external = sensors.readTorques(stamp).tau_ext;
         }
         return external;
     }

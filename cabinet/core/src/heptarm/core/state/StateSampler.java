@@ -194,12 +194,21 @@ public final class StateSampler {
 
     /** Reads the groups that are due and worth their cost now; keeps the newest samples of the others. */
     private State sample(long now, int groups) {
+        clock.hold(now);
+        try {
+            return read(now, groups);
+        } finally {
+            clock.release();
+        }
+    }
+
+    private State read(long now, int groups) {
         if (begin(jointsBudget, groups, now)) {
             joints = reader.sampleJoints(jointsBudget.stamp);
             end(jointsBudget);
         }
         if (begin(torquesBudget, groups, now)) {
-            torques = reader.torques(torquesBudget.stamp);
+            torques = robot.sensors.readTorques(torquesBudget.stamp);
             end(torquesBudget);
         }
         if (begin(poseBudget, groups, now)) {
@@ -237,7 +246,8 @@ public final class StateSampler {
         if ((groups & budget.bit) == 0 || now < budget.next) {
             return false;
         }
-        budget.stamp = budget.next == 0 ? now : clock.nanos(); // after slow readings the time is no longer `now`
+        // the image of the signals has no past; on a robot the time is no longer `now` after slow readings
+        budget.stamp = budget == ioBudget ? clock.nanos() : clock.stamp();
         budget.began = System.nanoTime();
         return true;
     }

@@ -9,7 +9,7 @@ public class StatisticTimer {
     private double least = Double.POSITIVE_INFINITY;
     private double most;
 
-    /** A step that is under way. */
+    /** A running measurement of one step. */
     public final class OneTimeStep {
         private final long begun = System.nanoTime();
 
@@ -39,7 +39,7 @@ public class StatisticTimer {
 
     @Override
     public synchronized String toString() {
-        return count == 0 ? "no step has ended"
+        return count == 0 ? "no step has ended yet"
                 : String.format("%d steps, mean %.3f ms, least %.3f ms, most %.3f ms", count, total / count, least, most);
     }
 }

@@ -7,7 +7,7 @@ public final class ThreadUtil {
     private ThreadUtil() {
     }
 
-    /** Sleeps for a time of the simulation; an interruption throws, and stays set. */
+    /** Sleeps in simulated time; an interruption throws and leaves the interrupt flag set. */
     public static void milliSleep(long millis) {
         try {
             Station.current().sleep(millis * 1000000L);

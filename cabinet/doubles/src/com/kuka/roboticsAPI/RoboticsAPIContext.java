@@ -7,11 +7,11 @@ import com.kuka.roboticsAPI.controllerModel.Controller;
 
 import heptarm.doubles.runtime.Station;
 
-/** Cabinets and devices of the project: here one of each. */
+/** Cabinets and devices of the project; here one of each. */
 public class RoboticsAPIContext {
     private final Station station;
 
-    /** Made by the simulation. */
+    /** Created by the simulation. */
     public RoboticsAPIContext(Station station) {
         this.station = station;
     }

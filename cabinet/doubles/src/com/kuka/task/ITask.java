@@ -2,13 +2,13 @@ package com.kuka.task;
 
 import java.util.Collection;
 
-/** A task of the project: its class, and what runs of it. */
+/** A task of the project: its class, and its running instances. */
 public interface ITask {
-    /** Starts it once more. */
+    /** Starts another instance. */
     ITaskInstance startInstance() throws InterruptedException;
 
     Collection<ITaskInstance> getInstances();
 
-    /** Stops all that runs of it, and waits for their ends. */
+    /** Stops all instances, and waits for their ends. */
     void stopAllInstances() throws InterruptedException;
 }

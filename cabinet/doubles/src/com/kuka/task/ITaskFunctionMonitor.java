@@ -6,6 +6,6 @@ import java.util.concurrent.TimeUnit;
 public interface ITaskFunctionMonitor {
     boolean isAvailable();
 
-    /** Waits until it can be called; false: the time has passed. */
+    /** Waits until it can be called; false if it cannot within the time. */
     boolean await(long time, TimeUnit unit) throws InterruptedException;
 }

@@ -1,6 +1,6 @@
 package com.kuka.task;
 
-/** A task that runs. */
+/** A running instance of a task. */
 public interface ITaskInstance {
     boolean isRunning();
 

@@ -26,6 +26,8 @@ import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
 import com.kuka.roboticsAPI.motionModel.MotionBatch;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 
+import heptarm.core.Clock;
+import heptarm.core.Clocks;
 import heptarm.doubles.plant.MotionListener;
 import heptarm.doubles.runtime.ApplicationServices;
 import heptarm.doubles.runtime.Station;
@@ -273,14 +275,13 @@ public final class MotionContainer implements IMotionContainer, MotionListener {
 
     @Override
     public synchronized void await(long time, TimeUnit unit) throws TimeoutException {
-        long deadline = System.nanoTime() + unit.toNanos(time);
+        Clock clock = station.clock();
+        long deadline = clock.nanos() + unit.toNanos(time);
         try {
             while (!isFinished()) {
-                long left = deadline - System.nanoTime();
-                if (left <= 0) {
+                if (!Clocks.await(this, clock, deadline)) {
                     throw new TimeoutException("the motion did not end within " + time + " " + unit);
                 }
-                TimeUnit.NANOSECONDS.timedWait(this, left);
             }
         } catch (InterruptedException e) {
             Thread.currentThread().interrupt();

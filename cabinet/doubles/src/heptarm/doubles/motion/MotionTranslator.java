@@ -1,13 +1,9 @@
 package heptarm.doubles.motion;
 
+import java.util.Arrays;
 import java.util.List;
 
 import com.kuka.connectivity.fastRobotInterface.FRIJointOverlay;
-import com.kuka.connectivity.motionModel.directServo.DirectServo;
-import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
-import com.kuka.connectivity.motionModel.smartServo.SmartServo;
-import com.kuka.connectivity.motionModel.smartServoLIN.SmartServoLIN;
-import com.kuka.roboticsAPI.deviceModel.JointPosition;
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
 import com.kuka.roboticsAPI.deviceModel.StatusTurnRedundancy;
@@ -18,28 +14,15 @@ import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
 import com.kuka.roboticsAPI.geometricModel.math.Matrix;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
-import com.kuka.roboticsAPI.motionModel.BrakeTest;
-import com.kuka.roboticsAPI.motionModel.CIRC;
-import com.kuka.roboticsAPI.motionModel.CartesianPTP;
-import com.kuka.roboticsAPI.motionModel.HandGuidingMotion;
 import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionOverlay;
-import com.kuka.roboticsAPI.motionModel.LIN;
-import com.kuka.roboticsAPI.motionModel.MotionBatch;
-import com.kuka.roboticsAPI.motionModel.PTP;
-import com.kuka.roboticsAPI.motionModel.PTPHome;
-import com.kuka.roboticsAPI.motionModel.PositionHold;
-import com.kuka.roboticsAPI.motionModel.RelativeLIN;
+import com.kuka.roboticsAPI.motionModel.Motion;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
-import com.kuka.roboticsAPI.motionModel.SPL;
-import com.kuka.roboticsAPI.motionModel.Spline;
-import com.kuka.roboticsAPI.motionModel.SplineJP;
 import com.kuka.roboticsAPI.motionModel.SplineMotionCP;
 
 import heptarm.doubles.seam.Blending;
 import heptarm.doubles.seam.CartesianDynamics;
 import heptarm.doubles.seam.FriOverlay;
-import heptarm.doubles.seam.MotionKind;
 import heptarm.doubles.seam.MotionOrder;
 import heptarm.doubles.seam.Redundancy;
 
@@ -52,7 +35,12 @@ public final class MotionTranslator {
 
     /** The order for a motion of a frame on the robot. */
     public static MotionOrder of(long id, IMotion motion, ObjectFrame moved, LBR robot) {
-        MotionOrder order = make(id, motion, robot);
+        if (!(motion instanceof Motion)) {
+            throw new IllegalArgumentException("the virtual cabinet cannot execute a motion of class " + motion.getClass().getName());
+        }
+        MotionOrder order = new MotionOrder();
+        order.id = id;
+        ((Motion<?>) motion).describe(order, moved, robot);
         order.tcp = pose(robot.getFlange().transformationTo(moved));
         List<? extends RobotMotion<?>> parts = parts(motion);
         order.parts = new MotionOrder[parts.size()];
@@ -62,9 +50,6 @@ public final class MotionTranslator {
             if (order.parts[i].breaks.length > 0) {
                 throw new IllegalArgumentException("break conditions of single parts are not supported: set them on the whole batch or spline");
             }
-        }
-        if (motion instanceof RelativeLIN) {
-            turn(order, (RelativeLIN) motion, moved, robot);
         }
         if (motion instanceof RobotMotion) {
             parametrize(order, (RobotMotion<?>) motion);
@@ -76,27 +61,9 @@ public final class MotionTranslator {
         return order;
     }
 
-    /** Converts an offset given in a frame that moves with the flange to the axes of the motion frame, since the arm will be elsewhere when it runs. */
-    private static void turn(MotionOrder order, RelativeLIN motion, ObjectFrame moved, LBR robot) {
-        for (AbstractFrame one = motion.getReference(); one != null; one = one.getParent()) {
-            if (one == robot.getFlange()) {
-                Transformation to = moved.transformationTo(motion.getReference());
-                Transformation turn = Transformation.ofRad(0, 0, 0, to.getAlphaRad(), to.getBetaRad(), to.getGammaRad());
-                order.offset = pose(turn.compose(motion.getOffset()).compose(turn.invert()));
-                order.reference = null;
-            }
-        }
-    }
-
     /** Motions of a batch, segments of a spline; none of others. */
     static List<? extends RobotMotion<?>> parts(IMotion motion) {
-        if (motion instanceof MotionBatch) {
-            return ((MotionBatch) motion).getMotions();
-        }
-        if (motion instanceof Spline) {
-            return ((Spline) motion).segments();
-        }
-        return motion instanceof SplineJP ? ((SplineJP) motion).segments() : List.of();
+        return motion instanceof Motion ? ((Motion<?>) motion).parts() : List.of();
     }
 
     /** Sets the parameters that have not been set yet. */
@@ -135,75 +102,14 @@ public final class MotionTranslator {
         return Double.isNaN(value) ? other : value;
     }
 
-    private static MotionOrder make(long id, IMotion motion, LBR robot) {
-        MotionOrder order;
-        if (motion instanceof PTP) {
-            order = order(id, MotionKind.PTP);
-            order.joints = ((PTP) motion).getDestination().get();
-        } else if (motion instanceof PTPHome) {
-            order = order(id, MotionKind.PTP);
-            order.joints = robot.home() instanceof JointPosition ? ((JointPosition) robot.home()).get() : null;
-            if (order.joints == null) {
-                target(order, (AbstractFrame) robot.home(), robot);
-            }
-        } else if (motion instanceof BrakeTest) {
-            order = order(id, MotionKind.HOLD);
-            order.duration = ((BrakeTest) motion).seconds();
-        } else if (motion instanceof CartesianPTP) {
-            order = order(id, MotionKind.PTP);
-            target(order, ((CartesianPTP) motion).getDestination(), robot);
-        } else if (motion instanceof LIN) {
-            order = order(id, MotionKind.LIN);
-            target(order, ((LIN) motion).getDestination(), robot);
-        } else if (motion instanceof CIRC) {
-            order = order(id, MotionKind.CIRC);
-            order.via = pose(((CIRC) motion).auxiliary().transformationFromWorld());
-            target(order, ((CIRC) motion).getDestination(), robot);
-        } else if (motion instanceof SPL) {
-            order = order(id, MotionKind.SPL);
-            target(order, ((SPL) motion).getDestination(), robot);
-        } else if (motion instanceof MotionBatch || motion instanceof Spline || motion instanceof SplineJP) {
-            order = order(id,
-                    motion instanceof MotionBatch ? MotionKind.BATCH : motion instanceof Spline ? MotionKind.SPLINE : MotionKind.SPLINE_JOINTS);
-        } else if (motion instanceof RelativeLIN) {
-            RelativeLIN relative = (RelativeLIN) motion;
-            order = order(id, MotionKind.LIN_REL);
-            order.offset = pose(relative.getOffset());
-            order.reference = axes(relative.getReference());
-        } else if (motion instanceof PositionHold) {
-            order = order(id, MotionKind.HOLD);
-            order.duration = ((PositionHold) motion).seconds();
-        } else if (motion instanceof HandGuidingMotion) {
-            order = order(id, MotionKind.GUIDE);
-            order.handGuiding = ((HandGuidingMotion) motion).settings();
-        } else if (motion instanceof SmartServo || motion instanceof DirectServo) {
-            order = order(id, motion instanceof SmartServo ? MotionKind.SERVO : MotionKind.DIRECT);
-            order.servoTiming = ((ServoMotion<?>) motion).timing();
-        } else if (motion instanceof SmartServoLIN) {
-            order = order(id, MotionKind.STRAIGHT);
-            order.servoTiming = ((SmartServoLIN) motion).timing();
-            order.straightLimits = ((SmartServoLIN) motion).limits();
-            order.reference = axes(((SmartServoLIN) motion).reference());
-        } else {
-            throw new IllegalArgumentException("the virtual cabinet cannot execute a motion of class " + motion.getClass().getName());
-        }
-        return order;
-    }
-
-    private static MotionOrder order(long id, MotionKind kind) {
-        MotionOrder order = new MotionOrder();
-        order.id = id;
-        order.kind = kind;
-        return order;
-    }
-
     /** Quaternion of a frame's axes in the base; null: of none. */
-    private static double[] axes(AbstractFrame frame) {
-        if (frame == null) {
-            return null;
-        }
-        double[] placed = pose(World.Current.getRootFrame().transformationTo(frame));
-        return new double[] {placed[3], placed[4], placed[5], placed[6]};
+    public static double[] axes(AbstractFrame frame) {
+        return frame == null ? null : axes(frame, World.Current.getRootFrame());
+    }
+
+    /** Quaternion of a frame's axes seen from another frame. */
+    public static double[] axes(AbstractFrame frame, AbstractFrame from) {
+        return Arrays.copyOfRange(pose(from.transformationTo(frame)), 3, 7);
     }
 
     private static void overlay(MotionOrder order, IMotionOverlay overlay) {
@@ -216,7 +122,8 @@ public final class MotionTranslator {
         }
     }
 
-    private static void target(MotionOrder order, AbstractFrame frame, LBR robot) {
+    /** Set the target of an order to a frame. */
+    public static void target(MotionOrder order, AbstractFrame frame, LBR robot) {
         order.pose = pose(frame.transformationFromWorld());
         order.redundancy = redundancy(frame, robot);
     }

@@ -4,13 +4,17 @@ import java.util.Arrays;
 
 import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
-import com.kuka.roboticsAPI.geometricModel.math.CoordinateAxis;
 
-import heptarm.doubles.seam.Axis;
+import heptarm.doubles.seam.Condition;
 import heptarm.doubles.seam.MeasuringFrame;
+import heptarm.doubles.seam.WrenchAbove;
+import heptarm.doubles.seam.WrenchOutside;
 
 /** A condition on the external force or torque at a frame. The simulated estimate is exact: tolerances have no effect. */
 public abstract class WrenchCondition extends AbstractCondition {
+    /** Component of a wrench with which its torques begin. */
+    protected static final int TORQUES = 3;
+
     private final AbstractFrame measured;
     private final AbstractFrame orientation;
 
@@ -19,8 +23,29 @@ public abstract class WrenchCondition extends AbstractCondition {
         this.orientation = orientation;
     }
 
+    /** The magnitude of some components (forces along x y z, then torques about them) is above a threshold. */
+    protected final Condition above(LBR robot, double threshold, int... components) {
+        WrenchAbove condition = new WrenchAbove();
+        condition.frame = frame(robot);
+        for (int component : components) {
+            condition.components |= 1 << component;
+        }
+        condition.threshold = threshold;
+        return condition;
+    }
+
+    /** A component (forces along x y z, then torques about them) is outside a band. */
+    protected final Condition outside(LBR robot, double[] band, int component) {
+        WrenchOutside condition = new WrenchOutside();
+        condition.frame = frame(robot);
+        condition.component = component;
+        condition.low = band[0];
+        condition.high = band[1];
+        return condition;
+    }
+
     /** Measuring point and axes; without frames those of the flange. */
-    protected final MeasuringFrame frame(LBR robot) {
+    private MeasuringFrame frame(LBR robot) {
         AbstractFrame point = measured == null ? robot.getFlange() : measured;
         AbstractFrame axes = orientation == null ? point : orientation;
         MeasuringFrame frame = new MeasuringFrame();
@@ -44,10 +69,5 @@ public abstract class WrenchCondition extends AbstractCondition {
     /** Pose seen from the flange if the frame is fixed to it, otherwise from the base. */
     private static double[] seen(AbstractFrame frame, boolean moves, LBR robot) {
         return MotionTranslator.pose((moves ? robot.getFlange() : robot.getRootFrame()).transformationTo(frame));
-    }
-
-    /** An axis in the plant's terms. */
-    protected static Axis axis(CoordinateAxis axis) {
-        return Axis.valueOf(axis.name());
     }
 }

@@ -35,8 +35,8 @@ public final class PeriodicSampler {
         long next = first;
         try {
             while (!stopped) {
-                long now = clock.sleepUntil(next);
-                sample.accept(now - first);
+                clock.hold(clock.sleepUntil(next));
+                sample.accept(clock.stamp() - first);
                 next += period;
             }
         } catch (InterruptedException e) {

@@ -49,6 +49,22 @@ public final class PlantClock implements Clock {
     }
 
     @Override
+    public void hold(long nanos) {
+        sharedState.hold(nanos / Seam.TICK_NS);
+    }
+
+    @Override
+    public void release() {
+        sharedState.release();
+    }
+
+    @Override
+    public long stamp() {
+        long held = sharedState.held();
+        return held < 0 ? nanos() : held * Seam.TICK_NS;
+    }
+
+    @Override
     public double rate() {
         double rate = sharedState.rate();
         return rate > 0.0 ? rate : FREE_RUN;

@@ -16,22 +16,29 @@ import heptarm.doubles.seam.TargetWords;
 /**
  * Reads the last states of the plant from memory shared with Python, and writes servo targets, outputs and the override into it.
  *
- * <p>A thread that a {@link PlantClock} has woken for a tick reads the state of exactly that tick as long as it is kept;
- * all other threads read the newest state.
+ * <p>A thread that a {@link PlantClock} has woken for a tick reads the state of exactly that tick for a while; a thread that
+ * holds a tick reads the state of that tick until it releases it, however late it comes to that. All others read the newest state.
  */
 public final class SharedState {
     private static final int WORD = Long.BYTES;
     private static final int TARGET = WORD * TargetWords.START;
-    /** A state further back than this [ticks] may be overwritten while it is read. */
+    /** A thread that was woken longer ago than this [ticks], or that wakes later than half of it, reads the newest state. */
     private static final int OLDEST = 200;
-    /** A thread that wakes later than this [ticks] reads the newest state, so that it has time to read before its state is overwritten. */
     private static final int FAR = OLDEST / 2;
 
     private static final VarHandle LONGS =
             MethodHandles.byteBufferViewVarHandle(long[].class, ByteOrder.nativeOrder());
 
     private final ByteBuffer memory;
-    private final ThreadLocal<long[]> views = ThreadLocal.withInitial(() -> new long[] {-1});
+    private final ThreadLocal<View> views = ThreadLocal.withInitial(View::new);
+
+    /** A copy of the state that a thread reads. */
+    private static final class View {
+        /** -1: none. */
+        long tick = -1;
+        boolean held;
+        final long[] words = new long[StateWords.SIZE];
+    }
 
     public SharedState(ByteBuffer memory) {
         this.memory = memory.order(ByteOrder.nativeOrder());
@@ -89,16 +96,49 @@ public final class SharedState {
 
     /** Selects the tick that the calling thread reads from now on, or the newest if that tick is too old; returns the selected tick. */
     long view(long tick) {
-        long newest = newest();
-        long seen = newest - tick > FAR ? newest : tick;
-        views.get()[0] = seen;
-        return seen;
+        View view = views.get();
+        view.held = false;
+        copy(view, newest() - tick > FAR ? newest() : tick);
+        return view.tick;
     }
 
-    private long tick() {
-        long newest = newest();
-        long view = views.get()[0];
-        return view < 0 || newest - view > OLDEST ? newest : view;
+    /** Keeps the calling thread at a tick, or at the newest if that tick is not kept any more, until {@link #release}. */
+    void hold(long tick) {
+        View view = views.get();
+        copy(view, tick);
+        view.held = true;
+    }
+
+    /** Lets the calling thread read the newest state again. */
+    void release() {
+        View view = views.get();
+        view.held = false;
+        view.tick = -1;
+    }
+
+    /** The tick that the calling thread holds; -1: none. */
+    long held() {
+        View view = views.get();
+        return view.held ? view.tick : -1;
+    }
+
+    private void copy(View view, long wanted) {
+        long tick = Math.min(wanted, newest());
+        while (view.tick != tick) {
+            int base = StateWords.START + (int) (tick % Seam.SLOTS) * StateWords.SIZE;
+            if (word(base + StateWords.SEQ) == 2 * tick + 2) {
+                view.tick = -1;
+                for (int i = 0; i < StateWords.SIZE; i++) {
+                    view.words[i] = memory.getLong(WORD * (base + i));
+                }
+                VarHandle.loadLoadFence();
+                if (word(base + StateWords.SEQ) == 2 * tick + 2) {
+                    view.tick = tick;
+                    return;
+                }
+            }
+            tick = newest(); // it was overwritten
+        }
     }
 
     /** Value of a signal of the IO image. */
@@ -117,19 +157,14 @@ public final class SharedState {
 
     /** Copies {@code count} doubles of a state from {@code word} on. */
     public void read(int word, double[] out, int at, int count) {
-        while (true) {
-            long tick = tick();
-            int base = StateWords.START + (int) (tick % Seam.SLOTS) * StateWords.SIZE;
-            if (word(base + StateWords.SEQ) == 2 * tick + 2) {
-                for (int i = 0; i < count; i++) {
-                    out[at + i] = memory.getDouble(WORD * (base + word + i));
-                }
-                VarHandle.loadLoadFence();
-                if (word(base + StateWords.SEQ) == 2 * tick + 2) {
-                    return;
-                }
-            }
-            Thread.onSpinWait();
+        View view = views.get();
+        if (!view.held && (view.tick < 0 || newest() - view.tick > OLDEST)) {
+            view.tick = -1;
+            copy(view, newest());
+            view.tick = -1;
+        }
+        for (int i = 0; i < count; i++) {
+            out[at + i] = Double.longBitsToDouble(view.words[word + i]);
         }
     }
 

@@ -15,8 +15,10 @@ import com.kuka.roboticsAPI.deviceModel.LBRE1Redundancy;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.World;
 
+import heptarm.core.Clock;
 import heptarm.doubles.pad.SmartPad;
 import heptarm.doubles.plant.Plant;
+import heptarm.doubles.plant.PlantClock;
 import heptarm.doubles.plant.SharedState;
 import heptarm.doubles.plant.TimerQueue;
 import heptarm.doubles.seam.RobotDescription;
@@ -66,6 +68,11 @@ public final class Station {
             throw new IllegalStateException("no virtual cabinet is open; call Station.open first");
         }
         return current;
+    }
+
+    /** Simulation time. */
+    public Clock clock() {
+        return new PlantClock();
     }
 
     /** Sleeps for a duration in simulation time [ns]. */

@@ -9,7 +9,7 @@ public final class AllOf extends Condition {
 
     @Override
     int tag() {
-        return 10;
+        return 7;
     }
 
     @Override

@@ -9,7 +9,7 @@ public final class AnyOf extends Condition {
 
     @Override
     int tag() {
-        return 11;
+        return 8;
     }
 
     @Override

@@ -7,21 +7,18 @@ import heptarm.wire.Encoder;
 public final class CartesianImpedance extends ImpedanceMode {
     /** [N/m, Nm/rad] */
     public double[] stiffness = new double[6];
-    /** Damping ratios */
     public double[] damping = new double[6];
     /** [Nm/rad] */
     public double nullspaceStiffness;
-    /** Damping ratio */
     public double nullspaceDamping;
     /** [N, Nm] */
     public double[] additionalForce = new double[6];
-    /** NaN: unlimited [N, Nm] */
+    /** NaN: off [N, Nm] */
     public double[] maxForce = Seam.missing(6);
-    /** Whether reaching max_force ends the motion */
     public boolean maxForceStops = false;
-    /** NaN: unlimited [m/s, rad/s] */
+    /** exceeding it stops; NaN: off [m/s, rad/s] */
     public double[] maxVelocity = Seam.missing(6);
-    /** NaN: unlimited [m, rad] */
+    /** exceeding it stops; NaN: off [m, rad] */
     public double[] maxDeviation = Seam.missing(6);
     /** Quaternion of the directions in the base; none: axes of the motion frame */
     public double[] axes;

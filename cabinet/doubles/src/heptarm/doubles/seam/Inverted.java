@@ -9,7 +9,7 @@ public final class Inverted extends Condition {
 
     @Override
     int tag() {
-        return 12;
+        return 9;
     }
 
     @Override

@@ -7,7 +7,6 @@ import heptarm.wire.Encoder;
 public final class JointImpedance extends ImpedanceMode {
     /** [Nm/rad] */
     public double[] stiffness = new double[7];
-    /** Damping ratios */
     public double[] damping = new double[7];
 
     @Override

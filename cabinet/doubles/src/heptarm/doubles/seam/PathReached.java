@@ -13,7 +13,7 @@ public final class PathReached extends Condition {
 
     @Override
     int tag() {
-        return 9;
+        return 6;
     }
 
     @Override

@@ -5,15 +5,15 @@ import heptarm.wire.Encoder;
 
 /** Timing of a servo motion. */
 public final class ServoTiming {
-    /** Shortest trajectory to a target [s] */
-    public double minimumTime = 0.02;
-    /** The motion ends this long after its target was reached [s] */
-    public double goalTimeout = 30.0;
-    /** How long the velocity of a passed target is kept [s] */
+    /** shortest trajectory to a target [s] */
+    public double minTrajectoryTime = 0.02;
+    /** the motion ends this long after its target was reached [s] */
+    public double goalTimeout = 300.0;
+    /** of the smart engine: how long a target's velocity is kept after the target was passed [s] */
     public double speedTimeout = 0.1;
 
     void write(Encoder out) {
-        out.putF64(minimumTime);
+        out.putF64(minTrajectoryTime);
         out.putF64(goalTimeout);
         out.putF64(speedTimeout);
     }

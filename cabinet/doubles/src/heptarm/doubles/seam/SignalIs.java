@@ -11,7 +11,7 @@ public final class SignalIs extends Condition {
 
     @Override
     int tag() {
-        return 7;
+        return 4;
     }
 
     @Override

@@ -12,7 +12,7 @@ public final class SignalOutside extends Condition {
 
     @Override
     int tag() {
-        return 8;
+        return 5;
     }
 
     @Override

@@ -14,19 +14,19 @@ public final class SineImpedance extends ImpedanceMode {
     public double[] phase = new double[6];
     /** [N, Nm] */
     public double[] bias = new double[6];
-    /** NaN: unlimited [N, Nm] */
+    /** [N, Nm] */
     public double[] forceLimit = Seam.missing(6);
-    /** NaN: unlimited [m, rad] */
+    /** [m, rad] */
     public double[] positionLimit = Seam.missing(6);
-    /** NaN: not given [s] */
+    /** [s] */
     public double totalTime = Double.NaN;
     /** [s] */
-    public double riseTime;
-    /** NaN: not given [s] */
+    public double riseTime = 0.0;
+    /** [s] */
     public double holdTime = Double.NaN;
     /** [s] */
-    public double fallTime;
-    /** Whether the motion waits for the end of the pattern */
+    public double fallTime = 0.0;
+    /** the motion ends only after the pattern has finished */
     public boolean stayActive = false;
 
     @Override

@@ -1,5 +1,5 @@
 package com.kuka.common.concurrent;
 
-/** Only imports of it are known; there is nothing to call. */
+/** Only imports are known; it has no members. */
 public interface IWaitToken {
 }

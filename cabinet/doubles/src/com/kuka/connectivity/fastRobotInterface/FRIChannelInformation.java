@@ -28,12 +28,12 @@ public class FRIChannelInformation {
         return quality;
     }
 
-    /** Mean time to an answer [ms]. */
+    /** Mean latency of the answers [ms]. */
     public double getLatency() {
         return latency;
     }
 
-    /** Its mean change from one answer to the next [ms]. */
+    /** Jitter: mean change of the latency from one answer to the next [ms]. */
     public double getJitter() {
         return jitter;
     }

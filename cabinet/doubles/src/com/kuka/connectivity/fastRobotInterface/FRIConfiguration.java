@@ -34,7 +34,7 @@ public class FRIConfiguration {
 
     public static FRIConfiguration createRemoteConfiguration(Device device, String hostName) {
         if (hostName == null || hostName.isEmpty()) {
-            throw new IllegalArgumentException("an FRI session needs the address of its client");
+            throw new IllegalArgumentException("the address of the FRI client must not be empty");
         }
         return new FRIConfiguration(device, hostName);
     }
@@ -62,7 +62,7 @@ public class FRIConfiguration {
         portOnController = within("portOnController", port, 1, PORTS);
     }
 
-    /** An input that the client sees, or an output that it sees and writes; at most ten. */
+    /** An input that the client reads, or an output that it reads and writes; at most ten. */
     public void registerIO(AbstractIO io) {
         if (io == null) {
             throw new IllegalArgumentException("signal must not be null");
@@ -96,7 +96,7 @@ public class FRIConfiguration {
         return device;
     }
 
-    /** The settings in the plant's terms; for the simulation. */
+    /** The settings as the plant takes them; for the simulation. */
     public FriSessionSettings settings() {
         FriSessionSettings settings = new FriSessionSettings();
         settings.host = host;

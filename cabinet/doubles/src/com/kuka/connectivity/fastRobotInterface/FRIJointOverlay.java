@@ -2,7 +2,7 @@ package com.kuka.connectivity.fastRobotInterface;
 
 import com.kuka.roboticsAPI.motionModel.IMotionOverlay;
 
-/** Lets the client of a session command on top of a motion. */
+/** Superimposes the commands of an FRI client on a motion. */
 public class FRIJointOverlay implements IMotionOverlay {
     private final FRISession session;
     private final ClientCommandMode mode;
@@ -21,7 +21,7 @@ public class FRIJointOverlay implements IMotionOverlay {
         return session;
     }
 
-    /** What the client commands; for the simulation. */
+    /** Quantity that the client commands; for the simulation. */
     public ClientCommandMode mode() {
         return mode;
     }

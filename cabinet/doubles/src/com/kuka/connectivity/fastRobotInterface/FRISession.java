@@ -8,11 +8,13 @@ import java.util.concurrent.TimeoutException;
 import com.kuka.connectivity.fastRobotInterface.FRIChannelInformation.FRIConnectionQuality;
 import com.kuka.connectivity.fastRobotInterface.FRIChannelInformation.FRISessionState;
 
+import heptarm.core.Clock;
+import heptarm.core.Clocks;
 import heptarm.doubles.plant.FriChannel;
 import heptarm.doubles.runtime.ApplicationServices;
 import heptarm.doubles.runtime.Station;
 
-/** An FRI session; it opens when it is made. */
+/** An FRI session, opened by its constructor. */
 public class FRISession implements FriChannel {
     private static final double MILLI = 1e3;
 
@@ -27,19 +29,18 @@ public class FRISession implements FriChannel {
         number = station.plant.friOpen(configuration.settings(), this);
     }
 
-    /** Waits until the client answers well enough for an overlay. */
+    /** Waits until the quality of the connection suffices for an overlay. */
     public void await(long time, TimeUnit unit) throws TimeoutException {
-        long deadline = System.nanoTime() + unit.toNanos(time);
+        Clock clock = station.clock();
+        long deadline = clock.nanos() + unit.toNanos(time);
         try {
             synchronized (this) {
                 while (information.getFRISessionState() == FRISessionState.IDLE
                         || information.getFRISessionState() == FRISessionState.MONITORING_WAIT) {
-                    long left = deadline - System.nanoTime();
-                    if (left <= 0 || closed) {
+                    if (closed || !Clocks.await(this, clock, deadline)) {
                         throw new TimeoutException("no FRI client answered well enough within " + time + " " + unit + ": "
                                 + information);
                     }
-                    TimeUnit.NANOSECONDS.timedWait(this, left);
                 }
             }
         } catch (InterruptedException e) {
@@ -87,7 +88,7 @@ public class FRISession implements FriChannel {
         }
     }
 
-    /** An exception in one listener of the application must not keep the others from being called. */
+    /** An exception in one listener of the application must not prevent calls of the others. */
     private static void tell(IFRISessionListener listener, FRIChannelInformation now, boolean other) {
         try {
             if (other) {

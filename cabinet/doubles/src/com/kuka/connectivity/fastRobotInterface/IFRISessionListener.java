@@ -1,6 +1,6 @@
 package com.kuka.connectivity.fastRobotInterface;
 
-/** Hears of an FRI session. */
+/** Called when the state or quality of an FRI session changes. */
 public interface IFRISessionListener {
     void onFRISessionStateChanged(FRIChannelInformation friChannelInformation);
 

@@ -1,5 +1,5 @@
 package com.kuka.generated.flexfellow;
 
-/** A mobile cabinet that some projects have; only imports of it are known, there is nothing to call. */
+/** A mobile cabinet of some projects. Only imports are known; it has no members. */
 public interface FlexFellow {
 }

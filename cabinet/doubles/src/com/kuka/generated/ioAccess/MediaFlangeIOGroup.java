@@ -7,7 +7,7 @@ import com.kuka.roboticsAPI.controllerModel.Controller;
 import com.kuka.roboticsAPI.ioModel.AbstractIOGroup;
 import com.kuka.roboticsAPI.ioModel.IOTypes;
 
-/** The signals of the media flanges, for projects that lack their own exported class; theirs comes first. */
+/** The signals of the media flanges, for projects without an exported class of their own, which takes precedence. */
 @Singleton
 public class MediaFlangeIOGroup extends AbstractIOGroup {
     private static final String[] INPUTS =

@@ -3,7 +3,7 @@ package com.kuka.roboticsAPI.annotations;
 import java.util.Set;
 import java.util.concurrent.ConcurrentHashMap;
 
-/** Knows which applications go on by themselves after a stop. Injected. */
+/** Lists the applications that resume automatically after a stop. Injected. */
 public class AutomaticResumeManager implements IAutomaticResumeFunction {
     private final Set<String> enabled = ConcurrentHashMap.newKeySet();
 
@@ -17,7 +17,7 @@ public class AutomaticResumeManager implements IAutomaticResumeFunction {
         enabled.remove(application);
     }
 
-    /** Whether an application may go on, by its full or its simple name; for the simulation. */
+    /** Whether an application may resume, by its full or its simple name; for the simulation. */
     public boolean mayResume(Class<?> application) {
         return enabled.contains(application.getName()) || enabled.contains(application.getSimpleName())
                 || enabled.contains(application.getSimpleName() + ".class");

@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.annotations;
 
-/** Lets an application go on by itself after a stop. */
+/** Lets an application resume automatically after a stop. */
 public interface IAutomaticResumeFunction {
     void enableApplicationResuming(String application);
 

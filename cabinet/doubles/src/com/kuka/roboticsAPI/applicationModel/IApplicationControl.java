@@ -10,15 +10,15 @@ public interface IApplicationControl {
 
     void setApplicationOverride(double value);
 
-    /** Lowers the application override to at most this. */
+    /** Limits the application override to this. */
     void clipApplicationOverride(double most);
 
-    /** Lowers the override at the smartPAD to at most this. */
+    /** Limits the override of the smartPAD to this. */
     void clipManualOverride(double most);
 
     /** Pauses all motions on their path. */
     void pause();
 
-    /** Stops all motions on their path; as far as is known, the same as a pause. */
+    /** Stops all motions on their path; assumed to be the same as a pause. */
     void halt();
 }

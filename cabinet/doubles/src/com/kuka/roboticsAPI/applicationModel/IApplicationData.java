@@ -7,7 +7,7 @@ import com.kuka.roboticsAPI.persistenceModel.processDataModel.IProcessData;
 public interface IApplicationData {
     IProcessData getProcessData(String id);
 
-    /** A new tool or workpiece as the project's template of that name describes it. */
+    /** A new tool or workpiece from the project's template of that name. */
     <T> T createFromTemplate(String name);
 
     /** A taught frame, by its path. */

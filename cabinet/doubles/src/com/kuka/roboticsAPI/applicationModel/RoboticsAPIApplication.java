@@ -12,18 +12,18 @@ public abstract class RoboticsAPIApplication extends RoboticsAPITask {
     public void onApplicationStateChanged(RoboticsAPIApplicationState state) {
     }
 
-    /** What a generated {@code main} calls; here, as on a robot, it is the cabinet that runs applications. */
+    /** Called by a generated {@code main}; no effect, since the cabinet runs applications. */
     public void runApplication() {
         throw new IllegalStateException("the cabinet runs applications: heptarm sim --app FOLDER --app-class "
                 + getClass().getSimpleName());
     }
 
-    /** The robot; there is one, whatever the name. */
+    /** The robot; there is only one, so the name has no effect. */
     public Robot getRobot(Controller controller, String name) {
         return Station.current().robot;
     }
 
-    /** A new tool or workpiece as the project's template of that name describes it. */
+    /** A new tool or workpiece from the project's template of that name. */
     public <T> T createFromTemplate(String name) {
         return getApplicationData().createFromTemplate(name);
     }

@@ -1,5 +1,5 @@
 package com.kuka.roboticsAPI.commandModel;
 
-/** What is known of a command while it runs; to be printed. */
+/** Runtime data of a command, to be printed. */
 public interface ICommandRuntimeData {
 }

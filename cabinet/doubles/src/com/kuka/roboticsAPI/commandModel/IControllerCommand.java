@@ -1,5 +1,5 @@
 package com.kuka.roboticsAPI.commandModel;
 
-/** A command as the cabinet knows it; to be printed. */
+/** A command of the cabinet, to be printed. */
 public interface IControllerCommand {
 }

@@ -6,9 +6,9 @@ import heptarm.doubles.plant.ConditionListener;
 import heptarm.doubles.runtime.Station;
 import heptarm.doubles.seam.Condition;
 
-/** Watches a condition, whether a motion runs or not. Made by an ObserverManager. */
+/** Monitors a condition, also without a motion. Created by an ObserverManager. */
 public class ConditionObserver {
-    /** Hears of every edge. */
+    /** Called on every edge. */
     interface Hearer {
         void edge(ConditionObserver observer, Date time, boolean value);
     }

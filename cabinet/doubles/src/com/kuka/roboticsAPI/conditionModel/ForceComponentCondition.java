@@ -6,9 +6,8 @@ import com.kuka.roboticsAPI.geometricModel.math.CoordinateAxis;
 
 import heptarm.doubles.motion.WrenchCondition;
 import heptarm.doubles.seam.Condition;
-import heptarm.doubles.seam.ForceOutside;
 
-/** A component of the external force lies outside a band [N]. */
+/** A component of the external force is outside a band [N]. */
 public class ForceComponentCondition extends WrenchCondition {
     private final CoordinateAxis axis;
     private final double[] band;
@@ -35,11 +34,6 @@ public class ForceComponentCondition extends WrenchCondition {
 
     @Override
     protected Condition forPlant(LBR robot) {
-        ForceOutside outside = new ForceOutside();
-        outside.frame = frame(robot);
-        outside.axis = axis(axis);
-        outside.low = band[0];
-        outside.high = band[1];
-        return outside;
+        return outside(robot, band, axis.ordinal());
     }
 }

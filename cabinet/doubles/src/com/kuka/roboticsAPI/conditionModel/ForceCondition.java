@@ -6,11 +6,8 @@ import com.kuka.roboticsAPI.geometricModel.math.CoordinateAxis;
 
 import heptarm.doubles.motion.WrenchCondition;
 import heptarm.doubles.seam.Condition;
-import heptarm.doubles.seam.ForceAbove;
-import heptarm.doubles.seam.NormalForceAbove;
-import heptarm.doubles.seam.ShearForceAbove;
 
-/** The external force, all of it or its part along or across an axis, is above a threshold [N]. */
+/** The magnitude of the external force, or of its part along or across an axis, is above a threshold [N]. */
 public final class ForceCondition extends WrenchCondition {
     /** Which part of the force. */
     private enum Part { SPATIAL, NORMAL, SHEAR }
@@ -91,24 +88,14 @@ public final class ForceCondition extends WrenchCondition {
 
     @Override
     protected Condition forPlant(LBR robot) {
+        int along = axis.ordinal();
         switch (part) {
             case NORMAL:
-                NormalForceAbove normal = new NormalForceAbove();
-                normal.frame = frame(robot);
-                normal.axis = axis(axis);
-                normal.threshold = threshold;
-                return normal;
+                return above(robot, threshold, along);
             case SHEAR:
-                ShearForceAbove shear = new ShearForceAbove();
-                shear.frame = frame(robot);
-                shear.axis = axis(axis);
-                shear.threshold = threshold;
-                return shear;
+                return above(robot, threshold, (along + 1) % 3, (along + 2) % 3);
             default:
-                ForceAbove force = new ForceAbove();
-                force.frame = frame(robot);
-                force.threshold = threshold;
-                return force;
+                return above(robot, threshold, 0, 1, 2);
         }
     }
 }

@@ -2,7 +2,7 @@ package com.kuka.roboticsAPI.conditionModel;
 
 import java.util.Date;
 
-/** Hears that a condition begins or ceases to hold. */
+/** Called when a condition becomes true or false. */
 public interface IAnyEdgeListener {
     void onAnyEdge(ConditionObserver observer, Date time, int missedEvents, boolean value);
 }

@@ -2,7 +2,7 @@ package com.kuka.roboticsAPI.conditionModel;
 
 import com.kuka.roboticsAPI.executionModel.IFiredTriggerInfo;
 
-/** The application is called, by a thread of the cabinet's. */
+/** Calls the application, in a thread of the cabinet. */
 public interface ICallbackAction extends ITriggerAction {
     void onTriggerFired(IFiredTriggerInfo info);
 }

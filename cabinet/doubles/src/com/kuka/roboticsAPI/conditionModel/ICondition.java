@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.conditionModel;
 
-/** Something that holds or does not while a motion runs. */
+/** A condition, monitored while a motion runs. */
 public interface ICondition {
     ICondition or(ICondition... others);
 

@@ -2,7 +2,7 @@ package com.kuka.roboticsAPI.conditionModel;
 
 import java.util.Date;
 
-/** Hears that a condition ceases to hold. */
+/** Called when a condition becomes false. */
 public interface IFallingEdgeListener {
     void onFallingEdge(ConditionObserver observer, Date time, int missedEvents);
 }

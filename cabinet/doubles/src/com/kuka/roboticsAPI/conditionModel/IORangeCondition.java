@@ -7,7 +7,7 @@ import heptarm.doubles.motion.AbstractCondition;
 import heptarm.doubles.seam.Condition;
 import heptarm.doubles.seam.SignalOutside;
 
-/** A numeric input or output lies within a range. No call of KUKA's constructor is known; this one is a guess. */
+/** A numeric input or output is within a range. No call of KUKA's constructor is known; this signature is a guess. */
 public class IORangeCondition extends AbstractCondition {
     private final AbstractIO signal;
     private final double[] band;

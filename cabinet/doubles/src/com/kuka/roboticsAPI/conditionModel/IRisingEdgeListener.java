@@ -2,7 +2,7 @@ package com.kuka.roboticsAPI.conditionModel;
 
 import java.util.Date;
 
-/** Hears that a condition begins to hold. */
+/** Called when a condition becomes true. */
 public interface IRisingEdgeListener {
     void onRisingEdge(ConditionObserver observer, Date time, int missedEvents);
 }

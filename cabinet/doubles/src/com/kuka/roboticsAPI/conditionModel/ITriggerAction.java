@@ -1,5 +1,5 @@
 package com.kuka.roboticsAPI.conditionModel;
 
-/** What is done when a trigger fires. */
+/** Action of a trigger. */
 public interface ITriggerAction {
 }

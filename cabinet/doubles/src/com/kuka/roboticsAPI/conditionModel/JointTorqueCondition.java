@@ -7,7 +7,7 @@ import heptarm.doubles.motion.AbstractCondition;
 import heptarm.doubles.seam.Condition;
 import heptarm.doubles.seam.JointTorqueOutside;
 
-/** The external torque of a joint lies outside a band [Nm]. */
+/** The external torque of a joint is outside a band [Nm]. */
 public class JointTorqueCondition extends AbstractCondition {
     private final JointEnum joint;
     private final double[] band;

@@ -15,7 +15,7 @@ public class MotionPathCondition extends AbstractCondition {
 
     public MotionPathCondition(ReferenceType reference, double distance, long delay) {
         if (!(reference == ReferenceType.START ? distance >= 0.0 : distance <= 0.0)) {
-            throw new IllegalArgumentException("the point lies " + distance + " mm from " + reference + ", beyond the path");
+            throw new IllegalArgumentException("the point must be on the path, got " + distance + " mm from " + reference);
         }
         this.reference = reference;
         this.distance = distance;

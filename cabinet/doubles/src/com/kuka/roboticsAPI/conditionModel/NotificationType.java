@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.conditionModel;
 
-/** When an observer is told. */
+/** When an observer is notified. */
 public enum NotificationType {
     EdgesOnly, OnEnable, MissedEvents, All
 }

@@ -10,7 +10,7 @@ import heptarm.doubles.runtime.ApplicationServices;
 import heptarm.doubles.runtime.Station;
 import heptarm.doubles.seam.Condition;
 
-/** Watches conditions for an application. */
+/** Monitors conditions for an application. */
 public class ObserverManager {
     private final Station station = Station.current();
     private final Collection<ConditionObserver> observers = new CopyOnWriteArrayList<>();
@@ -49,12 +49,12 @@ public class ObserverManager {
         return made;
     }
 
-    /** Waits until a condition holds. */
+    /** Waits until a condition is met. */
     public void waitFor(ICondition condition) {
         waitFor(condition, Long.MAX_VALUE, TimeUnit.NANOSECONDS);
     }
 
-    /** Waits for it until some time has passed; false: it does not hold yet. */
+    /** Waits for a condition; false if it is not met within the time. */
     public boolean waitFor(ICondition condition, long time, TimeUnit unit) {
         CountDownLatch held = new CountDownLatch(1);
         Condition translated = AbstractCondition.translate(condition, station.robot);

@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.conditionModel;
 
-/** What a point on the path is counted from. */
+/** Reference of a point on the path. */
 public enum ReferenceType {
     START, DEST
 }

@@ -6,9 +6,8 @@ import com.kuka.roboticsAPI.geometricModel.math.CoordinateAxis;
 
 import heptarm.doubles.motion.WrenchCondition;
 import heptarm.doubles.seam.Condition;
-import heptarm.doubles.seam.TorqueOutside;
 
-/** A component of the external torque lies outside a band [Nm]. */
+/** A component of the external torque is outside a band [Nm]. */
 public class TorqueComponentCondition extends WrenchCondition {
     private final CoordinateAxis axis;
     private final double[] band;
@@ -35,11 +34,6 @@ public class TorqueComponentCondition extends WrenchCondition {
 
     @Override
     protected Condition forPlant(LBR robot) {
-        TorqueOutside outside = new TorqueOutside();
-        outside.frame = frame(robot);
-        outside.axis = axis(axis);
-        outside.low = band[0];
-        outside.high = band[1];
-        return outside;
+        return outside(robot, band, TORQUES + axis.ordinal());
     }
 }

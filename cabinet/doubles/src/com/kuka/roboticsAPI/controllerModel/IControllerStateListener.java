@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.controllerModel;
 
-/** Hears of a controller. */
+/** Called on changes of a controller. */
 public interface IControllerStateListener {
     void onShutdown(Controller controller);
 

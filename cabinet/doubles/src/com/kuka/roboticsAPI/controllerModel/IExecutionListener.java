@@ -2,7 +2,7 @@ package com.kuka.roboticsAPI.controllerModel;
 
 import com.kuka.roboticsAPI.controllerModel.sunrise.ResumeMode;
 
-/** Hears of pauses of the execution. */
+/** Called when execution is paused or resumed. */
 public interface IExecutionListener {
     void onExecutionPaused(Controller controller);
 

@@ -1,5 +1,5 @@
 package com.kuka.roboticsAPI.controllerModel;
 
-/** What a state port told; the virtual cabinet has none. */
+/** Data of a state port; the virtual cabinet has none. */
 public class StatePortData {
 }

@@ -94,22 +94,22 @@ public abstract class LBR extends Robot {
         return flange;
     }
 
-    /** It stands in the origin of the world, whatever it is told. */
+    /** Has no effect: the robot is at the origin of the world. */
     @Override
     public void attachTo(AbstractFrame frame) {
     }
 
-    /** Kept for safety functions, which the simulation does not have. */
+    /** Has no effect: the simulation has no safety functions. */
     public void setSafetyWorkpiece(Workpiece workpiece) {
     }
 
-    /** Where ptpHome leads; without a word all zeros. */
+    /** Home position of ptpHome; default: all zeros. */
     public void setHomePosition(JointPosition joints) {
         checkLimits(joints);
         home = new JointPosition(joints);
     }
 
-    /** Where ptpHome leads, for its flange. */
+    /** Home position of ptpHome, as a pose of the flange. */
     public void setHomePosition(AbstractFrame frame) {
         home = frame;
     }
@@ -119,13 +119,13 @@ public abstract class LBR extends Robot {
         return home;
     }
 
-    /** Something was attached or detached: the controller takes the load over; for the simulation. */
+    /** Transfers the load to the controller after something was attached or detached; for the simulation. */
     public void carries() {
         station.plant.setAttachedLoad(AttachedLoadCalculator.of(flange, getChildren()));
         station.settle();
     }
 
-    /** Chooses one of the safety states "1" to "10" of the project; the simulation monitors none of them. */
+    /** Selects one of the safety states "1" to "10" of the project; the simulation monitors none of them. */
     public void setESMState(String state) {
         if (!ESM_STATE.matcher(state).matches()) {
             throw new IllegalArgumentException("safety state must be 1 to 10, got " + state);
@@ -133,13 +133,13 @@ public abstract class LBR extends Robot {
         ApplicationServices.current().logger.info("ESM state " + state);
     }
 
-    /** Changes where a frame of the robot, or of what it carries, is seen from its parent. */
+    /** Changes a frame of the robot, or of an attached object, relative to its parent. */
     public void changeFramePosition(ObjectFrame frame, ITransformation fromParent) {
         frame.place(fromParent);
     }
 
     /**
-     * Joint positions for a frame of the flange and its redundancy; what it does not say is as near as possible to the present.
+     * Joint positions for a frame of the flange and its redundancy; what is not given stays as close as possible to the current one.
      *
      * @throws IllegalArgumentException there are none
      */
@@ -157,7 +157,7 @@ public abstract class LBR extends Robot {
         return station.context;
     }
 
-    /** Whether drives are on and nobody demands a stop; a pause does not count. */
+    /** Whether the drives are on and no stop is requested; a pause does not matter. */
     public boolean isMotionEnabled() {
         return flag(SafetyFlags.READY);
     }
@@ -205,7 +205,7 @@ public abstract class LBR extends Robot {
         return cartesian(getCommandedJointPosition(), frameOnRobot);
     }
 
-    /** Where a frame on the robot is when the joints are somewhere; for the simulation. */
+    /** Pose of a frame on the robot at given joint positions; for the simulation. */
     public Frame cartesian(JointPosition joints, ObjectFrame frameOnRobot) {
         Transformation commanded = kinematics.flange(joints.get());
         return new Frame(frameOnRobot == flange ? commanded : commanded.compose(flange.transformationTo(frameOnRobot)));
@@ -220,7 +220,7 @@ public abstract class LBR extends Robot {
         return getExternalForceTorque(measureFrame, null);
     }
 
-    /** External wrench at the origin of a frame, in the axes of another (null: of the same). */
+    /** External wrench at the origin of a frame, in the axes of another frame (null: of the same). */
     public ForceSensorData getExternalForceTorque(AbstractFrame measureFrame, AbstractFrame orientationFrame) {
         double[] wrench = numbers(StateWords.WRENCH, 6);
         Transformation here = flange.transformationFromWorld();
@@ -260,7 +260,7 @@ public abstract class LBR extends Robot {
         return new SunriseSafetyState(station.sharedState.integer(StateWords.FLAGS), getOperationMode());
     }
 
-    /** Refuses joint positions that the robot cannot have, in Sunrise's words; for the simulation. */
+    /** Refuses joint positions beyond the limits, with Sunrise's text; for the simulation. */
     public void checkLimits(JointPosition joints) {
         double[] low = station.description.qMin;
         double[] high = station.description.qMax;
@@ -272,7 +272,7 @@ public abstract class LBR extends Robot {
         }
     }
 
-    /** Whether impedance control may begin: at rest, nothing pushes, not stretched out; for the simulation. */
+    /** Whether impedance control may start: at rest, without contact, not stretched out; for the simulation. */
     public boolean isFitForImpedance() {
         double[] external = numbers(StateWords.TAU_EXT, AXES);
         double[] speed = numbers(StateWords.DQ, AXES);
@@ -347,7 +347,7 @@ public abstract class LBR extends Robot {
         motion.accepted(runtime);
     }
 
-    /** A failed asynchronous motion takes those behind it with it. */
+    /** A failed asynchronous motion cancels those queued behind it. */
     private void ended(MotionContainer container) {
         Boolean asynchronous;
         List<IMotionContainer> tail = new ArrayList<>();
@@ -366,7 +366,7 @@ public abstract class LBR extends Robot {
         }
     }
 
-    /** Number of motions that run or wait. */
+    /** Number of running and queued motions. */
     public int activeContainers() {
         int count = 0;
         synchronized (open) {

@@ -5,7 +5,7 @@ import com.kuka.roboticsAPI.geometricModel.redundancy.AbstractRedundancyCollecti
 
 import heptarm.doubles.runtime.ParameterList;
 
-/** Which of the postures of a pose: status and turn bits; -1: not given. */
+/** Configuration for a pose: Status and Turn; -1: not given. */
 public class StatusTurnRedundancy extends AbstractRedundancyCollection {
     private int status;
     private int turn;

@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.executionModel;
 
-/** A command could not be planned or carried out. */
+/** A command could not be planned or executed. */
 public class CommandInvalidException extends RuntimeException {
     private static final long serialVersionUID = 1L;
 

@@ -6,7 +6,7 @@ import java.util.concurrent.TimeoutException;
 import com.kuka.roboticsAPI.commandModel.ICommandRuntimeData;
 import com.kuka.roboticsAPI.commandModel.IControllerCommand;
 
-/** A command under way. */
+/** A running command. */
 public interface ICommandContainer extends IExecutionContainer {
     void cancel();
 

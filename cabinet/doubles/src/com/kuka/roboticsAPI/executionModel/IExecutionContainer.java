@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.executionModel;
 
-/** Something that the cabinet executes. */
+/** An execution of the cabinet. */
 public interface IExecutionContainer {
     boolean isFinished();
 

@@ -15,7 +15,7 @@ import com.kuka.roboticsAPI.geometricModel.redundancy.IRedundancyCollection;
 public abstract class AbstractFrame {
     private final Map<Device, IRedundancyCollection> redundancy = new HashMap<>();
 
-    /** The frame that this one is given in; null for the world itself. */
+    /** The parent frame; null for the world. */
     public abstract AbstractFrame getParent();
 
     abstract Transformation fromParent();
@@ -29,7 +29,7 @@ public abstract class AbstractFrame {
         return parent == null ? fromParent() : parent.transformationFromWorld().compose(fromParent());
     }
 
-    /** The other frame as seen from this one; by way of the nearest frame that both hang on, so that a moving robot blurs nothing. */
+    /** The other frame relative to this one, by their nearest common ancestor, so that a moving robot adds no error. */
     public Transformation transformationTo(AbstractFrame other) {
         List<AbstractFrame> mine = new ArrayList<>();
         for (AbstractFrame frame = this; frame != null; frame = frame.getParent()) {
@@ -42,7 +42,7 @@ public abstract class AbstractFrame {
         return from(common).invert().compose(other.from(common));
     }
 
-    /** This frame as seen from one that it hangs on; null: from the world. */
+    /** This frame relative to one of its ancestors; null: to the world. */
     private Transformation from(AbstractFrame above) {
         if (this == above) {
             return Transformation.IDENTITY;
@@ -56,14 +56,14 @@ public abstract class AbstractFrame {
         return Math.sqrt(t.getX() * t.getX() + t.getY() * t.getY() + t.getZ() * t.getZ());
     }
 
-    /** Whether it is that close to another: distance [mm], angle of the rotation between them [rad]. */
+    /** Whether it is close to another frame: distance [mm], angle of the rotation between them [rad]. */
     public boolean isCloseTo(AbstractFrame other, double distance, double angle) {
         Matrix r = transformationTo(other).getRotationMatrix();
         double cosine = (r.get(0, 0) + r.get(1, 1) + r.get(2, 2) - 1.0) / 2.0;
         return distanceTo(other) <= distance && Math.acos(Math.max(-1.0, Math.min(1.0, cosine))) <= angle;
     }
 
-    /** Whether it hangs in the same tree as another. */
+    /** Whether it is in the same tree as another frame. */
     public boolean hasPathTo(AbstractFrame other) {
         return top(this) == top(other);
     }
@@ -76,7 +76,7 @@ public abstract class AbstractFrame {
         return found;
     }
 
-    /** Where it is in the world. */
+    /** Pose in the world. */
     public String toStringInWorld() {
         return transformationFromWorld().toString();
     }

@@ -3,7 +3,7 @@ package com.kuka.roboticsAPI.geometricModel;
 import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 
-/** A frame that an application makes; without a parent it is given in the world. Mutable. */
+/** A frame created by an application; without a parent it refers to the world. Mutable. */
 public class Frame extends AbstractFrame {
     private AbstractFrame parent;
     private Transformation fromParent;

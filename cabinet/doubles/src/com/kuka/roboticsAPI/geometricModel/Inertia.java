@@ -14,7 +14,7 @@ public final class Inertia {
 
     public static Inertia of(double x, double y, double z) {
         if (!(x >= 0 && y >= 0 && z >= 0)) {
-            throw new IllegalArgumentException("no moment of inertia is negative: " + x + ", " + y + ", " + z);
+            throw new IllegalArgumentException("moments of inertia must not be negative, got " + x + ", " + y + ", " + z + " kg m²");
         }
         return new Inertia(x, y, z);
     }

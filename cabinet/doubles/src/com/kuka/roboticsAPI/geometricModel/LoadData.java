@@ -18,7 +18,7 @@ public class LoadData {
         this.inertia = inertia;
     }
 
-    /** Becomes like another; for the simulation. */
+    /** Copies another; for the simulation. */
     public void take(LoadData other) {
         mass = other.mass;
         centre = other.centre;
@@ -31,7 +31,7 @@ public class LoadData {
 
     public void setMass(double kilograms) {
         if (!(kilograms >= 0)) {
-            throw new IllegalArgumentException("the mass is " + kilograms + " kg; it cannot be negative");
+            throw new IllegalArgumentException("the mass must not be negative, got " + kilograms + " kg");
         }
         mass = kilograms;
     }

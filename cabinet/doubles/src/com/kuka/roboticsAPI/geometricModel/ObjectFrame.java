@@ -13,7 +13,7 @@ import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
 
-/** A frame of an object. Where the object moves, so does the frame. */
+/** A frame of an object, which moves with the object. */
 public class ObjectFrame extends AbstractFrame {
     private final String name;
     private final SceneGraphObject owner;
@@ -22,7 +22,7 @@ public class ObjectFrame extends AbstractFrame {
     private volatile Transformation placed;
     private final List<ObjectFrame> children = new CopyOnWriteArrayList<>();
 
-    /** Made by the objects that have frames; the parent of an object's root is what the object is attached to. */
+    /** Created by objects; the parent of an object's root is the frame to which the object is attached. */
     public ObjectFrame(String name, SceneGraphObject owner, Supplier<? extends AbstractFrame> parent,
             Supplier<Transformation> fromParent) {
         this.name = name;
@@ -45,7 +45,7 @@ public class ObjectFrame extends AbstractFrame {
         return fromParent == null ? placed : fromParent.get();
     }
 
-    /** Puts it somewhere else as seen from its parent; for the simulation. */
+    /** Changes its pose relative to its parent; for the simulation. */
     public void place(ITransformation anew) {
         if (fromParent != null) {
             throw new IllegalArgumentException("the frame " + name + " cannot be moved by hand");
@@ -114,7 +114,7 @@ public class ObjectFrame extends AbstractFrame {
         return copy;
     }
 
-    /** Attaches the frame's object so that this frame comes to lie upon another. */
+    /** Attaches the object of this frame so that this frame coincides with another. */
     public void attachTo(AbstractFrame frame) {
         if (!(owner instanceof SpatialObject)) {
             throw new IllegalStateException("the frame " + name + " belongs to no object that could be attached");

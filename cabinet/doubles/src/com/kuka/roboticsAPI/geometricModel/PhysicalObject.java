@@ -6,7 +6,7 @@ import com.kuka.roboticsAPI.motionModel.IMotion;
 import com.kuka.roboticsAPI.motionModel.IMotionContainer;
 import com.kuka.roboticsAPI.motionModel.IMotionContainerListener;
 
-/** An object with a load. Motions of the object move its default motion frame. */
+/** An object with load data. Motions of the object refer to its default motion frame. */
 public abstract class PhysicalObject extends SpatialObject {
     private final LoadData load;
     private volatile ObjectFrame moved;
@@ -24,7 +24,7 @@ public abstract class PhysicalObject extends SpatialObject {
         return load;
     }
 
-    /** The frame that motions of the object move; its root unless another was chosen. */
+    /** The motion frame of the object; default: its root. */
     public ObjectFrame getDefaultMotionFrame() {
         ObjectFrame chosen = moved;
         return chosen == null ? getRootFrame() : chosen;

@@ -4,7 +4,7 @@ import java.util.ArrayList;
 import java.util.List;
 import java.util.concurrent.CopyOnWriteArrayList;
 
-/** Anything with a name in the scene, and what is attached to it. */
+/** An object of the scene with a name, and the objects attached to it. */
 public abstract class SceneGraphObject {
     private final String name;
     private final List<SceneGraphObject> children = new CopyOnWriteArrayList<>();
@@ -17,7 +17,7 @@ public abstract class SceneGraphObject {
         return name;
     }
 
-    /** What is attached now; a copy, so that it can be gone through while objects are detached. */
+    /** The attached objects; a copy, so that objects can be detached while it is iterated. */
     public List<SceneGraphObject> getChildren() {
         return new ArrayList<>(children);
     }

@@ -43,12 +43,12 @@ public abstract class SpatialObject extends SceneGraphObject {
         return root.add(name, fromRoot);
     }
 
-    /** Attaches this object's root to a frame; it leaves where it was. */
+    /** Attaches the root of this object to a frame, and detaches it from its current one. */
     public void attachTo(AbstractFrame frame) {
         attachTo(frame, Transformation.IDENTITY);
     }
 
-    /** The same with the root somewhere else than in the frame's origin. */
+    /** The same, with an offset of the root from the origin of the frame. */
     void attachTo(AbstractFrame frame, Transformation rootInFrame) {
         for (AbstractFrame one = frame; one != null; one = one.getParent()) {
             if (owner(one) == this) {
@@ -77,7 +77,7 @@ public abstract class SpatialObject extends SceneGraphObject {
         }
     }
 
-    /** Returns the robot that it was on; null if it was on none. */
+    /** Returns the robot to which it was attached; null if none. */
     private LBR release() {
         AbstractFrame held = attachedTo;
         if (held == null) {
@@ -92,7 +92,7 @@ public abstract class SpatialObject extends SceneGraphObject {
         return robot;
     }
 
-    /** Detaches all that is attached to this object. */
+    /** Detaches everything attached to this object. */
     public void detachAll() {
         for (SceneGraphObject child : getChildren()) {
             if (child instanceof SpatialObject) {

@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.geometricModel;
 
-/** A tool: frames, and a load that counts while it is attached to a robot. */
+/** A tool: frames, and load data that apply while it is attached to a robot. */
 public class Tool extends PhysicalObject {
     public Tool(String name) {
         super(name);

@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.geometricModel;
 
-/** A workpiece: like a tool, held by one. */
+/** A workpiece, attached to a tool. */
 public class Workpiece extends PhysicalObject {
     public Workpiece(String name) {
         super(name);

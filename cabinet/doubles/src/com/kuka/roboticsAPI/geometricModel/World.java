@@ -2,7 +2,7 @@ package com.kuka.roboticsAPI.geometricModel;
 
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 
-/** The root of all frames. The robot stands in its origin. */
+/** The root of all frames. The robot is at its origin. */
 public final class World {
     public static final World Current = new World();
 

@@ -24,7 +24,7 @@ public abstract class AbstractIO {
         return place;
     }
 
-    /** With its group, its type, and the values that it can have; for the simulation. */
+    /** With its group, type and range; for the simulation. */
     public final FriSignal forFri() {
         FriSignal signal = new FriSignal();
         signal.name = group + "." + name;

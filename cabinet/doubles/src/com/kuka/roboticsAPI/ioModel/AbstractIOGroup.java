@@ -9,7 +9,7 @@ import heptarm.doubles.runtime.Station;
 import heptarm.doubles.seam.SafetyFlags;
 import heptarm.doubles.seam.StateWords;
 
-/** Inputs and outputs that belong together; a project's classes derive from it. The virtual cabinet has every group that is made. */
+/** Inputs and outputs of a group; base of a project's classes. The virtual cabinet has every group that is created. */
 public abstract class AbstractIOGroup {
     private final String group;
     private final Map<String, Input> inputs = new LinkedHashMap<>();
@@ -17,7 +17,7 @@ public abstract class AbstractIOGroup {
 
     public AbstractIOGroup(Controller controller, String groupName) {
         if (controller == null) {
-            throw new IllegalArgumentException("an IO group belongs to a controller");
+            throw new IllegalArgumentException("the controller of an IO group must not be null");
         }
         group = groupName;
     }

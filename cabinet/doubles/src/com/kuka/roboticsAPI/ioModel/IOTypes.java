@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.ioModel;
 
-/** What an input or output is. */
+/** Type of an input or output. */
 public enum IOTypes {
     BOOLEAN, UNSIGNED_INTEGER, INTEGER, ANALOG
 }

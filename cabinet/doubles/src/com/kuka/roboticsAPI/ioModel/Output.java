@@ -23,7 +23,7 @@ public class Output extends AbstractIO {
 
     void check(double value) {
         if (!(value >= low && value <= high)) {
-            throw new IllegalArgumentException("output " + name() + " is to be " + value + "; it can be " + low + " to " + high);
+            throw new IllegalArgumentException("output " + name() + " must be in [" + low + ", " + high + "], got " + value);
         }
     }
 }

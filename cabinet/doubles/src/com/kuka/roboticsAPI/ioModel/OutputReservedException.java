@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.ioModel;
 
-/** An output belongs to somebody else. */
+/** An output is reserved by another client. */
 public class OutputReservedException extends RuntimeException {
     private static final long serialVersionUID = 1L;
 

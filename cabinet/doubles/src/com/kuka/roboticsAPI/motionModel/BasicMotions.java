@@ -8,7 +8,7 @@ import com.kuka.roboticsAPI.geometricModel.math.ITransformation;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
 
-/** Makes motions. */
+/** Creates motions. */
 public final class BasicMotions {
     private BasicMotions() {
     }

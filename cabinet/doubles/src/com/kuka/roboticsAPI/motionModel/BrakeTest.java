@@ -2,11 +2,15 @@ package com.kuka.roboticsAPI.motionModel;
 
 import com.kuka.roboticsAPI.controllerModel.sunrise.brakeTest.BrakeState;
 import com.kuka.roboticsAPI.controllerModel.sunrise.brakeTest.BrakeTestResult;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
 import heptarm.doubles.motion.MotionContainer;
 import heptarm.doubles.runtime.Station;
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
 
-/** Loads the brake of an axis, from 0, with a torque [Nm]. The simulated arm holds still meanwhile; its brakes hold what the axis can exert. */
+/** Loads the brake of an axis, from 0, with a torque [Nm]. The simulated arm rests; its brakes hold the axis' maximum torque. */
 public class BrakeTest extends RobotMotion<BrakeTest> {
     private static final double SECONDS = 1.0;
 
@@ -15,17 +19,17 @@ public class BrakeTest extends RobotMotion<BrakeTest> {
 
     public BrakeTest(int axis, double torque) {
         if (axis < 0 || axis > 6) {
-            throw new IllegalArgumentException("axis " + axis + "; there are 0 to 6");
+            throw new IllegalArgumentException("axis must be 0 to 6, got " + axis);
         }
         this.axis = axis;
         this.torque = notNegative("torque", torque);
     }
 
-    /** What the test that has run found. */
+    /** Result of the finished test. */
     public static BrakeTestResult evaluateResult(IMotionContainer container) {
         IMotion motion = ((MotionContainer) container).getLastExecutedMotion();
         if (!(motion instanceof BrakeTest)) {
-            throw new IllegalArgumentException("this was no brake test but " + container.getCommand());
+            throw new IllegalArgumentException("the motion must be a brake test, got " + container.getCommand());
         }
         BrakeTest test = (BrakeTest) motion;
         double most = Station.current().description.tauMax[test.axis];
@@ -34,8 +38,9 @@ public class BrakeTest extends RobotMotion<BrakeTest> {
         return new BrakeTestResult(test.axis, state, test.torque, most);
     }
 
-    /** How long it lasts [s]; for the simulation. */
-    public double seconds() {
-        return SECONDS;
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.kind = MotionKind.HOLD;
+        order.duration = SECONDS;
     }
 }

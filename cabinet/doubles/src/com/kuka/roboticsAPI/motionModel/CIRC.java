@@ -1,6 +1,12 @@
 package com.kuka.roboticsAPI.motionModel;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
 
 /** Arc of a circle through an auxiliary point. */
 public class CIRC extends SplineMotionCP<CIRC> {
@@ -16,8 +22,10 @@ public class CIRC extends SplineMotionCP<CIRC> {
         return destination;
     }
 
-    /** A point on the way; for the simulation. */
-    public AbstractFrame auxiliary() {
-        return auxiliary;
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.kind = MotionKind.CIRC;
+        order.via = MotionTranslator.pose(auxiliary.transformationFromWorld());
+        MotionTranslator.target(order, destination, robot);
     }
 }

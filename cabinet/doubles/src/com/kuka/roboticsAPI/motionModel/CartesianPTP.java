@@ -1,6 +1,12 @@
 package com.kuka.roboticsAPI.motionModel;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
 
 /** Point to point, to a frame. */
 public class CartesianPTP extends SplineMotionJP<CartesianPTP> {
@@ -12,5 +18,11 @@ public class CartesianPTP extends SplineMotionJP<CartesianPTP> {
 
     public AbstractFrame getDestination() {
         return destination;
+    }
+
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.kind = MotionKind.PTP;
+        MotionTranslator.target(order, destination, robot);
     }
 }

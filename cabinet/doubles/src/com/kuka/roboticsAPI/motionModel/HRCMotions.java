@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.motionModel;
 
-/** Makes motions in which a person and the robot work together. */
+/** Creates motions in which a person and the robot work together. */
 public final class HRCMotions {
     private HRCMotions() {
     }

@@ -2,11 +2,16 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.Arrays;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
 import heptarm.doubles.seam.AtLimit;
 import heptarm.doubles.seam.HandGuiding;
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
 import heptarm.doubles.seam.OutsideLimit;
 
-/** A person leads the arm while the enabling switch of the hand guiding device is held; it ends when the switch is let go. */
+/** Hand guiding while the enabling switch of the hand guiding device is held; ends when it is released. */
 public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
     private static final int AXES = 7;
     private static final double MM = 1e-3;
@@ -37,7 +42,7 @@ public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
         return radians.clone();
     }
 
-    /** Upper limits [rad]; they count for axes whose limits are enabled. */
+    /** Upper limits [rad] of the axes whose limits are enabled. */
     public HandGuidingMotion setJointLimitsMax(double... radians) {
         highest = seven("jointLimitsMax", radians);
         return this;
@@ -58,25 +63,25 @@ public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
         return this;
     }
 
-    /** Whether at a limit every axis is held until the switch is let go, or only the one at its limit. */
+    /** Whether at a limit every axis stops until the switch is released, or only the axis at its limit. */
     public HandGuidingMotion setJointLimitViolationFreezesAll(boolean all) {
         freezes = all;
         return this;
     }
 
-    /** Whether an axis that is beyond its limit at the start is pulled back, or can only be led back. */
+    /** Whether an axis that starts beyond its limit is pulled back, or can only be guided back. */
     public HandGuidingMotion setPermanentPullOnViolationAtStart(boolean pull) {
         pulls = pull;
         return this;
     }
 
-    /** No axis is led faster [rad/s]. */
+    /** Velocity limit of each axis [rad/s]. */
     public HandGuidingMotion setJointVelocityLimit(double radiansPerSecond) {
         jointVelocity = positive("jointVelocityLimit", radiansPerSecond);
         return this;
     }
 
-    /** The moved frame is led no faster [mm/s]. */
+    /** Velocity limit of the motion frame [mm/s]. */
     public HandGuidingMotion setCartVelocityLimit(double millimetresPerSecond) {
         cartesianVelocity = positive("cartVelocityLimit", millimetresPerSecond);
         return this;
@@ -87,28 +92,28 @@ public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
         return setJointVelocityLimit(radiansPerSecond);
     }
 
-    /** The older name of {@link #setJointLimitsMax}. */
+    /** Former name of {@link #setJointLimitsMax}. */
     public HandGuidingMotion setAxisLimitsMax(double... radians) {
         return setJointLimitsMax(radians);
     }
 
-    /** The older name of {@link #setJointLimitsMin}. */
+    /** Former name of {@link #setJointLimitsMin}. */
     public HandGuidingMotion setAxisLimitsMin(double... radians) {
         return setJointLimitsMin(radians);
     }
 
-    /** The older name of {@link #setJointLimitsEnabled}. */
+    /** Former name of {@link #setJointLimitsEnabled}. */
     public HandGuidingMotion setAxisLimitsEnabled(boolean... axes) {
         return setJointLimitsEnabled(axes);
     }
 
-    /** The older name of {@link #setJointLimitViolationFreezesAll}. */
+    /** Former name of {@link #setJointLimitViolationFreezesAll}. */
     public HandGuidingMotion setAxisLimitViolationFreezesAll(boolean all) {
         return setJointLimitViolationFreezesAll(all);
     }
 
-    /** The limits in the plant's terms; for the simulation. */
-    public HandGuiding settings() {
+    /** The limits in the plant's terms. */
+    private HandGuiding settings() {
         HandGuiding settings = new HandGuiding();
         for (int i = 0; i < AXES; i++) {
             if (enabled[i] && !(lowest[i] < highest[i])) {
@@ -123,5 +128,11 @@ public class HandGuidingMotion extends RobotMotion<HandGuidingMotion> {
         settings.atLimit = freezes ? AtLimit.ALL : AtLimit.AXIS;
         settings.outside = pulls ? OutsideLimit.PULL : OutsideLimit.FREE;
         return settings;
+    }
+
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.kind = MotionKind.GUIDE;
+        order.handGuiding = settings();
     }
 }

@@ -4,7 +4,7 @@ import com.kuka.roboticsAPI.conditionModel.ICondition;
 import com.kuka.roboticsAPI.executionModel.ICommandContainer;
 import com.kuka.roboticsAPI.executionModel.IFiredConditionInfo;
 
-/** A motion under way. */
+/** A running motion. */
 public interface IMotionContainer extends ICommandContainer {
     IMotion getCurrentMotion();
 

@@ -3,7 +3,7 @@ package com.kuka.roboticsAPI.motionModel;
 import com.kuka.roboticsAPI.executionModel.ExecutionState;
 import com.kuka.roboticsAPI.executionModel.IExecutionContainer;
 
-/** Hears of a container, on a thread of the cabinet. */
+/** Called on changes of a container, in a thread of the cabinet. */
 public interface IMotionContainerListener {
     void onStateChanged(IExecutionContainer container, ExecutionState state);
 

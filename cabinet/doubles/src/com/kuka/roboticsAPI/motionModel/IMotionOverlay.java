@@ -1,5 +1,5 @@
 package com.kuka.roboticsAPI.motionModel;
 
-/** Something that changes a motion while it runs. */
+/** Changes a motion while it runs. */
 public interface IMotionOverlay {
 }

@@ -1,6 +1,12 @@
 package com.kuka.roboticsAPI.motionModel;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
 
 /** Straight line to a frame. */
 public class LIN extends SplineMotionCP<LIN> {
@@ -12,5 +18,11 @@ public class LIN extends SplineMotionCP<LIN> {
 
     public AbstractFrame getDestination() {
         return destination;
+    }
+
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.kind = MotionKind.LIN;
+        MotionTranslator.target(order, destination, robot);
     }
 }

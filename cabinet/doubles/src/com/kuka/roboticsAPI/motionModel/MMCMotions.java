@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.motionModel;
 
-/** The name that {@link HRCMotions} had before. */
+/** Former name of {@link HRCMotions}. */
 public final class MMCMotions {
     private MMCMotions() {
     }

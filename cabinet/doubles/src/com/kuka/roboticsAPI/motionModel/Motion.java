@@ -1,9 +1,26 @@
 package com.kuka.roboticsAPI.motionModel;
 
+import java.util.List;
+
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.seam.MotionOrder;
+
 /** Base of motions; {@code T} is the motion's own type, so that setters chain. */
 public abstract class Motion<T extends Motion<T>> implements IMotion {
     @SuppressWarnings("unchecked")
     protected final T self() {
         return (T) this;
+    }
+
+    /** Write the kind of this motion and its own parameters into an order for the plant, in SI; for the simulation. */
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        throw new IllegalArgumentException("the virtual cabinet cannot execute a motion of class " + getClass().getName());
+    }
+
+    /** Motions of a batch, segments of a spline; none of others; for the simulation. */
+    public List<? extends RobotMotion<?>> parts() {
+        return List.of();
     }
 }

@@ -2,18 +2,34 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.List;
 
-/** Motions that are commanded together; what is set on the batch holds for those of them that say nothing else. */
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
+
+/** Motions commanded together; settings of the batch apply to those motions that have none of their own. */
 public class MotionBatch extends RobotMotion<MotionBatch> {
     private final List<RobotMotion<?>> motions;
 
     public MotionBatch(RobotMotion<?>... motions) {
         if (motions.length == 0) {
-            throw new IllegalArgumentException("a batch has at least one motion");
+            throw new IllegalArgumentException("a batch must have at least one motion");
         }
         this.motions = List.of(motions);
     }
 
     public List<RobotMotion<?>> getMotions() {
         return motions;
+    }
+
+    @Override
+    public List<RobotMotion<?>> parts() {
+        return motions;
+    }
+
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.kind = MotionKind.BATCH;
     }
 }

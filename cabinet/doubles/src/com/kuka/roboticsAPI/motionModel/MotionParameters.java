@@ -6,7 +6,7 @@ import heptarm.doubles.seam.Blending;
 import heptarm.doubles.seam.CartesianDynamics;
 import heptarm.doubles.seam.JointDynamics;
 
-/** A motion's parameters at one time, to be printed; NaN where nothing was set. */
+/** Parameters of a motion, to be printed; NaN where not set. */
 public final class MotionParameters {
     private static final double MM = 1e-3;
 

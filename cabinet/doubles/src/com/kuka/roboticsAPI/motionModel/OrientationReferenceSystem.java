@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.motionModel;
 
-/** What the orientation is led relative to. */
+/** Reference of the orientation. */
 public enum OrientationReferenceSystem {
     Base, Path
 }

@@ -1,6 +1,11 @@
 package com.kuka.roboticsAPI.motionModel;
 
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
 
 /** Point to point, to joint positions. */
 public class PTP extends SplineMotionJP<PTP> {
@@ -12,5 +17,11 @@ public class PTP extends SplineMotionJP<PTP> {
 
     public JointPosition getDestination() {
         return new JointPosition(destination);
+    }
+
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.kind = MotionKind.PTP;
+        order.joints = destination.get();
     }
 }

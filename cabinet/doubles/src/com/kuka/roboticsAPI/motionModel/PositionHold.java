@@ -2,25 +2,32 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.concurrent.TimeUnit;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
 
-/** Holds the position for a time; -1: until it is cancelled; 0: it ends at once. */
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
+
+/** Holds the position for a time; -1: until cancelled; 0: it ends at once. */
 public class PositionHold extends RobotMotion<PositionHold> {
     /** One cycle of the controller [s]. */
     private static final double SHORTEST = 1e-3;
 
+    /** NaN: until cancelled [s]. */
     private final double seconds;
 
     public PositionHold(IMotionControlMode mode, long duration, TimeUnit unit) {
         if (duration < -1) {
-            throw new IllegalArgumentException("duration must not be negative, or -1 for ever, got " + duration);
+            throw new IllegalArgumentException("duration must be 0 or positive, or -1 for no end, got " + duration);
         }
         seconds = duration < 0 ? Double.NaN : duration == 0 ? SHORTEST : unit.toNanos(duration) * 1e-9;
         setMode(mode);
     }
 
-    /** Duration [s]; NaN: until cancelled; for the simulation. */
-    public double seconds() {
-        return seconds;
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.kind = MotionKind.HOLD;
+        order.duration = seconds;
     }
 }

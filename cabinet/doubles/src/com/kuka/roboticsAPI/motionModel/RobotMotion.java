@@ -10,7 +10,7 @@ import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
 import heptarm.doubles.seam.Blending;
 import heptarm.doubles.seam.JointDynamics;
 
-/** A motion of a robot with the parameters that all of them share. */
+/** A motion of a robot, with the parameters of all motions. */
 public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
     private static final int AXES = 7;
     private static final double MM = 1e-3;
@@ -73,13 +73,13 @@ public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
         return self();
     }
 
-    /** Ends the motion when a condition holds; several: when one of them does. */
+    /** Ends the motion when a condition is met; of several conditions, when one is met. */
     public T breakWhen(ICondition condition) {
         breaks.add(condition);
         return self();
     }
 
-    /** Does something when a condition holds for the first time; the motion goes on. */
+    /** Executes an action when a condition is met for the first time; the motion continues. */
     public T triggerWhen(ICondition condition, ITriggerAction action) {
         triggers.add(condition);
         actions.add(action);
@@ -96,7 +96,7 @@ public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
         return triggers;
     }
 
-    /** What a trigger does; for the simulation. */
+    /** Action of a trigger; for the simulation. */
     public ITriggerAction action(int trigger) {
         return actions.get(trigger);
     }
@@ -106,12 +106,12 @@ public abstract class RobotMotion<T extends RobotMotion<T>> extends Motion<T> {
         return self();
     }
 
-    /** What changes the motion while it runs; null: nothing; for the simulation. */
+    /** Overlay of the motion; null: none; for the simulation. */
     public IMotionOverlay overlay() {
         return overlay;
     }
 
-    /** What is set now, to be printed. */
+    /** Current settings, to be printed. */
     public MotionParameters getParams() {
         return new MotionParameters(this);
     }

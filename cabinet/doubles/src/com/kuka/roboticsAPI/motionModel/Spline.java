@@ -2,19 +2,30 @@ package com.kuka.roboticsAPI.motionModel;
 
 import java.util.List;
 
-/** A spline block in space: segments that are gone through without a halt. */
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
+
+/** A Cartesian spline block: segments without a stop between them. */
 public class Spline extends SplineMotionCP<Spline> {
     private final List<SplineMotionCP<?>> segments;
 
     public Spline(SplineMotionCP<?>... segments) {
         if (segments.length == 0) {
-            throw new IllegalArgumentException("a spline has at least one segment");
+            throw new IllegalArgumentException("a spline must have at least one segment");
         }
         this.segments = List.of(segments);
     }
 
-    /** For the simulation. */
-    public List<SplineMotionCP<?>> segments() {
+    @Override
+    public List<SplineMotionCP<?>> parts() {
         return segments;
+    }
+
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.kind = MotionKind.SPLINE;
     }
 }

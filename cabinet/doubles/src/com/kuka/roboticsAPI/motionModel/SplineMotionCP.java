@@ -4,7 +4,7 @@ import heptarm.doubles.seam.CartesianDynamics;
 import heptarm.doubles.seam.OrientationReference;
 import heptarm.doubles.seam.OrientationType;
 
-/** A motion planned in space. */
+/** A motion planned in Cartesian space. */
 public abstract class SplineMotionCP<T extends SplineMotionCP<T>> extends RobotMotion<T> {
     private static final double MM = 1e-3;
 

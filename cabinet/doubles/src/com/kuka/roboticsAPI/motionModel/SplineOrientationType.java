@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.motionModel;
 
-/** How the orientation is led along a path in space. */
+/** Interpolation of the orientation along a Cartesian path. */
 public enum SplineOrientationType {
     Variable, Constant, Ignore, OriJoint
 }

@@ -24,8 +24,8 @@ import heptarm.doubles.plant.PeriodicSampler;
 import heptarm.doubles.runtime.Station;
 
 /**
- * Records numbers of the robot into a text file: a line of names, then one of numbers for each sample, the time in seconds
- * first. A name without a folder is put where the process data {@code recordings} says, otherwise into the folder for
+ * Records data of the robot to a text file: a line of names, then a line of numbers for each sample, the time in seconds
+ * first. A name without a folder is put into the folder in the process data {@code recordings}, otherwise into that for
  * temporary files.
  */
 public class DataRecorder {
@@ -49,7 +49,7 @@ public class DataRecorder {
     public DataRecorder() {
     }
 
-    /** A time of -1 records until it is stopped. */
+    /** A duration of -1 records until stopped. */
     public DataRecorder(String fileName, long timeout, TimeUnit unit, int sampleIntervalMs) {
         setFileName(fileName);
         setTimeout(timeout, unit);
@@ -58,14 +58,14 @@ public class DataRecorder {
 
     private void change() {
         if (enabled) {
-            throw new IllegalStateException("the recorder is enabled; it cannot be changed any more");
+            throw new IllegalStateException("the recorder cannot change after enable()");
         }
     }
 
     public void setFileName(String name) {
         change();
         if (name == null || name.isEmpty()) {
-            throw new IllegalArgumentException("a recording needs the name of a file");
+            throw new IllegalArgumentException("the name of the recording's file must not be empty");
         }
         fileName = name;
     }
@@ -82,17 +82,17 @@ public class DataRecorder {
     public void setSampleInterval(int milliseconds) {
         change();
         if (milliseconds < 1) {
-            throw new IllegalArgumentException("the interval is " + milliseconds + " ms; 1 ms is the shortest");
+            throw new IllegalArgumentException("the interval must be at least 1 ms, got " + milliseconds + " ms");
         }
         sampleInterval = milliseconds;
     }
 
-    /** The same by another name. */
+    /** The same under another name. */
     public void setSampleRate(int milliseconds) {
         setSampleInterval(milliseconds);
     }
 
-    // ------------------------------------------------------------------------------ what is recorded
+    // ------------------------------------------------------------------------------ data to record
     private DataRecorder add(String name, String[] parts, Supplier<double[]> source) {
         change();
         for (String part : parts) {
@@ -168,10 +168,10 @@ public class DataRecorder {
     }
 
     // ------------------------------------------------------------------------------ recording
-    /** Gets ready; from now on nothing can be changed. */
+    /** Prepares the recording; settings cannot change afterwards. */
     public synchronized void enable() {
         if (sources.isEmpty()) {
-            throw new IllegalStateException("nothing was added that could be recorded");
+            throw new IllegalStateException("add data to the recorder before enable()");
         }
         enabled = true;
     }
@@ -185,10 +185,10 @@ public class DataRecorder {
         return new File(folder == null ? System.getProperty("java.io.tmpdir") : folder.toString(), fileName);
     }
 
-    /** Begins to record; once. */
+    /** Starts the recording; only once. */
     public synchronized void startRecording() {
         if (!enabled || begun) {
-            throw new IllegalStateException(begun ? "a recorder records once" : "enable() comes before startRecording()");
+            throw new IllegalStateException(begun ? "a recorder can record only once" : "call enable() before startRecording()");
         }
         begun = true;
         try {
@@ -222,7 +222,7 @@ public class DataRecorder {
 
     public synchronized void stopRecording() {
         if (sampling == null) {
-            throw new IllegalStateException("nothing is recorded");
+            throw new IllegalStateException("no recording is running");
         }
         sampling.stop();
         finish();
@@ -232,7 +232,7 @@ public class DataRecorder {
         return written.getCount() == 0;
     }
 
-    /** Waits for the end of the recording; false: the time has passed. */
+    /** Waits for the end of the recording; false if it does not end within the time. */
     public boolean awaitFileAvailable(long time, TimeUnit unit) {
         try {
             return written.await(time, unit);

@@ -2,7 +2,7 @@ package com.kuka.roboticsAPI.sensorModel;
 
 import com.kuka.roboticsAPI.geometricModel.math.Vector;
 
-/** Estimated external force [N] and torque [Nm] acting on the robot, with the estimate's inaccuracy. */
+/** Estimated external force [N] and torque [Nm] acting on the robot, and their inaccuracies. */
 public final class ForceSensorData {
     private final Vector force;
     private final Vector torque;

@@ -6,7 +6,7 @@ import heptarm.doubles.plant.PeriodicSampler;
 import heptarm.doubles.runtime.Station;
 import heptarm.doubles.seam.StateWords;
 
-/** Finds the largest torque of each joint between two times; sampled every millisecond of the simulation. */
+/** Finds the largest torque of each joint between two times, sampled every simulated millisecond. */
 public class TorqueEvaluator {
     private static final long PERIOD_NS = 1000000L;
 
@@ -19,14 +19,14 @@ public class TorqueEvaluator {
         most = new double[robot.getJointCount()];
     }
 
-    /** True: the torques that the sensors measure; false: those that the model commands. */
+    /** True: measured torques; false: commanded torques. */
     public void setTorqueMeasured(boolean value) {
         measured = value;
     }
 
     public synchronized void startEvaluation() {
         if (sampling != null) {
-            throw new IllegalStateException("the evaluation runs already");
+            throw new IllegalStateException("an evaluation is already running");
         }
         java.util.Arrays.fill(most, 0.0);
         int word = measured ? StateWords.TAU : StateWords.TAU_CMD;
@@ -42,7 +42,7 @@ public class TorqueEvaluator {
 
     public synchronized TorqueStatistic stopEvaluation() {
         if (sampling == null) {
-            throw new IllegalStateException("no evaluation runs");
+            throw new IllegalStateException("no evaluation is running");
         }
         sampling.stop();
         sampling = null;

@@ -2,7 +2,7 @@ package com.kuka.roboticsAPI.sensorModel;
 
 import java.util.Arrays;
 
-/** The largest torque of each joint over a time [Nm]. */
+/** Largest torque of each joint over a time [Nm]. */
 public final class TorqueStatistic {
     private final double[] most;
 

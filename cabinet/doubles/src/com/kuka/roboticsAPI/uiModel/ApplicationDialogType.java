@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.uiModel;
 
-/** Weight of a dialog. */
+/** Severity of a dialog. */
 public enum ApplicationDialogType {
     QUESTION, INFORMATION, WARNING, ERROR
 }

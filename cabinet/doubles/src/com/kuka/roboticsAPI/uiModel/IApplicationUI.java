@@ -2,7 +2,7 @@ package com.kuka.roboticsAPI.uiModel;
 
 import com.kuka.roboticsAPI.uiModel.userKeys.IUserKeyBar;
 
-/** The smartPAD, as far as an application may use it. */
+/** Interface of an application to the smartPAD. */
 public interface IApplicationUI {
     /** Shows a dialog and waits until a button is pressed; returns its index. */
     int displayModalDialog(ApplicationDialogType type, String text, String... buttons);

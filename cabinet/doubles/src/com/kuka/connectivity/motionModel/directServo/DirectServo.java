@@ -2,8 +2,13 @@ package com.kuka.connectivity.motionModel.directServo;
 
 import com.kuka.connectivity.motionModel.smartServo.ServoMotionJP;
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
-/** Goes straight for each destination; they have to be close and smooth. */
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
+
+/** Moves directly to each destination; destinations must be close and smooth. */
 public class DirectServo extends ServoMotionJP<DirectServo> {
     private final JointPosition start;
 
@@ -23,5 +28,11 @@ public class DirectServo extends ServoMotionJP<DirectServo> {
 
     public JointPosition getStart() {
         return new JointPosition(start);
+    }
+
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        super.describe(order, motionFrame, robot);
+        order.kind = MotionKind.DIRECT;
     }
 }

@@ -1,6 +1,6 @@
 package com.kuka.connectivity.motionModel.smartServo;
 
-/** Hears when a servo motion has reached its goal. */
+/** Called when a servo motion has reached its goal. */
 public interface IServoOnGoalReachedEvent {
     void onGoalReachedEvent(String state, double[] currentAxisPos, int[] osTimestamp, int targetId);
 }

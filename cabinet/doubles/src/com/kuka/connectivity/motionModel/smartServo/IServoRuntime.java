@@ -5,9 +5,9 @@ import com.kuka.roboticsAPI.geometricModel.Frame;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.motionModel.controlModeModel.IMotionControlMode;
 
-/** What all servo motions can do while they run. */
+/** Operations of all running servo motions. */
 public interface IServoRuntime {
-    /** Refreshes what the getters tell; a time stamp [ms]. */
+    /** Updates the values of the getters; returns a time stamp [ms]. */
     long updateWithRealtimeSystem();
 
     boolean stopMotion();

@@ -5,7 +5,7 @@ import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.Frame;
 import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
-/** A running SmartServo: takes destinations. */
+/** A running SmartServo, which accepts destinations. */
 public interface ISmartServoRuntime extends IServoRuntime {
     long setDestination(JointPosition destination);
 

@@ -3,18 +3,26 @@ package com.kuka.connectivity.motionModel.smartServo;
 import java.util.concurrent.TimeUnit;
 
 import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
 import com.kuka.roboticsAPI.motionModel.RobotMotion;
 
 import heptarm.doubles.motion.ServoRuntime;
+import heptarm.doubles.seam.MotionOrder;
 import heptarm.doubles.seam.ServoTiming;
 
 /** A motion that follows destinations given while it runs; {@code T} is its own type, so that setters chain. */
 public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<T> {
+    private static final double GOAL_TIMEOUT = 30.0;
+
     private final ServoTiming timing = new ServoTiming();
     private ServoRuntime runtime;
 
-    /** Whether a servo motion under impedance control may begin now: at rest, nothing pushes, not singular, the load data right. */
+    protected ServoMotion() {
+        timing.goalTimeout = GOAL_TIMEOUT;
+    }
+
+    /** Whether a servo motion in impedance control may start now: at rest, without contact, not singular, with correct load data. */
     public static boolean validateForImpedanceMode(PhysicalObject object) {
         LBR robot = object.carrier();
         if (robot == null) {
@@ -24,7 +32,7 @@ public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<
     }
 
     public T setMinimumTrajectoryExecutionTime(double seconds) {
-        timing.minimumTime = positive("minimumTrajectoryExecutionTime", seconds);
+        timing.minTrajectoryTime = positive("minimumTrajectoryExecutionTime", seconds);
         return self();
     }
 
@@ -42,23 +50,23 @@ public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<
         return self();
     }
 
-    /** A larger acceleration than the robot's own is not simulated. */
+    /** Has no effect: the simulation does not exceed the robot's own acceleration. */
     public T overrideJointAcceleration(double factor) {
         positive("factor", factor);
         return self();
     }
 
-    /** The trace is a file for KUKA's service. */
+    /** Has no effect: the trace is a file for KUKA's service. */
     public T useTrace(boolean on) {
         return self();
     }
 
-    /** The running motion; waits until it has begun. */
+    /** The running motion; waits until it has started. */
     public IServoRuntime getRuntime() {
         return getRuntime(true);
     }
 
-    /** The running motion; with {@code waitForActivation} it waits until it has begun. */
+    /** The running motion; with {@code waitForActivation} waits until it has started. */
     public IServoRuntime getRuntime(boolean waitForActivation) {
         return running(waitForActivation);
     }
@@ -70,7 +78,7 @@ public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<
             accepted = runtime;
         }
         if (accepted == null) {
-            throw new IllegalStateException("the servo motion was not commanded yet; call moveAsync first");
+            throw new IllegalStateException("the servo motion is not commanded: call moveAsync first");
         }
         if (waitForActivation) {
             accepted.awaitActivation();
@@ -78,9 +86,9 @@ public abstract class ServoMotion<T extends ServoMotion<T>> extends RobotMotion<
         return accepted;
     }
 
-    /** For the simulation. */
-    public ServoTiming timing() {
-        return timing;
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        order.servoTiming = timing;
     }
 
     /** The cabinet has accepted the motion; for the simulation. */

@@ -1,8 +1,13 @@
 package com.kuka.connectivity.motionModel.smartServo;
 
 import com.kuka.roboticsAPI.deviceModel.JointPosition;
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
-/** Plans a limited trajectory to each destination, far or near; begins at a position that has to be the present one. */
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
+
+/** Plans a limited trajectory to each destination, far or near. The start position must be the current one. */
 public class SmartServo extends ServoMotionJP<SmartServo> {
     private final JointPosition start;
 
@@ -22,5 +27,11 @@ public class SmartServo extends ServoMotionJP<SmartServo> {
 
     public JointPosition getStart() {
         return new JointPosition(start);
+    }
+
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        super.describe(order, motionFrame, robot);
+        order.kind = MotionKind.SERVO;
     }
 }

@@ -1,11 +1,16 @@
 package com.kuka.connectivity.motionModel.smartServoLIN;
 
 import com.kuka.connectivity.motionModel.smartServo.ServoMotion;
+import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.MotionKind;
+import heptarm.doubles.seam.MotionOrder;
 import heptarm.doubles.seam.StraightLimits;
 
-/** Follows destinations on straight lines; begins at a frame that has to be where the moved frame is. */
+/** Follows destinations on straight lines. The start frame must be the current pose of the motion frame. */
 public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
     private static final int AXES = 3;
     private static final double MM = 1e-3;
@@ -18,7 +23,7 @@ public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
         this.start = start;
     }
 
-    /** Along whose axes the limits hold; without it the world's. */
+    /** Frame along whose axes the limits apply; default: the world. */
     public SmartServoLIN setReferenceFrame(AbstractFrame frame) {
         reference = frame;
         return this;
@@ -44,7 +49,7 @@ public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
         return limit("maxOrientationAcceleration", radiansPerSecondSquared, limits.acceleration, AXES, 1.0);
     }
 
-    /** The simulated arm keeps its arm angle, so that nothing moves in the null space. */
+    /** Has no effect: the simulated arm keeps its arm angle, so it does not move in the null space. */
     public SmartServoLIN setMaxNullSpaceVelocity(double velocity) {
         positive("maxNullSpaceVelocity", velocity);
         return this;
@@ -82,13 +87,11 @@ public class SmartServoLIN extends ServoMotion<SmartServoLIN> {
         return start;
     }
 
-    /** For the simulation. */
-    public StraightLimits limits() {
-        return limits;
-    }
-
-    /** For the simulation; null: the world. */
-    public AbstractFrame reference() {
-        return reference;
+    @Override
+    public void describe(MotionOrder order, ObjectFrame motionFrame, LBR robot) {
+        super.describe(order, motionFrame, robot);
+        order.kind = MotionKind.STRAIGHT;
+        order.straightLimits = limits;
+        order.reference = MotionTranslator.axes(reference);
     }
 }

@@ -8,12 +8,12 @@ import com.kuka.roboticsAPI.geometricModel.PhysicalObject;
 import com.kuka.roboticsAPI.geometricModel.Tool;
 import com.kuka.roboticsAPI.geometricModel.math.Transformation;
 
-/** Helpers of the servo motions' examples. */
+/** Helpers from KUKA's examples of servo motions. */
 public final class ServoMotionUtilities {
     private ServoMotionUtilities() {
     }
 
-    /** Makes a tool and attaches it to the robot's flange: where its tip is [mm], its mass [kg], where that is [mm]. */
+    /** Creates a tool and attaches it to the flange: position of the tip [mm], mass [kg], centre of mass [mm]. */
     public static PhysicalObject createTool(LBR robot, String name, double[] tip, double mass, double[] centreOfMass) {
         LoadData load = new LoadData();
         load.setMass(mass);

@@ -1,5 +1,5 @@
 package com.kuka.grippertoolbox.api.gripper;
 
-/** Of the option "gripper toolbox", which is not simulated; only imports of it are known, there is nothing to call. */
+/** Of the option "gripper toolbox", which is not simulated. Only imports are known; it has no members. */
 public abstract class AbstractGripper {
 }

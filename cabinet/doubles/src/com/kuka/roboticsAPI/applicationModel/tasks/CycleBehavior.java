@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.applicationModel.tasks;
 
-/** What becomes of a cycle that is late: with {@code BestEffort} it is done as soon as it can be. */
+/** What happens to a late cycle: with {@code BestEffort} it runs as soon as possible. */
 public enum CycleBehavior {
     BestEffort
 }

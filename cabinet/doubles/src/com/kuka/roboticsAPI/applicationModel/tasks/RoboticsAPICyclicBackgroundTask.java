@@ -8,7 +8,7 @@ import java.util.concurrent.TimeUnit;
 
 import heptarm.doubles.plant.PlantClock;
 
-/** A background task that is called again and again; times are those of the simulation. An exception of a cycle ends it. */
+/** A background task that is called periodically, in simulated time. An exception in a cycle ends it. */
 public abstract class RoboticsAPICyclicBackgroundTask extends RoboticsAPIBackgroundTask {
     private final FutureTask<Void> cycles = new FutureTask<>(this::cycle, null);
     private long initialDelay = -1;
@@ -16,10 +16,10 @@ public abstract class RoboticsAPICyclicBackgroundTask extends RoboticsAPIBackgro
 
     public abstract void runCyclic() throws Exception;
 
-    /** Says from {@link #initialize} when the first cycle is, and how often there is one. */
+    /** Sets delay and period of the cycles; called from {@link #initialize}. */
     protected void initializeCyclic(long delay, long every, TimeUnit unit, CycleBehavior behavior) {
         if (delay < 0 || every <= 0) {
-            throw new IllegalArgumentException("a delay of " + delay + " and a period of " + every + ": at least 0 and 1 are legal");
+            throw new IllegalArgumentException("initial delay must be at least 0 and period at least 1, got " + delay + " and " + every);
         }
         initialDelay = unit.toNanos(delay);
         period = unit.toNanos(every);
@@ -40,7 +40,7 @@ public abstract class RoboticsAPICyclicBackgroundTask extends RoboticsAPIBackgro
             cycles.run();
             cycles.get();
         } catch (CancellationException e) {
-            Thread.interrupted(); // the interruption has done its work
+            Thread.interrupted(); // clear the flag of the handled interruption
         } catch (ExecutionException e) {
             throw e.getCause() instanceof Exception ? (Exception) e.getCause() : e;
         }

@@ -14,7 +14,7 @@ import com.kuka.task.ITaskManager;
 import heptarm.doubles.runtime.ApplicationServices;
 import heptarm.doubles.runtime.Station;
 
-/** Base of all that the cabinet runs, applications and background tasks: initialize, run, dispose. */
+/** Base of applications and background tasks: initialize, run, dispose. */
 public abstract class RoboticsAPITask {
     private final ApplicationServices desk = ApplicationServices.current();
 
@@ -50,17 +50,17 @@ public abstract class RoboticsAPITask {
         return desk.observers;
     }
 
-    /** What has to be done before the application may go on; an arm that keeps its path needs nothing. */
+    /** Recovery before the application may continue; never required, since the simulated arm stays on its path. */
     public IRecovery getRecovery() {
         return () -> false;
     }
 
-    /** The cabinet; there is one, whatever the name. */
+    /** The cabinet; there is only one, so the name has no effect. */
     public Controller getController(String name) {
         return Station.current().controller;
     }
 
-    /** The robot; there is one, whatever the name. */
+    /** The robot; there is only one, so the name has no effect. */
     public Device getDevice(Controller controller, String name) {
         return Station.current().robot;
     }
@@ -69,7 +69,7 @@ public abstract class RoboticsAPITask {
         return Station.current().tasks;
     }
 
-    /** A function that background tasks provide; its calls fail while none of them runs. */
+    /** A function of a background task; calls fail while no such task runs. */
     public <T> T getTaskFunction(Class<T> type) {
         return Station.current().tasks.function(type);
     }

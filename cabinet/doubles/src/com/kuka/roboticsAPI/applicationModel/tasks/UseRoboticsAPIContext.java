@@ -5,7 +5,7 @@ import java.lang.annotation.RetentionPolicy;
 
 import com.kuka.roboticsAPI.RoboticsAPIContext;
 
-/** Says which context a task wants; the virtual cabinet has one, so that nothing changes. */
+/** Selects the context of a task; no effect, since the virtual cabinet has only one. */
 @Retention(RetentionPolicy.RUNTIME)
 public @interface UseRoboticsAPIContext {
     Class<? extends RoboticsAPIContext> value() default RoboticsAPIContext.class;

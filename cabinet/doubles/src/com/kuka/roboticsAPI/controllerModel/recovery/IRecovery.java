@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.controllerModel.recovery;
 
-/** Whether something has to be done before the application may go on. */
+/** Whether recovery is required before the application may continue. */
 public interface IRecovery {
     boolean isRecoveryRequired();
 }

@@ -5,7 +5,7 @@ import com.kuka.roboticsAPI.controllerModel.DispatchedEventData;
 import com.kuka.roboticsAPI.controllerModel.StatePortData;
 import com.kuka.roboticsAPI.deviceModel.Device;
 
-/** A listener that does nothing, to be extended. */
+/** An empty listener to extend. */
 public class ControllerStateListenerAdapter implements ISunriseControllerStateListener {
     @Override
     public void onSafetyStateChanged(Device device, SunriseSafetyState safetyState) {

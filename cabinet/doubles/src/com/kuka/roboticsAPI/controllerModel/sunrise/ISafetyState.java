@@ -2,7 +2,7 @@ package com.kuka.roboticsAPI.controllerModel.sunrise;
 
 import com.kuka.roboticsAPI.deviceModel.OperationMode;
 
-/** What the safety controller tells. */
+/** Safety state reported by the safety controller. */
 public interface ISafetyState {
     SunriseSafetyState.EmergencyStop getEmergencyStopInt();
 

@@ -6,7 +6,7 @@ import com.kuka.roboticsAPI.controllerModel.IControllerStateListener;
 import com.kuka.roboticsAPI.controllerModel.StatePortData;
 import com.kuka.roboticsAPI.deviceModel.Device;
 
-/** Hears of the safety state, of readiness and of field buses. */
+/** Called when the safety state, readiness or a field bus changes. */
 public interface ISunriseControllerStateListener extends IControllerStateListener {
     void onSafetyStateChanged(Device device, SunriseSafetyState safetyState);
 
@@ -15,7 +15,7 @@ public interface ISunriseControllerStateListener extends IControllerStateListene
     default void onStatePortChangeReceived(Controller controller, StatePortData data) {
     }
 
-    /** Its older name. */
+    /** Its former name. */
     default void statePortChanged(Controller controller, StatePortData data) {
     }
 

@@ -6,6 +6,6 @@ import com.kuka.roboticsAPI.controllerModel.sunrise.connectionLib.Message;
 
 /** Low-level requests; those of position and torque referencing are simulated. */
 public interface ISunriseRequestService extends IRequestService {
-    /** Sends a request and waits for its answer; its parameter 0 is 1 if that worked. */
+    /** Sends a request and waits for the answer, whose parameter 0 is 1 on success. */
     Message sendSynchronousSSR(SSR request);
 }

@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.controllerModel.sunrise;
 
-/** How execution goes on after a pause. */
+/** How execution resumes after a pause. */
 public enum ResumeMode {
     OnPath, NoMotion
 }

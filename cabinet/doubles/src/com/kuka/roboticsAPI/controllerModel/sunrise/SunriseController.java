@@ -13,7 +13,7 @@ public class SunriseController extends Controller {
         this.station = station;
     }
 
-    /** Acknowledges errors whose cause has gone. */
+    /** Acknowledges errors whose cause is gone. */
     public void acknowledgeError() {
         station.plant.acknowledge();
     }

@@ -7,7 +7,7 @@ import heptarm.doubles.runtime.Station;
 import heptarm.doubles.seam.SafetyFlags;
 import heptarm.doubles.seam.StateWords;
 
-/** Pausing, resuming and cancelling what the cabinet executes. */
+/** Pauses, resumes and cancels the execution of the cabinet. */
 public final class SunriseExecutionService implements IExecutionService {
     private static final double AT_REST = 0.001;
 
@@ -25,7 +25,7 @@ public final class SunriseExecutionService implements IExecutionService {
         return (flags() & SafetyFlags.PAUSED) != 0;
     }
 
-    /** Whether execution is paused and the arm rests. */
+    /** Whether execution is paused and the arm is at rest. */
     public boolean isPausedAndStopped() {
         double[] speed = new double[7];
         station.sharedState.read(StateWords.DQ, speed);
@@ -53,7 +53,7 @@ public final class SunriseExecutionService implements IExecutionService {
         station.plant.pause();
     }
 
-    /** Lets execution go on unless a stop is demanded; without motion: what was under way is dropped before. */
+    /** Resumes execution unless a stop is requested; without motion: drops the interrupted motions first. */
     public void resumeExecution(ResumeMode mode) {
         if (mode == ResumeMode.NoMotion) {
             station.plant.cancelAll();
@@ -66,7 +66,7 @@ public final class SunriseExecutionService implements IExecutionService {
         station.plant.cancelAll();
     }
 
-    /** Keeps motions from running until {@link #unblockExecutionForBrakeTest}. */
+    /** Blocks motions until {@link #unblockExecutionForBrakeTest}. */
     public void blockExecutionForBrakeTest() {
         startPause();
     }
@@ -75,7 +75,7 @@ public final class SunriseExecutionService implements IExecutionService {
         station.plant.resume();
     }
 
-    /** Its older name. */
+    /** Its former name. */
     public int getActiveContainerCount() {
         return getActiveMotionContainerCount();
     }

@@ -7,7 +7,7 @@ import heptarm.doubles.runtime.Station;
 
 /** The robot of a cabinet. */
 public final class SunriseLBR extends LBR {
-    /** Made by the simulation. */
+    /** Created by the simulation. */
     public SunriseLBR(String name, Controller controller, Station station) {
         super(name, controller, station);
     }

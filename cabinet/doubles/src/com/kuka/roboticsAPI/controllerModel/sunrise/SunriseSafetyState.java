@@ -9,7 +9,7 @@ public final class SunriseSafetyState implements ISafetyState {
     /** Emergency stop. */
     public enum EmergencyStop { ACTIVE, INACTIVE }
 
-    /** Kind of the stop that safety demands. */
+    /** Kind of stop requested by the safety controller. */
     public enum SafetyStopType {
         NOSTOP, STOP0, STOP1, STOP2;
 

@@ -61,7 +61,7 @@ public final class Transformation implements ITransformation {
                 : ofRad(other.getX(), other.getY(), other.getZ(), other.getAlphaRad(), other.getBetaRad(), other.getGammaRad());
     }
 
-    /** This one, then the other, seen from this one's frame. */
+    /** The composition: this transformation, then the other in its frame. */
     public Transformation compose(ITransformation next) {
         Transformation o = of(next);
         double[][] product = new double[3][3];
@@ -119,7 +119,7 @@ public final class Transformation implements ITransformation {
         return level() ? 0.0 : Math.atan2(r[2][1], r[2][2]);
     }
 
-    /** Gimbal lock: only the sum of alpha and gamma is determined, gamma is taken as 0. */
+    /** Gimbal lock: only the sum of alpha and gamma is determined; gamma is set to 0. */
     private boolean level() {
         return Math.hypot(r[0][0], r[1][0]) < 1e-12;
     }

@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.geometricModel.math;
 
-/** A transformation by its six numbers: millimetres; angles about z, y, x [rad]; they stay as they were given. */
+/** A transformation of six numbers: x, y, z [mm] and angles about z, y, x [rad], kept as given. */
 public final class XyzAbcTransformation implements ITransformation {
     private final double[] numbers;
 

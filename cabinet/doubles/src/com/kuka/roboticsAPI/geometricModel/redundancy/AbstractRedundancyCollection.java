@@ -1,5 +1,5 @@
 package com.kuka.roboticsAPI.geometricModel.redundancy;
 
-/** Base of what a pose leaves open. */
+/** Base of redundancies. */
 public abstract class AbstractRedundancyCollection implements IRedundancyCollection {
 }

@@ -2,7 +2,7 @@ package com.kuka.roboticsAPI.geometricModel.redundancy;
 
 import com.kuka.common.params.IParameterSet;
 
-/** What a pose leaves open of a robot's joints. */
+/** Redundancy of a robot at a pose. */
 public interface IRedundancyCollection {
     /** Status and turn, then E1 where there is one. */
     IParameterSet getAllParameters();

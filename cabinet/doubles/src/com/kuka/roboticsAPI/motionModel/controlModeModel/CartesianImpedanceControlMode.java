@@ -4,19 +4,28 @@ import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.List;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.AbstractFrame;
 import com.kuka.roboticsAPI.geometricModel.CartDOF;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.motion.ControlModeTranslator;
+import heptarm.doubles.motion.MotionTranslator;
+import heptarm.doubles.seam.CartesianImpedance;
+import heptarm.doubles.seam.ImpedanceMode;
 
 /**
- * A spring and a damper between the moved frame and its set-point, and one that keeps the elbow. Directions in the order
+ * A spring and a damper between the motion frame and its set-point, and in the null space. Directions in the order
  * x y z a b c; [N/m], [Nm/rad], [N], [Nm], [mm], [rad].
  */
 public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
     static final int DIRECTIONS = 6;
-    /** A limit of this size counts as none. */
+    /** A limit of this size or above is no limit. */
     static final double OFF = 1e6;
     private static final double STIFFEST = 5000.0;
     private static final double STIFFEST_ROTATION = 300.0;
+    /** Largest stiffness that the plant takes [Nm/rad]. */
+    private static final double PLANT_NULL_SPACE_STIFFNESS = 5000.0;
     private static final double DEFAULT_DAMPING = 0.7;
     private static final double LEAST_DAMPING = 0.1;
     private static final double LEAST_NULL_SPACE_DAMPING = 0.3;
@@ -48,7 +57,7 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
         referenceSystem = other.referenceSystem;
     }
 
-    /** Sets parameters of some directions. */
+    /** Selects the directions whose parameters are set. */
     public static class CartImpBuilder {
         final int[] chosen;
         private final CartesianImpedanceControlMode mode;
@@ -153,7 +162,7 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
         return this;
     }
 
-    /** The control exerts no larger force [N, Nm]; with the flag, reaching it ends the motion. */
+    /** Limit of the force of the controller [N, Nm]; with the flag, reaching it ends the motion. */
     public CartesianImpedanceControlMode setMaxControlForce(double x, double y, double z, double a, double b, double c,
             boolean addStopCondition) {
         maxControlForce = limits("maxControlForce", true, x, y, z, a, b, c);
@@ -169,7 +178,7 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
         return this;
     }
 
-    /** The frame whose axes the directions are; without one those of the moved frame. */
+    /** Frame of the directions; default: the motion frame. */
     public CartesianImpedanceControlMode setReferenceSystem(AbstractFrame frame) {
         referenceSystem = frame;
         return this;
@@ -217,14 +226,27 @@ public class CartesianImpedanceControlMode extends AbstractMotionControlMode {
         return nullSpaceDamping;
     }
 
-    /** For the simulation. */
-    public double[] additionalForces() {
-        return additionalControlForce.clone();
+    @Override
+    public ImpedanceMode forPlant(ObjectFrame motionFrame, LBR robot) {
+        return spring(motionFrame, robot);
     }
 
-    /** The frame of the axes, null: the moved one; for the simulation. */
-    public AbstractFrame referenceSystem() {
-        return referenceSystem;
+    /** Spring and damper in the plant's terms. */
+    final CartesianImpedance spring(ObjectFrame motionFrame, LBR robot) {
+        CartesianImpedance spring = new CartesianImpedance();
+        spring.stiffness = ControlModeTranslator.directions(stiffness);
+        spring.damping = ControlModeTranslator.directions(damping);
+        spring.nullspaceStiffness = Math.min(nullSpaceStiffness, PLANT_NULL_SPACE_STIFFNESS);
+        spring.nullspaceDamping = nullSpaceDamping;
+        spring.additionalForce = ControlModeTranslator.directions(additionalControlForce);
+        spring.maxForce = ControlModeTranslator.forceLimits(maxControlForce);
+        spring.maxForceStops = stopsAtMaxControlForce;
+        spring.maxVelocity = ControlModeTranslator.motionLimits(maxCartesianVelocity);
+        spring.maxDeviation = ControlModeTranslator.motionLimits(maxPathDeviation);
+        if (referenceSystem != null && referenceSystem != motionFrame) {
+            spring.axes = MotionTranslator.axes(referenceSystem, robot.getRootFrame());
+        }
+        return spring;
     }
 
     @Override

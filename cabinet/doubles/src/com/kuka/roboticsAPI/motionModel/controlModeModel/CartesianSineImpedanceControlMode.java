@@ -1,12 +1,15 @@
 package com.kuka.roboticsAPI.motionModel.controlModeModel;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
 import com.kuka.roboticsAPI.geometricModel.CartDOF;
 import com.kuka.roboticsAPI.geometricModel.CartPlane;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
 
 import heptarm.doubles.motion.ControlModeTranslator;
+import heptarm.doubles.seam.ImpedanceMode;
 import heptarm.doubles.seam.SineImpedance;
 
-/** Cartesian impedance with a force laid over it: a constant part and a sine in each direction, risen and fallen. */
+/** Cartesian impedance with an overlaid force: in each direction a constant and a sine, with rise and fall times. */
 public class CartesianSineImpedanceControlMode extends CartesianImpedanceControlMode {
     private static final double FASTEST = 15.0;
     private static final double LISSAJOUS_RATIO = 0.4;
@@ -40,7 +43,7 @@ public class CartesianSineImpedanceControlMode extends CartesianImpedanceControl
         stayActive = other.stayActive;
     }
 
-    /** Sets parameters of some directions. */
+    /** Selects the directions whose parameters are set. */
     public static class CartSineImpBuilder extends CartImpBuilder {
         private final CartesianSineImpedanceControlMode mode;
 
@@ -126,7 +129,7 @@ public class CartesianSineImpedanceControlMode extends CartesianImpedanceControl
         return mode;
     }
 
-    /** Outwards for half of the time, then back. */
+    /** Outwards for half of the time, then inwards. */
     public static CartesianSineImpedanceControlMode createSpiralPattern(CartPlane plane, double frequency, double amplitude,
             double stiffness, double totalTime) {
         CartesianSineImpedanceControlMode mode = new CartesianSineImpedanceControlMode();
@@ -146,7 +149,7 @@ public class CartesianSineImpedanceControlMode extends CartesianImpedanceControl
 
     // ------------------------------------------------------------------------------ times
 
-    /** The force is gone after this time in any case [s]. */
+    /** The force ends after this time at the latest [s]. */
     public CartesianSineImpedanceControlMode setTotalTime(double seconds) {
         totalTime = notNegative("totalTime", seconds);
         return this;
@@ -180,15 +183,16 @@ public class CartesianSineImpedanceControlMode extends CartesianImpedanceControl
         return fallTime;
     }
 
-    /** The motion does not end before the pattern has. */
+    /** The motion does not end before the pattern. */
     public CartesianSineImpedanceControlMode setStayActiveUntilPatternFinished(boolean stay) {
         stayActive = stay;
         return this;
     }
 
-    /** The pattern in the plant's terms, without its base; for the simulation. */
-    public SineImpedance pattern() {
+    @Override
+    public ImpedanceMode forPlant(ObjectFrame motionFrame, LBR robot) {
         SineImpedance pattern = new SineImpedance();
+        pattern.base = spring(motionFrame, robot);
         pattern.amplitude = ControlModeTranslator.directions(amplitude);
         pattern.frequency = ControlModeTranslator.directions(frequency);
         double[] phase = new double[DIRECTIONS];

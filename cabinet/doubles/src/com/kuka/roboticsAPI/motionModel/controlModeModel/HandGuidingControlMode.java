@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.motionModel.controlModeModel;
 
-/** The mode of hand guiding motions; other motions refuse it. */
+/** Control mode of hand guiding motions; refused by other motions. */
 public class HandGuidingControlMode extends AbstractMotionControlMode {
     @Override
     public String toString() {

@@ -2,7 +2,13 @@ package com.kuka.roboticsAPI.motionModel.controlModeModel;
 
 import java.util.Arrays;
 
-/** A spring and a damper in every joint [Nm/rad], damping as a ratio. */
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.seam.ImpedanceMode;
+import heptarm.doubles.seam.JointImpedance;
+
+/** A spring [Nm/rad] and a damper (damping ratio) in every joint. */
 public class JointImpedanceControlMode extends AbstractMotionControlMode {
     private static final double STIFFNESS = 1000.0;
     private static final double DAMPING = 0.7;
@@ -29,7 +35,7 @@ public class JointImpedanceControlMode extends AbstractMotionControlMode {
 
     private void set(double[] into, String name, double high, double[] values) {
         if (values.length != into.length) {
-            throw new IllegalArgumentException(name + " takes " + into.length + " values, not " + values.length);
+            throw new IllegalArgumentException(name + " must have " + into.length + " values, got " + values.length);
         }
         for (double value : values) {
             if (!(value >= 0.0 && value <= high)) {
@@ -69,6 +75,14 @@ public class JointImpedanceControlMode extends AbstractMotionControlMode {
 
     public double[] getDamping() {
         return damping.clone();
+    }
+
+    @Override
+    public ImpedanceMode forPlant(ObjectFrame motionFrame, LBR robot) {
+        JointImpedance joints = new JointImpedance();
+        joints.stiffness = stiffness.clone();
+        joints.damping = damping.clone();
+        return joints;
     }
 
     @Override

@@ -1,13 +1,23 @@
 package com.kuka.roboticsAPI.motionModel.controlModeModel;
 
+import com.kuka.roboticsAPI.deviceModel.LBR;
+import com.kuka.roboticsAPI.geometricModel.ObjectFrame;
+
+import heptarm.doubles.seam.ImpedanceMode;
+
 /** Stiff position control. */
 public class PositionControlMode extends AbstractMotionControlMode {
     public PositionControlMode() {
         this(true);
     }
 
-    /** What the flag means is not known; both are the same here. */
+    /** The meaning of the flag is not known; it has no effect here. */
     public PositionControlMode(boolean flag) {
+    }
+
+    @Override
+    public ImpedanceMode forPlant(ObjectFrame motionFrame, LBR robot) {
+        return null;
     }
 
     @Override

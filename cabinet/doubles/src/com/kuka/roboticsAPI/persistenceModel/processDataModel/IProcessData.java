@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.persistenceModel.processDataModel;
 
-/** A value that a person can set at the smartPAD. */
+/** A value that the operator can set at the smartPAD. */
 public interface IProcessData {
     <T> T getValue();
 

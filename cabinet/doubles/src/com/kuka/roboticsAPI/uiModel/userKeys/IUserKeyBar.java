@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.uiModel.userKeys;
 
-/** Four keys beside the smartPAD's screen; they appear when the bar is published and a person selects it. */
+/** Four keys beside the screen of the smartPAD; visible when the bar is published and selected by the operator. */
 public interface IUserKeyBar {
     IUserKey addUserKey(int slot, IUserKeyListener listener, boolean ignoreEvents);
 

@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.uiModel.userKeys;
 
-/** Hears of a key. */
+/** Called on events of a key. */
 public interface IUserKeyListener {
     void onKeyEvent(IUserKey key, UserKeyEvent event);
 }

@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.uiModel.userKeys;
 
-/** A place on a key. */
+/** Position on a key. */
 public enum UserKeyAlignment {
     TopLeft, TopMiddle, TopRight, MiddleLeft, Middle, MiddleRight, BottomLeft, BottomMiddle, BottomRight
 }

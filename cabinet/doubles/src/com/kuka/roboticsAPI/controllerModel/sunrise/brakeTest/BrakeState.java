@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.controllerModel.sunrise.brakeTest;
 
-/** What a brake test found. */
+/** Result of a brake test. */
 public enum BrakeState {
     Holds(LogLevel.Info), Slips(LogLevel.Error), NotTested(LogLevel.Warning);
 

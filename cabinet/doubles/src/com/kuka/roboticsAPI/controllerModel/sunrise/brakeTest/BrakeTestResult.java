@@ -7,7 +7,7 @@ public final class BrakeTestResult {
     private final double torque;
     private final double most;
 
-    /** Made by the simulation. */
+    /** Created by the simulation. */
     public BrakeTestResult(int axis, BrakeState state, double torque, double most) {
         this.axis = axis;
         this.state = state;

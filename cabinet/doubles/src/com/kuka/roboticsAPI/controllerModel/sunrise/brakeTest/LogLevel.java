@@ -1,6 +1,6 @@
 package com.kuka.roboticsAPI.controllerModel.sunrise.brakeTest;
 
-/** How grave a result is. */
+/** Severity of a result. */
 public enum LogLevel {
     Info, Warning, Error
 }

@@ -4,7 +4,7 @@ package com.kuka.roboticsAPI.controllerModel.sunrise.connectionLib;
 public final class Message {
     private final int[] parameters;
 
-    /** Made by the simulation. */
+    /** Created by the simulation. */
     public Message(int... parameters) {
         this.parameters = parameters.clone();
     }

@@ -15,10 +15,10 @@ public class PositionMastering {
         return new MasteringInfo(this);
     }
 
-    /** Of an axis, from 0. */
+    /** Of an axis, counted from 0. */
     public boolean isAxisMastered(int axis) {
         if (axis < 0 || axis >= robot.getJointCount()) {
-            throw new IllegalArgumentException("axis " + axis + "; there are 0 to " + (robot.getJointCount() - 1));
+            throw new IllegalArgumentException("axis must be 0 to " + (robot.getJointCount() - 1) + ", got " + axis);
         }
         return robot.isMastered();
     }

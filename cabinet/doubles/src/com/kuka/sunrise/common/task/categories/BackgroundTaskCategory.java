@@ -3,7 +3,7 @@ package com.kuka.sunrise.common.task.categories;
 import java.lang.annotation.Retention;
 import java.lang.annotation.RetentionPolicy;
 
-/** Says whether the cabinet starts a background task by itself. */
+/** Whether the cabinet starts a background task automatically. */
 @Retention(RetentionPolicy.RUNTIME)
 public @interface BackgroundTaskCategory {
     boolean autoStart() default false;

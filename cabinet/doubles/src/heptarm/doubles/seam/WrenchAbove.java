@@ -3,22 +3,22 @@ package heptarm.doubles.seam;
 
 import heptarm.wire.Encoder;
 
-/** The external force across an axis is above a threshold. */
-public final class ShearForceAbove extends Condition {
+/** The magnitude of some components of the external wrench is above a threshold. */
+public final class WrenchAbove extends Condition {
     public MeasuringFrame frame = new MeasuringFrame();
-    public Axis axis = Axis.X;
-    /** [N] */
+    public int components;
+    /** [N, Nm] */
     public double threshold;
 
     @Override
     int tag() {
-        return 4;
+        return 2;
     }
 
     @Override
     void write(Encoder out) {
         frame.write(out);
-        out.putU8(axis.value());
+        out.putU8(components);
         out.putF64(threshold);
     }
 }

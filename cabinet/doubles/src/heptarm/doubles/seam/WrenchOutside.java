@@ -3,24 +3,25 @@ package heptarm.doubles.seam;
 
 import heptarm.wire.Encoder;
 
-/** A component of the external torque is outside a band. */
-public final class TorqueOutside extends Condition {
+/** A component of the external wrench is outside a band. */
+public final class WrenchOutside extends Condition {
     public MeasuringFrame frame = new MeasuringFrame();
-    public Axis axis = Axis.X;
-    /** [Nm] */
+    /** 0 to 2: forces along x y z; 3 to 5: torques about x y z */
+    public int component;
+    /** [N, Nm] */
     public double low;
-    /** [Nm] */
+    /** [N, Nm] */
     public double high;
 
     @Override
     int tag() {
-        return 6;
+        return 3;
     }
 
     @Override
     void write(Encoder out) {
         frame.write(out);
-        out.putU8(axis.value());
+        out.putU8(component);
         out.putF64(low);
         out.putF64(high);
     }

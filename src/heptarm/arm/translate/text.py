@@ -1,0 +1,70 @@
+"""Text from the network, made safe to print: what could control a terminal or forge a line of a log is removed."""
+
+from __future__ import annotations
+
+import unicodedata
+from dataclasses import fields, is_dataclass, replace
+from typing import Any
+
+from heptarm.wire.messages import Message, ProcessData
+
+#: Control characters, invisible format characters such as those that reverse the direction of writing, halves of
+#: surrogate pairs, separators of lines and paragraphs.
+_REMOVED = ("Cc", "Cf", "Cs", "Zl", "Zp")
+#: Fields that may have several lines.
+_WITH_LINES = ("text",)
+
+
+def printable(text: str, *, lines: bool = False) -> str:
+    """Remove what cannot be printed.
+
+    Args:
+        text: from another client, a cabinet or the environment.
+        lines: keep line breaks; otherwise they become blanks.
+    """
+    if text.isprintable():
+        return text
+    if lines:
+        return "\n".join(printable(line) for line in text.split("\n"))
+    one_line = " ".join(text.splitlines()).replace("\t", " ")
+    return "".join(c for c in one_line if unicodedata.category(c) not in _REMOVED)
+
+
+def printable_message(message: Message) -> Message:
+    """Remove from all texts of a message what cannot be printed; values of process data stay as they are."""
+    if isinstance(message, ProcessData):
+        return message
+    cleaned: Message = _cleaned(message, lines=False)
+    return cleaned
+
+
+def _cleaned(value: Any, *, lines: bool) -> Any:
+    if isinstance(value, str):
+        return printable(value, lines=lines)
+    if isinstance(value, tuple):
+        new = tuple(_cleaned(one, lines=lines) for one in value)
+        return value if all(a is b for a, b in zip(value, new)) else new
+    if not is_dataclass(value) or isinstance(value, type) or not _has_text(type(value)):
+        return value
+    changed = {}
+    for name in _TEXTS[type(value)]:
+        old = getattr(value, name)
+        new = _cleaned(old, lines=name in _WITH_LINES)
+        if new is not old:
+            changed[name] = new
+    return replace(value, **changed) if changed else value
+
+
+#: By class: its fields that are texts, or may contain some.
+_TEXTS: dict[type, tuple[str, ...]] = {}
+
+
+def _has_text(kind: Any) -> bool:
+    if kind not in _TEXTS:
+        numbers = ("int", "float", "bool", "bytes", "int | None", "float | None")
+        _TEXTS[kind] = tuple(
+            one.name
+            for one in fields(kind)
+            if str(one.type) not in numbers and not str(one.type).startswith(("tuple[float", "tuple[int"))
+        )
+    return bool(_TEXTS[kind])
