@@ -52,9 +52,11 @@ test: setup $(STAMPS)/browser lint check  ## everything; what takes long begins 
 	$(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(LONGEST)
 	@$(MAKE) --no-print-directory test-ros
 
-# Each of them mostly waits, and takes one processor at most.
-test-ros: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## both ROS nodes, side by side
-	@$(MAKE) --no-print-directory -j2 --output-sync=target test-ros2 test-ros1
+# Each of them takes a processor or two: simulator, node, client.
+ROS_JOBS ?= $(shell n=$$(nproc 2>/dev/null || echo 2); if [ $$n -gt 3 ]; then echo 2; else echo 1; fi)
+
+test-ros: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## both ROS nodes; side by side where there are four processors, or with ROS_JOBS=2
+	@$(MAKE) --no-print-directory -j$(ROS_JOBS) $(if $(filter-out 1,$(ROS_JOBS)),--output-sync=target) test-ros2 test-ros1
 
 test-long: setup $(STAMPS)/browser  ## everything with LONG=1: soaks, long searches, all cases of conformance
 	LONG=1 $(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --timeout 3600 $(LONGEST)

@@ -73,11 +73,10 @@ def test_a_client_that_does_not_read_is_closed_and_holds_up_nobody(make: Callabl
 def test_requests_without_reading_the_answers_end_that_client_only(make: Callable[..., FakeCabinet]) -> None:
     cabinet = make(heartbeat=10.0)  # the other client sends nothing meanwhile
     with Peer(cabinet.port) as rude, Peer(cabinet.port) as other:
-        burst = b"".join(rude.pack(wire.Stop(), 1 + k) for k in range(1000))
         rude.socket.settimeout(10)
         with pytest.raises(OSError):
             for _ in range(2000):
-                rude.socket.sendall(burst)
+                rude.socket.sendall(b"".join(rude.pack(wire.Stop(), 1 + k) for k in range(1000)))
         assert isinstance(other.ask(wire.Stop()), wire.Accepted)
     assert cabinet.errors() == []
 
