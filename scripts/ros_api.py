@@ -195,6 +195,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "heptarm.modes": {
         "CartesianImpedance": ("~/mode/cartesian_impedance",),
+        "HandGuiding": ("the node reports no control mode",),
         "JointImpedance": ("~/mode/joint_impedance",),
         "Position": ("~/mode/position",),
         "compliance": ("~/guide", "~/teach", "~/mode/cartesian_impedance"),

@@ -241,7 +241,7 @@ def sim(
     if fri is not None:
         from heptarm.cli import fri_sim
 
-        own = {"--view": view, "--key": bool(key), "--project": project is not None}
+        own = {"--view": view, "--key-file": key_file is not None, "--project": project is not None}
         for name, present in own.items():
             if present:
                 raise CommandRejected(
@@ -591,6 +591,7 @@ def _ready(child: subprocess.Popen[str], otherwise: str) -> dict[str, Any]:
     ready = _first(child, otherwise)
     if not ready.get("ready"):
         raise ConnectFailed(
-            f"{otherwise}: {ready.get('error')}", hint="choose another port with --port, or 0 for any"
+            f"{otherwise}: {ready.get('error')}",
+            hint="" if ready.get("host") else "choose another port with --port, or 0 for any",
         )
     return ready
