@@ -38,7 +38,7 @@ def arm(cabinet: RunningCabinet) -> Iterator[Arm]:
 @contextmanager
 def silence(arm: Arm) -> Iterator[None]:
     """A block in which any message to the cabinet but a ping is an error."""
-    link = arm._connection.link
+    link = arm.connection.link
     send, stream = link._send, link.send_one_way
 
     def refuse(message: Any, *arguments: Any) -> Any:
@@ -58,7 +58,7 @@ def silence(arm: Arm) -> Iterator[None]:
 
 def settings_of(arm: Arm) -> tuple[object, ...]:
     """What a refused call must not change."""
-    tooling, connection = arm._tooling, arm._connection
+    tooling, connection = arm._tooling, arm.connection
     return (
         arm.speed,
         arm._mode,
