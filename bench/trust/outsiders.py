@@ -8,12 +8,16 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from statistics import median
 
 import heptarm as ha
 from bench.measure.cabinet import Cabinet
 from bench.measure.figure import Figure, benchmark
 from bench.measure.noise import Noise
 from bench.trust.flood import Flood
+from heptarm.arm.link.halt import halt
+from heptarm.io import tcp
+from heptarm.io.clock import RealClock
 from heptarm.wire import messages
 from heptarm.wire.codes import Code
 from heptarm.wire.frames import FrameReader, pack
@@ -27,7 +31,9 @@ FORGED = int(os.environ.get("BENCH_HELLOS", "10000"))
 def stop_under_flood() -> Iterator[Figure]:
     """`heptarm stop`, the start of Python included, while 1,000 sockets are held and 200 connects a second come."""
     for name, greets in (("silent", False), ("greeting", True)):
-        times, rests = [], 0
+        times: list[float] = []
+        halts: list[float] = []
+        rests = 0
         with (
             Noise() as noise,
             Cabinet() as cabinet,
@@ -35,22 +41,30 @@ def stop_under_flood() -> Iterator[Figure]:
             Flood(cabinet.port, held=HELD, rate=RATE, greets=greets),
         ):
             for index in range(STOPS):
-                motion = arm.start(ha.ptp([1.5 if index % 2 else -1.5, 0.5, 0, -1.2, 0, 0.9, 0]), speed=0.2)
-                times.append(_stop(cabinet.port))
+                motion = arm.start(ha.ptp([1.5 if index % 2 else -1.5, 0.5, 0, -1.2, 0, 0.9, 0]), speed=0.1)
+                if index % 2:
+                    halts.append(_halt(cabinet.port))
+                else:
+                    times.append(_stop(cabinet.port))
                 try:
-                    motion.wait(timeout=10)
+                    motion.wait(timeout=60)
                 except ha.MotionAborted as error:
                     rests += error.cause is ha.Cause.STOPPED
-        detail = {
-            "held": HELD,
-            "per_second": RATE,
-            "stops": STOPS,
-            "median": round(sorted(times)[STOPS // 2], 3),
-        }
+        detail = {"held": HELD, "per_second": RATE, "median": round(median(times), 3)}
+        halted = {"median": round(median(halts), 4)}
+        noisy = noise.is_noisy
+        yield Figure(f"stop_under_flood_{name}", max(times), "s", limit=1.0, disturbed=noisy, detail=detail)
+        yield Figure(f"halt_under_flood_{name}", max(halts), "s", limit=1.0, disturbed=noisy, detail=halted)
         yield Figure(
-            f"stop_under_flood_{name}", max(times), "s", limit=1.0, disturbed=noise.is_noisy, detail=detail
+            f"stopped_under_flood_{name}", rests, "count", limit=STOPS, disturbed=noisy, at_least=True
         )
-        yield Figure(f"stopped_under_flood_{name}", rests, "count", limit=STOPS, at_least=True)
+
+
+def _halt(port: int) -> float:
+    """Seconds from the connection of a running program until the cabinet has commanded the stop."""
+    began = time.monotonic()
+    halt(lambda: tcp.connect("127.0.0.1", port), messages.StopKind.PATH, clock=RealClock(), timeout=10.0)
+    return time.monotonic() - began
 
 
 def _stop(port: int) -> float:

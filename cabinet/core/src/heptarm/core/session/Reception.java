@@ -25,7 +25,8 @@ import heptarm.wire.StopKind;
  * <p>The thread polls plain sockets: the streams of a java.nio channel cannot read and write at the same time in Java 6.
  */
 final class Reception {
-    private static final int BACKLOG = 512;
+    /** Connections that the system keeps until they are accepted, at most: an overflow would cost a client a second. */
+    private static final int BACKLOG = 4096;
     private static final int MAX_WAITING = 256;
     private static final int MAX_OF_ADDRESS = 192;
     private static final long PATIENCE_NS = 1000000000L;
