@@ -2,7 +2,7 @@
 PY := .venv/bin/python
 STAMPS := build/stamps
 
-.PHONY: setup cabinet demo test test-ros test-ros2 test-ros1 test-long conformance lint check bench figures lock docs wheel clean help
+.PHONY: setup cabinet demo test test-ros test-ros2 test-ros1 test-long conformance lint check bench soak figures lock docs wheel clean help
 
 setup: $(STAMPS)/venv cabinet  ## virtual environment, package, compiled cabinet
 
@@ -69,13 +69,18 @@ test-ros1: setup $(STAMPS)/ros1  ## the ROS 1 node with a real roscore, where th
 	@if [ -x build/ros1/bin/python ]; then build/ros1/bin/python -m pytest $(LONGEST) tests/ros1; \
 	else echo "no ROS 1 here: the tests of its node are skipped"; fi
 
-conformance: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## every case of conformance against both nodes, with each way of execution
-	@for way in servo spline fri; do for ros in ros2 ros1; do \
-	if [ -x build/$$ros/bin/python ]; then echo "$$ros, $$way:"; \
-	CONFORMANCE=all EXECUTION=$$way build/$$ros/bin/python -m pytest -q tests/$$ros/test_conformance.py || exit 1; fi; done; done
+conformance: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## every case of conformance against both nodes, with each kind of execution
+	@for execution in servo spline fri; do for ros in ros2 ros1; do \
+	if [ -x build/$$ros/bin/python ]; then echo "$$ros, $$execution:"; \
+	CONFORMANCE=all EXECUTION=$$execution build/$$ros/bin/python -m pytest -q tests/$$ros/test_conformance.py || exit 1; fi; done; done
 
 bench: setup  ## figures as JSON lines; GROUP=fri or ONLY=name selects, LIST=1 lists them, STORE=1 stores the run
 	@$(PY) -m bench $(if $(GROUP),--group $(GROUP)) $(if $(ONLY),--only $(ONLY)) $(if $(LIST),--list) $(if $(STORE),--store)
+
+MINUTES ?= 3
+
+soak: setup  ## everything at once on a virtual cabinet for MINUTES=3: what grows, what is lost; in build/soak
+	$(PY) -m bench.trust --minutes $(MINUTES)
 
 figures: $(STAMPS)/venv  ## docs/explanation/figures.md, from the newest stored run
 	$(PY) scripts/figures_page.py

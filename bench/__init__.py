@@ -1,6 +1,6 @@
-"""Figures: what heptarm promises, measured. `python -m bench` prints them.
+"""Benchmarks: measure the figures that heptarm states. `python -m bench` prints them.
 
 Each folder is a group of benchmarks: `protocol`, `state`, `servo`, `motion`, `safety`, `simulator`, `fri`, `ros`, `rl`.
-`measure` holds what they share: the figure record, blocks under a placement, the store. `results` holds stored runs and
-the text from which `scripts/figures_page.py` makes docs/explanation/figures.md; `java` holds a floor in Java.
+`measure` has their common parts: the figure record, blocks under a placement, the store. `results` holds stored runs
+and the text from which `scripts/figures_page.py` makes docs/explanation/figures.md; `java` holds a floor in Java.
 """

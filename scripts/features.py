@@ -23,12 +23,12 @@ PAGE = ROOT / "docs" / "reference" / "features.md"
 
 HEAD = """# Features
 
-What the open frameworks for this arm offer (libiiwa, iiwa_stack, KUKA-IIWA-API, KST, iiwaPy3, iiwapy), and where it
-is here: the name in Python, and the scenario that shows it. [Scenarios](../guide/scenarios.md) run on the virtual
-cabinet and, with care, on a robot.
+The features of the open frameworks for this arm (libiiwa, iiwa_stack, KUKA-IIWA-API, KST, iiwaPy3, iiwapy), with
+their names in Python and the scenarios that show them. [Scenarios](../guide/scenarios.md) run on the virtual cabinet
+and, with care, on a robot.
 
-The column *known from* names the systems in which the feature works without reserve; where it is empty, none has it
-whole. This page is written by `scripts/features.py` from `docs/features.toml`.
+The column *known from* lists the systems in which the feature works completely; it is empty where none has it. This
+page is written by `scripts/features.py` from `docs/features.toml`.
 """
 
 
@@ -118,7 +118,7 @@ def page() -> str:
     every = scenarios()
     lines = [HEAD]
     for letter, title in groups.items():
-        lines += [f"## {title}", "", "| | feature | known from | here | shown by |", "|---|---|---|---|---|"]
+        lines += [f"## {title}", "", "| | feature | known from | heptarm | shown by |", "|---|---|---|---|---|"]
         for row in rows:
             if row.id[0] == letter and not row.left_out:
                 peers = ", ".join(row.peers)
@@ -126,7 +126,7 @@ def page() -> str:
                     f"| {row.id} | {_cell(row.title)} | {peers} | {_here(row)} | {_shown(row, every)} |"
                 )
         lines.append("")
-    lines += ["## What is left out, and why", "", "| | feature | known from | why |", "|---|---|---|---|"]
+    lines += ["## Missing features", "", "| | feature | known from | reason |", "|---|---|---|---|"]
     for row in rows:
         if row.left_out:
             lines.append(

@@ -64,7 +64,7 @@ def newest() -> tuple[Record, list[Record]]:
 
 
 def groups() -> list[Record]:
-    """What bench/results/figures.toml says of each group."""
+    """The text of bench/results/figures.toml for each group."""
     return list(tomllib.loads(TEXTS.read_text())["group"])
 
 

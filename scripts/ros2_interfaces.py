@@ -50,7 +50,7 @@ RUNTIME = ("rosidl_runtime_c", "rcutils")
 
 
 class Package:
-    """One interface package on its way into the environment.
+    """An interface package to install into the environment.
 
     Args:
         source: folder with msg/, srv/, action/.
@@ -85,24 +85,24 @@ class Package:
         from rosidl_cli.command.translate.api import translate
         from rosidl_generator_type_description.cli import HashTypeDescription
 
-        shares = [str(self.prefix / "share" / name) for name in self.dependencies]
+        folders = [str(self.prefix / "share" / name) for name in self.dependencies]
         folder = self.work / self.name
         with contextlib.redirect_stdout(io.StringIO()):
             translate(
                 package_name=self.name,
                 interface_files=[f"{self.source}:{path}" for path in self.files],
-                include_paths=shares,
+                include_paths=folders,
                 output_format="idl",
                 output_path=folder,
             )
         idl = [f"{folder}:{path.relative_to(folder)}" for path in sorted(folder.rglob("*.idl"))]
-        HashTypeDescription("hash").generate_type_hashes(self.name, idl, shares, output_path=folder)
+        HashTypeDescription("hash").generate_type_hashes(self.name, idl, folders, output_path=folder)
         described = [str(path) for path in sorted(folder.rglob("*.json"))]
         for module, name, place in GENERATORS:
-            self._run(getattr(importlib.import_module(module), name), place, idl, shares, described)
+            self._run(getattr(importlib.import_module(module), name), place, idl, folders, described)
 
     def _run(
-        self, kind: Any, place: str, idl: Sequence[str], shares: Sequence[str], described: Sequence[str]
+        self, kind: Any, place: str, idl: Sequence[str], folders: Sequence[str], described: Sequence[str]
     ) -> None:
         settings: dict[str, Any] = {}
         if place in ("support", "py"):
@@ -115,7 +115,7 @@ class Package:
         words: dict[str, Any] = {"output_path": out}
         if "type_description_files" in inspect.signature(generator.generate).parameters:
             words["type_description_files"] = described
-        generator.generate(self.name, idl, shares, **words)
+        generator.generate(self.name, idl, folders, **words)
 
     # ----------------------------------------------------------------------------------- compile
 
@@ -208,17 +208,17 @@ class Package:
     def _copy(self) -> None:
         version = f"python{sys.version_info[0]}.{sys.version_info[1]}"
         site = self.prefix / "lib" / version / "site-packages" / self.name
-        share = self.prefix / "share" / self.name
-        for folder in (site, share):
+        resources = self.prefix / "share" / self.name
+        for folder in (site, resources):
             shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(self.generated / "py" / self.name, site, ignore=shutil.ignore_patterns("*.c", "tmp"))
         for library in self.libraries.iterdir():
             shutil.copy2(library, self.prefix / "lib" / library.name)
-        shutil.copytree(self.work / self.name, share)
+        shutil.copytree(self.work / self.name, resources)
         for path in self.files:
-            shutil.copy2(self.source / path, share / path)
+            shutil.copy2(self.source / path, resources / path)
         if (self.source / "package.xml").exists():
-            shutil.copy2(self.source / "package.xml", share)
+            shutil.copy2(self.source / "package.xml", resources)
         headers = shutil.ignore_patterns("*.c", "*.cpp", "tmp")
         for _, _, place in GENERATORS[:4]:
             target = self.prefix / "include" / self.name / self.name

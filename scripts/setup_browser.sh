@@ -1,5 +1,5 @@
 #!/bin/sh
-# The screenshot test of the viewer needs Chromium. Installed on Debian when root; otherwise that test is skipped and says so.
+# The screenshot test of the viewer needs Chromium. Installed on Debian when root; otherwise that test is skipped, with a message.
 for name in chromium chromium-browser google-chrome; do
     command -v "$name" >/dev/null && exit 0
 done

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Makes build/ros1: rospy from Debian's packages, our interfaces, our node. Where there are no such packages, it says so and
-# ends well without build/ros1: the tests are skipped then. Where making it fails, it fails.
+# Makes build/ros1: rospy from Debian's packages, our interfaces, our node. Without such packages it reports that and
+# succeeds without build/ros1: the tests are skipped then. An error of the set-up itself is a failure.
 set -eu
 cd "$(dirname "$0")/.."
 venv=build/ros1

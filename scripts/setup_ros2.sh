@@ -1,6 +1,6 @@
 #!/bin/sh
-# Makes build/ros2: rclpy from PyPI's wheels, our interfaces, our node, for machines without ROS. Where there are no
-# wheels, it says so and ends well without build/ros2: the tests are skipped then. Where making it fails, it fails.
+# Makes build/ros2: rclpy from PyPI's wheels, our interfaces, our node, for machines without ROS. Without
+# wheels it reports that and succeeds without build/ros2: the tests are skipped then. An error of the set-up is a failure.
 set -eu
 cd "$(dirname "$0")/.."
 venv=build/ros2

@@ -25,7 +25,7 @@ _LATE = ("slow", "browser")
 #: Folders with what takes long; training at the end of them, since it leaves little time to what runs beside it.
 _LONG_FIRST = ("docs", "arm", "examples", "cli", "scenarios", "doubles", "ros", "cabinet", "house", "rl")
 
-# no timing assertions, least of all on a machine that does other things as well
+# no timing assertions, above all on a busy machine
 settings.register_profile("heptarm", deadline=None)
 settings.load_profile("heptarm")
 
@@ -60,7 +60,7 @@ class RunningCabinet:
 
     @property
     def target(self) -> str:
-        """What to connect to."""
+        """The target to connect to."""
         return f"sim://{self.host}:{self.port}"
 
 
@@ -93,5 +93,5 @@ def arm(cabinet: RunningCabinet) -> Iterator[Arm]:
 
 @pytest.fixture
 def private_target() -> str:
-    """A target that starts a virtual cabinet of one's own, five times as fast as time."""
+    """A target that starts a private virtual cabinet, five times as fast as real time."""
     return "sim://iiwa14?speed=5"

@@ -1,4 +1,4 @@
-"""No process outlives the test that started it: a plugin of pytest for all tests.
+"""A pytest plugin for all tests: no process outlives the test that started it.
 
 Every process inherits a mark in its environment. It names the run and the owner: a test, or for what a fixture starts
 the test, module, folder or session that the fixture lives for. When an owner is over, what is left of its processes is
@@ -21,7 +21,7 @@ import pytest
 
 from tests import reaper
 
-#: A process may take so long to end by itself [s].
+#: Time for a process to end by itself [s].
 GRACE = 3.0
 
 _run = uuid.uuid4().hex
@@ -33,7 +33,7 @@ _failed = pytest.StashKey[bool]()
 
 @contextmanager
 def _owned_by(owner: str) -> Iterator[None]:
-    """Mark what is started meanwhile."""
+    """Mark the processes that are started meanwhile."""
     outer = os.environ.get(reaper.MARK)
     os.environ[reaper.MARK] = f"{_run} {owner}".encode("unicode_escape").decode()
     try:
@@ -89,14 +89,14 @@ def pytest_unconfigure() -> None:
 def pytest_fixture_setup(
     fixturedef: pytest.FixtureDef[Any], request: pytest.FixtureRequest
 ) -> Generator[None, Any, Any]:
-    """What a fixture starts may live as long as the fixture."""
+    """Processes of a fixture may live as long as the fixture."""
     with _owned_by(request.node.nodeid):
         return (yield)
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, Any, Any]:
-    """What a test starts ends with it."""
+    """Processes of a test end with it."""
     try:
         with _owned_by(item.nodeid):
             return (yield)
@@ -112,7 +112,7 @@ def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> 
         return (yield)
     finally:
         left = "\n".join(map(str, _end(_chain(item) - _chain(nextitem))))
-        if left and item.stash.get(_failed, False):  # it could not clear up; that is not what it failed of
+        if left and item.stash.get(_failed, False):  # it could not clean up, but that is not why it failed
             item.add_report_section("teardown", "processes", f"ended, for the test left them behind:\n{left}")
         elif left:
             pytest.fail(f"the test left processes behind, which are ended now:\n{left}", pytrace=False)
@@ -137,6 +137,6 @@ def pytest_testnodedown(node: Any) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Name what was left."""
+    """Name the processes that were left."""
     for process in _left:
         terminalreporter.write_line(f"left behind by the tests: {process}", red=True)

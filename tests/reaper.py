@@ -1,4 +1,4 @@
-"""Ends what tests have started when the tests themselves are gone, however they ended: killed, too.
+"""Ends the processes of tests when the tests themselves have ended, also when they were killed.
 
     python tests/reaper.py RUN PARENT
 
@@ -17,7 +17,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-#: Environment variable that every process of a test inherits: the run, and whose the process is.
+#: Environment variable that every process of a test inherits: the run, and the owner of the process.
 MARK = "TESTS_OF_HEPTARM"
 
 
@@ -56,7 +56,7 @@ def started(run: str, *, but: Collection[int] = ()) -> list[Started]:
                     command = (folder / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
                     found.append(Started(pid, entry[len(mark) :].decode(errors="replace"), command.strip()))
         except OSError:
-            continue  # ended meanwhile, or somebody else's
+            continue  # ended meanwhile, or of another user
     return found
 
 
@@ -68,7 +68,7 @@ def abort(process: Started) -> None:
 
 
 def end(process: Started) -> None:
-    """End it at once, also where it is stopped."""
+    """Kill it, also if it is suspended."""
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.kill(process.pid, signal.SIGKILL)
 

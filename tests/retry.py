@@ -1,4 +1,4 @@
-"""Tries again where this machine was too busy: a plugin of pytest, and the one helper for all tests.
+"""Retries where this machine was too busy: a pytest plugin, and the one helper for all tests.
 
 FRI answers that come late and servo targets that do not come are faults that heptarm has to report, and on a machine
 that is busy with something else it is right to. Such a test says nothing about heptarm; it runs again. Each such case
@@ -22,11 +22,11 @@ import pytest
 
 T = TypeVar("T")
 
-#: So often in a run at most.
+#: Most retries in a run.
 LIMIT = 8
-#: And so often in a row.
+#: Most retries in a row.
 IN_A_ROW = 2
-#: Whatever keeps the machine busy may end meanwhile [s].
+#: Pause before a retry, in which the load of the machine may end [s].
 PAUSE = 1.0
 
 _LATE_ANSWERS = ("this machine answers late", "QualityLost")
@@ -59,7 +59,7 @@ def retry(attempt: Callable[[], T], cause: Callable[[T | Exception], str]) -> T:
 
 
 def answers_late(outcome: object) -> str:
-    """The cause of a program or a call that was told that FRI answers came late from this machine.
+    """The cause, if a program or a call reported late FRI answers of this machine.
 
     A session on this machine that loses its quality has no other cause, even where too few answers tell it.
     """
@@ -71,7 +71,7 @@ def answers_late(outcome: object) -> str:
 
 
 def starved(outcome: object) -> str:
-    """The cause of a program or a call whose servo targets came too late."""
+    """The cause, if servo targets of a program or a call were too late."""
     if isinstance(outcome, subprocess.CompletedProcess):
         failed = outcome.returncode != 0 and any(one in outcome.stderr for one in _LATE_TARGETS)
         return "servo targets came late" if failed else ""
@@ -99,26 +99,26 @@ def _cases() -> list[str]:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Begin to count; workers of pytest-xdist count with the process that has started them."""
+    """Start counting; workers of pytest-xdist count with the process that started them."""
     if not hasattr(config, "workerinput"):
         descriptor, os.environ[_FILE] = tempfile.mkstemp(prefix="retries-of-heptarm-")
         os.close(descriptor)
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Forget the count."""
+    """Reset the count."""
     if not hasattr(config, "workerinput"):
         Path(os.environ.pop(_FILE)).unlink(missing_ok=True)
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Fail the run if too much was tried again."""
+    """Fail the run after too many retries."""
     if not hasattr(session.config, "workerinput") and len(_cases()) > LIMIT:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Name every case."""
+    """List every case."""
     cases = _cases()
     for case in cases:
         terminalreporter.write_line(f"tried again on a busy machine: {case}", yellow=True)

@@ -1,4 +1,4 @@
-"""What it costs to read a monitoring message and to write a command."""
+"""Time to read a monitoring message and to write a command."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def fri_codec() -> Iterator[Figure]:
 
 
 def _times(call: Callable[[], object], count: int = 20_000) -> list[float]:
-    """What each call takes [us]."""
+    """Duration of each call [us]."""
     taken = []
     for _ in range(count):
         begin = time.perf_counter_ns()

@@ -1,4 +1,4 @@
-"""Every fault of an FRI session, a hundred times each."""
+"""Every fault of an FRI session, 100 times each."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from bench.measure.figure import Figure, benchmark
 from heptarm.errors import HeptarmError
 from tests.sim_fri import kills, scenarios
 
-#: Fewer are for a first look.
+#: Fewer are for a quick check.
 TIMES = int(os.environ.get("BENCH_TIMES", "100"))
 
 

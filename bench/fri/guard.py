@@ -1,4 +1,4 @@
-"""Wild commands through the whole stack: a step, NaN, ten times the speed of each axis."""
+"""Invalid commands through the whole stack: a step, NaN, ten times the speed of each axis."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from bench.measure.cabinet import Cabinet
 from bench.measure.figure import Figure, benchmark
 from heptarm.fri.guard.fallback import Missing, Policy
 
-#: What the report has to name after each command.
+#: Interventions that the report must name after each command.
 NAMED = ("velocity limited", "not finite", "acceleration limited")
 
 
 @dataclass(frozen=True)
 class Wild:
-    """How the arm moved under wild commands.
+    """Motion of the arm under invalid commands.
 
     Attributes:
         survived: the session lasted to the end.

@@ -32,14 +32,14 @@ SECONDS = float(os.environ.get("BENCH_SECONDS", "600"))
 BENT = ha.deg(0, 30, 0, -90, 0, 60, 0)
 #: Of the sine [rad], [Hz]: at most 0.19 rad/s, so that a message's delay alone is 0.2 mrad.
 AMPLITUDE, FREQUENCY = 0.15, 0.2
-#: How far the torque law moves the joints from where they began [rad].
+#: Distance by which the torque law moves the joints from their start [rad].
 OFFSET = np.array([0.05, 0.05, -0.05, 0.05, -0.05, 0.05, 0.1])
 FORCE = 10.0
-#: Height of the flange above the table when the force begins [m].
+#: Height of the flange above the table when the force starts [m].
 GAP = 0.005
 #: Force and torque laws have brought the arm to rest after this time [s].
 SETTLED = 4.0
-#: A message counts as disturbed if a bare realtime thread missed a period as lately as this [s].
+#: A message counts as disturbed if a bare realtime thread missed a period within this time before it [s].
 BEFORE, AFTER, STALL = 0.002, 0.05, 1e-3
 #: Compliant along z, stiff across it.
 COMPLIANT = CartesianImpedance(stiffness=(3000, 3000, 0, 200, 200, 200))
@@ -73,7 +73,7 @@ class Tape:
 
     @property
     def lost(self) -> int:
-        """How many messages were lost."""
+        """Number of lost messages."""
         return len(self.losses)
 
     def take(self) -> None:
@@ -111,7 +111,7 @@ class Tape:
 
     @property
     def received(self) -> npt.NDArray[np.int64]:
-        """When they came, shape (n,) [ns of the monotonic clock]."""
+        """Times of receipt, shape (n,) [ns of the monotonic clock]."""
         return np.array(self._received, dtype=np.int64)
 
     @property
@@ -122,7 +122,7 @@ class Tape:
 
 @dataclass(frozen=True)
 class Session:
-    """How a session went, whatever it commanded.
+    """Outcome of a session, whatever it commanded.
 
     Attributes:
         lasted: time for which commands were effective [s].
@@ -161,7 +161,7 @@ class Session:
 
 @dataclass(frozen=True)
 class Tracking:
-    """How the plant followed a sine.
+    """Accuracy with which the plant followed a sine.
 
     Attributes:
         session: how the session went.
@@ -186,7 +186,7 @@ class Tracking:
 
 @dataclass(frozen=True)
 class Balance:
-    """How torques alone held the arm.
+    """Accuracy with which torques alone held the arm.
 
     Attributes:
         session: how the session went.
@@ -203,7 +203,7 @@ class Balance:
 
 @dataclass(frozen=True)
 class Press:
-    """How a force was held on the table.
+    """Accuracy with which a force was held on the table.
 
     Attributes:
         session: how the session went.
@@ -230,12 +230,12 @@ class Recording:
     error: HeptarmError | None = None
 
     def calm(self, times: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-        """Which times lie away from stalls of the machine."""
+        """Whether times are away from stalls of the machine."""
         return ~self.stalls.during(times, before=BEFORE, after=AFTER, longer=STALL)
 
     @property
     def session(self) -> Session:
-        """How it went."""
+        """The outcome."""
         tape, missed = self.tape, self.stalls.lengths[self.stalls.lengths >= STALL]
         t = tape.t
         return Session(
@@ -253,7 +253,7 @@ class Recording:
 
 @contextlib.contextmanager
 def _recorded(arm: ha.Arm, kind: str, **settings: Any) -> Iterator[Recording]:
-    """Open a session and watch the machine; what ended it early is kept beside what was recorded until then."""
+    """Open a session and watch the machine; an error that ended it early is kept beside the recorded data."""
     found: Recording | None = None
     stalls = Stalls()
     try:
@@ -368,7 +368,7 @@ def _arm() -> Iterator[ha.Arm]:
 
 
 def _lasted(name: str, session: Session, seconds: float) -> Figure:
-    """How long a session lasted; its end decides nothing if the machine stalled."""
+    """Duration of a session; its end decides nothing if the machine stalled."""
     return Figure(
         f"{name}_time",
         session.lasted,

@@ -31,7 +31,7 @@ def swing(t: float, amplitude: float, frequency: float) -> float:
 
 
 def sine(s: State, out: Output, p: Params) -> None:
-    """Every joint on a sine around where it was."""
+    """Move every joint on a sine around its start."""
     out.q[:] += swing(s.t, p.amplitude, p.frequency)
 
 

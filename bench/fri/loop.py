@@ -1,4 +1,4 @@
-"""How long the FRI client takes to answer, beside a bare UDP echo in C, with the user's process idle and busy."""
+"""Reply latency of the FRI client beside a bare UDP echo in C, with the user's process idle and busy."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.messages import SessionState
 from heptarm.fri.protocol.version import Version
 
-#: Over all blocks of a placement; fewer are for a first look.
+#: Over all blocks of a placement; fewer are for a quick check.
 CYCLES = int(os.environ.get("BENCH_CYCLES", "25000"))
 _SOURCES = Path(__file__).parent
 _JOINTS = (0.1, 0.4, -0.1, -1.2, 0.2, 0.9, 0.0)
-#: Counts as the latency of a reply that did not come [us].
+#: Counts as the latency of a missing reply [us].
 _NONE = 1000.0
 _LIMITS = (("", 50.0, 1.35), ("_p99", 99.0, 1.5))
 
@@ -114,7 +114,7 @@ def _run(
 
 
 def _be_busy(client: Client, stop: threading.Event) -> None:
-    """Keep a whole processor busy, as a user's process may, and give a command now and then."""
+    """Keep a whole processor busy, as a user's process may, and send a command now and then."""
     while not stop.is_set():
         for _ in range(20_000):
             pass

@@ -4,7 +4,7 @@ import java.net.InetAddress;
 import java.net.ServerSocket;
 import java.net.Socket;
 
-/** The floor of a round trip: sends back every octet that comes, with nothing in between. */
+/** The floor of a round trip: sends every received byte back, and does nothing else. */
 public final class Echo {
     private Echo() {
     }

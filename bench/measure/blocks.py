@@ -1,4 +1,4 @@
-"""Measure a quantity beside its own floor: by turns, in blocks, under the same placement on the processors."""
+"""Measure a quantity and its floor alternately, in blocks, with the same placement on the processors."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def by_turns(
                 pin(os.getpid(), one.placement.near)
                 place(one.placement)
                 with Noise() as noise:
-                    if number % 2:  # who goes first changes, so that a drift favours nobody
+                    if number % 2:  # the order alternates, so that a drift affects both sides equally
                         values, floors = value(), floor()
                     else:
                         floors, values = floor(), value()

@@ -67,7 +67,7 @@ class Cabinet:
         return next(int(line.split()[1]) for line in text.splitlines() if line.startswith("Pss:")) / 1024
 
     def stats(self) -> dict[str, Any]:
-        """The loop's statistics so far."""
+        """Statistics of the loop so far."""
         self._stats.unlink(missing_ok=True)
         self.process.send_signal(signal.SIGUSR1)
         deadline = time.monotonic() + 30.0

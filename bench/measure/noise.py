@@ -1,4 +1,4 @@
-"""How much of the machine others take during a measurement: other processes, and the host of a virtual machine."""
+"""Processor time taken by others during a measurement: other processes, and the host of a virtual machine."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ OTHERS = 0.1
 
 @dataclass
 class Noise:
-    """Measures what others take of the machine during a `with` block.
+    """Measures the processor time that others take during a `with` block.
 
     Attributes:
         others: processors that processes other than those measured took.
@@ -40,7 +40,7 @@ class Noise:
 
     @property
     def is_noisy(self) -> bool:
-        """Whether that is too much."""
+        """Whether others took too much."""
         return self.others + self.stolen > OTHERS
 
 

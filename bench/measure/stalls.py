@@ -1,4 +1,4 @@
-"""When the machine stalled, as a bare realtime thread on each processor saw it: the floor of all timing."""
+"""Stalls of the machine, measured by a bare realtime thread on each processor: the floor of all timing."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Stalls:
     def during(
         self, times: npt.NDArray[np.int64], *, before: float, after: float, longer: float
     ) -> npt.NDArray[np.bool_]:
-        """Which times lie in a stall, or near it.
+        """Whether times are in a stall, or near one.
 
         Args:
             times: shape (n,) [ns of the monotonic clock].

@@ -57,7 +57,7 @@ class Store:
 
 
 def machine() -> dict[str, Any]:
-    """What of the machine decides figures."""
+    """Properties of the machine that affect the figures."""
     text = Path("/proc/cpuinfo").read_text() if Path("/proc/cpuinfo").exists() else ""
     model = re.search(r"^model name\s*:\s*(.+)$", text, re.MULTILINE)
     kernel = re.match(r"[0-9.]*[0-9]", platform.release())

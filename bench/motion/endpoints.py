@@ -1,4 +1,4 @@
-"""Where motions end, and how straight a line is."""
+"""Accuracy of end positions and of straight lines."""
 
 from __future__ import annotations
 

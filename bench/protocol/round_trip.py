@@ -16,6 +16,8 @@ from heptarm.wire import messages
 
 #: Requests of a block, back to back; and with a pause of so many seconds before each.
 REQUESTS, PAUSED, PAUSE = 4000, 200, 0.005
+#: Pre-shared key of the session that has one, and the limit of its ratio.
+KEY, KEY_LIMIT = "k7fh-9tqa-x2mn-p4cw-8r3e-vd6y-s5gj", 1.5
 #: Of the ratio; on one core nothing is waited for, and the work of the API itself weighs more.
 LIMITS = {"one_core": 2.5, "two_cores": 2.0}
 
@@ -64,7 +66,7 @@ def round_trip() -> Iterator[Figure]:
 
 
 def _times(call: Callable[[], object], count: int, pause: float) -> list[float]:
-    """How long each call takes [s]."""
+    """Duration of each call [s]."""
     times = []
     for _ in range(count):
         if pause:
@@ -80,3 +82,25 @@ def _echo(raw: socket.socket, payload: bytes) -> None:
     missing = len(payload)
     while missing:
         missing -= len(raw.recv(missing))
+
+
+@benchmark("round_trip_with_key")
+def round_trip_with_key() -> Iterator[Figure]:
+    """Round trip of a request in a session with a key, beside one without."""
+    with (
+        Cabinet() as open_cabinet,
+        Cabinet("--data", f"heptarm.key={KEY}") as keyed_cabinet,
+        ha.connect(open_cabinet.target) as plain,
+        ha.connect(keyed_cabinet.target, key=KEY) as keyed,
+    ):
+
+        def place(placement: Placement) -> None:
+            pin(open_cabinet.process.pid, placement.far)
+            pin(keyed_cabinet.process.pid, placement.far)
+
+        for found in by_turns(
+            lambda: _times(lambda: keyed.set_override(1.0), REQUESTS, 0.0),
+            lambda: _times(lambda: plain.set_override(1.0), REQUESTS, 0.0),
+            place,
+        ):
+            yield found.figure("round_trip_key", 50, "us", limit=KEY_LIMIT, scale=1e6)

@@ -1,4 +1,4 @@
-"""Policies on an arm through the whole stack, beside what the arm's own limits allow."""
+"""Policies on an arm through the whole stack, beside the optimum within the limits of the arm."""
 
 from __future__ import annotations
 

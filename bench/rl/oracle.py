@@ -1,4 +1,4 @@
-"""A yardstick: the joints that reach a target in the fewest full-speed steps, and an arm driven straight there.
+"""Oracle: the joint positions that reach a target in the fewest full-speed steps, and an arm that moves straight there.
 
 The fewest steps bound every policy. The arm that is driven there does not: it lags, and knows nothing of it.
 """
@@ -12,11 +12,11 @@ from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import Array
 
 _STARTS, _ROUNDS, _STEP, _DAMPED = 120, 120, 0.6, 1e-3
-_AIM = 0.8  # of the radius: an oracle that aims at its very rim would miss it by a hair
+_AIM = 0.8  # of the radius: an oracle that aims at the boundary itself would narrowly miss it
 
 
 class Oracle:
-    """Decides as if it had solved every target beforehand: each joint at full speed straight to its place.
+    """A policy that knows the solution of every target: each joint moves to it at full speed.
 
     Args:
         task: with joint actions.

@@ -16,7 +16,7 @@ from heptarm.rl.sim.batch import BatchReach
 from heptarm.rl.sim.randomisation import Randomisation
 from heptarm.rl.task import ReachTask
 
-#: How many seeds are trained; fewer, as BENCH_SEEDS=1, for a first look.
+#: Number of trained seeds; fewer, such as BENCH_SEEDS=1, for a quick check.
 SEEDS = range(int(os.environ.get("BENCH_SEEDS", "5")))
 TARGETS = 1000
 #: Late and compliant, on the plant: two decisions are 67 ms.

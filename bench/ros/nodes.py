@@ -1,4 +1,4 @@
-"""The nodes with real rclpy and a real roscore: how a trajectory is followed, how evenly joint states come."""
+"""The nodes with rclpy and a roscore: accuracy of trajectories, regularity of joint states."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bench.measure.figure import Figure, benchmark
 from bench.measure.noise import Noise
 
 ROOT = Path(__file__).parents[2]
-#: How near in time [ms] and in space [mrad] each execution is to pass a point.
+#: Required accuracy in time [ms] and position [mrad] at the points of a trajectory, by execution.
 EXECUTIONS = {"servo": (20.0, 2.0), "fri": (5.0, 0.5)}
 
 

@@ -1,4 +1,4 @@
-"""What the peers of both ROS measure, free of ROS: how near its points a trajectory came, how evenly states come."""
+"""Measurements of the peers of ROS 1 and ROS 2, without ROS: accuracy of a trajectory, regularity of joint states."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Floats = npt.NDArray[np.float64]
 
 #: A trajectory of so many seconds and points.
 SECONDS, POINTS = 10.0, 100
-#: How near each execution is to pass a point [rad]; how long its motion may take to start [s].
+#: Required accuracy at a point by execution [rad]; longest time until its motion starts [s].
 NEAR, OPENING = {"servo": 2e-3, "fri": 5e-4}, 4.0
 #: States per second, and for how long.
 RATE, WATCHED = 200.0, 60.0
@@ -29,7 +29,7 @@ TURNS = np.array([1.0, 2.0, 1.5, 1.0, 2.0, 1.5, 2.5])
 
 
 class Watch:
-    """Everything that comes on a topic of joint states.
+    """Records all messages of a topic of joint states.
 
     Args:
         stamp: time stamp of a message [s].
@@ -44,7 +44,7 @@ class Watch:
         self._taken.append((time.time(), message))
 
     def restart(self) -> None:
-        """Forget what came."""
+        """Clear the records."""
         self._taken = []
 
     def __len__(self) -> int:
@@ -52,7 +52,7 @@ class Watch:
 
     @property
     def times(self) -> tuple[Floats, Floats]:
-        """When messages came, and their stamps [s]."""
+        """Times of receipt and stamps of the messages [s]."""
         taken = list(self._taken)
         return np.array([came for came, _ in taken]), np.array([self._stamp(one) for _, one in taken])
 
@@ -79,7 +79,7 @@ def wave(fraction: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def follow(client: Client, watch: Watch, execution: str) -> dict[str, Any]:
-    """Send the trajectory, wait for its end, and measure how near the arm came.
+    """Send the trajectory, wait for its end, and measure its accuracy.
 
     Args:
         client: of the action.
@@ -97,7 +97,7 @@ def follow(client: Client, watch: Watch, execution: str) -> dict[str, Any]:
     sent = client.send(TrajectoryGoal(client.joints, points, start))
     ended = client.result(sent)
     assert ended.outcome is GoalOutcome.SUCCEEDED, ended
-    time.sleep(0.1)  # the last states are on their way
+    time.sleep(0.1)  # the last states are in transit
     stamps, places = watch.track
     times = stamps - start
     fine = np.arange(-0.02, 0.02005, 0.0001)
@@ -123,7 +123,7 @@ def follow(client: Client, watch: Watch, execution: str) -> dict[str, Any]:
 
 
 def compare(states: Watch, bare: Watch, processes: Sequence[int]) -> dict[str, Any]:
-    """How evenly joint states come, and their latency beside that of a bare topic in the same windows of time.
+    """Regularity of joint states, and their latency beside that of a bare topic in the same windows of time.
 
     Args:
         states: on the node's joint states.
@@ -140,7 +140,7 @@ def compare(states: Watch, bare: Watch, processes: Sequence[int]) -> dict[str, A
                 pin(os.getpid(), placement.near)
                 for process in processes:
                     pin(process, placement.far)
-                time.sleep(0.2)  # what was on its way while threads changed places
+                time.sleep(0.2)  # messages in transit while the threads change
                 states.restart()
                 bare.restart()
                 with Noise(measured=tuple(processes)) as noise:

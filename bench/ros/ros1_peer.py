@@ -33,7 +33,7 @@ def _end(node: NodeProcess) -> None:
 
 
 def trajectory(target: str, execution: str) -> dict[str, Any]:
-    """How near the arm passes the points of a trajectory, and when."""
+    """Measure at which distance and when the arm passes the points of a trajectory."""
     node = NodeProcess(target, state_rate=RATE, execution=execution)
     client = Client(None)
     client.ready()
@@ -43,7 +43,7 @@ def trajectory(target: str, execution: str) -> dict[str, Any]:
 
 
 def states(target: str, cabinet: int) -> dict[str, Any]:
-    """How evenly joint states come, and their latency beside that of a bare topic."""
+    """Measure the regularity of joint states, and their latency beside that of a bare topic."""
     node = NodeProcess(target, state_rate=RATE)
     until(lambda: rospy.get_published_topics("/heptarm"), "the node is not there")
     with subprocess.Popen([sys.executable, "-m", "bench.ros.ros1_peer", "publish"]) as process:

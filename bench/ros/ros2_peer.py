@@ -28,7 +28,7 @@ def watched(ros: Ros, topic: str) -> Watch:
 
 
 def trajectory(target: str, execution: str) -> dict[str, Any]:
-    """How near the arm passes the points of a trajectory, and when."""
+    """Measure at which distance and when the arm passes the points of a trajectory."""
     ros = Ros("bench")
     node = NodeProcess(target, state_rate=RATE, execution=execution)
     client = Client(ros, None)
@@ -40,7 +40,7 @@ def trajectory(target: str, execution: str) -> dict[str, Any]:
 
 
 def states(target: str, cabinet: int) -> dict[str, Any]:
-    """How evenly joint states come, and their latency beside that of a bare topic."""
+    """Measure the regularity of joint states, and their latency beside that of a bare topic."""
     ros = Ros("bench")
     node = NodeProcess(target, state_rate=RATE)
     client = Client(ros, None)

@@ -1,4 +1,4 @@
-"""The controlling client is killed in mid-motion."""
+"""The controlling client is killed during a motion."""
 
 from __future__ import annotations
 

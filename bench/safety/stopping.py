@@ -64,7 +64,7 @@ def _stop(kind: str, how: str, random: np.random.Generator) -> tuple[float, floa
 
 
 def _stop_guided(kind: str, how: str, random: np.random.Generator) -> tuple[float, float]:
-    """The same while the arm follows a Cartesian target, or a hand that keeps pushing."""
+    """The same while the arm follows a Cartesian target, or a person who keeps pushing."""
     plant = Plant("iiwa14", q=READY)
     if kind == "guiding":
         plant.submit(Order(1, "guide", guide=hand_guide()))

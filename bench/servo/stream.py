@@ -18,7 +18,7 @@ from bench.measure.cabinet import Cabinet
 from bench.measure.figure import Figure, benchmark
 from heptarm.wire import messages
 
-#: Of servo motions over all blocks of both placements; fewer are for a first look.
+#: Of servo motions over all blocks of both placements; fewer are for a quick check.
 SECONDS = float(os.environ.get("BENCH_SECONDS", "60"))
 RATE = 200.0
 AMPLITUDE = np.array([0, 0, 0, 0, 0, 0.15, 0.3])
@@ -42,7 +42,7 @@ class Stream:
         self.trips = self.late_ticks = self.sent = self.received = self.applied = 0
 
     def block(self) -> list[float]:
-        """What each `set` of a motion costs [us]."""
+        """Duration of each `set` of a motion [us]."""
         arm, costs = self._arm, []
         sv = arm.servo("joint", rate=RATE, speed=1.0, acceleration=1.0, watchdog=0.1)
         try:
@@ -97,7 +97,7 @@ def servo() -> Iterator[Figure]:
 
 
 def bare(arm: ha.Arm, raw: socket.socket, seconds: float) -> list[float]:
-    """What sending as many bytes costs where nothing else is done: as rarely, in the same loop [us]."""
+    """Duration of a bare send of as many bytes, at the same rate in the same loop [us]."""
     payload = bytes(messages.HEADER.size + messages.ServoJoints.LAYOUT.size)
     start = arm.state.q
     costs = []
@@ -115,7 +115,7 @@ def bare(arm: ha.Arm, raw: socket.socket, seconds: float) -> list[float]:
 
 @contextlib.contextmanager
 def reader() -> Iterator[tuple[int, socket.socket]]:
-    """A process that does nothing but read, by its number, and a connection to it."""
+    """The id of a process that only reads, and a connection to it."""
     with subprocess.Popen([sys.executable, "-c", READER], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         with socket.create_connection(("127.0.0.1", int(process.stdout.readline()))) as raw:

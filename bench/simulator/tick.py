@@ -1,4 +1,4 @@
-"""What a tick of the simulated arm costs beside MuJoCo's step of the same model, both in the same realtime loop."""
+"""Duration of a tick of the simulated arm beside MuJoCo's step of the same model, both in the same realtime loop."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ HERE, THERE = (0.0, 0.5, 0.0, -1.3, 0.0, 0.9, 0.0), (0.6, 0.7, 0.2, -1.0, 0.3, 0
 
 
 class Moving:
-    """The plant, which moves to and fro."""
+    """The plant, moving back and forth."""
 
     def __init__(self) -> None:
         self._plant, self._number = Plant("iiwa14", q=HERE), 0
@@ -57,7 +57,7 @@ class Bare:
 def paced(
     shared: SharedState, prepare: Callable[[], None], step: Callable[[], None], count: int
 ) -> list[float]:
-    """What each of some steps of a realtime loop costs [us]."""
+    """Durations of steps of a realtime loop [us]."""
     costs: list[float] = []
 
     def tick() -> None:

@@ -21,14 +21,14 @@ from heptarm.model.kinematics import forward
 from heptarm.values.pose import Pose
 from heptarm.values.robot import ROBOTS
 
-#: Of states over all blocks of a placement, and of their floor; fewer are for a first look.
+#: Of states over all blocks of a placement, and of their floor; fewer are for a quick check.
 SECONDS = float(os.environ.get("BENCH_SECONDS", "60")) / 2
 #: Bytes of a state's frame, header included.
 FRAME = 690
 
 
 class States:
-    """Takes blocks of states and keeps what has to hold for every one of them."""
+    """Records blocks of states and checks every state."""
 
     def __init__(self, arm: ha.Arm, seconds: float) -> None:
         self._arm, self._seconds = arm, seconds

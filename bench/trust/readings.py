@@ -103,8 +103,6 @@ class Comparison:
                     self.contradictions[what] += 1
                 self.oldest = max(self.oldest, 1e-6 * (groups.motion.stamp - group.stamp))
             joints = groups.joints
-            if state.stamp != groups.pose.stamp:  # whoever takes the difference of poses uses it
-                self.contradictions["stamp of the state"] += 1
             if before is not None:
                 self.gaps += joints.stamp - before.stamp > 5 * TICK_NS
                 self.contradictions["dq"] += not self._is_velocity(before, joints, speeds, first)

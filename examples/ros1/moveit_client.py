@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What MoveIt does with a plan, without MoveIt: checks the start, sends, watches the time, cancels, looks again.
+"""Execute a plan as MoveIt does, without MoveIt: check the start, send the goal, monitor its duration, cancel it.
 
 A straight line in joint space stands in for a planner. Everything else is what MoveIt's execution manager and its
 simple controller manager do with a controller of the type FollowJointTrajectory.
@@ -40,14 +40,14 @@ class Execution:
         self.state = message
 
     def current(self) -> JointState:
-        """A state that was measured after now."""
+        """A state measured after the call."""
         now = rospy.Time.now()
         while self.state.header.stamp <= now:
             rospy.sleep(0.005)
         return self.state
 
     def execute(self, trajectory: JointTrajectory, *, stop_after: float = 0.0) -> str:
-        """Returns MoveIt's word for the end; `stop_after` [s] is the user's stop button."""
+        """Return MoveIt's result code; `stop_after` simulates the user's stop button [s]."""
         state = self.current()
         place = dict(zip(state.name, state.position))
         for name, value in zip(trajectory.joint_names, trajectory.points[0].positions):
@@ -62,7 +62,7 @@ class Execution:
         return STATUS[self.client.get_state()]
 
     def wait_for_rest(self) -> JointState:
-        """Three states in a row that are alike."""
+        """Wait for three equal states in a row."""
         before, alike = self.current(), 0
         while alike < 3:
             now = self.current()
@@ -72,7 +72,7 @@ class Execution:
 
 
 def plan(start: JointState, seconds: float, **target: float) -> JointTrajectory:
-    """From where the arm is, in 20 pieces, at rest at both ends, with all that a planner gives."""
+    """A plan from the current state in 20 segments, at rest at both ends, with all fields that a planner sets."""
     goal = [target.get(name, value) for name, value in zip(start.name, start.position)]
     trajectory = JointTrajectory(joint_names=list(start.name))
     for number in range(21):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Targets while the arm moves: joint 5 swings; when the script ends or hangs, the arm brakes by itself."""
+"""Swing joint 5 with a stream of targets; when the script ends or hangs, the arm brakes by itself."""
 
 import math
 

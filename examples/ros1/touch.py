@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How high is the table? Down until something is touched, back a little, down again slowly, and up."""
+"""Measure the height of a table: move down until contact, retract, move down again slowly, and up."""
 
 import math
 
@@ -13,7 +13,7 @@ rospy.init_node("touch")
 
 
 def do(kind, name: str, goal):
-    """A goal's result."""
+    """Return the result of a goal."""
     client = actionlib.SimpleActionClient(name, kind)
     client.wait_for_server()
     client.send_goal_and_wait(goal)

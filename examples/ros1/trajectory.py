@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A trajectory as a goal of FollowJointTrajectory: feedback, result, and a goal that is rejected with a reason."""
+"""Send trajectories as goals of FollowJointTrajectory: feedback, result, and a goal that is rejected with a reason."""
 
 import math
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Joint and pose commands by topics, and the states that tell when they are done."""
+"""Send joint and pose commands by topics, and wait for the states that show their ends."""
 
 import math
 
@@ -10,7 +10,7 @@ from sensor_msgs.msg import JointState
 
 
 class Mover(Node):
-    """The newest states, and commands that wait."""
+    """Keeps the newest states, and sends commands and waits for their ends."""
 
     def __init__(self) -> None:
         super().__init__("move")
@@ -34,7 +34,7 @@ class Mover(Node):
             rclpy.spin_once(self, timeout_sec=0.1)
 
     def move_joints(self, **target: float) -> None:
-        """To some joints' positions [rad]; the others stay."""
+        """Move some joints to positions [rad]; the others keep theirs."""
         self.to_joints.publish(JointState(name=list(target), position=list(target.values())))
         self.until(lambda: all(abs(self.position(name) - value) < 2e-3 for name, value in target.items()))
 
@@ -42,7 +42,7 @@ class Mover(Node):
         return self.joints.position[self.joints.name.index(name)]
 
     def move_straight(self, dx: float = 0.0, dy: float = 0.0, dz: float = 0.0) -> None:
-        """The flange on a line [m]."""
+        """Move the flange on a straight line [m]."""
         target = self.pose
         place = target.pose.position
         place.x, place.y, place.z = place.x + dx, place.y + dy, place.z + dz

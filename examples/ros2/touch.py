@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How high is the table? Down until something is touched, back a little, down again slowly, and up."""
+"""Measure the height of a table: move down until contact, retract, move down again slowly, and up."""
 
 import math
 
@@ -24,7 +24,7 @@ def discover(name: str) -> None:
 
 
 def do(kind, name: str, **goal):
-    """A goal's result."""
+    """Return the result of a goal."""
     client = ActionClient(node, kind, name)
     client.wait_for_server()
     discover("heptarm")

@@ -1,4 +1,4 @@
-"""What tests of the arm share."""
+"""Fixtures of the tests of the arm."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tests.arm.peer import Peer
 
 @pytest.fixture
 def peer() -> Iterator[Peer]:
-    """A scripted cabinet in memory; nothing of its script may be left."""
+    """A scripted cabinet in memory, whose script must be finished at the end."""
     peer = Peer()
     yield peer
     peer.close()

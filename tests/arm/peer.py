@@ -1,4 +1,4 @@
-"""A cabinet that does what a script says, over a transport in memory. `close` fails if a step was not consumed."""
+"""A cabinet that follows a script, over a transport in memory. `close` fails if a step was not consumed."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Served:
 
 
 class Peer:
-    """A scripted cabinet; what is not in the script and harmless is answered as a cabinet would."""
+    """A scripted cabinet; it answers harmless requests that are not in the script as a cabinet does."""
 
     def __init__(self, *, chunk: int | None = None, key: bytes | None = None, **changes: object) -> None:
         self.chunk, self.key, self.changes = chunk, key, {"robot": ROBOT} | changes
@@ -71,7 +71,7 @@ class Peer:
         return self
 
     def runs(self, number: int, *more: Reply, check: Callable[[Any], object] | None = None) -> Peer:
-        """A Run is accepted under that number."""
+        """Accept a Run with this id."""
         return self.expect(wire.Run, wire.Accepted(id=number), *more, check=check)
 
     def finished(
@@ -149,7 +149,7 @@ class Peer:
                         assert isinstance(event, Received)
                         self._answer(client, event)
                 now = time.monotonic()
-                is_open = client.session.state is SessionState.OPEN  # it may just have said goodbye
+                is_open = client.session.state is SessionState.OPEN  # it may just have sent Goodbye
                 if client.rate and now >= due and is_open and not client.is_mute:
                     due = now + 1.0 / client.rate
                     client.say(self.state())
@@ -207,5 +207,7 @@ class Peer:
             client.rate = message.rate
         elif isinstance(message, wire.TakeControl | wire.ReleaseControl | wire.Stop):
             client.say(wire.Accepted(id=0), request)
+        elif isinstance(message, wire.Halt):
+            client.say(wire.Halted())
         elif not isinstance(message, wire.Goodbye):
             self.problems.append(f"nobody expected {message}")

@@ -18,7 +18,7 @@ PROGRAM = """
     handle = arm.start(ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.2))
     arm.wait_until(lambda s: abs(s.dq).max() > 0.1)
     try:
-        print(arm._connection.cabinet.pid if arm._connection.cabinet else "moving", flush=True)
+        print(arm.connection.cabinet.pid if arm.connection.cabinet else "moving", flush=True)
         handle.wait()
         print("arrived", flush=True)
     except KeyboardInterrupt:
@@ -30,7 +30,7 @@ PROGRAM = """
 def script(
     tmp_path: Path, target: str, on_disconnect: str = "stop", *, watchdog: float = 10.0
 ) -> tuple[subprocess.Popen[str], str]:
-    """A program of its own in the middle of a motion, and what it said."""
+    """A separate program in the middle of a motion, and its output."""
     file = tmp_path / "program.py"
     file.write_text(textwrap.dedent(PROGRAM))
     command = [sys.executable, str(file), target, on_disconnect, str(watchdog)]

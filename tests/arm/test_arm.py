@@ -35,7 +35,7 @@ def test_a_closed_arm_leaves_no_thread_and_sends_goodbye(peer: Peer) -> None:
     left = {thread.name for thread in set(threading.enumerate()) - before}
     assert "heptarm-link" not in left
     deadline = time.monotonic() + 20.0
-    while not peer.seen or not isinstance(peer.seen[-1], wire.Goodbye):  # it may not have read all of it yet
+    while not peer.seen or not isinstance(peer.seen[-1], wire.Goodbye):  # it may not have read everything yet
         assert time.monotonic() < deadline, peer.seen
         time.sleep(0.01)
     kinds = [type(message).__name__ for message in peer.seen]

@@ -1,4 +1,4 @@
-"""Callbacks run in the thread that reads the link: what would wait there for itself is refused."""
+"""Callbacks run in the thread that reads the link: a call that would wait for itself is refused."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_what_does_not_wait_works_in_a_callback(peer: Peer) -> None:
     with peer.arm() as arm:
 
         def callback(handle: ha.MotionHandle) -> None:
-            assert handle.wait().arrived  # it has ended: nothing to wait for
+            assert handle.wait().arrived  # it has ended, so this does not wait
             started.append(arm.start(HOME))
             arm.stop()
             done.set()

@@ -1,4 +1,4 @@
-"""Break conditions through everything: API, TCP, the Java application, the doubles, the plant, and a table in it."""
+"""Break conditions through the whole stack: API, TCP, Java application, doubles, plant, and a table in it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""FRI sessions through everything: API, TCP, Java application, doubles, plant, and UDP to the loop's process."""
+"""FRI sessions through the whole stack: API, TCP, Java application, doubles, plant, and UDP to the loop's process."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from tests.retry import answers_late, retry
 
 A7 = np.array([0, 0, 0, 0, 0, 0, 1.0])
 SOFT = CartesianImpedance(stiffness=(1500, 1500, 1500, 150, 150, 150))
-#: Long enough for a machine that does other things as well.
+#: Long enough for a busy machine.
 LONG = 10
 
 
@@ -47,7 +47,7 @@ def arm(cabinet: RunningCabinet) -> Iterator[ha.Arm]:
 
 
 def patient(test: Callable[..., None]) -> Callable[..., None]:
-    """A test that begins again if this machine was too busy to answer in time."""
+    """Repeat a test if this machine was too busy to answer in time."""
 
     @functools.wraps(test)
     def tried(*arguments: Any, **named: Any) -> None:
@@ -85,7 +85,7 @@ def test_a_law_moves_the_arm_and_its_parameters_change_while_it_runs(arm: ha.Arm
         seen = [s for s in rt.history() if s.is_commanding]
         turned = max(s.q[6] - start[6] for s in seen)
     assert 0.03 < turned < 0.06
-    # the arm is where it was told to be, two messages later at most
+    # the arm is at the commanded position at most two messages later
     told = np.array([s.q_sent for s in seen])
     found = np.array([s.q for s in seen])
     assert min(np.abs(found[2:] - told[k : len(told) - 2 + k]).max() for k in range(3)) < 3e-3
@@ -107,8 +107,8 @@ def test_the_simple_form_commands_in_the_loop_and_the_next_session_needs_nothing
                 rt.command(q=goal)
                 if np.abs(s.q - goal).max() < 2e-3:
                     break
-        assert rt.next() is None  # and nothing more comes
-    assert rt.limited and "A7" in rt.report  # a jump was asked for; the guard made a motion of it
+        assert rt.next() is None  # and no more messages arrive
+    assert rt.limited and "A7" in rt.report  # a jump was commanded; the guard turned it into a motion
 
 
 @patient
@@ -190,7 +190,7 @@ def test_what_does_not_go_together_is_refused_here_as_it_is_there(
         mode=mode_message(mode),  # type: ignore[arg-type]
     )
     with pytest.raises(ha.CommandRejected) as there:
-        arm._connection.request(message)
+        arm.connection.request(message)
     assert here.value.code == there.value.code == code
     assert type(here.value) is type(there.value) and here.value.hint
 
@@ -278,7 +278,7 @@ def test_when_nothing_arrives_the_error_says_where_to_look(arm: ha.Arm, kind: st
         arm.fri(kind, period_ms=LONG, host="192.0.2.7", timeout=0.3),  # type: ignore[arg-type]
     ):
         pass
-    with arm.fri("monitor", period_ms=2) as rt:  # and nothing has to be started anew
+    with arm.fri("monitor", period_ms=2) as rt:  # and nothing has to be restarted
         assert rt.next() is not None
 
 
@@ -315,16 +315,17 @@ def test_a_stop_from_another_thread_ends_the_loop(arm: ha.Arm) -> None:
         threading.Timer(0.2, arm.stop).start()
         for s in rt:
             rt.command(q=s.q_ipo)
-        rt.command(q=rt.start.q)  # does nothing any more
+        rt.command(q=rt.start.q)  # no longer has an effect
     assert error.value.cause is ha.Cause.STOPPED
     arm.wait_for_rest()
 
 
 @patient
 def test_a_loop_that_is_killed_loses_the_quality_and_the_next_one_works(arm: ha.Arm) -> None:
+    # on a port of its own: the cabinet goes on sending to it, also if another test took it meanwhile
     with (
         pytest.raises(ha.QualityLost, match="quality is (POOR|FAIR).*process has ended"),
-        arm.fri("position", period_ms=LONG, law=swing, params={"amplitude": 0.05}) as rt,
+        arm.fri("position", period_ms=LONG, port=0, law=swing, params={"amplitude": 0.05}) as rt,
     ):
         os.kill(int(rt.client._header[at.PID]), signal.SIGKILL)
         assert not rt.wait(30.0)
@@ -367,7 +368,7 @@ def test_an_emergency_stop_ends_the_overlay_in_words_and_the_next_session_works(
                 assert rt.next() is not None
                 arm.operator.fault("emergency_stop")
                 assert not rt.wait(30.0)
-                # the session that monitors goes on
+                # the monitoring session continues
                 assert next(s.safety for s in watching if s.safety) is Safety.STOP_1
             assert error.value.cause is ha.Cause.SAFETY
             with pytest.raises(ha.NeedsOperator, match="release the emergency stop"), arm.fri("position"):

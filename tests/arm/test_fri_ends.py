@@ -1,4 +1,4 @@
-"""How FRI sessions end, told by a cabinet that does what a script says; the messages over UDP are real."""
+"""Ends of FRI sessions with a scripted cabinet; the messages over UDP are real."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def peer() -> Iterator[Peer]:
 
 @contextmanager
 def speaking(peer: Peer, *, number: int, state: SessionState) -> Iterator[dict[str, Any]]:
-    """The peer accepts a session and sends, as a controller does, from its beginning until it is ended."""
+    """The peer accepts a session and sends messages as a controller does, from its start to its end."""
     heard: dict[str, Any] = {"running": threading.Event()}
 
     def accept(client: Served, request: int) -> None:
@@ -67,7 +67,7 @@ def changed(number: int, state: States, quality: wire.FriQuality, code: int = 0,
 def end_of(
     peer: Peer, quality: wire.FriQuality, cause: wire.Cause, *, code: int, text: str
 ) -> Callable[[], None]:
-    """The cabinet's last words of session 7, as it says them: the session, then the motion."""
+    """The last events of session 7, in the cabinet's order: the session, then the motion."""
 
     def say() -> None:
         peer.tell(changed(7, States.IDLE, quality, code, text))
@@ -140,7 +140,7 @@ def test_a_monitor_that_the_cabinet_ends(peer: Peer, quality: str, text: str, ki
         assert rt.next() is not None
         peer.tell(changed(9, States.IDLE, wire.FriQuality[quality], 0, text))
         assert not rt.wait(30.0)
-        peer.tell(changed(9, States.MONITORING_READY, wire.FriQuality.GOOD))  # told late: it stays ended
+        peer.tell(changed(9, States.MONITORING_READY, wire.FriQuality.GOOD))  # late event: the session stays ended
         assert rt.next() is None
 
 

@@ -1,4 +1,4 @@
-"""Short runs of what the benchmarks promise of FRI through the whole stack: sine, torques, table, wild commands."""
+"""Short runs of the FRI benchmarks through the whole stack: sine, torques, table, invalid commands."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from bench.fri import hold as fri_hold
 from bench.measure.cabinet import Cabinet
 from tests.arm.test_fri import patient
 
-#: Slow enough for a machine that does other things as well.
+#: Slow enough for a busy machine.
 PERIOD = 5
 
 
 def complete(session: fri_hold.Session) -> None:
-    """A benchmark keeps what a session recorded that ended early; a test begins again."""
+    """A benchmark keeps the records of a session that ended early; a test repeats it."""
     if session.error is not None:
         raise session.error
 

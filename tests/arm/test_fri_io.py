@@ -1,4 +1,4 @@
-"""Signals of FRI sessions through everything: API, application, doubles, controller, and the loop's process."""
+"""Signals of FRI sessions through the whole stack: API, application, doubles, controller, and the loop's process."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BUTTON, LAMP = "MediaFlange.UserButton", "MediaFlange.LEDBlue"
 
 @pytest.fixture(scope="module")
 def arm() -> Iterator[ha.Arm]:
-    """One with an operator, who presses the button."""
+    """A cabinet with an operator who presses the button."""
     with ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0) as arm:
         arm.move(ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0)), speed=0.6)
         yield arm
@@ -53,7 +53,7 @@ def test_inputs_are_read_and_outputs_written_in_the_loop(arm: ha.Arm) -> None:
         rt.output("LEDBlue", True)
         until(lambda: rt.outputs == {LAMP: True})
         until(lambda: arm.io[LAMP] is True)
-        arm.io[LAMP] = False  # the application writes it too, and the session shows it
+        arm.io[LAMP] = False  # the application also writes it, and the session shows it
         until(lambda: rt.state.io[LAMP] is False)
         for name, value, words in (
             ("user_button", True, "is an input of the cabinet"),
@@ -108,7 +108,7 @@ def test_what_cannot_be_carried_is_refused_here_and_there(
             host="127.0.0.1", period=0.01, command=wire.FriCommandMode.MONITOR, io=tuple(names)
         )
         with pytest.raises(ha.CommandRejected, match=words) as error:
-            arm._connection.request(message)
+            arm.connection.request(message)
         assert error.value.code == code
 
 

@@ -1,4 +1,4 @@
-"""A cabinet without the options for FRI and hand guiding: everything else works, and they are refused in words."""
+"""A cabinet without the options for FRI and hand guiding refuses them with a text; everything else works."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ with ha.connect("sim://iiwa14") as arm:
     assert "hold" in arm.capabilities and not [c for c in arm.capabilities if c.startswith("fri")]
     for ask in (
         lambda: arm.fri("position"),
-        lambda: arm._connection.request(
+        lambda: arm.connection.request(
             wire.FriOpen(host="127.0.0.1", period=0.01, command=wire.FriCommandMode.MONITOR)
         ),
     ):

@@ -1,4 +1,4 @@
-"""`arm.fri("pose")` as a 2.x cabinet would offer it: the session's object before a tiny controller."""
+"""`arm.fri("pose")` as a 2.x cabinet would offer it: the session object with a minimal controller."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Cabinet:
         self.clock = SimpleNamespace(nanos=time.monotonic_ns, sleep=time.sleep)
 
     def check_may_wait(self, call: str) -> None:
-        """Nothing waits in a callback here."""
+        """No callback waits here."""
 
     def enter_block(self, program: object, what: str) -> None:
         """No other block is open here."""

@@ -39,7 +39,7 @@ def arm(table: ha.Arm) -> Iterator[ha.Arm]:
 
 
 def lead(arm: ha.Arm, push: list[float], way: float) -> None:
-    """Push until a joint has turned so far [rad]."""
+    """Push until a joint has turned by this angle [rad]."""
     before = arm.state.q
     arm.operator.push(push, duration=300.0)
     try:
@@ -101,9 +101,9 @@ def test_what_makes_no_sense_is_refused(arm: ha.Arm) -> None:
         arm.start(ha.hand_guide(), until=path.after(0.1))
     with pytest.raises(ha.LimitError, match="A1"):
         arm.start(ha.hand_guide(q_max=[9.0] + [np.nan] * 6))
-    low = wire.HandGuide(q_min=(-9.0,) * 7)  # past the client's own checks
+    low = wire.HandGuide(q_min=(-9.0,) * 7)  # bypassing the checks of the client
     with pytest.raises(ha.LimitError, match="joint limit of hand guiding must be in"):
-        arm._connection.request(wire.Run(items=(wire.Item(motion=low),)))
+        arm.connection.request(wire.Run(items=(wire.Item(motion=low),)))
 
 
 def test_led_precisely_along_one_axis(arm: ha.Arm) -> None:
@@ -229,7 +229,7 @@ def test_a_guard_with_a_margin_is_watched_here(arm: ha.Arm) -> None:
     assert guard.is_moving
     met: list[ha.Collision] = []
     with pytest.raises(ha.CollisionDetected) as error, arm.guarded(guard, on_collision=met.append):
-        for _ in range(2):  # it goes on watching
+        for _ in range(2):  # it continues to monitor
             with contextlib.suppress(ha.MotionAborted):
                 arm.move(ha.lin_rel(z=-0.4, frame="base", speed_mps=0.05))
             arm.wait_for_rest()

@@ -1,4 +1,4 @@
-"""Ctrl-C is held back while the shield is up, and only then."""
+"""Ctrl-C is deferred while the shield is active, and only then."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Signals, keys, messages and process data through everything; the operator plays the person and the world."""
+"""Signals, keys, messages and process data through the whole stack; the operator plays the person and the periphery."""
 
 from __future__ import annotations
 
@@ -108,10 +108,10 @@ def test_keys_of_the_smartpad(arm: ha.Arm) -> None:
     with pytest.raises(ha.CommandRejected, match="disabled"):
         arm.operator.press_key(2)
     arm.pad.set_key(2, "next part", led="green")
-    listeners = arm._connection.events.key_listeners
+    listeners = arm.connection.events.key_listeners
 
     def press() -> None:
-        arm.wait_until(lambda state: len(listeners) == 2, timeout=20.0)  # somebody waits for it
+        arm.wait_until(lambda state: len(listeners) == 2, timeout=20.0)  # a call waits for it
         arm.operator.press_key(2)
 
     person = threading.Thread(target=press)

@@ -1,4 +1,4 @@
-"""The arm's link to a scripted cabinet in memory: how it is lost, kept and used by many."""
+"""The arm's link to a scripted cabinet in memory: loss, heartbeat and use by several threads."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_stop_finds_its_way_when_the_connection_is_lost(peer: Peer) -> None:
     arm = peer.arm()
     peer.drop()
     arm.stop()
-    assert peer.dials == 2 and any(isinstance(message, wire.Stop) for message in peer.seen)
+    assert peer.dials == 2 and any(isinstance(message, wire.Halt) for message in peer.seen)
     arm.close()
 
 
@@ -71,10 +71,10 @@ def test_silence_is_noticed() -> None:
 def test_heartbeats_go_both_ways() -> None:
     peer = Peer(heartbeat=0.2)
     with peer.arm(rate=0.0) as arm:
-        count = arm._connection.link.offset.count  # type: ignore[union-attr]
+        count = arm.connection.link.offset.count  # type: ignore[union-attr]
         peer.tell(wire.Ping(sent=77))
         deadline = time.monotonic() + 20.0
-        while arm._connection.link.offset.count < count + 5 or wire.Pong not in {type(m) for m in peer.seen}:  # type: ignore[union-attr]
+        while arm.connection.link.offset.count < count + 5 or wire.Pong not in {type(m) for m in peer.seen}:  # type: ignore[union-attr]
             assert time.monotonic() < deadline
             time.sleep(0.01)
         with pytest.raises(ha.StaleState):
@@ -120,13 +120,23 @@ def test_requests_from_many_threads(peer: Peer) -> None:
 
 
 def test_an_answer_that_does_not_come(peer: Peer) -> None:
+    peer.expect(wire.SetOverride)
+    with peer.arm() as arm:
+        patient = arm.connection.options
+        arm.connection.options = replace(patient, timeout=0.2)
+        with pytest.raises(ha.Timeout, match="SetOverride"):
+            arm.set_override(0.5)
+        arm.connection.options = patient
+
+
+def test_a_stop_that_is_not_answered_goes_another_way(peer: Peer) -> None:
     peer.expect(wire.Stop)
     with peer.arm() as arm:
-        patient = arm._connection.options
-        arm._connection.options = replace(patient, timeout=0.2)
-        with pytest.raises(ha.Timeout, match="Stop"):
-            arm.stop()
-        arm._connection.options = patient
+        patient = arm.connection.options
+        arm.connection.options = replace(patient, timeout=0.5)
+        arm.stop()
+        arm.connection.options = patient
+    assert any(isinstance(message, wire.Halt) for message in peer.seen)
 
 
 def test_a_cabinet_that_breaks_the_protocol(peer: Peer) -> None:

@@ -1,4 +1,4 @@
-"""Cartesian impedance and overlaid forces through everything: API, TCP, Java application, doubles, plant."""
+"""Cartesian impedance and overlaid forces through the whole stack: API, TCP, Java application, doubles, plant."""
 
 from __future__ import annotations
 

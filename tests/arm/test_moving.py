@@ -19,7 +19,7 @@ HOME = ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0))
 
 
 def later(seconds: float, *messages: wire.Message):
-    """Replies that come after a while."""
+    """Replies that arrive later."""
 
     def reply(client: Served, _: int) -> None:
         def speak() -> None:

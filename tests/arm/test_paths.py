@@ -1,4 +1,4 @@
-"""Arcs, splines and blended programs through the whole stack, measured on the states that come back."""
+"""Arcs, splines and blended programs through the whole stack, measured on the pushed states."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def moved(pose: Pose, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Pose:
 
 
 def carried_out(arm: Arm, motion: object) -> tuple[ha.Result, Array]:
-    """Result and the flange's places meanwhile, shape (n, 3)."""
-    states: States = arm.states(size=100_000)  # from before the beginning
+    """The result, and the positions of the flange during the motion, shape (n, 3) [m]."""
+    states: States = arm.states(size=100_000)  # from before the start
     result = arm.start(motion).wait(timeout=60.0)  # type: ignore[arg-type]
     return result, np.array([state.pose.xyz for state in up_to(states, arm.wait_for_rest())])
 

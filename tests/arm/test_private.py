@@ -1,4 +1,4 @@
-"""Private simulators: they come and go with their arm."""
+"""Private simulators start and end with their arm."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ def gone(pid: int, seconds: float = 20.0) -> bool:
 def test_a_private_simulator_comes_and_goes_with_its_arm(private_target: str) -> None:
     threads = set(threading.enumerate())
     with ha.connect(private_target, watchdog=5.0, timeout=30.0) as arm:
-        assert arm._connection.cabinet is not None
-        pid = arm._connection.cabinet.pid
+        assert arm.connection.cabinet is not None
+        pid = arm.connection.cabinet.pid
         assert alive(pid) and arm.is_virtual and arm.robot.name == "iiwa14"
         assert arm.move(ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.1)).arrived
-        arm.wait_until(lambda _: 2.5 < arm._connection.link.offset.rate < 6.0, timeout=60.0)
+        arm.wait_until(lambda _: 2.5 < arm.connection.link.offset.rate < 6.0, timeout=60.0)
         assert -2.0 < np.median([state.age for state in arm.states(duration=0.3)]) < 2.0
     assert gone(pid)
     left = {thread.name for thread in set(threading.enumerate()) - threads if thread.is_alive()}
@@ -60,9 +60,9 @@ def test_a_private_simulator_ends_with_a_killed_program(private_target: str, tmp
 
 def test_a_simulator_that_dies_is_a_lost_connection(private_target: str) -> None:
     arm = ha.connect(private_target, watchdog=5.0, timeout=30.0)
-    assert arm._connection.cabinet is not None
+    assert arm.connection.cabinet is not None
     handle = arm.start(ptp(deg(60, 30, 0, -90, 0, 60, 0), speed=0.05))
-    os.kill(arm._connection.cabinet.pid, signal.SIGKILL)
+    os.kill(arm.connection.cabinet.pid, signal.SIGKILL)
     with pytest.raises(ha.ConnectionLost):
         handle.wait(timeout=20.0)
     with pytest.raises(ha.ConnectionLost):

@@ -57,7 +57,7 @@ FORK = """
     if holder == 0:
         signal.pause()
         os._exit(0)
-    simulator = arm._connection.cabinet._process
+    simulator = arm.connection.cabinet._process
     arm.close()
     assert simulator.returncode == 0, "it was killed, for the child holds its pipe"
     os.kill(holder, 9)
@@ -89,7 +89,7 @@ MULTIPROCESSING = """
 
     if __name__ == "__main__":
         arm = ha.connect("sim://iiwa14")
-        target = f"sim://127.0.0.1:{arm._connection.cabinet.port}"
+        target = f"sim://127.0.0.1:{arm.connection.cabinet.port}"
         arm.move(HOME)
         for method in ("fork", "spawn"):
             context = multiprocessing.get_context(method)

@@ -1,4 +1,4 @@
-"""What a state tells besides positions: how sure the estimate of forces is, redundancy, stamps of the groups."""
+"""Readings of a state besides positions: inaccuracy of the estimated forces, redundancy, stamps of the groups."""
 
 from __future__ import annotations
 

@@ -39,8 +39,8 @@ def test_a_cabinet_that_cannot_recover_says_so(peer: Peer) -> None:
 def test_another_ones_control_is_left_to_people(peer: Peer) -> None:
     taken = wire.Rejected(code=Code.CONTROL_TAKEN, text="eve (session 7) controls this robot")
     with peer.arm() as arm:
-        arm._connection.in_control = False
-        arm._connection.controller = "eve"
+        arm.connection.in_control = False
+        arm.connection.controller = "eve"
         peer.expect(wire.TakeControl, taken)
         assert arm.recover().remaining == ("let eve release control",)
 

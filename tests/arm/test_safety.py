@@ -1,4 +1,4 @@
-"""Stops, modes and errors through the whole stack: what a motion's result says, what state shows, what recovers."""
+"""Stops, modes and errors through the whole stack: results of motions, states, recovery."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ FAR = ptp(AWAY, speed=0.3)
 
 @pytest.fixture(scope="module")
 def desk() -> Iterator[Arm]:
-    """A simulator whose operator these tests play; real time, since they look at what happens meanwhile."""
+    """A simulator whose operator these tests play; in real time, since they check the states meanwhile."""
     with ha.connect("sim://iiwa14", watchdog=5.0, timeout=30.0) as arm:
         yield arm
 
 
 @pytest.fixture
 def safe(desk: Arm) -> Iterator[Arm]:
-    """At home, automatic, nothing pressed; and afterwards again."""
+    """At home, in automatic mode, nothing pressed; restored afterwards."""
     _tidy(desk)
     desk.move(ptp(HOME))
     yield desk
@@ -83,7 +83,7 @@ def test_a_stop_ends_what_runs_and_waits(safe: Arm, fault: str, says: str, step:
     safe.operator.clear()
     safe.wait_until(lambda s: not s.safety.protective_stop, timeout=20.0)
     with pytest.raises(ha.SafetyStop, match="recover"):
-        safe.move(ptp(HOME))  # nothing begins by itself when the button is released
+        safe.move(ptp(HOME))  # no motion starts by itself when the button is released
     done = safe.recover()
     assert done.done and done.did and not done.remaining
     assert safe.state.safety.ready_to_move
@@ -217,13 +217,13 @@ def test_stop_after_motion_lets_it_finish(safe: Arm) -> None:
 
 def test_an_observer_stops_what_another_controls(safe: Arm) -> None:
     handle = under_way(safe, safe.start(FAR))
-    host = safe._connection.cabinet
+    host = safe.connection.cabinet
     assert host is not None
     with ha.connect(f"sim://{host.host}:{host.port}", control=False) as other:
         other.stop("fast")
         with pytest.raises(ha.MotionAborted):
             handle.wait(timeout=20.0)
-        left = other.recover()  # control is another's
+        left = other.recover()  # another client is in control
         assert not left.done and "release control" in left.remaining[0]
         with pytest.raises(ha.CommandRejected, match="operator"):
             _ = other.operator
@@ -243,7 +243,7 @@ def test_a_fault_that_is_none_is_refused() -> None:
 def test_recover_reconnects(cabinet: RunningCabinet) -> None:
     arm = ha.connect(cabinet.target, watchdog=5.0)
     try:
-        arm._connection.link._transport.close()
+        arm.connection.link.cut()
         deadline = time.monotonic() + 30.0
         while arm.connected and time.monotonic() < deadline:
             time.sleep(0.02)

@@ -1,4 +1,4 @@
-"""Servo motions through everything: API, TCP, the Java application, the doubles, the plant."""
+"""Servo motions through the whole stack: API, TCP, Java application, doubles, plant."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ TOUCH = 2e-3
 
 
 def follow(sv: ha.JointServo, seconds: float, *, turn: float = 0.2) -> np.ndarray:
-    """Swings A7 and comes back; returns the farthest target."""
+    """Swing A7 and return; return the farthest target."""
     farthest = sv.start.q
     while sv.tick() and sv.t < seconds:
         farthest = sv.set(sv.start.q + turn * np.sin(np.pi * min(sv.t / seconds, 1.0)) * A7)
@@ -66,7 +66,7 @@ def test_poses_are_followed_and_one_out_of_reach_is_refused_but_told_of(arm: ha.
         assert arm.state.pose.distance_to(goal) < 1e-3
         while (
             sv.tick() and sv.t < 20.0 and sv.stats.refused == 0
-        ):  # of two that come together the newer counts
+        ):  # of two that arrive together the newer one counts
             sv.set(ha.Pose.of([3.0, 0, 0], start.quat))
         sv.set(goal)
     assert sv.stats.refused > 0 and "not reachable" in sv.stats.text
@@ -134,7 +134,7 @@ def test_a_loop_that_hangs_ends_in_a_stop_and_an_error_that_says_so(arm: ha.Arm)
         arm.wait_until(lambda _: not sv.active)
         assert sv.tick() is None
         assert not sv.active
-        sv.set(sv.start.q)  # does nothing any more
+        sv.set(sv.start.q)  # no longer has an effect
     assert np.abs(arm.wait_for_rest().dq).max() < 0.01
 
 
@@ -250,4 +250,4 @@ def test_a_move_inside_the_block_is_refused_at_once_and_the_stream_goes_on(arm: 
     with arm.servo("joint", watchdog=2.0, until=force < 999) as sv:
         while sv.tick():
             sv.set(sv.start.q)
-        assert arm.move(ha.ptp(home)).arrived  # the servo motion has ended: nothing to wait for
+        assert arm.move(ha.ptp(home)).arrived  # the servo motion has ended, so this does not wait

@@ -1,4 +1,4 @@
-"""States: the newest, the last ones, and streams, on a clock that stands until it is told."""
+"""States: the newest, the last ones, and streams, on a manual clock."""
 
 from __future__ import annotations
 

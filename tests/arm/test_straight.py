@@ -1,4 +1,4 @@
-"""Straight servo motions through everything, limits that a kind of stream does not heed, and the way home."""
+"""Straight servo motions through the whole stack, limits that a kind of stream does not obey, and the home position."""
 
 from __future__ import annotations
 

@@ -10,6 +10,7 @@ import pytest
 
 import heptarm as ha
 from heptarm import Arm, Tool, Workpiece
+from heptarm.arm.devices.tools import Tooling
 from heptarm.errors import CommandRejected, ModeConflict
 from heptarm.model import dynamics
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
@@ -51,13 +52,13 @@ def bare(cabinet: RunningCabinet) -> Iterator[Arm]:
 
 
 def fresh(arm: Arm) -> ha.State:
-    """A state that was sampled after now, so that everything before counts in it."""
+    """A state sampled after the call, which includes all earlier effects."""
     now = arm.state.stamp
     return arm.wait_until(lambda s: s.stamp > now + 30_000_000)
 
 
 def settled(arm: Arm) -> ha.State:
-    """A state after the arm has got used to another load."""
+    """A state after the arm has settled under another load."""
     arm.move(hold(0.5))
     return fresh(arm)
 
@@ -90,7 +91,7 @@ def test_the_motors_carry_it_and_nothing_is_felt(bare: Arm) -> None:
         assert np.abs(state.tau_ext).max() < 0.01
         assert np.abs(state.wrench.array).max() < 0.02
         more = state.tau - before.tau
-        assert abs(more[1]) > abs(expected[1]) + 2.0  # the part's weight comes on top
+        assert abs(more[1]) > abs(expected[1]) + 2.0  # plus the weight of the part
         assert state.q == pytest.approx(before.q, abs=1e-4)
 
 
@@ -126,7 +127,7 @@ def test_another_frame_of_the_tool_can_be_the_default(bare: Arm) -> None:
     bare.attach_tool(GRIPPER, frame="pad")
     assert fresh(bare).pose.distance_to(bare.pose("pad")) < 1e-4
     assert bare.pose("tcp", reference="pad").distance_to(GRIPPER.frame("pad").inverse() @ TIP) < 1e-5
-    bare.attach_tool("gripper")  # by its name it is known now
+    bare.attach_tool("gripper")  # it is known by its name now
     control = fresh(bare).groups.mode
     assert control is not None
     assert control.frame == "tcp"
@@ -134,7 +135,7 @@ def test_another_frame_of_the_tool_can_be_the_default(bare: Arm) -> None:
 
 
 def test_the_wrench_is_told_where_and_as_one_likes() -> None:
-    """Too light a declaration: the rest of the weight is a force that the arm feels."""
+    """With too light load data, the rest of the weight counts as an external force."""
     heavy = Tool("heavy", mass=3.0, com=(0.0, 0.0, 0.1), tcp=Pose.at(0, 0, 0.2))
     with ha.connect("sim://iiwa14?speed=3&payload=3,0,0,0.1", watchdog=PATIENCE) as arm:
         arm.move(ptp(HOME))
@@ -236,7 +237,7 @@ def test_tools_and_places_of_the_project(tmp_path: Path) -> None:
             fresh(arm)
             assert arm.pose(reference="/Table/Corner").x - before.x == pytest.approx(-0.02, abs=2e-4)
             arm.move(hold(0.2), mode=CartesianImpedance(frame="/Table/Corner"))
-            arm.move(hold(0.2), mode=CartesianImpedance(frame="Tip"))  # the moved frame's own
+            arm.move(hold(0.2), mode=CartesianImpedance(frame="Tip"))  # that of the motion frame
             with pytest.raises(CommandRejected, match="got flange"):
                 arm.move(hold(0.2), mode=CartesianImpedance(frame="flange"))
         with pytest.raises(CommandRejected, match="Gripper"):
@@ -245,7 +246,7 @@ def test_tools_and_places_of_the_project(tmp_path: Path) -> None:
             arm.attach_tool(Tool("Gripper"))
 
 
-#: What a client refuses by itself, and the message with which it is bypassed.
+#: What a client refuses by itself, and the message that bypasses the check.
 UNKNOWN: dict[str, Callable[[], Lin | LinRel]] = {
     "moved": lambda: lin_rel(z=0.01, moving="pad"),
     "axes": lambda: lin_rel(z=0.01, frame="nowhere"),
@@ -258,9 +259,9 @@ def test_frames_that_nothing_has_are_refused_on_both_sides(
     bare: Arm, name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     fresh(bare)
-    with pytest.raises(CommandRejected, match="there are: flange, tool") as here:
+    with pytest.raises(CommandRejected, match="must be one of flange, tool") as here:
         bare.move(UNKNOWN[name]())
-    monkeypatch.setattr(bare._tooling, "check", lambda _motions, _mode: None)
+    monkeypatch.setattr(Tooling, "check", lambda _self, _motions, _mode: None)
     with pytest.raises(CommandRejected) as there:
         bare.move(UNKNOWN[name]())
     assert here.value.code == there.value.code == Code.UNKNOWN_NAME

@@ -1,4 +1,4 @@
-"""Triggers and events through everything: API, TCP, the Java application, the doubles, the plant."""
+"""Triggers and events through the whole stack: API, TCP, Java application, doubles, plant."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def arm(cell: ha.Arm) -> ha.Arm:
 
 
 def place(event: ha.MotionEvent) -> np.ndarray:
-    """Where the flange was commanded to be, shape (3,) [m]."""
+    """Commanded position of the flange, shape (3,) [m]."""
     assert event.state is not None and event.state.joints is not None
     return forward(robot("iiwa14"), event.state.joints.q_cmd)[:3, 3]
 
@@ -115,7 +115,7 @@ def test_events_come_by_callbacks_too_under_override_and_pause(arm: ha.Arm) -> N
     assert handle.wait_started(20.0) and not handle.done
     arm.resume()
     arm.set_override(0.9)
-    handle.add_event_callback(lambda event: 1 / 0)  # its errors are its own
+    handle.add_event_callback(lambda event: 1 / 0)  # its errors are not heptarm's
     assert handle.wait().arrived
     arm.set_override(1.0)
     late: list[ha.MotionEvent] = []

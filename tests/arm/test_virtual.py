@@ -153,7 +153,7 @@ def test_the_second_controller_hears_who_controls(arm: Arm, cabinet: RunningCabi
 
 def test_an_observer_sees_and_stops_but_does_not_move(arm: Arm, cabinet: RunningCabinet) -> None:
     with ha.connect(cabinet.target, control=False, name="observer") as observer:
-        assert observer.controller == arm._connection.options.name and not observer.in_control
+        assert observer.controller == arm.connection.options.name and not observer.in_control
         with pytest.raises(ha.NotInControl, match=str(os.getpid())):
             observer.move(ptp(HOME))
         handle = arm.start(FAR)
@@ -172,7 +172,7 @@ def test_two_clients_of_one_process_are_told_apart(arm: Arm, cabinet: RunningCab
     with ha.connect(cabinet.target, control=False) as observer:
         with pytest.raises(ha.NotInControl) as refused:
             observer.move(ptp(HOME))
-        mine, other = arm._connection.options.name, observer._connection.options.name
+        mine, other = arm.connection.options.name, observer.connection.options.name
         assert mine != other and refused.value.text.startswith(f"{mine} controls the robot, not {other}")
     with (
         ha.connect(cabinet.target, control=False, name=mine) as twin,
@@ -254,7 +254,7 @@ def test_leaving_the_block_leaves_the_arm_at_rest(cabinet: RunningCabinet) -> No
 def test_ctrl_c_stops_the_arm(cabinet: RunningCabinet, tmp_path: Path) -> None:
     process, said = script(tmp_path, cabinet.target)
     assert said == "moving"
-    time.sleep(0.2)  # it has said so, now it waits
+    time.sleep(0.2)  # it has printed so, now it waits
     process.send_signal(signal.SIGINT)
     out, errors = end(process)
     assert "interrupted" in out, (out, errors)
@@ -284,7 +284,7 @@ def test_a_killed_controller_is_stopped_and_replaced(cabinet: RunningCabinet, tm
             assert said == "moving"
             assert observer.controller == "script"
             process.kill()
-            # its watchdog time is longer: the end of the connection says it
+            # its watchdog time is longer: the end of the connection shows the loss
             observer.wait_until(lambda s: np.abs(s.dq).max() < 0.01 and not s.motion.active, timeout=8.0)
             end(process)
             observer.wait_until(lambda s: observer.controller == "", timeout=20.0)

@@ -1,4 +1,4 @@
-"""One fake cabinet for all tests that leave it as they found it, and a maker for those that need their own."""
+"""One fake cabinet for all tests that restore its state, and a factory for those that need their own."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ class FakeCabinet:
         return sorted(self._say("threads").split())
 
     def close(self) -> list[str]:
-        """Closes the server; returns the names of the threads that it leaves."""
+        """Closes the server; returns the names of the threads that are left."""
         left = self._say("close").split()
         assert self.process.wait(timeout=10) == 0
         return left

@@ -1,4 +1,4 @@
-"""A client made of a socket and frames: it can say what a real client never would."""
+"""A client made of a socket and frames: it can send what a real client never would."""
 
 from __future__ import annotations
 
@@ -21,11 +21,26 @@ class Closed(Exception):
     """The cabinet has closed the connection."""
 
 
+class Busy(Exception):
+    """The cabinet has waited too long for the handshake."""
+
+
 class Peer:
-    """One connection. Everything that comes is kept in `seen`, with the frame that brought it."""
+    """One connection. `seen` keeps every message with its frame."""
 
     def __init__(self, port: int, *, hello: bool = True, name: str = "peer", key: str = "") -> None:
-        self.socket = socket.create_connection(("127.0.0.1", port), timeout=30)
+        self._port = port
+        self._connect()
+        while hello:
+            try:
+                self.welcome = self.greet(name=name, key=key)
+                break
+            except Busy:  # this machine held up the client for longer than the cabinet waits
+                self.socket.close()
+                self._connect()
+
+    def _connect(self) -> None:
+        self.socket = socket.create_connection(("127.0.0.1", self._port), timeout=30)
         self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.reader = FrameReader()
         self.seen: list[tuple[Frame, Any]] = []
@@ -33,8 +48,6 @@ class Peer:
         self._request = 0
         self._seq = 0
         self._tag: FrameTag | None = None
-        if hello:
-            self.welcome = self.greet(name=name, key=key)
 
     def greet(self, *, name: str = "peer", key: str = "", major: int = wire.MAJOR) -> wire.Welcome:
         hello = self.hello = wire.Hello(major=major, minor=0, name=name, version="0", nonce=NONCE)
@@ -46,8 +59,10 @@ class Peer:
                 exchange.add(one.TYPE, one.encode())
             tags = exchange.tags(NONCE, message.nonce)
             self.send(wire.Proof(mac=exchange.client_mac()))
-            message = self.next()  # nothing follows the Welcome before this client says something
+            message = self.next()
             self._tag, self.reader.tag = tags
+        if isinstance(message, wire.Refusal) and message.code == Code.SILENT:
+            raise Busy
         assert isinstance(message, wire.Welcome), message
         return message
 
@@ -65,7 +80,7 @@ class Peer:
         return self.answer(self._request)
 
     def take_control(self, *, watchdog: float = 10.0) -> None:
-        """Takes control; waits for it if the cabinet has not yet seen that the controller before has gone."""
+        """Takes control; waits if the cabinet has not yet noticed that the previous controller is gone."""
         deadline = time.monotonic() + 30.0
         while not isinstance(answer := self.ask(wire.TakeControl(watchdog=watchdog)), wire.Accepted):
             assert answer.code == Code.CONTROL_TAKEN and time.monotonic() < deadline, answer
@@ -84,7 +99,7 @@ class Peer:
     def wait_for(
         self, kind: type[M], where: Callable[[M], bool] = lambda _: True, timeout: float = 30.0
     ) -> M:
-        """The first message of a kind, also one that has come already."""
+        """The first message of a kind, also one received earlier."""
         found: M = self.wait(lambda _, message: isinstance(message, kind) and where(message), timeout=timeout)
         return found
 
@@ -101,7 +116,7 @@ class Peer:
         return [message for _, message in self.seen if isinstance(message, kind)]
 
     def read_for(self, seconds: float, *, silent: bool = False) -> None:
-        """Reads whatever comes for a while; says something now and then unless it is to be silent."""
+        """Reads all messages for a while; sends something now and then unless it is to be silent."""
         deadline = time.monotonic() + seconds
         spoke = 0.0
         while (left := deadline - time.monotonic()) > 0:

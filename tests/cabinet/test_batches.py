@@ -1,4 +1,4 @@
-"""Blended items through the core: told of one by one, and refused with the same words as without blending."""
+"""Blended items through the core: reported one by one, and refused with the same texts as without blending."""
 
 from __future__ import annotations
 

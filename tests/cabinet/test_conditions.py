@@ -1,4 +1,4 @@
-"""Break conditions in the core: checked, watched by the robot or by the core, and told of with where the robot was."""
+"""Break conditions in the core: checked, monitored by the robot or the core, reported with the state of the robot."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_the_leaf_that_fired_is_named_and_where_the_robot_was(cabinet: FakeCabin
         ((wire.ForceOutside(axis=wire.Axis.Z, low=-2.0, high=1000.0),), 0),
         ((wire.ForceAbove(threshold=900.0, tolerance=0.1),), 0),  # the estimate is 0.5 N inaccurate
         ((wire.SignalIs(signal="Flange.Button", value=False),), 0),
-        ((wire.SignalOutside(signal="Cell.Level", low=1.0, high=2.0),), 0),  # watched by the core
+        ((wire.SignalOutside(signal="Cell.Level", low=1.0, high=2.0),), 0),  # monitored by the core
     ],
 )
 def test_every_kind_fires(cabinet: FakeCabinet, nodes: tuple[wire.ConditionNode, ...], fired: int) -> None:

@@ -100,7 +100,7 @@ def test_a_silent_controller_loses_control_in_its_watchdog_time(
     with Peer(cabinet.port, name="observer") as observer, Peer(cabinet.port, name="silent") as silent:
         silent.ask(wire.TakeControl(watchdog=1.0))
         silent.ask(wire.SetOverride(value=0.5 / rate))
-        began = time.monotonic()  # before its last word
+        began = time.monotonic()  # before its last message
         silent.ask(run(ptp(2.5)))
         observer.wait_for(wire.MotionStarted)
         finished = observer.wait_for(wire.MotionFinished)
@@ -108,14 +108,14 @@ def test_a_silent_controller_loses_control_in_its_watchdog_time(
         assert finished.cause == wire.Cause.LOST
         assert "silent" in finished.text
         assert observer.wait_for(wire.ControlChanged, lambda e: e.controller == "").session == 0
-        # the silent one is still connected; it learns what happened and can take control again
+        # the silent client is still connected; it receives the event and can take control again
         assert silent.wait_for(wire.MotionFinished).cause == wire.Cause.LOST
         assert silent.ask(run(ptp(0.0))).code == Code.NOT_IN_CONTROL
         assert isinstance(silent.ask(wire.TakeControl()), wire.Accepted)
 
 
 def test_words_that_came_while_the_cabinet_was_held_up_count(make: Callable[..., FakeCabinet]) -> None:
-    """A machine that stands still for longer than the watchdog time has heard nobody, and blames nobody."""
+    """A machine that was suspended for longer than the watchdog time does not count its clients as lost."""
     cabinet = make()
     with Peer(cabinet.port) as peer:
         for _ in range(2):
@@ -181,7 +181,7 @@ def test_heartbeat_goes_both_ways(make: Callable[..., FakeCabinet]) -> None:
 
 
 def test_control_changes_hands_a_hundred_times(connect: Connect) -> None:
-    """Whoever takes control right after another was lost keeps it, and its motion."""
+    """A client that takes control right after another was lost keeps it, and its motion."""
     observer = connect(name="observer")
     port = observer.socket.getpeername()[1]
     for turn in range(100):

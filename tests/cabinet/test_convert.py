@@ -20,7 +20,7 @@ def _poses() -> list[Pose]:
     for _ in range(COUNT):
         quat = chance.normal(size=4)
         poses.append(Pose.of(chance.uniform(-1.5, 1.5, size=3), quat / np.linalg.norm(quat)))
-    for b in (math.pi / 2, -math.pi / 2):  # where a and c are not unique, and all around it
+    for b in (math.pi / 2, -math.pi / 2):  # where a and c are not unique, and near that
         for off in (0.0, *(sign * 10.0**-k for k in range(1, 17) for sign in (1, -1))):
             a, c = chance.uniform(-math.pi, math.pi, size=2)
             poses.append(Pose.xyz_abc(0.1, 0.2, 0.3, a, b + off, c))

@@ -1,4 +1,4 @@
-"""FRI sessions in the cabinet's core: opened, commanded, ended, and what becomes of one that nobody answers."""
+"""FRI sessions in the cabinet's core: opened, commanded, ended, and the outcome of one that nobody answers."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_without_an_answering_client_it_fails_in_words(cabinet: FakeCabinet) -> 
         end = peer.wait_for(wire.MotionFinished, lambda event: event.id == session)
         assert (end.cause, end.code) == (wire.Cause.FAILED, Code.NOT_READY)
         assert "no FRI client answered from 127.0.0.1:30200 within 0.2 s" in end.text
-        assert isinstance(peer.ask(run(ptp(0.1))), wire.Accepted)  # and everything goes on
+        assert isinstance(peer.ask(run(ptp(0.1))), wire.Accepted)  # and everything continues
 
 
 def test_an_overlay_that_fails_ends_the_motion_with_the_robots_words(cabinet: FakeCabinet) -> None:

@@ -1,4 +1,4 @@
-"""Random and mutated frames: the server lives, nothing in it fails, nothing is left behind, the next client works."""
+"""Random and mutated frames: the server survives, logs no error, leaks nothing, and serves the next client."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def _resident(process: int) -> float:
 
 @contextlib.contextmanager
 def _reading(peer: Peer) -> Iterator[None]:
-    """Reads and answers meanwhile: a slow machine takes longer than the cabinet waits for a silent client."""
+    """Reads and answers meanwhile: a slow machine may exceed the cabinet's time limit for silent clients."""
     enough = threading.Event()
 
     def read() -> None:

@@ -1,4 +1,4 @@
-"""Hand guiding in the core: checked, and its break condition watched here, since no robot says that it would."""
+"""Hand guiding in the core: checked, and its break condition monitored by the core, as no robot is known to do it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The first frames of a connection: versions, key, allow-list, and octets that are no frame."""
+"""The first frames of a connection: versions, key, allow-list, and bytes that are no frame."""
 
 from __future__ import annotations
 
@@ -165,7 +165,7 @@ def test_what_may_not_come_before_the_proof(keyed: FakeCabinet) -> None:
 
 def test_an_address_that_is_not_on_the_list_is_refused(make: Callable[..., FakeCabinet]) -> None:
     cabinet = make(allow="10.0.0.1, 10.0.0.2")
-    for _ in range(5):  # the refusal is there every time, also when the client has said something already
+    for _ in range(5):  # the refusal arrives every time, also when the client has already sent something
         with Peer(cabinet.port, hello=False) as peer:
             peer.send(wire.Hello(major=wire.MAJOR, minor=0, name="x", version="0", nonce=NONCE))
             assert peer.wait_for(wire.Refusal).code == Code.NOT_ALLOWED
@@ -173,30 +173,14 @@ def test_an_address_that_is_not_on_the_list_is_refused(make: Callable[..., FakeC
             assert peer.is_closed()
 
 
-def test_only_so_many_clients_and_places_become_free_again(make: Callable[..., FakeCabinet]) -> None:
-    cabinet = make()
-    peers = [Peer(cabinet.port) for _ in range(16)]
-    with Peer(cabinet.port, hello=False) as late:
-        assert late.wait_for(wire.Refusal).code == Code.TOO_MANY_CLIENTS
-        assert late.is_closed()
-    for peer in peers:
-        peer.close()
-    deadline = time.monotonic() + 30.0
-    while any("reader" in name for name in cabinet.threads()):
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-    with Peer(cabinet.port) as peer:
-        assert isinstance(peer.ask(wire.Stop()), wire.Accepted)
-
-
 def test_a_connection_that_never_says_hello_is_closed(make: Callable[..., FakeCabinet]) -> None:
     cabinet = make()
     with Peer(cabinet.port, hello=False) as peer:
         began = time.monotonic()
-        hello = pack(wire.Hello.TYPE, b"\0" * 1000, seq=0)
-        peer.socket.sendall(hello[:1])
+        hello = pack(wire.Hello.TYPE, b"\0" * 900, seq=0)
         closed = False
-        while not closed and time.monotonic() < began + 30.0:  # octet by octet is no hello either
-            peer.socket.sendall(hello[1 + int(time.monotonic() - began) :][:1])
-            closed = peer.is_closed(0.5)
-        assert closed and time.monotonic() - began > 4.0
+        while not closed and time.monotonic() < began + 30.0:  # byte by byte it is no hello either
+            peer.socket.sendall(hello[int(5 * (time.monotonic() - began)) :][:1])
+            closed = peer.is_closed(0.2)
+        assert closed and time.monotonic() - began > 0.9
+        assert peer.wait_for(wire.Refusal).code == Code.SILENT

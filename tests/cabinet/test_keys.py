@@ -56,7 +56,7 @@ def test_a_person_at_the_smartpad_stops_and_takes_control_away(virtual: tuple[in
         assert "smartPAD" in end.text
         assert abs(end.q[0]) < 1.4
 
-        accepted = peer.ask(run(ptp(1.5)))  # control was not touched
+        accepted = peer.ask(run(ptp(1.5)))  # control did not change
         peer.wait_for(wire.MotionStarted, lambda e: e.id == accepted.id)
         keys.write_text(f"{STOP}\n{RELEASE}\n")
         assert peer.wait_for(wire.MotionFinished, lambda e: e.id == accepted.id).cause == wire.Cause.STOPPED

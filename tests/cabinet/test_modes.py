@@ -1,4 +1,4 @@
-"""Control modes in the core: what a client would not send is refused here as well, with the same code."""
+"""Control modes in the core: values that a client refuses are refused here as well, with the same code."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ WAVE = wire.SineImpedance(
     phase=(0.0,) * 6,
     bias=(0.0,) * 6,
 )
-#: Fields that contradict each other, the parameter that is named, and what a client is to make of them.
+#: Contradicting fields, the parameter in the refusal, and the error that a client raises.
 CONTRADICTIONS: dict[str, tuple[dict[str, Any], str]] = {
     "too stiff about x": ({"stiffness": (0.0,) * 3 + (301.0, 0.0, 0.0)}, "stiffness[3]"),
     "too stiff about z": ({"stiffness": (5000.0,) * 3 + (0.0, 0.0, 5000.0)}, "stiffness[5]"),
@@ -51,7 +51,7 @@ BAD = {
     },
     **{name: (replace(WAVE, **fields), field) for name, (fields, field) in ENDLESS.items()},
 }
-#: Beside the limit, on the right side.
+#: Close to the limit, on the allowed side.
 GOOD = (
     SPRING,
     replace(SPRING, stiffness=(5000.0,) * 3 + (300.0,) * 3),

@@ -210,7 +210,7 @@ def test_a_bad_item_is_refused_by_name_and_nothing_moves(
 def test_an_empty_program_and_what_is_not_there_are_refused(peer: Peer) -> None:
     assert peer.ask(run()).code == Code.BAD_LENGTH
     assert peer.ask(wire.GetProcessData(name="x")).code == Code.UNKNOWN_NAME
-    assert isinstance(peer.ask(wire.Recover()), wire.Accepted)  # nothing is to be done
+    assert isinstance(peer.ask(wire.Recover()), wire.Accepted)  # nothing to do
 
 
 def test_so_many_motions_may_wait_and_no_more(peer: Peer) -> None:
@@ -265,7 +265,7 @@ def test_control_becomes_free_even_if_the_robot_cannot_be_stopped(make: Callable
             peer.wait_for(wire.MotionStarted)
             peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="jammed"))
             rejected = peer.ask(wire.Stop())
-            assert rejected.code == Code.INTERNAL  # whoever stops must know that it did not help
+            assert rejected.code == Code.INTERNAL  # the client that stops must learn that it failed
         after.wait_for(wire.ControlChanged, lambda e: e.controller == "" and "lost" in e.text)
         after.take_control()
         deadline = time.monotonic() + 30.0

@@ -1,4 +1,4 @@
-"""The core and the robot's safety: what a stop ends, what cannot begin, and what recovering does."""
+"""The core and the safety of the robot: what a stop ends, what cannot start, and what a recovery does."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def test_an_enabling_switch_pauses_motions_and_ends_what_is_led_from_outside(pee
 def test_what_was_accepted_just_before_a_stop_was_seen_needs_an_operator(peer: Peer) -> None:
     say(peer, "T1")  # seen a little later; until then programs are accepted, and wait
     accepted = peer.ask(run(ptp(0.3)))
-    if isinstance(accepted, wire.Rejected):  # it was seen in time
+    if isinstance(accepted, wire.Rejected):  # noticed in time
         assert accepted.code == Code.NEEDS_OPERATOR
         return
     moved = [e for e in peer.all(wire.MotionStarted) if e.id == accepted.id]

@@ -1,4 +1,4 @@
-"""Servo streams in the core: the newest target wins, each brings its watchdog, nothing is lost silently."""
+"""Servo streams in the core: the newest target counts, each has its own watchdog, nothing is lost silently."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def finish(peer: Peer, servo: int) -> wire.MotionFinished:
 
 
 def reached(peer: Peer, a7: float) -> None:
-    """Waits until the fake's A7 is there."""
+    """Waits until A7 of the fake robot has reached a position."""
     peer.ask(wire.Subscribe(groups=wire.Groups.JOINTS, rate=100.0))
     since = len(peer.seen)
     peer.wait(
@@ -48,7 +48,7 @@ def reached(peer: Peer, a7: float) -> None:
 
 
 def told_of(peer: Peer, servo: int) -> None:
-    """Waits until the cabinet says that it has refused a target."""
+    """Waits until the cabinet reports a refused target."""
     peer.wait_for(wire.ServoStatus, lambda event: event.servo == servo and event.refused > 0)
 
 
@@ -90,7 +90,7 @@ def test_without_a_target_in_time_the_arm_stops_and_says_why(cabinet: FakeCabine
         assert end.cause is wire.Cause.STARVED
         assert "50 ms" in end.text
         assert status(peer, servo).late == 1
-        assert isinstance(peer.ask(run(ptp(0.1))), wire.Accepted)  # and everything goes on
+        assert isinstance(peer.ask(run(ptp(0.1))), wire.Accepted)  # and everything continues
 
 
 def test_a_target_that_came_while_the_cabinet_stood_still_counts(make: Callable[..., FakeCabinet]) -> None:
@@ -150,7 +150,7 @@ def test_each_kind_of_bad_target_bears_its_code(cabinet: FakeCabinet) -> None:
             servo = opened(peer)
             fields = {name: getattr(message, name) for name in message.__slots__}
             peer.send(type(message)(**{**fields, "servo": servo, "watchdog": 2.0}))
-            if code is Code.UNREACHABLE:  # seen only when it is applied, and whoever closes drops what waits
+            if code is Code.UNREACHABLE:  # checked only when it is applied, and closing drops waiting targets
                 told_of(peer, servo)
             peer.ask(wire.ServoClose(servo=servo))
             assert status(peer, servo).code == code

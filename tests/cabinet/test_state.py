@@ -1,4 +1,4 @@
-"""Pushed state: rates, groups, stamps, ages."""
+"""Pushed states: rates, groups, stamps, ages."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _FIELDS = {
 #: Time constant of the filter of the velocity that the core reports [s].
 FILTER = 0.01
 #: A machine that is busy with something else wakes the cabinet late, and it skips the states of that time. So tests
-#: of rates want this share of the states at least; how exactly rates are kept is a figure of `bench/`.
+#: of rates require at least this fraction of the states; `bench/` measures how exactly rates are kept.
 KEPT = 0.2
 
 
@@ -46,7 +46,7 @@ def clock(peer: Peer) -> tuple[float, int, float]:
 
 
 def comes_at(seen: np.ndarray, rate: float) -> None:
-    """States are due on a grid of the cabinet's clock: never more than one for each of its points, and in order."""
+    """States are due on a grid of the cabinet's clock: at most one for each point of it, in order."""
     assert (np.diff(seen) > 0).all()
     due = (seen[-1] - seen[0]) * 1e-9 * rate
     assert KEPT * due < len(seen) <= due + 2
@@ -68,7 +68,7 @@ def test_only_the_groups_that_were_asked_for(connect: Connect) -> None:
     peer = connect()
     for chosen in (G.JOINTS, G.POSE | G.SAFETY, G.TORQUES | G.WRENCH | G.MOTION):
         peer.ask(wire.Subscribe(groups=chosen, rate=200.0))
-        # some of the ones before may still be on their way; behind the first of these come no others
+        # some older ones may still arrive; after the first new one no old ones do
         peer.wait(
             lambda _, m, g=chosen: isinstance(m, wire.State) and carried(m) == set(g), since=len(peer.seen)
         )
@@ -76,7 +76,7 @@ def test_only_the_groups_that_were_asked_for(connect: Connect) -> None:
         assert carried(later) == set(chosen)
     peer.ask(wire.Subscribe(groups=G.JOINTS, rate=0.0))
     patience = time.monotonic() + 10.0
-    while peer.all(wire.State) and time.monotonic() < patience:  # those that were on their way
+    while peer.all(wire.State) and time.monotonic() < patience:  # those in transit
         peer.seen.clear()
         peer.read_for(0.3)
     assert not peer.all(wire.State)
@@ -99,7 +99,7 @@ def test_two_clients_with_two_rates(connect: Connect) -> None:
 
 
 def test_velocity_follows_the_motion(connect: Connect) -> None:
-    """It is the filtered difference of the positions by their stamps, however fast the robot really was.
+    """The velocity is the filtered difference of the positions by their stamps, independent of the true velocity.
 
     The fake robot is no measure: it loses time with each tick that a busy machine wakes it late, and lags behind its
     speed of 1 rad/s by that much.
@@ -107,7 +107,7 @@ def test_velocity_follows_the_motion(connect: Connect) -> None:
     peer = connect()
     peer.take_control()
     peer.ask(wire.Subscribe(groups=G.JOINTS | G.MOTION, rate=200.0))
-    begin = peer.ask(run(ptp(0.0)))  # wherever other tests left it
+    begin = peer.ask(run(ptp(0.0)))  # where other tests left it
     peer.wait_for(wire.MotionFinished, lambda e: e.id == begin.id)
     accepted = peer.ask(run(ptp(0.6)))
     peer.wait_for(wire.MotionFinished, lambda e: e.id == accepted.id)
@@ -135,7 +135,7 @@ def test_a_cabinet_with_costly_getters_keeps_the_joints_fresh(make: Callable[...
     cabinet = make(getter=0.002)
     with Peer(cabinet.port) as peer:
         peer.ask(wire.Subscribe(groups=G(63), rate=100.0))
-        peer.read_for(2.0)  # costs are learnt
+        peer.read_for(2.0)  # the costs are measured first
         peer.seen.clear()
         peer.read_for(2.0)
         joints = stamps(peer, "joints")

@@ -1,4 +1,4 @@
-"""The octet stream: any split or merge is legal, and a client that does not read holds up nobody."""
+"""The byte stream: any split or merge is legal, and a client that does not read delays no other."""
 
 from __future__ import annotations
 
@@ -41,18 +41,17 @@ def test_frames_are_numbered_without_a_gap(connect: Connect) -> None:
 def test_a_body_of_the_largest_size_is_taken_and_a_larger_one_is_not(connect: Connect) -> None:
     peer = connect()
     body = b"\0" * wire.MAX_BODY
-    peer.socket.sendall(wire.HEADER.pack(wire.MAGIC, wire.MAJOR, 0, 900, len(body), 0, 1, 0) + body)
+    peer.socket.sendall(wire.HEADER.pack(wire.MAGIC, wire.MAJOR, 0, 900, len(body), 1, 1, 0) + body)
     assert peer.answer(1).code == Code.UNKNOWN_MESSAGE
-    peer.socket.sendall(wire.HEADER.pack(wire.MAGIC, wire.MAJOR, 0, 900, len(body) + 1, 0, 2, 0))
+    peer.socket.sendall(wire.HEADER.pack(wire.MAGIC, wire.MAJOR, 0, 900, len(body) + 1, 2, 2, 0))
     assert peer.wait_for(wire.Goodbye).code == Code.BAD_FRAME
 
 
 def test_a_client_that_does_not_read_is_closed_and_holds_up_nobody(make: Callable[..., FakeCabinet]) -> None:
     cabinet = make()
     every = wire.Groups(63)
-    with Peer(cabinet.port, hello=False) as slow, Peer(cabinet.port, name="quick") as quick:
+    with Peer(cabinet.port, name="slow") as slow, Peer(cabinet.port, name="quick") as quick:
         slow.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        slow.greet(name="slow")
         slow.send(wire.Subscribe(groups=every, rate=1000.0), 1)
         quick.ask(wire.Subscribe(groups=every, rate=200.0))
         deadline = time.monotonic() + 60.0
@@ -72,7 +71,7 @@ def test_a_client_that_does_not_read_is_closed_and_holds_up_nobody(make: Callabl
 
 
 def test_requests_without_reading_the_answers_end_that_client_only(make: Callable[..., FakeCabinet]) -> None:
-    cabinet = make(heartbeat=10.0)  # the other one has nothing to say meanwhile
+    cabinet = make(heartbeat=10.0)  # the other client sends nothing meanwhile
     with Peer(cabinet.port) as rude, Peer(cabinet.port) as other:
         burst = b"".join(rude.pack(wire.Stop(), 1 + k) for k in range(1000))
         rude.socket.settimeout(10)

@@ -50,13 +50,13 @@ def peer(cabinet: FakeCabinet) -> Iterator[Peer]:
 
 
 def rest(peer: Peer) -> None:
-    """Waits until nothing runs: only then may the load change."""
+    """Waits until no motion runs: only then may the load change."""
     accepted = peer.ask(run(replace(ptp(), motion=wire.Hold(duration=0.01))))
     peer.wait_for(wire.MotionFinished, lambda event: event.id == accepted.id)
 
 
 def fitted(peer: Peer) -> tuple[str, str, str]:
-    """What the next state says of tool, workpiece and moved frame."""
+    """Tool, workpiece and motion frame in the next state."""
     since = len(peer.seen)
     peer.ask(wire.Subscribe(groups=wire.Groups.MODE, rate=100.0))
     state = peer.wait(lambda _, message: isinstance(message, wire.State), since=since)
@@ -64,7 +64,7 @@ def fitted(peer: Peer) -> tuple[str, str, str]:
     return state.mode.tool, state.mode.workpiece, state.mode.frame
 
 
-#: Fields that no tool has: what the client refuses in tests/values/test_tool.py, with the same codes.
+#: Invalid fields of tools: what the client refuses in tests/values/test_tool.py, with the same codes.
 BAD: list[tuple[dict[str, Any], int, str]] = [
     ({"name": ""}, Code.BAD_LENGTH, "name"),
     ({"name": "x" * 65}, Code.BAD_LENGTH, "name"),
@@ -116,7 +116,7 @@ def test_tools_come_and_go_and_the_state_says_so(peer: Peer) -> None:
     assert fitted(peer) == ("gripper", "", "tcp")
     peer.ask(wire.AttachLoad(load=EMPTY, attached=True))
     peer.ask(wire.AttachTool(name="gripper", frame="pad"))
-    assert fitted(peer) == ("gripper", "", "pad")  # the workpiece went with the tool
+    assert fitted(peer) == ("gripper", "", "pad")  # the workpiece was detached with the tool
     peer.ask(wire.DefineTool(tool=replace(GRIPPER, mass=2.0)))
     assert fitted(peer) == ("gripper", "", "pad")
     peer.ask(wire.DefineTool(tool=replace(GRIPPER, frames=frames("tip"))))
@@ -185,7 +185,7 @@ def test_an_observer_changes_nothing(cabinet: FakeCabinet, peer: Peer) -> None:
 
 
 def under(frame: str) -> dict[str, tuple[Any, str]]:
-    """Requests with the name of a frame, and the parameter that is named."""
+    """Requests with the name of a frame, and the parameter in the refusal."""
     offset = wire.LinRel(offset=HERE, reference=frame)
     wave = wire.SineImpedance(
         base=replace(SPRING, frame=frame),

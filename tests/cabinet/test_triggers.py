@@ -1,4 +1,4 @@
-"""Triggers in the core: checked, carried out by the cabinet, told of; items of a program are told of as they end."""
+"""Triggers in the core: checked, executed by the cabinet, reported; items of a program are reported as they end."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def finish(peer: Peer, number: int) -> wire.MotionFinished:
 
 
 def told(peer: Peer, number: int) -> list[tuple[str, int]]:
-    """What was told of a program, in its order."""
+    """The events of a program, in their order."""
     return [
         (type(m).__name__, m.item)
         for _, m in peer.seen
@@ -73,7 +73,7 @@ def fired(peer: Peer, number: int) -> list[wire.TriggerFired]:
 
 
 def lamp(port: int) -> tuple[float, float]:
-    """The lamp and the level, as an observer sees them."""
+    """The lamp and the level in the states of an observer."""
     with Peer(port) as peer:
         peer.ask(wire.Subscribe(groups=wire.Groups.IO, rate=100.0))
         state = peer.wait_for(wire.State)

@@ -1,4 +1,4 @@
-"""`heptarm sim --app`: applications of other people, and those written on heptarm's core without any network."""
+"""`heptarm sim --app`: applications of other people, and those on heptarm's core without a network."""
 
 from __future__ import annotations
 
@@ -224,7 +224,7 @@ def test_sources_run_in_the_encodings_that_they_are_written_in(tmp_path: Path, e
 
 
 def wrong(folder: Path, body: str, imports: str = "") -> str:
-    """What is said about an application that does not compile."""
+    """Messages about an application that does not compile."""
     (folder / "Wrong.java").write_text(
         f"{imports} import com.kuka.roboticsAPI.deviceModel.LBR;"
         "import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;\n"

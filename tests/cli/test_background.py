@@ -1,4 +1,4 @@
-"""Commands that a script has started in the background, where a shell lets them ignore SIGINT."""
+"""Commands started by a script in the background, where the shell makes them ignore SIGINT."""
 
 from __future__ import annotations
 

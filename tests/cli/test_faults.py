@@ -1,4 +1,4 @@
-"""`heptarm sim` as the operator's desk: faults at a time, and words typed while it runs."""
+"""`heptarm sim` with a simulated operator: timed faults, and commands typed while it runs."""
 
 from __future__ import annotations
 

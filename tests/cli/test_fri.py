@@ -26,7 +26,7 @@ def free_port() -> int:
 
 
 class Told(list[Any]):
-    """What a controller has printed; and what is typed to it."""
+    """Output and input of a controller process."""
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         super().__init__()
@@ -42,7 +42,7 @@ class Told(list[Any]):
 def controller(
     port: int, *arguments: str, version: str = "1.15", typed: bool = False
 ) -> Iterator[tuple[Any, Told]]:
-    """`heptarm sim --fri`; what it prints, at last also how it ended."""
+    """`heptarm sim --fri`: its output, including its end."""
     command = [*HEPTARM, "sim", "--json", "--fri", version, "--fri-client", f"127.0.0.1:{port}"]
     with ctrl_c_interrupts():
         started = subprocess.Popen(

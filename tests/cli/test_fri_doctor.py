@@ -1,4 +1,4 @@
-"""`heptarm doctor --fri` and `heptarm bench --fri`: each fault is named, with what to do about it."""
+"""`heptarm doctor --fri` and `heptarm bench --fri`: each fault is named, with its remedy."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_a_cabinet_with_fri_is_looked_at_without_moving_anything(cabinet: Runnin
     assert "FRI 1.14-1.16, every 10 ms" in found["FRI messages"]["found"]
     assert re.search("EXCELLENT|GOOD", found["FRI quality"]["found"])
     assert "ms median" in found["FRI answers"]["found"]
-    assert "FRI session" not in found  # which would tell of an error
+    assert "FRI session" not in found  # which would contain an error
 
 
 def test_somebody_elses_application_is_listened_to(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""`heptarm teach` and `heptarm replay`; the hand is the simulator's operator, whose words come with a time."""
+"""`heptarm teach` and `heptarm replay`; the simulated operator guides the arm by timed commands."""
 
 from __future__ import annotations
 

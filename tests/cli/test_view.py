@@ -63,7 +63,7 @@ def _orange(picture: np.ndarray) -> float:
 
 
 def _settled(browser: object, patience: float = 60.0) -> np.ndarray:
-    """The picture once the arm is drawn and does not change any more."""
+    """The picture, once the arm is drawn and no longer changes."""
     deadline = time.monotonic() + patience
     before = _picture(browser)
     while time.monotonic() < deadline:

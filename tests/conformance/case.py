@@ -34,7 +34,7 @@ UNFIT: dict[str, dict[str, str]] = {
 
 #: A small displacement, different for every joint so that a mix-up shows [rad].
 STEP = np.array([0.05, -0.03, 0.04, 0.06, -0.05, 0.07, 0.1])
-#: The arm moves around this position [rad].
+#: The arm moves near this position [rad].
 HOME = np.array([0.0, 0.0, 0.0, -np.pi / 2, 0.0, np.pi / 2, 0.0])
 #: Largest error of an arm that has arrived [rad].
 TOUCH = 0.012
@@ -119,7 +119,7 @@ def arrives(client: Client, there: Array) -> None:
 
 
 def under_way(client: Client, here: Array, far: float = 0.01) -> None:
-    """Wait until the arm has moved this far from a position [rad]; an execution may take some time to begin."""
+    """Wait until the arm has moved this far from a position [rad]; an execution may start late."""
     for _ in range(1000):
         if np.abs(client.place().q - here).max() > far:
             return
@@ -133,7 +133,7 @@ def rests(client: Client) -> Array:
         before = client.place()
         client.sleep(0.05)
         after = client.place()
-        # an arm whose plant had no time to go on seems to stand, but for its velocity
+        # an arm whose plant had no processor time seems to rest, except for its velocity
         if np.abs(after.q - before.q).max() < 2e-4 and np.abs([before.dq, after.dq]).max() < 0.01:
             return after.q
     raise AssertionError("the arm does not come to rest")

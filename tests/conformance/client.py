@@ -75,7 +75,7 @@ class Client(Protocol):
         ...
 
     def cancel(self, sent: SentGoal) -> bool:
-        """Ask to cancel; whether the server agreed."""
+        """Request cancellation; return whether the server accepted."""
         ...
 
     def result(self, sent: SentGoal, timeout: float = 60.0) -> ReceivedResult:
@@ -95,7 +95,7 @@ class Client(Protocol):
         ...
 
     def set(self, **values: object) -> bool:
-        """Set parameters of the node, `__` for a dot; whether it agreed."""
+        """Set parameters of the node, `__` for a dot; return whether it accepted."""
         ...
 
     def activate(self, *, on: bool) -> None:

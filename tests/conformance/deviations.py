@@ -1,4 +1,4 @@
-"""Goals that the arm does not follow, or not to their end: tolerances."""
+"""Goals that the arm does not follow to their end: tolerances."""
 
 from __future__ import annotations
 

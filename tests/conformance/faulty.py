@@ -1,10 +1,10 @@
-"""A virtual cabinet that takes faults as lines on its standard input; its end ends the cabinet.
+"""A virtual cabinet that reads faults as lines from its standard input; end of file ends it.
 
     .venv/bin/python tests/conformance/faulty.py [options of heptarm.sim.runtime.cabinet]
 
 follows, frozen, lags: how the arm does what its set-points say, whoever makes them. press, release: the emergency stop.
 Everything else is what the operator does, as in `heptarm sim`.
-Every line is answered by itself on standard output.
+It answers every line on standard output.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from heptarm.sim.control.laws import MeasuredState
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.runtime import cabinet as virtual
 
-#: So many ticks late is an arm that lags.
+#: Delay of an arm that lags, in ticks.
 LAG = 400
-#: An arm that did not follow catches up no faster [rad per tick].
+#: Speed limit of an arm that catches up [rad per tick].
 CATCH_UP = 5e-4
 
 _behaviour = "follows"
@@ -39,7 +39,7 @@ class _Cabinet(virtual.VirtualCabinet):
 
 
 class _Unruly:
-    """Set-points as an arm takes them that does not do what it is told."""
+    """Set-points of an arm that does not follow its commands."""
 
     def __init__(self, honest: Any) -> None:
         self._honest = honest
@@ -86,7 +86,7 @@ if __name__ == "__main__":
     unruly = _Unruly(ActiveLaw.torque)
 
     def torque(control: ActiveLaw, sensed: MeasuredState) -> Any:
-        """The law's torque for the set-points as the arm takes them."""
+        """Torque of the law for the modified set-points."""
         return unruly.torque(control, sensed)
 
     ActiveLaw.torque = torque  # type: ignore[method-assign]

@@ -1,4 +1,4 @@
-"""Contacts, hand guiding, teaching, triggers and collisions, for both ROS; see `tests.conformance.surface`."""
+"""Contacts, hand guiding, teaching, triggers and collisions, for ROS 1 and ROS 2; see `tests.conformance.surface`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def along(probe: Probe, z: float, **more: Any) -> Any:
 
 
 def push(stage: Stage, sent: Sent, way: float) -> None:
-    """Push until a joint has turned so far [rad]."""
+    """Push until a joint has turned by this angle [rad]."""
     before = until(lambda: sent.told, "no feedback")[-1].position
     stage.do("push 0 6 6 300")
     until(lambda: np.abs(np.subtract(sent.told[-1].position, before)).max() > way, "the arm is not guided")
@@ -72,7 +72,7 @@ def case_a_touch_is_cancelled_and_preempted(probe: Probe, stage: Stage) -> None:
     sent = probe.send("touch", "Touch", **slowly)
     until(lambda: sent.told and sent.told[-1].travel > 2e-3, "the arm does not set out")
     follow = probe.tell("servo/velocity", "sensor_msgs/JointState", name=["A7"], velocity=[0.2])
-    follow()  # a servo topic waits for no place of its own
+    follow()  # a servo topic has no place in the queue
     sent.cancel()
     refused(sent.end(), "cancelled")
     sent = probe.send("touch", "Touch", **slowly)
@@ -123,7 +123,7 @@ def case_triggers_write_outputs_and_notify(probe: Probe, stage: Stage) -> None:
     sent = probe.send("run_program", "RunProgram", motions=program)
     assert done(sent.end()).item == 2
     until(lambda: lit("MediaFlange.LEDRed"), "the output is not written")
-    fed = [one for feedback in sent.told for one in feedback.events]  # the last may come behind the result
+    fed = [one for feedback in sent.told for one in feedback.events]  # the last one may arrive after the result
     assert fed[0].kind == "begun" and {feedback.item for feedback in sent.told} == {0, 1, 2}
     assert any(feedback.remaining > 0.0 for feedback in sent.told)
     number = fed[0].motion

@@ -1,4 +1,4 @@
-"""Goals that end early: another takes their place, or they are cancelled."""
+"""Goals that end early: preempted or cancelled."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from tests.conformance.client import Client, SentGoal
 
 
 def undisturbed(client: Client, measure: Callable[[], Found]) -> Found:
-    """What is measured while the machine does not stand still, which the stamps of joint states tell."""
+    """Discard measurements during stalls of the machine, which the stamps of joint states reveal."""
     for _ in range(10):
         begin = client.now()
         found = measure()
@@ -135,7 +135,7 @@ def cancelling_goes_straight_on_while_it_brakes(client: Client) -> None:
 
 
 def _mid_air(client: Client, far: float) -> tuple[SentGoal, float]:
-    """A7 goes at 0.4 rad/s and is so far [rad]: its goal, and in which direction it moves."""
+    """A7 moves at 0.4 rad/s and has passed this angle [rad]: its goal, and its direction."""
     here = client.place().q
     sign = -1.0 if here[6] > 0 else 1.0
     sent = client.send(goal(client, point(4.0, here + sign * 1.6 * (np.arange(7) == 6))))
@@ -145,7 +145,7 @@ def _mid_air(client: Client, far: float) -> tuple[SentGoal, float]:
 
 
 def _brakes(client: Client) -> tuple[Array, Array]:
-    """Cancel A7 in mid-air: times [s] and places [rad] of every joint state from then on."""
+    """Cancel a motion of A7: times [s] and positions [rad] of every joint state from then on."""
     sent, sign = _mid_air(client, 0.2)
     begin = client.now()
     client.cancel(sent)
@@ -173,11 +173,11 @@ def cancelling_makes_no_jump(client: Client) -> None:
 def cancelling_brakes_as_the_parameter_says(client: Client) -> None:
     assert client.set(max_deceleration_on_cancel=0.5)
     found: list[float] = []
-    # a stream that falters on a busy machine is another braking; none of them would be right by chance
+    # a stream that falters on a busy machine brakes, too; no such run can pass by chance
     while not found or (len(found) < 5 and not 0.3 < found[-1] < 0.8):
         times, way = undisturbed(client, lambda: _brakes(client))
         left = way[-1] - way
-        # with constant deceleration the square root of the way that is left falls evenly
+        # with constant deceleration the square root of the remaining distance falls linearly
         inside = (left > 0.01) & (left < 0.1)
         assert inside.sum() > 5, left
         slope, _ = np.polyfit(times[inside], np.sqrt(left[inside]), 1)
@@ -225,7 +225,7 @@ def the_deceleration_is_a_parameter(client: Client) -> None:
         sent, sign = _mid_air(client, 0.15)
         client.cancel(sent)
         client.result(sent)
-        # what was told last is nearly where the arm began to brake; a client may look much later than that
+        # the last report is close to where the arm started to brake; a client may look much later
         return sign * float(rests(client)[6] - client.feedback(sent)[-1].actual.q[6])
 
     ways = []

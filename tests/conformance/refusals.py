@@ -14,7 +14,7 @@ from tests.conformance.client import Client
 
 @dataclass(frozen=True)
 class Refusal:
-    """A goal that has to be rejected, with the code where codes are told."""
+    """A goal that must be rejected, with its code where there are codes."""
 
     change: Callable[[Client, TrajectoryGoal], TrajectoryGoal]
     code: ErrorCode

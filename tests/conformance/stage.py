@@ -21,12 +21,13 @@ def environment() -> dict[str, str]:
 
 
 class Stage:
-    """A virtual cabinet that listens, with a hand on its faults; it can be killed and started again on its port."""
+    """A virtual cabinet with injectable faults; it can be killed and restarted on its port."""
 
     def __init__(self, *options: str) -> None:
         self._options = options
         self.port = 0
-        self._environment = environment()  # also of a restart: it belongs to whoever has made this, see tests.processes
+        # also of a restart: it belongs to the creator of this object, see tests.processes
+        self._environment = environment()
         self.process = self._start()
 
     def _start(self) -> subprocess.Popen[str]:
@@ -47,7 +48,7 @@ class Stage:
 
     @property
     def target(self) -> str:
-        """What to connect to."""
+        """The target to connect to."""
         return f"sim://127.0.0.1:{self.port}"
 
     def do(self, word: str) -> None:

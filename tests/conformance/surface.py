@@ -1,6 +1,6 @@
-"""Everything of a node besides trajectories, through its services, actions and topics; the same for both ROS.
+"""All interfaces of a node except trajectories: services, actions and topics; the same for ROS 1 and ROS 2.
 
-A case takes a probe: a client of one node, whose arm is on a stage with the project `PROJECT`.
+A case takes a probe, a client of one node, whose arm is in a cabinet with the project `PROJECT`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ PARAMETERS: dict[str, object] = {"publish_signals": True, "publish_tf": True, "s
 #: Height of the table [m]; the flange is 10 cm above it at home.
 TABLE = 0.3
 HOME = np.radians([0, 30, 0, -90, 0, 60, 0]).tolist()
-#: A busy machine may need long for what is quick [s].
+#: Time limit of quick operations on a busy machine [s].
 PATIENCE = 120.0
 
 
@@ -49,7 +49,7 @@ class Sent(Protocol):
 
 
 class Probe(Protocol):
-    """A client of one node; names are relative to the node's, those with a slash before them are not."""
+    """A client of one node; names are relative to the node unless they start with a slash."""
 
     def call(self, name: str, kind: str, /, **request: Any) -> Any:
         """The answer of a service."""
@@ -81,14 +81,14 @@ class Probe(Protocol):
 
 
 def stage(folder: Path) -> Stage:
-    """A cabinet with signals and process data, whose arm stands before a table."""
+    """A cabinet with signals and process data, and a table in front of the arm."""
     project = folder / "RoboticsAPI.data.xml"
     project.write_text(PROJECT)
     return Stage("--project", str(project), "--box", f"0.6,0,{TABLE / 2},0.4,0.6,{TABLE}")
 
 
 def until(what: Callable[[], Any], why: str) -> Any:
-    """Wait until something is true; returns it."""
+    """Wait until a value is true; return it."""
     deadline = time.monotonic() + PATIENCE
     while time.monotonic() < deadline:
         if value := what():
@@ -98,13 +98,13 @@ def until(what: Callable[[], Any], why: str) -> Any:
 
 
 def done(answer: Any) -> Any:
-    """An answer or a result that is a success."""
+    """Assert that an answer or a result is a success."""
     assert answer.success, answer.message
     return answer
 
 
 def refused(answer: Any, *words: str) -> None:
-    """An answer or a result that is none, and says why."""
+    """Assert that an answer or a result is a failure with this reason."""
     assert not answer.success and all(word in answer.message for word in words), answer.message
 
 
@@ -341,7 +341,7 @@ def case_an_fri_session_is_opened_commanded_and_closed(probe: Probe, stage: Stag
     refused(probe.call("fri/open", "OpenFri", kind="dance"), "dance", "monitor")
 
     def stands(kind: str, **settings: Any) -> bool:
-        """Whether the status tells of a session; a busy machine may lose one, and then another is opened."""
+        """Whether the status shows a session; a busy machine may lose one, and then another is opened."""
         if status and status[-1].kind:
             return True
         answer = probe.call("fri/open", "OpenFri", kind=kind, period_ms=10, **settings)

@@ -1,4 +1,4 @@
-"""What is around goals: parameters, the override, the topic, the node's state."""
+"""The surroundings of goals: parameters, the override, the topic, the node's state."""
 
 from __future__ import annotations
 

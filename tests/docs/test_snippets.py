@@ -1,6 +1,6 @@
 """Every Python snippet of the documentation runs, page by page, against one virtual cabinet; the site builds.
 
-A page's blocks run in order in one process, as a reader would type them. A block whose fence says
+The blocks of a page run in order in one process, as a reader would type them. A block whose fence is
 ``python no-run`` is only compiled; pages without a block that runs are skipped.
 """
 
@@ -62,7 +62,7 @@ def test_snippets_run(page: Path, tmp_path: Path) -> None:
     files = []
     for line, source, run in _blocks(page):
         if run:
-            # Named after its place in the page, so that a traceback leads there.
+            # Named after its line in the page, so that a traceback refers to it.
             files.append(tmp_path / f"{page.stem}-line-{line}.py")
             files[-1].write_text(source, encoding="utf-8")
 

@@ -1,4 +1,4 @@
-"""The list of Sunrise's classes that applications use: surface.toml, read."""
+"""The list of Sunrise's classes that applications use, read from surface.toml."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Class:
 
     @property
     def simple(self) -> str:
-        """Its name alone."""
+        """Its simple name."""
         return self.name.replace("$", ".").rpartition(".")[2]
 
 
@@ -50,7 +50,7 @@ class Part:
 
 
 def read() -> tuple[tuple[Part, ...], tuple[tuple[str, str], ...]]:
-    """The parts of the list, and what is left out and why."""
+    """The parts of the list, and what is missing and why."""
     content = tomllib.loads(FILE.read_text(encoding="utf-8"))
     parts = tuple(
         Part(

@@ -1,4 +1,4 @@
-"""What a Sunrise programmer does on heptarm's core without a network, from motions to tools and signals."""
+"""Programs on heptarm's core without a network, from motions to tools and signals."""
 
 from __future__ import annotations
 

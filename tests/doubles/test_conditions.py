@@ -1,4 +1,4 @@
-"""Conditions of a Sunrise application on the doubles: motions break, triggers call back, observers hear."""
+"""Conditions of a Sunrise application on the doubles: they break motions, fire triggers, notify observers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An FRI application as Sunrise programmers write it, its client in a process of its own, real UDP between them."""
+"""A typical FRI application on the doubles, with its client in another process and UDP between them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hand guiding as a Sunrise programmer uses it; the switch and the hand are the virtual operator's."""
+"""Hand guiding in a Sunrise application; the virtual operator holds the switch and guides the arm."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""IO groups and user keys of a Sunrise application on the doubles; the operator's words are the world's doing."""
+"""IO groups and user keys of a Sunrise application on the doubles; the operator's commands set inputs."""
 
 from __future__ import annotations
 

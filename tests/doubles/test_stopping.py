@@ -1,4 +1,4 @@
-"""Stops and errors as a Sunrise programmer meets them: execution pauses, listeners are told, somebody lets it go on."""
+"""Stops and errors in a Sunrise application: execution pauses, listeners are called, the operator resumes."""
 
 from __future__ import annotations
 

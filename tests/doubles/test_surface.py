@@ -1,4 +1,4 @@
-"""The doubles offer what applications of other people use of Sunrise, and samples use each class of it."""
+"""The doubles offer the classes of Sunrise that applications of other people use; samples use each of them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def checker(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def missing(lines: list[str], checker: Path) -> list[str]:
-    """What of some lines the doubles do not offer."""
+    """Members that the doubles do not offer."""
     path = ":".join(str(one) for one in (*_resources.jars(), checker))
     done = subprocess.run(
         ["java", "-cp", path, "sample.Surface"],

@@ -1,4 +1,4 @@
-"""A tour through what the other samples leave out: tasks, recordings, brake tests, geometry, a stop gone through."""
+"""Features that the other samples do not use: tasks, recordings, brake tests, geometry, a stop and its recovery."""
 
 from __future__ import annotations
 

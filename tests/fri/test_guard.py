@@ -1,4 +1,4 @@
-"""The guard: whatever is asked, what is sent keeps the limits; what fits passes; what was limited is named."""
+"""The guard: sent commands never exceed the limits; valid commands pass unchanged; limited ones are reported."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def begun(*, q: tuple[float, ...] = START, dq: tuple[float, ...] = STILL, period
 
 
 def run(guard: JointGuard, wishes: Iterable[object]) -> np.ndarray:
-    """What is sent, shape (n, 7)."""
+    """Sent commands, shape (n, 7)."""
     return np.array([list(guard.position(wish)) for wish in wishes])  # type: ignore[arg-type]
 
 
 def check(
     guard: JointGuard, sent: np.ndarray, q: tuple[float, ...] = START, dq: tuple[float, ...] = STILL
 ) -> None:
-    """The finite differences of what was sent, from the start on, keep every limit."""
+    """Assert that the finite differences of the sent commands keep every limit."""
     period, limits = guard.period, guard.limits
     before = np.array([np.subtract(q, np.multiply(n * period, dq)) for n in (3, 2, 1, 0)])
     track = np.vstack((before, sent))
@@ -50,7 +50,7 @@ wild = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-3.5, 3.5)
 
 @st.composite
 def requests(draw: st.DrawFn) -> list[tuple[float, ...] | None]:
-    """Jumps, ramps, sines, noise, no numbers and pauses, one after the other."""
+    """Jumps, ramps, sines, noise, NaN and pauses, one after the other."""
     wishes: list[tuple[float, ...] | None] = []
     for _ in range(draw(st.integers(1, 5))):
         kind, size = (
@@ -116,7 +116,7 @@ def test_braking_never_goes_further_than_foretold(
 
 
 def test_a_motion_within_the_limits_passes_unchanged() -> None:
-    """A sine that begins gently; not one sample is altered and nothing is reported."""
+    """A sine that starts smoothly passes unchanged and unreported."""
     times = np.arange(1, 4001) * 1e-3
     rise = np.minimum(times, 1.0)
     envelope = rise**3 * (10.0 - 15.0 * rise + 6.0 * rise**2)

@@ -118,7 +118,7 @@ def _classes(*, packed: tuple[str, ...]) -> dict[str, Any]:
 
 
 ORACLE = _classes(packed=PACKED)
-#: Writes every double the other way round; a decoder has to read both.
+#: Writes every double in the other encoding; a decoder has to read both.
 CONTRARY = _classes(packed=("Joints",))
 
 

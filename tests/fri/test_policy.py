@@ -1,4 +1,4 @@
-"""Missing commands: hold, extrapolate, ramp down, each with the guard behind it."""
+"""Missing commands: hold, extrapolate, ramp down, each followed by the guard."""
 
 from __future__ import annotations
 

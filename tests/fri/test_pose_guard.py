@@ -1,4 +1,4 @@
-"""The guard of poses: whatever is asked, what is sent keeps the limits; what fits passes; what was limited is named."""
+"""The guard of poses: sent poses never exceed the limits; valid ones pass unchanged; limited ones are reported."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def begun(limits: PoseLimits = LIMITS, *, twist: tuple[float, ...] = REST, perio
 
 
 def run(guard: PoseGuard, wishes: Iterable[object]) -> np.ndarray:
-    """What is sent, shape (n, 7)."""
+    """Sent commands, shape (n, 7)."""
     return np.array([guard.pose(wish) for wish in wishes])  # type: ignore[arg-type]
 
 
 def check(guard: PoseGuard, sent: np.ndarray, twist: tuple[float, ...] = REST) -> None:
-    """The differences of what was sent, from the start on, keep every limit."""
+    """Assert that the differences of the sent poses keep every limit."""
     period, limits = guard.period, guard.limits
     track = [START, *sent.tolist()]
     speeds = np.array([twist, *(np.divide(between(*two), period) for two in itertools.pairwise(track))])

@@ -1,4 +1,4 @@
-"""The client machine: a session from the first datagram to its end, and everything that can go wrong on the way."""
+"""The client machine: a session from the first datagram to its end, and everything that can go wrong."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def test_every_command_mode_gets_the_fields_it_needs(mode: CommandMode) -> None:
     waiting = heard(session, wire, monitoring(wire, 1, SessionState.COMMANDING_WAIT, mode=mode), 0)
     active = heard(session, wire, monitoring(wire, 2, SessionState.COMMANDING_ACTIVE, mode=mode), MS)
     assert session.mode is mode
-    for one in (waiting, active):  # nothing is wished: what does nothing is sent
+    for one in (waiting, active):  # no command: a neutral command is sent
         assert one is not None
         joints = mode in (CommandMode.POSITION, CommandMode.TORQUE, CommandMode.WRENCH)
         assert one.q == (IPO if joints else None)
@@ -312,7 +312,7 @@ def test_any_message_is_answered_legally_or_not_at_all(wire: Version, data: st.D
 
 
 class Exchange(RuleBasedStateMachine):
-    """A controller that does whatever it likes; the client's bookkeeping stays true."""
+    """A controller that behaves at random: the client's counters stay correct."""
 
     def __init__(self) -> None:
         super().__init__()

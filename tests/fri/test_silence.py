@@ -1,4 +1,4 @@
-"""After a silence commanding goes on without a step, whatever the controller did meanwhile."""
+"""After a silence commanding resumes without a step, whatever the controller did meanwhile."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Way = Callable[[float, float], tuple[float, float]]
 
 
 def goes_on(speed: float, time: float) -> tuple[float, float]:
-    """Way and speed after a time of a controller that keeps the last speed."""
+    """Distance and speed after a time, of a controller that keeps the last speed."""
     return speed * time, speed
 
 
@@ -53,7 +53,7 @@ def test_place_and_speed_are_told_from_the_way(controller: Way, time: float, spe
         (place,), (later,) = joints_after_gap(
             [chain], [speed], [then], [now], time=time, period=PERIOD, is_exact=is_exact
         )
-        # a reading that lags has made up for it when the arm stands
+        # a lagging reading has caught up when the arm rests
         assert later == pytest.approx(end, abs=2.1 * lag * abs(speed) / time + 1e-12)
         assert place == pytest.approx(chain + way, abs=2.1 * lag * abs(speed) + 1e-12)
 
@@ -103,7 +103,7 @@ def test_the_speed_is_never_more_than_before_nor_the_other_way(speed: float, way
 
 def test_a_pose_is_carried_on_along_its_direction() -> None:
     assert vector_in_gap((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), 0.05) == ([0.0] * 3, [0.0] * 3)
-    way, speed = vector_in_gap((0.0, 0.2, 0.0), (0.5, 0.01, 0.0), 0.05)  # it went on, and was pushed aside
+    way, speed = vector_in_gap((0.0, 0.2, 0.0), (0.5, 0.01, 0.0), 0.05)  # it continued, and was pushed aside
     assert way == pytest.approx([0.0, 0.01, 0.0]) and speed == pytest.approx([0.0, 0.2, 0.0])
     way, speed = vector_in_gap((0.0, 0.2, 0.0), (0.0, -0.01, 0.0), 0.05)
     assert way == speed == [0.0, 0.0, 0.0]

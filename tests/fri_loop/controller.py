@@ -1,4 +1,4 @@
-"""A tiny controller: sends monitoring messages through the states of a session and keeps the answers."""
+"""A minimal controller: sends monitoring messages through the states of a session and records the answers."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class Controller:
         return last.q if commanding and last is not None and last.q is not None else self.ipo
 
     def step(self) -> None:
-        """One message; takes the answers that have come."""
+        """Send one message and record the answers received so far."""
         with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
             while True:
                 octets = self._sock.recv(2048)
@@ -126,7 +126,7 @@ class Controller:
             time.sleep(self.period_ms * 1e-3)
 
     def walk(self, *states: SessionState, pause: float = 0.05) -> None:
-        """Go through states, a while in each."""
+        """Pass through states, with some messages in each."""
         for state in states:
             self.state = state
             time.sleep(pause)

@@ -1,4 +1,4 @@
-"""The client and its loop's process, against a tiny controller on this machine."""
+"""The client and its loop process, with a minimal controller on this machine."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_a_user_who_falls_silent_stops_the_arm_by_the_policy() -> None:
                     break
             deadline = time.monotonic() + 20.0
             while time.monotonic() < deadline:
-                time.sleep(0.4)  # the user's code is busy elsewhere; answers go on
+                time.sleep(0.4)  # the user's code is busy; answers continue
                 states = client.history(100)
                 if np.ptp([one.q_sent[0] for one in states[-50:]]) == 0.0:
                     break
@@ -308,10 +308,10 @@ def test_another_sender_is_ignored_while_a_session_stands(client: Client) -> Non
 
 
 def test_the_loop_ends_with_a_killed_user_and_brakes_before() -> None:
-    """The user's process dies at once while the arm moves: the loop brings it to a stop and goes."""
+    """The user's process is killed while the arm moves: the loop stops the arm and ends."""
     for _ in range(3):
         controller, answers = _braked_after_a_kill()
-        # a loop that hears nothing for 5 periods begins anew at rest: then nothing can be said about the way
+        # a loop without messages for 5 periods starts again at rest: then nothing is known about the path
         if controller.longest_pause < 4e-3 * controller.period_ms:
             break
     sent = np.array([one.q for one in controller.answers if one.q is not None])[-400:]
@@ -321,7 +321,7 @@ def test_the_loop_ends_with_a_killed_user_and_brakes_before() -> None:
 
 
 def _braked_after_a_kill() -> tuple[Controller, int]:
-    """The controller, and how many answers had come some time after its client's user was killed."""
+    """The controller, and the number of answers some time after the user's process was killed."""
     script = textwrap.dedent(
         """
         import numpy as np, os, sys

@@ -1,4 +1,4 @@
-"""The turn of the loop without sockets or processes: guard, policy and session together, and what is published."""
+"""A cycle of the loop without sockets or processes: guard, policy and session together, and the published state."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MS = 1_000_000
 
 
 class Bench:
-    """A cycle with a controller whose clock is counted."""
+    """A cycle with a controller that has a simulated clock."""
 
     def __init__(
         self,
@@ -163,7 +163,7 @@ def test_after_a_long_silence_an_arm_that_stands_is_left_at_rest() -> None:
     last = bench.sent[-1].q
     assert last is not None
     bench.now += 200 * MS
-    bench.controller.sequence += 200  # the controller has stopped at once, and shows it
+    bench.controller.sequence += 200  # the controller has stopped at once, and reports it
     bench.run(2)
     assert np.abs(np.subtract(bench.sent[-2].q, last)).max() < 1e-6, "no jump after the gap"
 
@@ -221,7 +221,7 @@ def _events(bench: Bench) -> list[np.ndarray]:
 
 
 def want(bench: Bench, **outputs: tuple[int, float]) -> None:
-    """What the user's process leaves: for each output a count and a value."""
+    """The outputs that the user's process writes: for each a count and a value."""
     io = {f"FRI.{name}": one for name, one in outputs.items()}
     bench.layout.outputs.write(json.dumps({"io": io, "frames": {}}))
 

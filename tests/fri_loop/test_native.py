@@ -1,4 +1,4 @@
-"""The native part does what the Python turn does, to the last bit: twins that see the same exchange."""
+"""The native part equals the Python cycle to the last bit: two loops process the same exchange."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ EXAMPLES = longer(25, 1000)
 
 
 class Twins:
-    """One bench in pure Python, one with the native part; everything happens to both."""
+    """One loop in pure Python, one with the native part; both receive the same input."""
 
     def __init__(self, **options: object) -> None:
         policy = options.pop("policy", None)
@@ -188,7 +188,7 @@ def test_laws(law: object) -> None:
 
 @pytest.mark.parametrize("wire", [Version.V1_15, Version.V2_5])
 def test_every_octet_of_a_message_damaged(wire: Version) -> None:
-    """What Python refuses, the native part refuses; a tag of zero or an illegal pose is nothing to read on in."""
+    """The native part refuses what Python refuses; a zero tag or an illegal pose ends the decoding."""
     twins = Twins(wire=wire)
     twins.step(state=SessionState.COMMANDING_WAIT)
     for octet in range(len(twins.pure.controller.datagram())):

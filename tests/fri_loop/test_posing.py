@@ -1,4 +1,4 @@
-"""Sessions that command poses: the turn of the loop without sockets, and a client with its process."""
+"""Sessions that command poses: a cycle of the loop without sockets, and a client with its process."""
 
 from __future__ import annotations
 
@@ -195,7 +195,7 @@ def test_after_a_long_silence_a_flange_that_went_on_is_not_halted() -> None:
     before = sent(bench, 2)[:, 0]
     speed = before[1] - before[0]
     assert speed == pytest.approx(0.25e-3)
-    for kept in (1.0, 0.0):  # it goes on; the next time it stands
+    for kept in (1.0, 0.0):  # it continues; the next time it rests
         last = sent(bench, 1)[0, 0]
         bench.now += 60_000_000
         bench.controller.sequence += 60

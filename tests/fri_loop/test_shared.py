@@ -1,4 +1,4 @@
-"""Shared memory: two processes, no lock, and no torn slot ever comes out."""
+"""Shared memory: two processes without a lock never read a torn slot."""
 
 from __future__ import annotations
 

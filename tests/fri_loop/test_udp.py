@@ -1,4 +1,4 @@
-"""UDP: receive times, a taken port in words, and what a closed socket says."""
+"""UDP: receive times, and the errors of a taken port and a closed socket."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from heptarm.io.udp import ALL_INTERFACES, UdpSocket, address_to_bind, own_addre
 
 def test_a_datagram_comes_with_the_time_of_its_arrival_not_of_its_reading() -> None:
     one, other = UdpSocket(0, host="127.0.0.1"), UdpSocket(0, host="127.0.0.1")
-    for _ in range(100):  # the kernel begins to stamp a moment after it was asked
+    for _ in range(100):  # the kernel starts to add time stamps a moment after the request
         before = time.monotonic_ns()
         assert other.send(b"hello", ("127.0.0.1", one.port))
         sent = time.monotonic_ns()

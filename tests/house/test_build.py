@@ -1,4 +1,4 @@
-"""The cabinet's build: what it refuses, and that what it made is fit for a JRE 6."""
+"""The build of the cabinet: what it refuses, and whether its output runs on a JRE 6."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def jdk() -> toolchain.Jdk:
 
 
 def _verdict(jdk: toolchain.Jdk, folder: Path, body: str, *, ecj: bool = False) -> list[str]:
-    """Compiles a class with the JDK's own library and lists what the check says of it."""
+    """Compiles a class with the JDK's own library and lists the findings of the check."""
     source = folder / "Probe.java"
     source.write_text(f"class Probe {{ {body} }}")
     command = (

@@ -7,6 +7,7 @@ own `__init__` counts where somebody imports a name from it, not where a module 
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -105,3 +106,18 @@ def test_a_circle_is_found() -> None:
     graph = {"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": {"a", "e"}, "e": {"d"}}
     assert _circles(graph) == [["b", "c", "b"], ["d", "e", "d"]]
     assert not _circles({"a": {"b", "c"}, "b": {"c"}, "c": set()})
+
+
+def test_nobody_reaches_into_an_arm() -> None:
+    """Scenarios, skills, tools and tests use what an arm offers, `arm.connection` where they need the messages."""
+    root = SOURCES.parent
+    inside = re.compile(r"\b(?!self\b|cls\b)\w+\._(connection|tooling|transport)\b")
+    folders = ("src/heptarm/testing", "src/heptarm/skills", "src/heptarm/cli", "src/heptarm/ros", "tests", "bench")
+    found = [
+        f"{path.relative_to(root)}:{number}: {line.strip()}"
+        for folder in folders
+        for path in sorted((root / folder).rglob("*.py"))
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1)
+        if inside.search(line)
+    ]
+    assert not found, "use arm.connection:\n" + "\n".join(found)

@@ -1,4 +1,4 @@
-"""Figures: the verdict of a record, the comparison in blocks, the store, and the page that is made of a stored run."""
+"""Figures: the verdict of a record, the comparison in blocks, the store, and the page generated from a stored run."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from bench.measure.figure import BENCHMARKS, Benchmark, Figure
 from bench.measure.noise import Noise
 
 ROOT = Path(__file__).resolve().parents[2]
-#: Those that need a ROS are left out.
+#: Without those that need ROS.
 MODULES = sorted(
     ".".join(path.relative_to(ROOT).with_suffix("").parts)
     for path in (ROOT / "bench").glob("*/*.py")

@@ -1,4 +1,4 @@
-"""The package's manners: light imports, one version, every public name there."""
+"""The package: light imports, one version, every public name available."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a test has started ends with it: also if it fails, hangs or is killed itself."""
+"""Processes started by a test end with it, also if it fails, hangs or is killed."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def start(name):
 
 
 def run(folder: Path, body: str, *options: str) -> tuple[subprocess.CompletedProcess[str], list[int]]:
-    """Run a file of tests in a pytest of its own; returns the processes that it has started, too."""
+    """Run a file of tests in a separate pytest; return its result and the processes that it has started."""
     (folder / "conftest.py").write_text(_CONFTEST)
     (folder / "test_it.py").write_text(_HEAD + body)
     (folder / "pytest.ini").write_text("[pytest]\n")

@@ -1,4 +1,4 @@
-"""What is tried again on a busy machine is named and counted over the whole run; what fails is never tried again."""
+"""Retries on a busy machine are named and counted over the whole run; a failed check is never retried."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Setting up an environment of ROS: what is not to be had is said, what fails fails, and neither counts as done."""
+"""Setting up a ROS environment: missing wheels are reported, errors fail, and neither counts as done."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def script(path: Path, text: str) -> None:
 
 @pytest.fixture
 def copy(tmp_path: Path) -> Path:
-    """The rule and the script of ROS 2, on a machine of which everything else is made up."""
+    """The rule and the script of ROS 2, with everything else of the machine faked."""
     for name in ("Makefile", "scripts/setup_ros2.sh"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)

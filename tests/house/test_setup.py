@@ -1,4 +1,4 @@
-"""What the set-up does when the tools that compile the cabinet are missing."""
+"""The set-up without the tools that compile the cabinet."""
 
 from __future__ import annotations
 

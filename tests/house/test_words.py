@@ -1,7 +1,7 @@
-"""One word for one idea, and the field's: words that heptarm does not use, with those that it uses instead.
+"""One word for one idea, the field's word: words that heptarm does not use, and their replacements.
 
 Identifiers are read word by word, so `max_octets` and `OctetReader` are found as well as prose. A word that also has a
-plain meaning is found in its other meanings only; `but` names these.
+common plain meaning is allowed in that meaning; `but` describes it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,21 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PLACES = ("src", "cabinet", "docs", "examples", "ros1", "ros2", "README.md", "CHANGELOG.md")
+PLACES = (
+    "src",
+    "cabinet",
+    "docs",
+    "examples",
+    "ros1",
+    "ros2",
+    "bench",
+    "schema",
+    "scripts",
+    "README.md",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+    "Makefile",
+)
 KINDS = {
     ".py",
     ".java",
@@ -59,7 +73,7 @@ RULES = (
         r"ways?",
         "path (geometry) or trajectory (path with time); else say it without",
         but=r"(?:this|that|same|other|either|any|one|two|no|which|every|best|only|right|wrong|safe|long|half|all the|"
-        r"by the|in the|on the|under|out of the|in a|a|the) ways?\b(?! (?:through|of joints|in joint))|"
+        r"by the|in the|on the|under|out of the|in a|a|the) ways?\b(?! (?:through|of joints|in joint))|one-way|"
         r"ways? (?:to|of doing)\b",
     ),
     Rule(r"courses?", "path (geometry) or trajectory (path with time)", but=r"of course"),
@@ -70,7 +84,7 @@ RULES = (
     Rule(r"says", "reports, states, sends"),
     Rule(r"wish|wishes|wished|wants|demands?|demanded", "request, command, target"),
     Rule(r"moved frames?", "tool frame or TCP (say which), or motion frame"),
-    Rule(r"(?:link|connection|it) (?:stands|is up)", "is connected"),
+    Rule(r"(?:link|connection|it) (?:stands|is up)", "is connected", but=r"it is up to"),
     Rule(r"octets?", "bytes"),
     Rule(r"anew", "again"),
     Rule(r"who(?:m)?ever", "any client that"),
@@ -90,7 +104,7 @@ RULES = (
         r"shares?",
         "fraction",
         but=r"shared|sharing|shares? (?:the|a|an|its|their|this|memory|one|it|them)\b|to share|share/|\"share\"|"
-        r"pkg[- ]share|package share|PACKAGE SHARE|share directory",
+        r"pkg[- ]share|package share|PACKAGE SHARE|share directory|/share\b",
     ),
     Rule(r"\b(?:class|interface|enum|record) Warden\b", "SafetyMonitor", exact=True),
     Rule(r"\b(?:class|interface|enum|record) Rack\b", "ToolTable", exact=True),
@@ -102,7 +116,7 @@ RULES = (
     Rule(r"\b(?:class|interface|enum|record) Desk\b", "ApplicationServices", exact=True),
     Rule(r"\b(?:class|interface|enum|record) \w*Insight\b", "SimulatorProbe", exact=True),
 )
-#: Any of the words: most lines have none.
+#: Any of the words: a quick check, since most lines have none.
 _ANY = re.compile("|".join(rule.word for rule in RULES), re.I)
 _INSIDE = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|_")
 

@@ -25,5 +25,5 @@ def denavit_hartenberg(robot: RobotModel, q: np.ndarray) -> np.ndarray:
 
 
 def random_q(robot: RobotModel, rng: np.random.Generator, share: float = 1.0) -> np.ndarray:
-    """Joint positions within that share of the limits, shape (7,) [rad]."""
+    """Joint positions within this fraction of the limits, shape (7,) [rad]."""
     return rng.uniform(share * robot.q_min, share * robot.q_max)

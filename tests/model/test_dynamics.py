@@ -28,7 +28,7 @@ def by_name(robot: RobotModel) -> str:
 
 
 def mujoco_model(robot: RobotModel, load: Body | None = None) -> tuple[object, object]:
-    """The plant's model without the assumptions that are not rigid-body dynamics, perhaps with a load."""
+    """The plant's model reduced to rigid-body dynamics, optionally with a load."""
     mujoco = pytest.importorskip("mujoco")
     from heptarm.sim.plant.world import specification
 
@@ -120,7 +120,7 @@ def test_laws(robot: RobotModel) -> None:
 
 @pytest.mark.parametrize("robot", ALL, ids=by_name)
 def test_gravity_is_the_slope_of_the_potential(robot: RobotModel) -> None:
-    """The load's share is the wrench of its weight, through the Jacobian."""
+    """The load adds the wrench of its weight, mapped by the Jacobian."""
     rng = np.random.default_rng(23)
     for _ in range(20):
         q = random_q(robot, rng)

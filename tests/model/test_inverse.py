@@ -143,7 +143,7 @@ def test_intervals_are_exact(robot: RobotModel) -> None:
 
 
 def test_intervals_find_what_a_grid_would_miss(robot: RobotModel) -> None:
-    """Close to six limits at once hardly any arm angle is left."""
+    """Close to six limits at once, hardly any arm angle is feasible."""
     corner = 0.9999 * robot.q_max * np.array([-1, 1, -1, 1, 1, 0.094, 1])
     wanted = forward(robot, corner)
     status = ik.redundancy(robot, corner).status

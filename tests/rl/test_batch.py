@@ -1,4 +1,4 @@
-"""The batched simulator: it repeats, it is late and weak where it shall be, and agrees with the plant."""
+"""The batched simulator: reproducible, with latency and compliance as set, and in agreement with the plant."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def test_a_saved_simulation_goes_on_as_if_nothing_had_happened() -> None:
 
 
 def test_the_plant_moves_alike() -> None:
-    """The virtual cabinet's plant, 1 kHz and its own servo, is where the training simulator says."""
+    """The plant of the virtual cabinet, at 1 kHz with its own servo, agrees with the training simulator."""
     task = ReachTask()
     goals = task.targets(np.random.default_rng(4), 2)
     trained, plant = (
@@ -123,7 +123,7 @@ def test_the_plant_moves_alike() -> None:
     for index in range(45):
         action = np.full((2, 7), 0.8 if index < 20 else -0.3 if index < 30 else 0.0)
         one, other = trained.step(action), plant.step(action)
-        # it may trail a little more or less
+        # the lag may differ a little
         assert np.abs(one.tip - other.tip).max() < 0.05
     assert np.abs(one.tip - other.tip).max() < 0.002
     assert one.observation == pytest.approx(other.observation, abs=0.01)

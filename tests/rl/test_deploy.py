@@ -1,4 +1,4 @@
-"""A policy on the virtual cabinet: through TCP, the Java application, a servo motion, the plant; and its guard."""
+"""A policy on the virtual cabinet, through TCP, Java application, servo motion and plant; and its guard."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ POINT = (0.55, 0.1, 0.4)
 
 
 def tried(arm: ha.Arm, *arguments: Any, **named: Any) -> EpisodeReport:
-    """A deployment that begins anew if the guard, or the cabinet, found this machine too busy."""
+    """A deployment that is repeated if the guard, or the cabinet, found this machine too busy."""
     for _ in range(3):
         try:
             return deploy(arm, *arguments, **named)
@@ -82,7 +82,7 @@ def test_targets_outside_the_box_and_foreign_robots_are_refused_before_anything_
 
 
 class Wild:
-    """Decides nonsense at full strength."""
+    """Returns random actions of full magnitude."""
 
     def __init__(self) -> None:
         self.task = ReachTask()

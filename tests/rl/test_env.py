@@ -1,4 +1,4 @@
-"""The task as others want it: Gymnasium's environment, Stable-Baselines3's VecEnv, MuJoCo Warp."""
+"""The task for other libraries: Gymnasium's environment, Stable-Baselines3's VecEnv, MuJoCo Warp."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reports: figures that can be checked by hand."""
+"""Reports: figures checked by hand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The policy among messages: joint states in any order, targets, silence."""
+"""The policy behind messages: joint states in any order, targets, silence."""
 
 from __future__ import annotations
 

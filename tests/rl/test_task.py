@@ -1,4 +1,4 @@
-"""The task: what the policy sees, what its actions do, and where that ends."""
+"""The task: observations, actions and their limits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Training: the arithmetic, interruptions, several workers, and that it learns."""
+"""Training: arithmetic, interruptions, several workers, and learning progress."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all actions share: the most active goals, and that each of them ends."""
+"""Properties of all actions: the limit of active goals, and that each goal ends."""
 
 from __future__ import annotations
 

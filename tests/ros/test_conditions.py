@@ -1,4 +1,4 @@
-"""Conditions as texts: what Python's own words would build, and nothing else."""
+"""Conditions as texts: the same conditions as in Python, and nothing else."""
 
 from __future__ import annotations
 

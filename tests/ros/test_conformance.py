@@ -1,4 +1,4 @@
-"""The cases of conformance against the runner alone, in time that is counted: what every node builds on."""
+"""The cases of conformance against the runner alone, in simulated time: the base of every node."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Bare:
         self._runner = TrajectoryRunner(self.joints, robot("iiwa14"), configuration.settings)
         self._time, self._q, self._dq = 100.0, HOME.copy(), np.zeros(7)
         self._how, self._scaling, self._active = "follows", 1.0, True
-        self._slept = 0.0  # less than a period: time that has not passed yet
+        self._slept = 0.0  # less than a period: it has not passed yet
         self._late: deque[KinematicState] = deque()
         self._ends: dict[int, GoalResult] = {}
         self._told: dict[int, list[GoalFeedback]] = {}

@@ -31,7 +31,7 @@ HOME = np.radians([0, 30, 0, -90, 0, 60, 0])
 AWAY = np.array([0.3, -0.1, 0.2, 0.2, -0.3, 0.2, 0.5])
 PATIENCE = 60.0
 PATIENT = {"constraints.goal_time": 20.0, "watchdog": 5.0, "fri.period": 10}
-#: A goal that something else is to end [s].
+#: Duration of a goal that something else is to end [s].
 LONG = 8.0
 
 
@@ -103,7 +103,7 @@ def recorder(driver: Driver) -> Recorder:
 
 
 def goal(driver: Driver, away: np.ndarray = AWAY, duration: float = 2.0) -> TrajectoryGoal:
-    """There and no further, in a curve."""
+    """A goal to a position, on a curve."""
     now = driver.arm.state.q_cmd
     shares = 0.5 * (1 - np.cos(np.pi * np.linspace(0, 1, 11)[1:]))
     times = np.linspace(0, duration, 11)[1:]
@@ -112,7 +112,7 @@ def goal(driver: Driver, away: np.ndarray = AWAY, duration: float = 2.0) -> Traj
 
 
 def steadily(driver: Driver, recorder: Recorder, attempt: Callable[[], None]) -> None:
-    """Again where the cabinet has ended an FRI session: it does so when answers come late, as from a busy machine."""
+    """Repeat if the cabinet has ended an FRI session: it does so when answers are late, as from a busy machine."""
     for _ in range(10):
         try:
             attempt()
@@ -138,7 +138,7 @@ def test_goals_arrive_one_after_the_other(driver: Driver, recorder: Recorder) ->
         assert np.abs(driver.arm.state.q - HOME).max() < 0.01
         assert (
             max(feedback.time for feedback in recorder.feedback) > 1.5
-        )  # told now and then, not at the very end
+        )  # reported now and then, not at the very end
 
     steadily(driver, recorder, there_and_back)
 
@@ -208,6 +208,6 @@ def test_a_spline_goes_through_the_points_as_fast_as_the_trajectory(cabinet: Run
         took = (recorder.moved[-1] - recorder.moved[0]) * 1e-9
         assert 0.6 * 4.0 < took < 1.25 * 4.0
         off = max(float(np.abs(told.desired.q - told.actual.q).max()) for told in recorder.feedback)
-        assert off < 0.02  # the curve between the points is the cabinet's
+        assert off < 0.02  # the cabinet chooses the curve between the points
     finally:
         driver.close()

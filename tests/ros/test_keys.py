@@ -23,6 +23,6 @@ def test_a_dump_of_the_parameters_has_no_key(tmp_path: Path) -> None:
     assert key not in str(configuration.values)
     driver = Driver(configuration, MagicMock())
     try:
-        assert driver.arm._connection.options.key == key.encode()
+        assert driver.arm.connection.options.key == key.encode()
     finally:
         driver.close()

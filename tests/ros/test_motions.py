@@ -1,4 +1,4 @@
-"""Motions from messages: each kind, defaults where nothing is given, refusals that name what is wrong."""
+"""Motions from messages: each kind, defaults of fields that are not given, refusals that name the error."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ EMPTY: dict[str, Any] = {
 
 
 class FakeDriver:
-    """A driver of an arm that stands still."""
+    """A driver of an arm at rest."""
 
     configuration = NodeConfiguration.of({})
     arm = SimpleNamespace(state=SimpleNamespace(q_cmd=HERE))

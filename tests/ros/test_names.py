@@ -1,4 +1,4 @@
-"""Targets as programs for libiiwa give them: NaN keeps."""
+"""Targets of programs for libiiwa: NaN keeps a position."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ NAN = math.nan
 
 
 class FakeDriver:
-    """A driver of an arm that stands still."""
+    """A driver of an arm at rest."""
 
     arm = SimpleNamespace(state=SimpleNamespace(q_cmd=HERE, pose_cmd=POSE))
     configuration = NodeConfiguration.of({})

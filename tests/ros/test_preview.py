@@ -1,4 +1,4 @@
-"""The preview of a runner predicts its commands, and the process of the FRI loop follows it."""
+"""The preview of a runner predicts its commands, and the process of the FRI loop follows them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PERIOD = 0.005
 
 
 def goal(*, start: float | None = None) -> TrajectoryGoal:
-    """A curve of a second; every joint another way."""
+    """A curve of one second; every joint moves differently."""
     times = np.linspace(0.0, 1.0, 11)[1:]
     away = np.linspace(0.1, 0.4, 7)
     way = [HOME + away * (10 * t**3 - 15 * t**4 + 6 * t**5) for t in times]
@@ -30,7 +30,7 @@ def goal(*, start: float | None = None) -> TrajectoryGoal:
 
 
 class Stage:
-    """A runner and an arm that is where it is told to be."""
+    """A runner and an arm that is where it is commanded to be."""
 
     def __init__(self) -> None:
         self.runner = TrajectoryRunner(NAMES, robot("iiwa14"), ExecutionSettings())
@@ -153,7 +153,7 @@ class Session:
         return [Message(self.t)]
 
     def commanded(self) -> np.ndarray:
-        """What the law answers now."""
+        """The current answer of the law."""
         out = Output()
         out.q[:] = HOME
         follow(self.state, out, self.params)  # type: ignore[arg-type]
@@ -183,7 +183,7 @@ def test_the_law_mirrors_before_there_are_set_points_and_brakes_after_the_last(s
 
 
 def test_over_fri_a_goal_is_commanded_at_its_times_however_late_this_process_is(session: Session) -> None:
-    """Here it looks every 0.2 s only, and messages come late: what is commanded is the trajectory all the same."""
+    """Here it looks every 0.2 s only, and messages are late: the commands are still those of the trajectory."""
     runner = TrajectoryRunner(NAMES, robot("iiwa14"), ExecutionSettings())
     still = MeasuredJoints(100.0, HOME, np.zeros(7))
     start = 100.3
@@ -227,7 +227,7 @@ def test_over_fri_a_cancellation_takes_effect_ahead_of_what_is_commanded(session
 
 
 def test_over_fri_clocks_that_part_bend_the_way_of_no_axis(session: Session, monkeypatch) -> None:
-    """The controller loses 20 ms at once: what is commanded follows by and by, without a step."""
+    """The controller loses 20 ms at once: the commands catch up gradually, without a step."""
     runner = TrajectoryRunner(NAMES, robot("iiwa14"), ExecutionSettings())
     runner.accept(goal(), now=100.0, state=MeasuredJoints(100.0, HOME, np.zeros(7)))
     overlay = _FriStream(session, PERIOD)  # type: ignore[arg-type]

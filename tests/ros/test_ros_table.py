@@ -1,4 +1,4 @@
-"""The reference of both nodes is made from their sources; it must not fall behind them."""
+"""The reference of both nodes is generated from their sources; it must be up to date."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_every_service_topic_and_action_of_ours_is_told_in_a_row(table) -> None:
         "~/joint_trajectory",
         "~/query_state",
         "/tf",
-    }  # ROS' own, and what Python needs not
+    }  # ROS' own, and what Python does not need
 
 
 def test_other_drivers_names_stand_for_ours(table) -> None:

@@ -1,4 +1,4 @@
-"""A call of several motions in a thread of its own: its result, its error, its end by stops until it gives up."""
+"""A call of several motions in a thread: its result, its error, its end by repeated stops."""
 
 from __future__ import annotations
 

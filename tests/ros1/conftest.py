@@ -1,4 +1,4 @@
-"""Tests with a real roscore and rospy; where there are none they are not there, and `make test-ros1` says so."""
+"""Tests with a roscore and rospy; without them no test is collected, and `make test-ros1` reports it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session")
 def stage() -> Iterator[Stage]:
-    """A virtual iiwa 14 with a hand on its faults."""
+    """A virtual iiwa 14 with injectable faults."""
     running = Stage()
     yield running
     running.close()
@@ -42,7 +42,7 @@ def stage() -> Iterator[Stage]:
 
 @pytest.fixture(scope="session")
 def spare() -> Iterator[Stage]:
-    """A second one, for tests that start a node of their own; they leave nobody in control of it."""
+    """A second one, for tests that start a node of their own; they release its control."""
     running = Stage()
     yield running
     running.close()
@@ -50,7 +50,7 @@ def spare() -> Iterator[Stage]:
 
 @pytest.fixture(scope="session")
 def ros() -> Iterator[None]:
-    """A roscore of one's own, and this process as a node of it."""
+    """A private roscore, and this process as a node of it."""
     from tests.ros1.peer import Core
 
     with Core("tester"):
@@ -59,7 +59,7 @@ def ros() -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def _forget(request: pytest.FixtureRequest) -> Iterator[None]:
-    """What a test has subscribed to ends with it."""
+    """Subscriptions of a test end with it."""
     from tests.ros1.peer import collected, forget
 
     before = collected()
@@ -88,7 +88,7 @@ def _client(stage: Stage, node: NodeProcess) -> Client:
 
 @pytest.fixture
 def client(_client: Client) -> Iterator[Client]:
-    """A client of the shared node; everything is as at the start afterwards."""
+    """A client of the shared node; restores everything afterwards."""
     from tests.conformance.case import rests
 
     yield _client

@@ -1,4 +1,4 @@
-"""The other side of a node: a client of ROS 1 with everything that a test asks of it, and the node's process."""
+"""A client of a node of ROS 1 with everything that a test needs, and the process of the node."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ from heptarm.ros.trajectory.trajectory import KinematicState
 from tests.conformance.client import ReceivedFeedback, ReceivedResult, SentGoal
 from tests.conformance.stage import ROOT, Stage
 
-#: A busy machine may need long for what is quick [s].
+#: Time limit of quick operations on a busy machine [s].
 PATIENCE = 120.0
-#: And its watchdogs must not bark at that.
+#: Watchdogs must not trip within it.
 PATIENT = {"watchdog": 5.0, "servo__watchdog": 1.0, "constraints__goal_time": 20.0}
 PACKAGES = ROOT / "ros1"
 NODE = PACKAGES / "heptarm_ros1" / "scripts" / "heptarm_node"
@@ -50,7 +50,7 @@ def sources() -> dict[str, str]:
 
 
 def until(what: Callable[[], Any], why: str, timeout: float = PATIENCE) -> Any:
-    """Wait until something is true; returns it."""
+    """Wait until a value is true; return it."""
     deadline = time.monotonic() + timeout
     while time.monotonic() < deadline:
         if value := what():
@@ -60,7 +60,7 @@ def until(what: Callable[[], Any], why: str, timeout: float = PATIENCE) -> Any:
 
 
 class Core:
-    """A roscore of one's own, and this process as a node of it.
+    """A private roscore, and this process as a node of it.
 
     Args:
         name: of the node.
@@ -74,7 +74,7 @@ class Core:
     def __enter__(self) -> Core:
         try:
             while not self._start():
-                pass  # somebody else was quicker to take the port
+                pass  # another process was quicker to take the port
             rospy.init_node(self._name, disable_signals=True)
         except BaseException:
             self._end()
@@ -82,7 +82,7 @@ class Core:
         return self
 
     def _start(self) -> bool:
-        """Start a master at a free port; whether it stands."""
+        """Start a master at a free port; return whether it runs."""
         with socket.socket() as door:
             door.bind(("127.0.0.1", 0))
             port = door.getsockname()[1]
@@ -128,7 +128,7 @@ class NodeProcess:
         return self.log.read_text()
 
     def waits_for(self, text: str) -> None:
-        """Wait until it says something."""
+        """Wait until its log contains a text."""
         until(lambda: text in self.said or self.process.poll() is not None, f"the node does not say {text!r}")
         assert text in self.said, self.said
 
@@ -162,12 +162,12 @@ def collect(name: str, kind: Any) -> list[Any]:
 
 
 def collected() -> int:
-    """How many topics are collected."""
+    """Number of collected topics."""
     return len(_collecting)
 
 
 def forget(count: int) -> None:
-    """Collect no more but for the first so many topics: each costs time with every message."""
+    """Stop collecting except for the first topics: each costs time with every message."""
     while len(_collecting) > count:
         _collecting.pop().unregister()
 
@@ -185,7 +185,7 @@ def active(status: list[Status]) -> None:
 
 
 def publisher(name: str, kind: Any) -> rospy.Publisher:
-    """A publisher to which somebody listens."""
+    """A publisher with a subscriber."""
     one = rospy.Publisher(name, kind, queue_size=1, tcp_nodelay=True)
     until(one.get_num_connections, f"nobody listens to {name}")
     return one
@@ -235,7 +235,7 @@ def stamp(message: Any) -> float:
 
 
 class Client:
-    """A client as the cases of conformance want it."""
+    """A client for the cases of conformance."""
 
     preempted = (GoalOutcome.PREEMPTED,)
     timely = False
@@ -252,7 +252,7 @@ class Client:
         self._before: dict[str, object] = {}  # of parameters that were changed, by their paths
 
     def ready(self) -> None:
-        """Wait until the node is active and everything has found each other."""
+        """Wait until the node is active and discovery is complete."""
         assert self._action.wait_for_server(rospy.Duration.from_sec(PATIENCE))
         active(self.status)
         until(lambda: self.states, "no joint states come")
@@ -305,7 +305,7 @@ class Client:
         outcome = {
             GoalStatus.SUCCEEDED: GoalOutcome.SUCCEEDED,
             GoalStatus.ABORTED: GoalOutcome.ABORTED,
-            # one word for two ends; the code tells which
+            # one status for two ends; the code distinguishes them
             GoalStatus.PREEMPTED: GoalOutcome.CANCELED
             if code is ErrorCode.SUCCESSFUL
             else GoalOutcome.PREEMPTED,
@@ -335,7 +335,7 @@ class Client:
         return False
 
     def _restore(self, values: dict[str, object]) -> None:
-        """Give parameters values they had; None: they were not there."""
+        """Restore values of parameters; None: they did not exist."""
         for path, value in values.items():
             if value is None:
                 rospy.delete_param(path)

@@ -1,4 +1,4 @@
-"""Runs the `rostopic`, `rosservice` and `rosparam` commands of a script with ROS' own code, one after the other.
+"""Runs the `rostopic`, `rosservice` and `rosparam` commands of a script with ROS' own code, in order.
 
     python -m tests.ros1.shell SCRIPT
 
@@ -27,7 +27,7 @@ TOOLS = {
 
 
 def commands(script: str) -> Iterator[list[str]]:
-    """The tools' commands, which may go on over lines inside quotes."""
+    """The commands of the tools; inside quotes they may span lines."""
     command = ""
     for line in script.splitlines():
         if command or line.split(" ")[0] in TOOLS:

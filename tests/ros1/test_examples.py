@@ -1,4 +1,4 @@
-"""Every example and every snippet of the guide runs as it stands, against the node and a virtual cabinet."""
+"""Every example and every snippet of the guide runs unchanged, against the node and a virtual cabinet."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.conformance.case import rests
 from tests.conformance.stage import ROOT
 from tests.ros1.peer import Client
 
-#: Without the one that feels for a table, which stands before the arm of the surface's tests.
+#: Without the one that touches a table: that is in front of the arm of the surface tests.
 EXAMPLES = sorted(
     path
     for path in (ROOT / "examples" / "ros1").iterdir()

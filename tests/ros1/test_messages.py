@@ -1,4 +1,4 @@
-"""Our definitions of control_msgs are upstream's to the last byte of their sums, or no client would talk to us."""
+"""Our definitions of control_msgs have upstream's check sums; otherwise no client could connect."""
 
 from __future__ import annotations
 

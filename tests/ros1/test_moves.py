@@ -1,4 +1,4 @@
-"""Single motions as actions: progress, arrival, cancelling, another one, refusal."""
+"""Single motions as actions: progress, arrival, cancellation, preemption, refusal."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_a_motion_of_joints_tells_how_far_it_is(client: Client, joints) -> None:
     assert joints.wait_for_result(LONG)
     assert joints.get_state() == GoalStatus.SUCCEEDED and joints.get_result().success
     assert joints.get_result().residual < 1e-3
-    # actionlib leaves out what comes after the result, on a way of its own
+    # actionlib drops feedback that arrives after the result, by another path
     assert told == sorted(told) and 0.0 < told[-1] <= 1.0
     assert np.abs(rests(client) - HOME).max() < 2e-3
 

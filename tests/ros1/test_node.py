@@ -1,4 +1,4 @@
-"""The node beside its action: states, commands, services, life cycle, parameters."""
+"""The node without its action: states, commands, services, life cycle, parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Services: what they do to the arm, and what they say when they do not."""
+"""Services: their effects on the arm, and their texts when they fail."""
 
 from __future__ import annotations
 

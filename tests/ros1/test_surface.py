@@ -1,4 +1,4 @@
-"""Services, actions and topics beside trajectories, by the cases of `tests.conformance.surface` and `hands`."""
+"""Services, actions and topics except trajectories, by the cases of `tests.conformance.surface` and `hands`."""
 
 from __future__ import annotations
 

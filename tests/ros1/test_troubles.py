@@ -1,4 +1,4 @@
-"""What goes wrong: power cuts, emergency stops, killed clients, wrong parameters."""
+"""Faults: power cuts, emergency stops, killed clients, wrong parameters."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_a_killed_client_leaves_a_node_that_lives(client: Client) -> None:
 
 @pytest.fixture(scope="module")
 def spare_node(ros: None, spare: Stage) -> Iterator[NodeProcess]:
-    """Another arm's node, which may come to harm."""
+    """A node of another arm, for tests that may damage it."""
     node = NodeProcess(spare.target, ns="/other", prefix="other_", diagnostics_rate=10.0)
     yield node
     assert node.end() == 0, node.said
@@ -107,7 +107,7 @@ def test_a_cabinet_without_power_and_back(other: Client) -> None:
 
 
 def test_a_node_that_the_system_stops_for_a_while(other: Client, spare_node: NodeProcess) -> None:
-    """The cabinet brakes the arm, the goal ends, and the node goes on."""
+    """The cabinet brakes the arm, the goal ends, and the node continues."""
     sent = other.send(step(other, time=9.0, size=6.0))
     until(lambda: other.feedback(sent), "the goal does not begin")
     spare_node.process.send_signal(signal.SIGSTOP)

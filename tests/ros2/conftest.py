@@ -1,4 +1,4 @@
-"""Tests with real rclpy; in an environment without it they are not there, and `make test-ros2` says so."""
+"""Tests with rclpy; without it no test is collected, and `make test-ros2` reports it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def free_domain(first: int) -> tuple[int, socket.socket]:
-    """A domain that no other run on this machine has, and what keeps it ours until this process ends."""
+    """A domain that no other run on this machine uses, and the lock that reserves it until this process ends."""
     for number in range(first, first + 101):
         held = socket.socket(socket.AF_UNIX)
         try:
@@ -42,7 +42,7 @@ os.environ.pop("HEPTARM_TARGET", None)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Lets the message generators, which rclpy imports, use what Python is about to drop."""
+    """Lets the message generators, which rclpy imports, use deprecated features of Python."""
     config.addinivalue_line("filterwarnings", "ignore:module 'sre_:DeprecationWarning")
 
 
@@ -53,7 +53,7 @@ def pytest_unconfigure() -> None:
 
 @pytest.fixture(scope="session")
 def stage() -> Iterator[Stage]:
-    """A virtual iiwa 14 with a hand on its faults."""
+    """A virtual iiwa 14 with injectable faults."""
     running = Stage()
     yield running
     running.close()
@@ -61,7 +61,7 @@ def stage() -> Iterator[Stage]:
 
 @pytest.fixture(scope="session")
 def spare() -> Iterator[Stage]:
-    """A second one, for tests that start a node of their own; they leave nobody in control of it."""
+    """A second one, for tests that start a node of their own; they release its control."""
     running = Stage()
     yield running
     running.close()
@@ -95,7 +95,7 @@ def ros() -> Iterator[Ros]:
 
 @pytest.fixture(autouse=True)
 def _forget(request: pytest.FixtureRequest) -> Iterator[None]:
-    """What a test has subscribed to ends with it."""
+    """Subscriptions of a test end with it."""
     ros: Ros | None = request.getfixturevalue("ros") if "ros" in request.fixturenames else None
     before = 0 if ros is None else ros.collected
     assert ros is None or ros.serves, "the node of the tests is served no more: an earlier error ended it"
@@ -125,7 +125,7 @@ def _client(ros: Ros, stage: Stage, node: NodeProcess) -> Client:
 
 @pytest.fixture
 def client(_client: Client) -> Iterator[Client]:
-    """A client of the shared node; everything is as at the start afterwards."""
+    """A client of the shared node; restores everything afterwards."""
     from tests.conformance.case import rests
 
     yield _client

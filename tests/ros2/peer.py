@@ -1,4 +1,4 @@
-"""The other side of a node: a client of ROS 2 with everything that a test asks of it, and the node's process."""
+"""A client of a node of ROS 2 with everything that a test needs, and the process of the node."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ from tests.conformance.stage import Stage
 
 #: Discovery can take some seconds, and a busy machine many more [s].
 PATIENCE = 120.0
-#: A busy machine needs patience of a node, too.
+#: Time limits of a node on a busy machine.
 PATIENT: dict[str, object] = {"servo__watchdog": 1.0, "watchdog": 5.0, "constraints__goal_time": 20.0}
 #: Parameters that cases change.
 DEFAULTS: dict[str, object] = {
@@ -58,7 +58,7 @@ OUTCOMES = {
 
 
 def until(what: Callable[[], Any], why: str, timeout: float = PATIENCE) -> Any:
-    """Wait until something is true; returns it."""
+    """Wait until a value is true; return it."""
     deadline = time.monotonic() + timeout
     while time.monotonic() < deadline:
         if value := what():
@@ -93,7 +93,7 @@ class NodeProcess:
         return self.log.read_text()
 
     def waits_for(self, text: str) -> None:
-        """Wait until it says something."""
+        """Wait until its log contains a text."""
         until(lambda: text in self.said or self.process.poll() is not None, f"the node does not say {text!r}")
         assert text in self.said, self.said
 
@@ -108,7 +108,7 @@ class NodeProcess:
             return self.process.wait()
 
     def finish(self) -> None:
-        """End it and look that it ended well; the log is kept if it did not."""
+        """End it and check its exit code; the log is kept if it failed."""
         code = self.end()
         said = self.said
         print(said)
@@ -138,15 +138,15 @@ class Ros:
         return self._thread.is_alive()
 
     def wait(self, future: Any, why: str, timeout: float = PATIENCE) -> Any:
-        """What a future brings."""
+        """Wait for the result of a future."""
         until(lambda: future.done() or not self.serves, why, timeout)
         assert future.done(), f"{why}: the node of the tests is served no more"
         return future.result()
 
     def act(self, kind: type, name: str) -> ActionClient[Any, Any, Any]:
-        """A client of an action that is there.
+        """A client of an available action.
 
-        rclpy shows a client to the executor before it is whole, so the executor's thread has to make it.
+        rclpy shows a client to the executor before it is complete, so the executor's thread has to create it.
         """
         if name not in self._actions:
             made = self._executor.create_task(ActionClient, self.node, kind, name)
@@ -158,7 +158,7 @@ class Ros:
         return client
 
     def find(self, kind: type, name: str) -> Any:
-        """A client of a service that is there."""
+        """A client of an available service."""
         if name not in self._clients:
             self._clients[name] = self.node.create_client(kind, name)
             self._meet(name)
@@ -167,7 +167,7 @@ class Ros:
         return client
 
     def _meet(self, name: str) -> None:
-        """Wait until the node of a service or an action has discovered all clients that there are here by now.
+        """Wait until the node of a service or an action has discovered all clients of this process.
 
         A client knows that it has discovered a server, but not whether the server has discovered it, and until then
         answers are lost. Discovery goes in the order in which clients are made. So one that is made now asks for
@@ -208,7 +208,7 @@ class Ros:
         return found
 
     def forget(self, count: int) -> None:
-        """Collect no more but for the first so many topics: each costs time with every message."""
+        """Stop collecting except for the first topics: each costs time with every message."""
         while len(self._collected) > count:
             subscription = self._collected.pop()
             done = self._executor.create_task(self.node.destroy_subscription, subscription)
@@ -216,7 +216,7 @@ class Ros:
 
     @property
     def collected(self) -> int:
-        """How many topics are collected."""
+        """Number of collected topics."""
         return len(self._collected)
 
     def close(self) -> None:
@@ -303,7 +303,7 @@ def fresh(ros: Ros, found: list[Any]) -> Any:
 
 
 class Client:
-    """A client as the cases of conformance want it."""
+    """A client for the cases of conformance."""
 
     preempted = (GoalOutcome.ABORTED,)
     timely = False
@@ -325,7 +325,7 @@ class Client:
         self._how, self._override = "follows", 1.0
 
     def ready(self) -> None:
-        """Wait until the node is active and everything has found each other."""
+        """Wait until the node is active and discovery is complete."""
         _ = self._action
         until(lambda: self.states and self.status and self.status[-1].active, "the node is not active")
 

@@ -1,4 +1,4 @@
-"""A stand-in for the `ros2` command, which is in no wheel: its words, so that documented commands run as written."""
+"""A substitute for the `ros2` command, which is in no wheel, so that documented commands run as written."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ VERBS = {"topic": topic, "service": service, "action": action, "param": param, "
 
 
 def run(ros: Ros, text: str) -> list[str]:
-    """Run the `ros2` commands of a script, which may go on over lines inside quotes; other lines are left out."""
+    """Run the `ros2` commands of a script, which may span lines inside quotes; other lines are skipped."""
     said, command = [], ""
     for line in text.splitlines():
         if command or line.startswith("ros2 "):

@@ -1,4 +1,4 @@
-"""The examples and the guide's commands and snippets run as they stand, against a node and a virtual arm."""
+"""The examples and the guide's commands and snippets run unchanged, against a node and a virtual arm."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.conformance.stage import ROOT
 from tests.ros2 import shell
 from tests.ros2.peer import Client
 
-#: Without the one that feels for a table, which stands before the arm of the surface's tests.
+#: Without the one that touches a table: that is in front of the arm of the surface tests.
 SCRIPTS = sorted(path for path in (ROOT / "examples" / "ros2").glob("*.py") if path.name != "touch.py")
 GUIDE = (ROOT / "docs" / "guide" / "ros2.md").read_text(encoding="utf-8")
 BLOCK = re.compile(r"^```(\w+)[^\n]*\n(.*?)^```", re.S | re.M)

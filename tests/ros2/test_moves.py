@@ -49,7 +49,7 @@ def joints(ros: Ros, client: Client) -> Moves:
 def test_a_motion_of_joints_a_line_and_an_arc(ros: Ros, client: Client, joints: Moves) -> None:
     status, result = joints.end(joints.start(position=HOME, speed=0.5))
     assert status == GoalStatus.STATUS_SUCCEEDED and result.success and result.residual < 1e-3
-    until(lambda: joints.told and joints.told[-1] == 1.0, "the end is not told")  # it comes on its own way
+    until(lambda: joints.told and joints.told[-1] == 1.0, "the end is not told")  # it arrives by another path
     assert joints.told == sorted(joints.told)
     assert np.abs(rests(client) - HOME).max() < 2e-3
     seen = ros.collect(PoseStamped, f"{client.name}/pose")

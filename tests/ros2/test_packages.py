@@ -258,7 +258,7 @@ def test_moveits_semantic_description_names_what_there_is() -> None:
 
 
 class Anything:
-    """Stands for whatever a launch file uses of packages that are not here, and keeps what it is given."""
+    """A substitute for what a launch file uses of missing packages; records its arguments."""
 
     made: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = []  # noqa: RUF012  one list for all
 

@@ -1,4 +1,4 @@
-"""The reach policy over ROS 2: joint states in, servo targets out, targets that come and change."""
+"""The reach policy over ROS 2: joint states in, servo targets out, changing targets."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_it_reaches_targets_one_after_the_other_and_holds(client: Client, ros: R
     for point in ((0.6, 0.15, 0.35), (0.55, -0.1, 0.5)):
 
         def reached(point: tuple[float, float, float] = point) -> bool:
-            targets.publish(target(*point))  # again and again: the first may come before they know each other
+            targets.publish(target(*point))  # repeatedly: the first may be sent before discovery is complete
             time.sleep(0.2)
             return bool(distances) and distances[-1].data < 0.01
 

@@ -1,4 +1,4 @@
-"""Services: what they do to the arm, and what they say when they do not."""
+"""Services: their effects on the arm, and their texts when they fail."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.ros2.peer import Client, Ros, until
 
 @pytest.fixture
 def ask(ros: Ros, client: Client):
-    """Calls a service and wants success."""
+    """Calls a service, which must succeed."""
 
     def call(name: str, kind: Any = Trigger, /, *, refused: bool = False, **request: Any) -> Any:
         answer = ros.call(kind, f"{client.name}/{name}", kind.Request(**request))

@@ -1,4 +1,4 @@
-"""What goes wrong around a node: emergency stop, a client that dies, a cabinet that dies and comes back."""
+"""Faults around a node: emergency stop, a killed client, a killed and restarted cabinet."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.ros2.peer import PATIENT, Client, NodeProcess, Ros, stamp, until
 
 @pytest.fixture(scope="module")
 def tough(spare: Stage) -> Iterator[NodeProcess]:
-    """A node that has to live through all of it."""
+    """A node that has to survive all of them."""
     running = NodeProcess(spare.target, name="tough", space="/trouble", diagnostics_rate=10.0, **PATIENT)
     yield running
     assert running.process.poll() is None, f"the node has died:\n{running.said}"
@@ -51,7 +51,7 @@ def test_an_emergency_stop_ends_a_goal_and_refuses_others(victim: Client, spare:
     until(
         lambda: ros.call(Trigger, "/trouble/tough/recover", Trigger.Request()).success, "it does not recover"
     )
-    stays(victim, rest)  # nothing goes on by itself
+    stays(victim, rest)  # nothing continues by itself
     succeeds(victim, step(victim))
 
 
@@ -88,7 +88,7 @@ def test_a_client_that_is_killed_leaves_a_node_that_serves_others(victim: Client
 
 
 def tough_is(found: list[DiagnosticArray], level: bytes) -> bool:
-    """Whether the node's newest diagnosis has that level."""
+    """Whether the newest diagnosis of the node has this level."""
     mine = [one for array in found for one in array.status if one.name == "trouble/tough: arm"]
     return bool(mine) and mine[-1].level == level
 
@@ -118,7 +118,7 @@ def test_a_cabinet_that_dies_and_comes_back(
 
 
 def test_a_node_that_the_system_stops_for_a_while(victim: Client, tough: NodeProcess) -> None:
-    """The cabinet brakes the arm, the goal ends, and the node goes on."""
+    """The cabinet brakes the arm, the goal ends, and the node continues."""
     here = victim.place().q
     sent = victim.send(step(victim, time=9.0, size=6.0))
     under_way(victim, here)

@@ -58,7 +58,7 @@ def _servo(**settings: Any) -> Callable[[Arm, Any], object]:
 
 
 def _within(call: Callable[[Any, Any], object], kind: str = "joint") -> Callable[[Arm, Any], object]:
-    """Does something with the servo motion that runs."""
+    """Uses the running servo motion."""
 
     def do(arm: Arm, value: Any) -> object:
         with arm.servo(kind, watchdog=2.0) as servo:
@@ -90,7 +90,7 @@ def _fri(**settings: Any) -> Callable[[Arm, Any], object]:
 
 def _connected(**settings: Any) -> Callable[[Arm, Any], object]:
     def do(arm: Arm, value: Any) -> object:
-        host = f"sim://{arm._connection.link.peer}"
+        host = f"sim://{arm.connection.link.peer}"
         given = {name: value if one is ... else one for name, one in settings.items()}
         return ha.connect(host, **given)
 

@@ -19,7 +19,7 @@ Bodies = Sequence[tuple[int, bytes]]
 
 @pytest.fixture(scope="session")
 def recode(tmp_path_factory: pytest.TempPathFactory) -> Callable[[Bodies], list[str]]:
-    """What the Java codec makes of bodies: each written again and judged, or "undecodable", or "unknown"."""
+    """Result of the Java codec for bodies: each encoded again and validated, or "undecodable", or "unknown"."""
     from heptarm import _resources
 
     if shutil.which("javac") is None:

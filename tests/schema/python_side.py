@@ -1,4 +1,4 @@
-"""What the Python codec makes of a body, in the words of the Java program."""
+"""Result of the Python codec for a body, in the format of the Java program."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def verdict(message: Message) -> str:
 
 
 def recoded(number: int, body: bytes) -> str:
-    """The body written again and judged, or "undecodable", or "unknown"."""
+    """The body encoded again and validated, or "undecodable", or "unknown"."""
     if number not in MESSAGES:
         return "unknown"
     try:

@@ -52,7 +52,7 @@ class Case:
 
 
 def bad_values(one: schema.Field) -> list[Bad]:
-    """What a field has to refuse."""
+    """The values that a field must refuse."""
     name, kind = one.type.name, one.type.kind
     if kind in ("prim", "array") and name == "f64":
         return list(_numbers(one))

@@ -32,7 +32,7 @@ def cabinet() -> Iterator[PrivateCabinet]:
 
 @pytest.fixture
 def peer(cabinet: PrivateCabinet) -> Iterator[Peer]:
-    """In control; what runs, hangs and glows is afterwards as it was before, and the cabinet works."""
+    """In control; afterwards motions, tools and lamps are as before, and the cabinet works."""
     with Peer(cabinet.port, name="bypass") as peer:
         peer.take_control()
         before = picture(cabinet)
@@ -45,7 +45,7 @@ def peer(cabinet: PrivateCabinet) -> Iterator[Peer]:
 
 
 def picture(cabinet: PrivateCabinet) -> tuple[object, ...]:
-    """What a refused request might have changed."""
+    """The state that a refused request might have changed."""
     with ha.connect(f"sim://{cabinet.host}:{cabinet.port}", control=False, timeout=PATIENCE) as arm:
         arm.subscribe(groups=("joints", "motion", "safety", "mode", "io"))
         state = arm.wait_until(lambda s: s.groups.io is not None and s.groups.mode is not None, timeout=PATIENCE)

@@ -23,7 +23,7 @@ def arm() -> Iterator[ha.Arm]:
 
 
 def refused() -> dict[str, list[Bad]]:
-    """What each field that clients send has to refuse."""
+    """The values that each field of a client must refuse."""
     every: dict[str, dict[str, Bad]] = {}
     names = {message.name for message in SENT}
     for case in cases():

@@ -1,4 +1,4 @@
-"""What is committed is what the schema says, and the schema is checked itself."""
+"""Committed files match the schema, and the schema itself is checked."""
 
 from __future__ import annotations
 

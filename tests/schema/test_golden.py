@@ -1,4 +1,4 @@
-"""The same octets in three hands: an independent walk over the schema wrote them, Python and Java read them."""
+"""Golden bytes: written by an independent walk over the schema, read by Python and Java."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Values that are legal by themselves and make no sense here: unknown names, crossed bounds, limits of this robot.
+"""Values that are legal by themselves but wrong here: unknown names, crossed bounds, limits of this robot.
 
 Each is given to the API, and as a raw message to the application past the API: both refuse it with the same code.
 """
@@ -45,7 +45,7 @@ def until(node: wire.ConditionNode) -> wire.Run:
 
 @dataclass(frozen=True)
 class Wrong:
-    """What makes no sense: the message and the place in it, the call and its parameter, the code of both."""
+    """Wrong values: the message and the field, the call and its parameter, the code of both."""
 
     message: wire.Message
     place: str
@@ -277,7 +277,7 @@ def test_both_sides_refuse_it_with_one_code(arm: Arm, what: str) -> None:
     with pytest.raises(ha.CommandRejected) as here:
         wrong.call(arm)
     with pytest.raises(ha.CommandRejected) as there:
-        arm._connection.link.request(wrong.message, timeout=30.0)
+        arm.connection.link.request(wrong.message, timeout=30.0)
     assert (here.value.code, here.value.parameter) == (wrong.code, wrong.name), here.value.text
     assert (there.value.code, there.value.parameter) == (wrong.code, wrong.place), there.value.text
     after = arm.wait_for_rest(timeout=30.0)

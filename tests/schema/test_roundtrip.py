@@ -1,4 +1,4 @@
-"""Any legal body comes back as it was; any other octets raise DecodeError and nothing else, in both languages alike."""
+"""Any legal body survives a round trip; any other bytes raise DecodeError and nothing else, in both languages."""
 
 from __future__ import annotations
 

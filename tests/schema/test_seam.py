@@ -1,4 +1,4 @@
-"""The seam between the doubles and the plant: values come back as they went, and the memory has no gaps."""
+"""The seam between the doubles and the plant: values survive a round trip, and the memory has no gaps."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ READY = (0.0, 0.5, 0.0, -1.3, 0.0, 0.9, 0.0)
 
 @dataclass
 class Ear:
-    """Hears what becomes of an order."""
+    """Records the events of an order."""
 
     heard: list[tuple[str, str]] = field(default_factory=list)
 
@@ -49,7 +49,7 @@ def ready(model: str = "iiwa14") -> Plant:
 
 
 def run(plant: Plant, *orders: Order, most: int = 30_000) -> Track:
-    """Submit orders and tick until nothing is left to do."""
+    """Submit orders and tick until the plant is idle."""
     for order in orders:
         plant.submit(order)
     seen = []

@@ -1,4 +1,4 @@
-"""A plant whose arm is where its set-points are: no dynamics, so that hundreds of stops take seconds."""
+"""A plant whose arm follows its set-points exactly: without dynamics, so that hundreds of stops take seconds."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def stopping_time(plant: Plant, how: str) -> float:
 
     A stop on the path brakes with what the path's limits allow, jerk included; a servo motion with its axes'. The
     others brake at each axis' full deceleration; on a curved path the axis that is fastest may not be the one that
-    sets the pace, so an emergency stop gets half as much again.
+    limits the speed, so an emergency stop gets half as much again.
     """
     run = plant.interpolator.run
     assert run is not None

@@ -1,4 +1,4 @@
-"""Batches: the arm does not stop where a motion is blended into the next, and keeps every limit on the way."""
+"""Batches: the arm does not stop where a motion blends into the next one, and keeps every limit."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ AWAY = (0.4, 0.3, 0.1, -1.0, 0.2, 0.7, -0.2)
 
 @dataclass
 class PartEar(Ear):
-    """Hears of parts, too."""
+    """Also records the events of parts."""
 
     parts: list[int] = field(default_factory=list)
 

@@ -1,4 +1,4 @@
-"""Arcs of the plant are round, turn the moved frame as they were told, and stop on the arc."""
+"""Arcs of the plant are circular, turn the motion frame as commanded, and stop on the arc."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def poses(plant: Plant, joints: Array, tcp: Pose = TCP) -> list[Pose]:
 def round_trip(
     plant: Plant, angle: float, tcp: Pose = TCP, radius: float = 0.08, plane: str = "xy"
 ) -> tuple[Order, Array]:
-    """An order for an arc from where the plant is, and the arc's centre."""
+    """An order for an arc from the current position of the plant, and its centre."""
     start = poses(plant, plant.snapshot.q_cmd[None], tcp)[0]
     centre = start.xyz + {"xy": (0, radius, 0), "xz": (0, 0, -radius), "yz": (0, radius, 0)}[plane]
     motion = arc(start, angle, centre=centre, plane=plane)
@@ -48,7 +48,7 @@ def test_an_arc_is_round_on_the_measured_pose(plane: str, angle: float) -> None:
     normal = {"xy": 2, "xz": 1, "yz": 0}[plane]
     assert np.abs(spokes[:, normal]).max() <= 0.5e-3
     assert seen[-1].xyz == pytest.approx(order.pose[:3], abs=2e-4)
-    # it goes round all the way: the angles between one look and the next add up
+    # it moves along the whole circle: the angles between the samples add up
     turned = np.cross(spokes[:-1], spokes[1:])[:, normal] / 0.08**2 * (-1 if plane == "xz" else 1)
     assert np.arcsin(turned).sum() == pytest.approx(angle, abs=0.01)
 

@@ -1,4 +1,4 @@
-"""Conditions on the plant: one that fires brakes the motion on its path; triggers go off, observers watch on."""
+"""Conditions on the plant: break conditions brake the motion on its path, triggers fire, observers continue."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def test_a_line_down_onto_a_push_brakes_on_its_path() -> None:
     way = forward(plant.robot, track.q_cmd[-1])[:3, 3] - start
     assert -0.15 < way[2] < -0.04 and np.abs(way[:2]).max() < 1e-3
     assert np.abs(track.acceleration).max() < 1.2 * plant.robot.ddq_max.max()
-    plant.submit(Order(2, "ptp", joints=READY))  # and the next motion begins where it came to rest
+    plant.submit(Order(2, "ptp", joints=READY))  # and the next motion starts where it came to rest
     run(plant)
     assert np.abs(plant.snapshot.q_cmd - READY).max() < 1e-9
 

@@ -1,4 +1,4 @@
-"""Cartesian impedance on the plant: it yields as ordered, limits stop the run and say so, modes take over gently."""
+"""Cartesian impedance on the plant: compliance as ordered, limits stop the motion, modes change smoothly."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_the_moved_frame_yields_not_the_flange() -> None:
     turning = CartesianImpedance((5000, 5000, 5000, 30, 300, 300))
     plant, _ = holding(turning, tcp=numbers(tool))
     before = tip(plant) @ tool
-    plant.apply_wrench((0, 0, 0), tuple(before.rotation @ (3.0, 0.0, 0.0)))  # about the moved frame's x
+    plant.apply_wrench((0, 0, 0), tuple(before.rotation @ (3.0, 0.0, 0.0)))  # about x of the motion frame
     plant.step(1500)
     moved = before.inverse() @ (tip(plant) @ tool)
     assert 2 * moved.quat[0] == pytest.approx(3.0 / 30.0, rel=0.02)
@@ -135,7 +135,7 @@ def test_an_overlaid_force_swings_the_hand_as_far_as_the_dynamics_let_it() -> No
     for _ in range(6000):
         plant.tick()
         way.append(yielded(plant)[1])
-    seen = np.array(way[2000:])  # one whole turn; so slowly the hand keeps up with the force
+    seen = np.array(way[2000:])  # one whole turn, slow enough for the hand to follow the force
     assert seen.max() == pytest.approx(10.0 / 500.0, rel=0.05)
     assert seen.min() == pytest.approx(-10.0 / 500.0, rel=0.05)
 

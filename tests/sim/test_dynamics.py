@@ -1,4 +1,4 @@
-"""Whatever limits a motion of any kind is given, it heeds: each one alone makes it slower."""
+"""Motions of every kind obey their limits: each limit alone makes a motion slower."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_limits_of_the_axes_are_heeded(kind: str, limit: str) -> None:
 @pytest.mark.parametrize("axis", range(7))
 def test_each_axis_has_its_own(kind: str, axis: int) -> None:
     order = ORDERS["ptp"] if kind == "lin" else ORDERS[kind]
-    if kind == "lin":  # a way on which every axis moves
+    if kind == "lin":  # a path on which every axis moves
         order = part("lin", pose=there(0.1, 0.15, -0.1, 0.5), redundancy=(0.5, 2, -1))
     slow = tuple(0.01 if index == axis else 1.0 for index in range(7))
     assert duration(limited(order, joint_velocity=slow)) > 1.1 * duration(order)

@@ -1,4 +1,4 @@
-"""What goes wrong under way ends the motion, never the loop; what acts from outside shows."""
+"""Faults during a motion end the motion, never the loop; external loads show in the state."""
 
 from __future__ import annotations
 

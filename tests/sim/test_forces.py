@@ -1,4 +1,4 @@
-"""Torques and wrenches: what the sensors show is what acts on the arm."""
+"""Torques and wrenches: the sensors show the load on the arm."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Hand guiding on the plant: the arm gives way while the switch is held, within its limits."""
+"""Hand guiding on the plant: the arm is compliant while the switch is held, within its limits."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SIDEWAYS = (0.0, 60.0, 0.0)
 
 
 def begun(guide: HandGuide | None = None, *, model: str = "iiwa14") -> tuple[Plant, Ear]:
-    """An arm that is being led."""
+    """An arm that is guided by hand."""
     plant, ear = ready(model), Ear()
     plant.submit(Order(1, "guide", guide=guide or hand_guide(), listener=ear))
     plant.safety.guide()
@@ -94,7 +94,7 @@ def test_no_axis_leaves_its_own_limits(force: tuple[float, ...]) -> None:
     plant, ear = begun()
     q, _ = lead(plant, force, 2.0)
     assert (q > plant.robot.q_min).all() and (q < plant.robot.q_max).all()
-    plant.apply_wrench(force)  # somebody goes on pushing
+    plant.apply_wrench(force)  # a person continues to push
     finish(plant)
     assert ear.causes[-1] == "done"
 

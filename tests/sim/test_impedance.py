@@ -1,4 +1,4 @@
-"""Cartesian impedance on a bare arm: it yields like the spring it was ordered as, and nothing makes it swing up."""
+"""Cartesian impedance on a bare arm: compliant with the commanded stiffness, and stable."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_a_push_moves_the_hand_by_force_over_stiffness(index: int, model: str, t
     arm.step(1.2)
     yielded = along(index, PUSH[index] / STIFFNESS[index])
     assert arm.law.deviation == pytest.approx(yielded, abs=0.02 * abs(yielded[index]))
-    moved = wanted.inverse() @ arm.pose  # by the arm's kinematics, not by what the law believes
+    moved = wanted.inverse() @ arm.pose  # by the kinematics of the arm, not the model of the law
     measured = np.concatenate([moved.xyz, 2.0 * moved.quat[:3]])
     assert measured[index] == pytest.approx(yielded[index], rel=0.02)
     arm.push = np.zeros(6)
@@ -163,7 +163,7 @@ def test_the_elbow_yields_like_a_spring_of_its_own_and_the_hand_stays() -> None:
     arm.step(0.002)
     arm.data.qfrc_applied[:7] = 0.0
     push = arm.sensed.mass @ way
-    push *= 5.0 / float(way @ push)  # 5 Nm along the elbow's way
+    push *= 5.0 / float(way @ push)  # 5 Nm along the motion of the elbow
     original = arm.law.torque
 
     def pushed(sensed: Any) -> Any:
@@ -241,7 +241,7 @@ def test_limits_that_stop_say_so(limits: dict[str, Any], text: str) -> None:
 
 
 def table(height: float, hardness: float) -> str:
-    """A table top under the hand; for the mass m of the arm it has a spring of 9 m hardness [1/s²]."""
+    """A table under the hand, a spring of stiffness 9 m for the mass m of the arm [1/s²]."""
     return (
         f'<geom name="table" type="box" pos="0.55 0 {height - 0.02}" size="0.3 0.3 0.02" contype="2" conaffinity="1" '
         f'solref="-{hardness} -{math.sqrt(hardness)}" solimp="0.9 0.9 0.001"/>'
@@ -249,7 +249,7 @@ def table(height: float, hardness: float) -> str:
 
 
 def lowering(arm: Arm, depth: float, speed: float) -> Any:
-    """A set-point that goes straight down by a depth and stays; in joints, by small steps."""
+    """A set-point that moves straight down by a depth and stays; in joints, by small steps."""
     steps = 400
     q = np.array(arm.start)
     path = [q.copy()]

@@ -1,4 +1,4 @@
-"""Motions of the plant end where they should, go straight where they should, and keep every limit."""
+"""Motions of the plant end at their targets, follow straight lines, and keep every limit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The operator of the virtual cabinet: what can be said, when it happens, and what is not understood."""
+"""The operator of the virtual cabinet: commands, their times, and unknown commands."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def test_signals_are_set_and_keys_pressed_also_at_a_time() -> None:
     pressed: list[tuple[str, int]] = []
     operator.press = lambda bar, slot: not pressed.append((bar, slot))  # type: ignore[func-returns-value]
     operator.schedule("set cell.door true@0.01")
-    operator.schedule("set Cell.Lid true@0.01")  # there is none: the arm goes on
+    operator.schedule("set Cell.Lid true@0.01")  # there is none: the arm continues
     for _ in range(20):
         operator.tick()
         plant.tick()

@@ -1,4 +1,4 @@
-"""Loads on the flange: what was declared is not felt, what was not is an external force."""
+"""Loads on the flange: declared ones are compensated, others count as external forces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Orders wait their turn; cancelling, pausing and the override work under way."""
+"""Orders are queued; cancelling, pausing and the override work during a motion."""
 
 from __future__ import annotations
 

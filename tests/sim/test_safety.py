@@ -1,4 +1,4 @@
-"""Stops of the safety controller: the arm keeps its path and its limits, brakes, and goes on afterwards."""
+"""Stops of the safety controller: the arm keeps its path and its limits, brakes, and continues afterwards."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def test_a_stop_is_latched_until_somebody_resumes() -> None:
     assert not (safety.stop_requested or safety.latched)
     safety.request_stop(StopRequest.EMERGENCY_STOP)
     safety.resume()
-    assert safety.stop_requested and safety.latched  # nobody resumes while the button is pressed
+    assert safety.stop_requested and safety.latched  # no resume while the button is pressed
     safety.withdraw(StopRequest.EMERGENCY_STOP)
     assert not safety.stop_requested and safety.latched
     safety.resume()
@@ -53,7 +53,7 @@ def test_the_enabling_switch_counts_in_t1_and_t2_only() -> None:
     safety.choose(OperationMode.T2)
     assert safety.stop_requested and safety.lacks_enabling
     safety.enable()
-    assert not safety.stop_requested and safety.latched  # pressing it alone does not let the arm go on
+    assert not safety.stop_requested and safety.latched  # pressing it alone does not resume the motion
     safety.resume()
     safety.release()
     assert safety.stop_requested and safety.latched
@@ -135,7 +135,7 @@ def _free_run(kind: str) -> list[Array]:
 
 
 def _distance(way: Array, place: Array) -> float:
-    """From a place to the polygon through the places of a way [rad]."""
+    """Distance from a position to the polygon through the positions of a path [rad]."""
     here, step = way[:-1], np.diff(way, axis=0)
     length = np.maximum((step**2).sum(axis=1), 1e-30)
     share = np.clip(((place - here) * step).sum(axis=1) / length, 0.0, 1.0)
@@ -153,14 +153,14 @@ def test_brakes_hold_a_soft_arm_against_a_push() -> None:
     plant.step(500)
     state = plant.snapshot
     assert np.abs(state.q - before).max() < 2e-3 and np.abs(state.tau_cmd).max() == 0.0
-    assert state.wrench[1] == pytest.approx(60.0, abs=1.0)  # and the sensors still feel it
+    assert state.wrench[1] == pytest.approx(60.0, abs=1.0)  # and the sensors still measure it
     plant.apply_wrench((0.0, 0.0, 0.0))
     plant.safety.withdraw()
     plant.resume()
     plant.step(500)
     plant.apply_wrench((0.0, 60.0, 0.0))
     plant.step(500)
-    assert np.abs(plant.snapshot.q - before).max() > 0.02  # soft again
+    assert np.abs(plant.snapshot.q - before).max() > 0.02  # compliant again
     plant.stop()
 
 

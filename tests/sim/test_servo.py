@@ -1,4 +1,4 @@
-"""Servo motions on the plant: the newest target wins, limits hold at every tick, and everything stops."""
+"""Servo motions on the plant: the newest target counts, limits hold at every tick, and every stop works."""
 
 from __future__ import annotations
 

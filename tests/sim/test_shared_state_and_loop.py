@@ -1,4 +1,4 @@
-"""The shared ring is never seen torn, and the loop keeps time."""
+"""The shared state is never read torn, and the loop keeps time."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def _pace(speed: float) -> list[float]:
 
 def test_the_loop_keeps_the_requested_speed() -> None:
     per_second, tick, _ = _pace(1.0)
-    assert 100 < per_second < 1100 and tick > 0.0  # time that the machine does not give is given up
+    assert 100 < per_second < 1100 and tick > 0.0  # time that the machine does not provide is given up
     assert 100 < _pace(4.0)[0] < 4400
     assert _pace(0.0)[0] > 100  # as fast as it goes
 

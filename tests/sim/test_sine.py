@@ -1,4 +1,4 @@
-"""Overlaid forces: what a clamped hand feels is what was ordered, and a free one swings as its spring lets it."""
+"""Overlaid forces: a clamped hand exerts the commanded force, a free one swings with its stiffness."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_it_can_keep_the_motion_waiting() -> None:
 
 
 def clamped(mode: SineImpedance, seconds: float, *, tcp: Pose | None = None) -> Array:
-    """What the clamp feels: wrenches at the moved frame, in its axes, every tick, shape (n, 6)."""
+    """Wrenches on the clamp at the motion frame, in its axes, every tick, shape (n, 6)."""
     link = Pose.from_matrix(forward(robot("iiwa14"), ASKEW)) @ Pose.at(z=-0.035)
     world = link.inverse()
     numbers = [*world.xyz, world.quat[3], *world.quat[:3]]

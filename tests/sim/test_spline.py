@@ -1,4 +1,4 @@
-"""Splines pass through their points without a halt, in space and in joint space."""
+"""Splines pass through their points without a stop, in Cartesian and in joint space."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Straight servo motions on the plant: lines in space, limits along each axis, braking on the line."""
+"""Straight servo motions on the plant: straight lines, limits along each axis, braking on the line."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def serving(tcp: Pose | None = None, **terms: object) -> tuple[Plant, Ear, Pose]
 
 
 def places(plant: Plant, ticks: int, tcp: Pose | None = None) -> tuple[Array, list[Pose]]:
-    """Where the moved frame was commanded to, tick by tick."""
+    """Commanded positions of the motion frame, tick by tick."""
     seen = []
     for _ in range(ticks):
         plant.tick()

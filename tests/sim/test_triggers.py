@@ -1,4 +1,4 @@
-"""Triggers on the plant: of parts of batches and splines, at the ends, under override and pause; parts are told of."""
+"""Triggers on the plant: in parts of batches and splines, at the ends, with override and pause; events of parts."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SPEED = 0.1
 
 @dataclass
 class Log:
-    """What is told of an order, each with the place of the set-point, shape (3,) [m]."""
+    """Events of an order, each with the position of the set-point, shape (3,) [m]."""
 
     plant: Plant
     told: list[tuple[str, Array]] = field(default_factory=list)
@@ -46,7 +46,7 @@ class Log:
         return [name for name, _ in self.told]
 
     def way(self, name: str) -> Array:
-        """Where it was told, from where the motion began, shape (3,) [m]."""
+        """Position of an event relative to the start of the motion, shape (3,) [m]."""
         return dict(self.told)[name] - self.told[0][1]
 
 
@@ -169,7 +169,7 @@ def test_an_arm_that_is_there_already_has_the_ends_only() -> None:
 def test_segments_of_a_joint_spline_are_told_of() -> None:
     plant = ready()
     log = Log(plant)
-    knots = [(0.1 * k, *READY[1:]) for k in (1, 2, 2, 3)]  # the third leads nowhere
+    knots = [(0.1 * k, *READY[1:]) for k in (1, 2, 2, 3)]  # the third one has no length
     parts = tuple(Order(1, "ptp", joints=knot) for knot in knots)
     order = Order(1, "spline_joints", parts=parts, listener=log, part_listener=log)
     seen = []

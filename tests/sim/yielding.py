@@ -58,12 +58,12 @@ class Arm:
         self.sensed = MeasuredState(
             d.qpos[:7], d.qvel[:7], self.mass[:7, :7], d.qfrc_bias[:7], d.qfrc_passive[:7], *[self.start] * 3
         )
-        self.push = np.zeros(6)  # on the moved frame, base axes
+        self.push = np.zeros(6)  # on the motion frame, base axes
         self.time = 0.0
         self.torque = np.zeros(7)
 
     def step(self, seconds: float, way: Way | None = None) -> list[Array]:
-        """Run for a time, the set-point on its way over the arm's time; deviations of every tick."""
+        """Run for a time while the set-point follows its path; deviations of every tick."""
         seen = []
         for _ in range(round(seconds * 1000)):
             self.tick(way)
@@ -90,7 +90,7 @@ class Arm:
 
     @property
     def pose(self) -> Pose:
-        """Of the moved frame."""
+        """Of the motion frame."""
         return Pose.from_matrix(forward(self.robot, self.data.qpos[:7])) @ self.tcp
 
     @property

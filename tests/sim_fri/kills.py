@@ -20,7 +20,7 @@ from heptarm.fri.loop.client import Client
 from tests.sim_fri.scenarios import QUALITY
 
 ROOT = Path(__file__).parents[2]
-#: Nobody waits longer than that on however busy a machine [s].
+#: Longest wait, also on a busy machine [s].
 PATIENCE = 120.0
 
 _CONTROLLER = """
@@ -94,7 +94,7 @@ def _running(text: str, *arguments: int) -> Iterator[Program]:
 
 
 def controllers(times: int) -> int:
-    """Kill the controller in mid-session: the client says so, waits, and the next controller commands it."""
+    """Kill the controller during a session: the client reports it, waits, and accepts the next controller."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         own = probe.getsockname()[1]
@@ -114,7 +114,7 @@ def controllers(times: int) -> int:
 
 
 def clients(times: int) -> int:
-    """Kill the client, in turns its loop and its user: the controller says why it ended, and takes the next one."""
+    """Kill the client, alternately its loop and its user: the controller reports the reason, and takes the next one."""
     with Client(0, timeout=PATIENCE) as probe:
         port = probe.port
     with _running(_CONTROLLER, port, 0) as controller:
@@ -133,7 +133,7 @@ def clients(times: int) -> int:
 
 
 def _without_loop(port: int) -> None:
-    """A client whose loop is killed: its user is told."""
+    """A client whose loop is killed: its user receives an error."""
     with Client(port, timeout=PATIENCE) as client:
         client.wait("COMMANDING_ACTIVE", timeout=PATIENCE)
         os.kill(int(client._header[at.PID]), signal.SIGKILL)

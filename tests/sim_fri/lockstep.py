@@ -105,7 +105,7 @@ class Lockstep:
                 self._controller.receive(answer, now)
 
     def command(self, q: npt.ArrayLike) -> None:
-        """What a user's process leaves for the loop, shape (7,) [rad]."""
+        """The command of the user's process, shape (7,) [rad]."""
         words = np.zeros(at.COMMAND_WORDS)
         words[at.C_Q : at.C_Q + 7] = q
         words.view(np.int64)[at.C_AT : at.C_GIVEN + 1] = EPOCH + self.plant.time_ns, at.GIVEN_Q
@@ -113,7 +113,7 @@ class Lockstep:
 
     @property
     def limited(self) -> list[str]:
-        """What the guard has limited, in words."""
+        """What the guard has limited, as text."""
         return self.cycle.guard.report.lines
 
     def _until(self, state: State) -> None:

@@ -1,4 +1,4 @@
-"""An arm that is where it is commanded, a client by the book, and both sides of a session on one clock."""
+"""An arm that follows exactly, a client that obeys the protocol, and both sides of a session on one clock."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Law = Callable[[m.Monitoring], m.Command]
 
 
 class Arm:
-    """Is where it is commanded, at once; what pushes it is only written down."""
+    """Follows its commands at once; external forces are only recorded."""
 
     def __init__(self, model: str = "iiwa14") -> None:
         self.robot: RobotModel = robot(model)
@@ -73,7 +73,7 @@ class Arm:
 
 
 def mirror(message: m.Monitoring) -> m.Command:
-    """A command that asks for what the interpolator does, in whatever command mode."""
+    """A command equal to the interpolator, in any command mode."""
     ipo, header = message.ipo, m.Header(0, 0)
     assert ipo is not None
     return m.Command(
@@ -88,7 +88,7 @@ def mirror(message: m.Monitoring) -> m.Command:
 
 @dataclass
 class Client:
-    """Answers as the vendor's client does: every n-th message, never in IDLE, mirroring while it waits."""
+    """Answers like the vendor's client: every n-th message, never in IDLE, mirroring while it waits."""
 
     version: Version
     law: Law = mirror
@@ -185,5 +185,5 @@ class Rig:
         return [event.text for event in self.events if isinstance(event, (Refused, OverlayEnded))]
 
     def command(self, **fields: object) -> None:
-        """From now on the client commands what its mirror does, but for these fields."""
+        """From now on the client commands the mirrored values, except for these fields."""
         self.client.law = lambda message: replace(mirror(message), **fields)

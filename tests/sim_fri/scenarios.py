@@ -1,4 +1,4 @@
-"""What can go wrong in a session, again and again: it ends as designed, its cause in words, and the next one works."""
+"""Faults of a session, repeated: it ends as designed with its cause as text, and the next one works."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ def stopped(pair: Pair) -> str:
 
 
 def mute(pair: Pair) -> str:
-    """The client answers no more."""
+    """The client stops answering."""
     pair.alive = False
     return QUALITY
 
 
 def jumping(pair: Pair) -> str:
-    """A client without a guard asks for a leap."""
+    """A client without a guard commands a jump."""
     pair.setpoint.q = (1.0,) * 7
     return "Illegal axis delta"
 
@@ -77,7 +77,7 @@ def reordered(pair: Pair) -> str:
 
 
 def corrupt(pair: Pair) -> str:
-    """A fifth of all datagrams is damaged; their check sums tell it."""
+    """A fifth of all datagrams is damaged; their check sums show it."""
     _lines(pair, corrupt=0.2)
     return QUALITY
 
@@ -88,7 +88,7 @@ FAULTS: tuple[Callable[[Pair], str], ...] = (
 
 
 def again(fault: Callable[[Pair], str], times: int) -> int:
-    """Let it happen so many times in one session of the controller; returns how often all went as designed."""
+    """Repeat it in one session of the controller; return how often it went as designed."""
     random.seed(7)
     pair = Pair(SessionConfiguration(Version.V2_7 if fault is corrupt else Version.V1_15))
     for turn in range(1, times + 1):
@@ -116,7 +116,7 @@ def again(fault: Callable[[Pair], str], times: int) -> int:
 
 
 def duplicates(times: int) -> int:
-    """A third of all datagrams comes twice, in both directions; commanding goes on, and no second one counts."""
+    """A third of all datagrams arrives twice, in both directions; commanding continues, duplicates are ignored."""
     pair = Pair(SessionConfiguration(Version.V1_15))
     pair.active(MotionOverlay())
     for turn in range(1, times + 1):
@@ -129,7 +129,7 @@ def duplicates(times: int) -> int:
 
 
 def garbage(times: int) -> int:
-    """Garbage to both sides in a session that stands; it goes on, and every piece is counted."""
+    """Garbage to both sides of an open session; it continues, and every piece is counted."""
     generator, pair = random.Random(5), Pair(SessionConfiguration(Version.V2_7))
     pair.active(MotionOverlay())
     for turn in range(1, times + 1):

@@ -1,4 +1,4 @@
-"""heptarm's client machine against heptarm's controller: two machines that know nothing of each other's code."""
+"""heptarm's client against heptarm's controller: two state machines without common code."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def test_a_session_that_is_torn_off_is_followed_by_another() -> None:
     pair = Pair(SessionConfiguration(Version.V2_7))
     for _ in range(5):
         pair.active(MotionOverlay())
-        pair.renew()  # as when the controller's process is killed: no last word
+        pair.renew()  # as when the controller's process is killed: no last message
     pair.active(MotionOverlay())
     assert Kind.RESTARTED in {event.kind for event in pair.session.events()}
 
@@ -98,5 +98,5 @@ def test_after_any_faults_the_two_find_each_other_again(version: Version, faults
     assert (pair.arm.leaps <= 1.2 * pair.arm.robot.dq_max * 1e-3 + 1e-12).all()
     pair.there, pair.back = FaultyLink(), FaultyLink()
     pair.controller.stop()
-    pair.run(700)  # a counter that was damaged under way may silence the client for a moment
+    pair.run(700)  # a counter damaged in transit may silence the client for a moment
     pair.active(MotionOverlay())

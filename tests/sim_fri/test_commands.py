@@ -1,4 +1,4 @@
-"""What a client may command, and what ends the motion as it does on a cabinet."""
+"""Commands that a client may send, and those that end the motion, as on a cabinet."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def seconds(message: m.Monitoring) -> float:
 
 
 def sine(amplitude: float, start: float) -> Law:
-    """A4 on a sine that begins with its crest, so at rest."""
+    """A4 on a sine that starts at its crest, at rest."""
 
     def law(message: m.Monitoring) -> m.Command:
         time = max(0.0, seconds(message) - start)
@@ -59,7 +59,7 @@ def test_the_arm_follows_a_law_one_receive_period_behind(version: Version, recei
     first = len(rig.arm.track)
     rig.run(2000)
     assert rig.controller.state is State.COMMANDING_ACTIVE, rig.told
-    # a message, its answer in the next tick, one receive period on the way: the delay in ticks
+    # a message, its answer in the next tick, one receive period of transfer: the delay in ticks
     delay = receive[0] * receive[1] + (0 if receive[0] * receive[1] == 1 else 1)
     ticks = np.arange(500, 2000)
     expected = np.array([wave((tick + 1 - delay) * 1e-3, 0.3) for tick in ticks])
@@ -95,7 +95,7 @@ def test_torques_of_answers_to_waiting_messages_are_ignored() -> None:
     rig.run(50)
     rig.controller.start(TORQUE)
     rig.run(9)
-    rig.latency = 2_900_000  # answers to waiting messages are under way when commanding becomes active
+    rig.latency = 2_900_000  # answers to waiting messages are in transit when commanding becomes active
     rig.until(State.COMMANDING_ACTIVE)
     rig.command(tau=(1.0,) * 7)
     rig.run(6)

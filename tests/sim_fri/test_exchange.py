@@ -121,7 +121,7 @@ def test_counters_are_each_others_reflections() -> None:
     sequences = [message.header.sequence for message in rig.client.seen]
     assert sequences == list(range(len(sequences)))
     last = rig.client.seen[-1].header
-    assert last.reflected == rig.client.sequence - 2  # the newest answer is still under way
+    assert last.reflected == rig.client.sequence - 2  # the newest answer is still in transit
 
 
 def test_a_restarted_client_is_heard_at_once() -> None:

@@ -1,4 +1,4 @@
-"""Faults do what they say, the same each time, and a session survives or ends as it should."""
+"""Faults do what their names state, reproducibly, and a session survives or ends as it should."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MS = 1_000_000
 
 
 def sent(faults: LinkFaults, count: int = 2000) -> tuple[list[tuple[int, int]], LinkFaultCounts]:
-    """What becomes of datagrams 0, 1, 2 … sent each millisecond: when each arrived [ms], and the counts."""
+    """Fate of datagrams 0, 1, 2 … sent each millisecond: time of arrival [ms], and the counts."""
     line, found = FaultyLink(faults), []
     for tick in range(count + 200):
         if tick < count:
@@ -139,7 +139,7 @@ class Trial:
         return [event.cause for event in self.rig.events if isinstance(event, OverlayEnded)]
 
     def works_again(self) -> None:
-        """After the faults: the same session comes back to commanding."""
+        """After the faults, the same session returns to commanding."""
         rig = self.rig
         rig.arm.safety = m.Safety.NORMAL_OPERATION
         rig.until(State.MONITORING_READY)
@@ -182,7 +182,7 @@ def test_great_faults_end_commanding_by_quality(
     trial = Trial(FaultScenario(to_client=both, from_client=both), version)
     while not trial.causes and trial.rig.now < 3_000 * MS:
         trial.run(20)
-    # a damaged command of a version without CRC may still be one, and then asks for something illegal
+    # a damaged command of a version without CRC may still be decodable, and illegal
     assert trial.causes[0] == "quality" or ("corrupt" in faults and not version.traits.framed)
     trial.works_again()
 

@@ -1,4 +1,4 @@
-"""Each fault many times in a row: it ends in a designed state, its cause in words, and commanding works again.
+"""Each fault many times in a row: it ends in a designed state with its cause as text, and commanding works again.
 
 A few times here, a hundred times in `make test-long`.
 """

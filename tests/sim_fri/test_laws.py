@@ -1,4 +1,4 @@
-"""Laws through the client's whole loop on the simulated arm: a sine, torques alone, a force on a table, wild wishes."""
+"""Laws through the client's whole loop on the simulated arm: sine, torques, force on a table, invalid commands."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_the_arm_follows_a_sine_within_a_milliradian() -> None:
 
 
 def test_lost_and_late_messages_do_not_jolt_an_arm_in_motion() -> None:
-    """The cabinet goes on with the last speed, and so does the loop: the next setpoint does not lie behind."""
+    """The cabinet continues with the last speed, and so does the loop: the next set-point is not behind."""
     both = Lockstep(laws.sine, {"amplitude": 0.15, "frequency": 0.2})
     both.run(2.3)
     for ticks in (1, 2, 3, 4):

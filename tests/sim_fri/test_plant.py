@@ -1,4 +1,4 @@
-"""Overlays on the simulated arm: what the client commands is what the arm does."""
+"""Overlays on the simulated arm: the arm follows the client's commands."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class World:
 
 
 def swing(world: World, amplitude: float) -> Law:
-    """All axes on sines that begin and go on without a jerk; the wish for a message's time."""
+    """All axes on sines without jerk; the command at a message's time."""
     start = world.now * 1e-9
 
     def law(message: m.Monitoring) -> m.Command:

@@ -53,7 +53,7 @@ class Both:
         self.socket.bind((HERE, 0))
         self.socket.settimeout(20.0)
         self.said: list[str] = []
-        self.track: list[Array] = []  # where the flange is, shape (3,) [m]
+        self.track: list[Array] = []  # position of the flange, shape (3,) [m]
         settings = StandaloneSettings(
             configuration=SessionConfiguration(Version.V2_5, 1),
             client=self.socket.getsockname(),
@@ -81,7 +81,7 @@ class Both:
         return forward(self.plant.robot, self.plant.snapshot.q)
 
     def command(self, pose: Array) -> None:
-        """What a user's process leaves for the loop, shape (7,) [m, x y z w]."""
+        """The command of the user's process, shape (7,) [m, x y z w]."""
         numbers = np.zeros(at.COMMAND_WORDS)
         numbers[at.C_POSE : at.C_POSE + 7] = pose
         numbers.view(np.int64)[at.C_AT : at.C_GIVEN + 1] = EPOCH + self.plant.time_ns, at.GIVEN_POSE
@@ -98,7 +98,7 @@ class Both:
 
 @contextmanager
 def session(law: Law | None = None) -> Iterator[Both]:
-    """Up to the moment in which commands become effective."""
+    """Until commands become effective."""
     both = Both(law)
     both.controller.server.open()
     try:
@@ -152,7 +152,7 @@ def test_a_step_of_half_a_metre_and_numbers_that_are_none() -> None:
         goal = start.array + (0.0, -0.5, 0.0, 0.0, 0.0, 0.0, 0.0)
         both.command(goal)
         both.run(1.0)
-        both.command(np.full(7, NAN))  # the step is the last wish
+        both.command(np.full(7, NAN))  # the step is the last command
         both.run(1.6)
         assert both.flange == pytest.approx(Pose.of(goal[:3], goal[3:]).matrix, abs=1e-4)
         speeds = np.diff(np.array(both.track), axis=0) * 1e3

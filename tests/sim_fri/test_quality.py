@@ -1,4 +1,4 @@
-"""The quality rule, in the words of its docstring."""
+"""The quality rule, as its docstring states it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MS = 1_000_000
 
 
 def fed(receive_ms: int, answers: list[int | None]) -> QualityMeter:
-    """A meter after receive periods that were answered after so many ns, or not at all."""
+    """A meter after receive periods with answers after these delays [ns], or without."""
     meter = QualityMeter(receive_ms * MS)
     replies = []
     for period, latency in enumerate(answers):

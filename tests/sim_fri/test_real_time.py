@@ -1,4 +1,4 @@
-"""The stand-alone controller in a process of its own and in real time, with a client that knows only its port."""
+"""The stand-alone controller in its own process, in real time, with a client that knows only its port."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_it_runs_until_it_is_stopped_and_says_goodbye() -> None:
     pipe = subprocess.PIPE
     with subprocess.Popen(command, stdin=pipe, stdout=pipe, text=True, cwd=ROOT) as process:
         assert process.stdin is not None and process.stdout is not None
-        for _ in range(6000):  # a minute at most, on however busy a machine
+        for _ in range(6000):  # at most a minute, also on a busy machine
             peer.turn()
             connection = peer.client.seen[-1].connection
             assert connection is not None

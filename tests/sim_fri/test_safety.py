@@ -1,4 +1,4 @@
-"""The simulated arm's safety controller as an FRI session sees it: a stop ends the overlay, and the next one works."""
+"""The safety controller of the simulated arm in an FRI session: a stop ends the overlay, and the next one works."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whatever a client, an application and a network do in whatever order: the session stays within its table."""
+"""Random events of client, application and network: the session never leaves its state table."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Session(RuleBasedStateMachine):
 
     @rule(mode=st.sampled_from(list(CONTROLS)))
     def come_to_command(self, mode: m.CommandMode) -> None:
-        """The way that random steps seldom find."""
+        """A sequence that random steps seldom find."""
         rig = self.rig
         rig.silent, rig.arm.safety = False, m.Safety.NORMAL_OPERATION
         rig.client.law = rig.client.waiting = mirror
@@ -90,7 +90,7 @@ class Session(RuleBasedStateMachine):
 
     @rule(step=st.floats(-2e-3, 2e-3), axis=st.integers(0, 6))
     def drive(self, step: float, axis: int) -> None:
-        """A steady drive, near the limit of the axes, from where the arm is."""
+        """A steady motion near the limit of the axes, from the current position."""
         arm = self.rig.arm
 
         def law(message: m.Monitoring) -> m.Command:

@@ -1,4 +1,4 @@
-"""The set-point between commands, and what it does when they stay away."""
+"""The set-point between commands, and without commands."""
 
 from __future__ import annotations
 

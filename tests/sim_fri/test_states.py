@@ -1,4 +1,4 @@
-"""The state table of a session, one test for each way from a state to another."""
+"""The state table of a session, one test for each transition."""
 
 from __future__ import annotations
 

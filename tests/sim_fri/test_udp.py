@@ -1,4 +1,4 @@
-"""Sessions over real sockets. Both sides take turns on a clock of their own, so that no test waits for the machine."""
+"""Sessions over real sockets. Both sides alternate on a simulated clock, so that no test depends on the machine."""
 
 from __future__ import annotations
 
@@ -214,7 +214,7 @@ def test_a_client_that_dies_ends_commanding_and_its_successor_commands() -> None
         assert b.controller.state is State.MONITORING_WAIT and b.arm.action is None
         b.peer.client = Client(Version.V1_15)
         for _ in range(60):
-            b.peer.turn()  # what came for the dead one
+            b.peer.turn()  # what arrived for the previous socket
         b.until(State.MONITORING_READY)
         b.server.start(MotionOverlay())
         b.until(State.COMMANDING_ACTIVE)
@@ -241,7 +241,7 @@ def test_a_taken_port_is_named_with_what_to_do() -> None:
 def test_beside_a_client_on_this_machine_any_port_will_do() -> None:
     with bench() as b, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         port = source_port(b.peer.address)
-        with suppress(OSError):  # somebody else has it: as good
+        with suppress(OSError):  # another process has it: as good
             other.bind((HERE, port))
         server = Server(b.configuration, b.arm, client=b.peer.address, bind=HERE)
         assert server.port not in (port, b.peer.address[1])

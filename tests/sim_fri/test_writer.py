@@ -14,7 +14,7 @@ from tests.fri import strategies as messages
 
 WRITERS = {
     version: MonitoringEncoder(version) for version in Version
-}  # as a session has one: what it kept must not leak
+}  # used like in a session: kept values must not leak
 
 
 @given(st.data(), st.sampled_from(Version))

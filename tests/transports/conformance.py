@@ -1,4 +1,4 @@
-"""What every transport must do: one suite, run on each of them."""
+"""Requirements of every transport: one suite, run on each of them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def receive(transport: Transport, size: int, *, chunk: int = 65536, seconds: flo
 
 
 class Conformance:
-    """Subclasses say how to make a connected pair."""
+    """Subclasses define how to create a connected pair."""
 
     MUCH = 8192  # times 256 bytes
 

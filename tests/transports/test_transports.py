@@ -1,4 +1,4 @@
-"""Both transports pass the suite; and what only TCP has."""
+"""Both transports pass the suite; and features of TCP alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arcs: three points make one, and a centre, a plane and an angle make three points."""
+"""Arcs: from three points, and three points from a centre, a plane and an angle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Conditions are values: built by comparing and combining, checked when made, never asked for their truth."""
+"""Conditions are values: built by comparisons and combinations, checked when created, without a truth value."""
 
 from __future__ import annotations
 

@@ -102,12 +102,12 @@ def test_errors_carry_what_was_seen() -> None:
 
 def test_taps_stand_out_from_what_acts_all_the_time() -> None:
     def taps(level: float, strong: float = 20.0) -> int:
-        """Of two pushes on an arm that bears a force, after 5 s."""
+        """Two pushes on an arm under a constant force, after 5 s."""
         watch, count = TapWatch(force=8.0), 0
         for i in range(700):
             t = 0.01 * i
             push = strong if 5.0 <= t < 5.1 or 5.5 <= t < 5.6 else 0.0
-            rises = level if t > 0.2 else 0.0  # something begins to hang on it
+            rises = level if t > 0.2 else 0.0  # a load is attached to it
             count = watch.see(t, np.array([0.0, rises, 3.0 + push]))
             if t >= 5.7:
                 break

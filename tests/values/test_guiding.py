@@ -55,7 +55,7 @@ def test_yielding_is_soft_where_it_is_told_to_be() -> None:
 
 
 def taught() -> ha.Trajectory:
-    """A second of rest, a turn of A1 there and A2 back, half a second of rest; 100 positions a second."""
+    """One second of rest, a rotation of A1 and of A2 back, half a second of rest; 100 positions per second."""
     t = np.arange(0.0, 4.0, 0.01)
     q = np.zeros((len(t), 7))
     go = np.clip(t - 1.0, 0.0, 2.5)

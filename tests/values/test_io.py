@@ -1,4 +1,4 @@
-"""Values of signals are found by the names that people use, and are values themselves."""
+"""Values of signals are found by their short and full names."""
 
 from __future__ import annotations
 

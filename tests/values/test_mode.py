@@ -1,4 +1,4 @@
-"""Control modes are values: checked when made, equal by their numbers, frozen; four patterns in one line each."""
+"""Control modes are values: checked when created, equal by their numbers, frozen; four patterns in one line each."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_equal_hashed_and_pickled_by_value(make: Callable[[], Mode]) -> None:
     assert pickle.loads(pickle.dumps(mode)) == mode
     with pytest.raises(
         (AttributeError, TypeError)
-    ):  # Python 3.10 says so with a TypeError where a slot is missing
+    ):  # Python 3.10 raises TypeError where a slot is missing
         setattr(mode, fields(mode)[0].name if fields(mode) else "stiffness", None)
 
 

@@ -1,4 +1,4 @@
-"""Motions are values: checked when made, equal by their numbers, frozen."""
+"""Motions are values: checked when created, equal by their numbers, frozen."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Splines: values of segments and points, and what does not belong to them."""
+"""Splines: values of segments and points, and refused members."""
 
 from __future__ import annotations
 

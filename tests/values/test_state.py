@@ -1,4 +1,4 @@
-"""States: groups with their own stamps; what is missing says so."""
+"""States: groups with their own stamps; a missing group raises an error."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_equal_by_value_and_read_only() -> None:
 
 def test_wrench_validity() -> None:
     zero = np.zeros(3)
-    assert Wrench(0, zero, zero).valid()  # the cabinet does not tell
+    assert Wrench(0, zero, zero).valid()  # the cabinet does not report it
     assert Wrench(0, zero, zero, zero + 5, zero + 5).valid()
     assert not Wrench(0, zero, zero, np.array([0.0, 0, 20]), zero).valid()
     assert not Wrench(0, zero, zero, zero, zero + 11).valid()

@@ -25,7 +25,7 @@ def test_a_tool_has_a_body_and_frames_of_which_the_tcp_is_the_first() -> None:
     assert tool.frame_names == ("tcp", "pad")
     assert tool.tcp == TIP
     assert tool.frame("pad").x == 0.02
-    with pytest.raises(CommandRejected, match="there are: tcp, pad") as refused:
+    with pytest.raises(CommandRejected, match="must be one of tcp, pad") as refused:
         tool.frame("tip")
     assert refused.value.code == 42
 
@@ -47,7 +47,7 @@ def test_tools_are_frozen_compare_by_their_numbers_and_differ_from_workpieces() 
         tool.com[0] = 1.0
 
 
-#: What is refused, with the code and the parameter; tests/cabinet refuses the same when the client is bypassed.
+#: Refused values, with the code and the parameter; tests/cabinet refuses the same when the client is bypassed.
 REFUSED: list[tuple[Callable[[Any], object], type[HeptarmError], int, str]] = [
     (lambda make: make("", mass=1), ShapeError, 3, "name"),
     (lambda make: make("x" * 65), ShapeError, 3, "name"),

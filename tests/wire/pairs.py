@@ -1,4 +1,4 @@
-"""A client and a cabinet session, joined by hand."""
+"""A client session and a cabinet session, connected by hand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The estimate of the cabinet's clock, on clocks made up here."""
+"""The estimate of the cabinet's clock, with simulated clocks."""
 
 from __future__ import annotations
 

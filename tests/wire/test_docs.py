@@ -1,4 +1,4 @@
-"""The page about sessions shows the table that the code uses."""
+"""The page about sessions shows the table of the code."""
 
 from __future__ import annotations
 

@@ -214,7 +214,7 @@ def test_a_state_is_decoded_when_wanted() -> None:
 
 
 def conversation() -> tuple[bytes, list[object]]:
-    """What a cabinet says in a session, and what a client must make of it."""
+    """Messages of a cabinet in a session, and the events that a client must derive from them."""
     client, cabinet = Session(Side.CLIENT, nonce=NONCES[0]), Session(Side.CABINET, nonce=NONCES[1])
     pour(client.send(client.hello(name="t")), cabinet)
     pour(client_frame := b"", cabinet)

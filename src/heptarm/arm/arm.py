@@ -164,6 +164,11 @@ class Arm:
         return f"<Arm {link.title}, {state}, {'in control' if link.in_control else 'observing'}>"
 
     @property
+    def connection(self) -> Connection:
+        """The connection beneath this arm: messages, clock and events. Tools and tests use it, programs need not."""
+        return self._connection
+
+    @property
     def connected(self) -> bool:
         """Whether it is connected to the cabinet."""
         return self._connection.is_connected

@@ -1,6 +1,6 @@
 """Watchdogs: after which silence the cabinet stops the arm.
 
-All defaults are in this table. The schema of the protocol has the ranges, and those defaults that the cabinet shares.
+All defaults are in this table. Ranges, and defaults that the cabinet has, too, come from the schema of the protocol.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ COMMANDS = {
     "demo": "demo:demo",
     "sim": "sim:sim",
     "state": "state:state",
-    "stop": "motion:stop",
+    "stop": "stop:stop",
     "recover": "motion:recover",
     "servo": "motion:servo",
     "teach": "motion:teach",

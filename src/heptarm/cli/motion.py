@@ -1,4 +1,4 @@
-"""Commands that move an arm: `heptarm move`, `servo`, `teach`, `replay`; and `stop` and `recover`."""
+"""Commands that move an arm: `heptarm move`, `servo`, `teach`, `replay`; and `recover`."""
 
 from __future__ import annotations
 
@@ -233,15 +233,6 @@ def replay(
     else:
         off = np.degrees(done.deviation)
         print(f"{done.result.cause.value} after {done.result.duration:.1f} s, {off:.2f} deg off at most")
-    return 0
-
-
-def stop(*, target: TargetOptions = NO_TARGET, as_json: Json = False) -> int:
-    """Stop the arm; needs no control."""
-    with target.connect(control=False) as arm:
-        arm.stop()
-        arm.wait_for_rest()
-    emit({"stopped": True}) if as_json else print("the arm is at rest")
     return 0
 
 

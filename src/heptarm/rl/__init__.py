@@ -1,6 +1,6 @@
-"""Learning: the task of reaching a point, a batched simulator, PPO, policies that need no torch.
+"""Reinforcement learning: the reach task, a batched simulator, PPO, policies that need no torch.
 
-Importing it makes `gymnasium.make("heptarm/Reach-v0")` known, where Gymnasium is installed.
+Importing it registers `gymnasium.make("heptarm/Reach-v0")`, if Gymnasium is installed.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ ENVIRONMENT = "heptarm/Reach-v0"
 
 
 def register() -> None:
-    """Make the environment known to Gymnasium; once is enough."""
+    """Register the environment with Gymnasium; repeated calls have no effect."""
     import gymnasium
 
     if ENVIRONMENT not in gymnasium.registry:

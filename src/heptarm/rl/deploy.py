@@ -1,4 +1,4 @@
-"""A policy on an arm, virtual or real: the same API, the same observation, the same integration of its actions.
+"""Deployment of a policy on a virtual or real arm, with the observations and integration of actions of training.
 
 The loop runs at the task's rate over a servo motion. Nothing here needs torch or MuJoCo.
 """
@@ -27,17 +27,17 @@ if TYPE_CHECKING:
     from heptarm.arm.motion.servo import JointServo
     from heptarm.values.state import State
 
-#: Where the target is, base frame, shape (3,) [m], at a time since the episode's beginning [s].
+#: Target in the base frame, shape (3,) [m], at a time since the start of the episode [s].
 Target = Callable[[float], Array]
 #: Ticks of the servo loop a decision where commands are delayed, so that a delay is met within a few milliseconds.
 _FINE = 4
-#: States a second per decision, so that what a decision sees is fresh.
+#: States per decision, so that a decision uses fresh measurements.
 _STATES = 8.0
 
 
 @dataclass(frozen=True, slots=True)
 class DeploySettings:
-    """How a policy is deployed.
+    """Settings of a deployment.
 
     Attributes:
         guard: limits.
@@ -58,7 +58,9 @@ class DeploySettings:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.latency <= 0.5:
-            raise LimitError(f"latency is {self.latency}; allowed is [0, 0.5] s", code=2, parameter="latency")
+            raise LimitError(
+                f"latency must be in [0, 0.5] s, got {self.latency} s", code=2, parameter="latency"
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +78,7 @@ def deploy(
     starts: npt.ArrayLike | None = None,
     progress: Callable[[int, float], object] | None = None,
 ) -> EpisodeReport:
-    """Run a policy on an arm, one episode a target, each from home.
+    """Run a policy on an arm, one episode per target, each from home.
 
     Args:
         arm: in control.
@@ -87,12 +89,12 @@ def deploy(
         progress: called after each episode with its number and its final distance [m].
 
     Returns:
-        The report; its facts tell what the guard did and how the streams went.
+        The report; its facts contain the interventions of the guard and the statistics of the streams.
 
     Raises:
         LimitError: a target outside the guard's box, or a robot that is not the task's.
-        StaleState: the states stopped coming; the arm was stopped.
-        StreamError: the servo stream ended under way.
+        StaleState: no more states arrived; the arm was stopped.
+        StreamError: the servo stream ended early.
     """
     task, settings = policy.task, settings or DeploySettings()
     if arm.robot.name != task.model.name:
@@ -138,11 +140,11 @@ def deploy(
 
 
 def _run(arm: Arm, pilot: Pilot, goal: Target, settings: DeploySettings) -> tuple[_Episode, int]:
-    """One episode; also how many of its ticks came late."""
+    """Run one episode; return its record and the number of late ticks."""
     task = pilot.task
     fine = _FINE if settings.latency > 0 else 1
     delay = ceil(settings.latency * task.rate * fine - 1e-9)
-    # the arm's time is what counts: a simulator may run faster than the clock on the wall
+    # use the arm's time: a simulator may run faster than real time
     rate = task.rate * fine * arm.real_time_factor
     waiting: deque[tuple[int, Array]] = deque()
     joints, targets = np.empty((task.steps + 1, 7)), np.empty((task.steps, 3))
@@ -173,7 +175,7 @@ def _run(arm: Arm, pilot: Pilot, goal: Target, settings: DeploySettings) -> tupl
 
 
 def _send(sv: JointServo, waiting: deque[tuple[int, Array]], tick: int) -> None:
-    """Send what is due, or again what was sent last, as a sign of life."""
+    """Send the due command, or repeat the last one for the watchdog."""
     while len(waiting) > 1 and waiting[1][0] <= tick:
         waiting.popleft()
     sv.set(waiting[0][1] if waiting[0][0] <= tick else sv.start.q)
@@ -202,7 +204,7 @@ def _listed(targets: npt.ArrayLike | Sequence[Target]) -> list[npt.ArrayLike | T
 
 
 def _target(target: npt.ArrayLike | Target, guard: PolicyGuard) -> Target:
-    """A target as a function of time, checked where it begins; a moving one is checked by the guard on the way."""
+    """A target as a function of time, checked at its start; the guard checks a moving one during the episode."""
     if callable(target):
         moving: Target = target
         point = array(moving(0.0), 3, "target")
@@ -214,7 +216,7 @@ def _target(target: npt.ArrayLike | Target, guard: PolicyGuard) -> Target:
 
 
 def circle(centre: npt.ArrayLike, radius: float, *, period: float) -> Target:
-    """A target that moves on a circle across the arm's front.
+    """A target that moves on a circle in front of the arm.
 
     Args:
         centre: base frame, shape (3,) [m].

@@ -21,12 +21,12 @@ from gymnasium import spaces  # noqa: E402
 
 ENGINES = {"plant": PlantEngine, "training": Engine}
 Observation = npt.NDArray[np.float32]
-#: No target is looked for farther from the base than this [m].
+#: Largest distance of a target from the base [m].
 FARTHEST = 2.0
 
 
 def observation_space(task: ReachTask) -> spaces.Box:
-    """What observations of a task may be; wide enough for any target that a robot could be given."""
+    """Space of the observations of a task, for all targets of a robot."""
     high = np.ones(task.observation_size, dtype=np.float32)
     high[:7] = 1.5
     high[14:17] = FARTHEST
@@ -35,12 +35,12 @@ def observation_space(task: ReachTask) -> spaces.Box:
 
 
 def action_space(task: ReachTask) -> spaces.Box:
-    """Actions are fractions of the largest step."""
+    """Space of the actions: fractions of the largest step."""
     return spaces.Box(-1.0, 1.0, (task.action_size,), dtype=np.float32)
 
 
 class ReachEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is not looked into
-    """One simulated robot that reaches for points.
+    """One simulated robot in the reach task.
 
     Episodes are truncated after `task.steps` decisions and never terminate. `info` holds "distance" [m],
     "is_success" (within the radius now), "target" and "tip", both shape (3,) [m].
@@ -56,7 +56,7 @@ class ReachEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is n
         render_mode: None; there are no pictures.
 
     Raises:
-        CommandRejected: no such engine, robot, action or feature.
+        CommandRejected: unknown engine, robot, action or feature.
         MissingExtra: Gymnasium is not installed.
     """
 
@@ -75,12 +75,10 @@ class ReachEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is n
     ) -> None:
         if engine not in ENGINES:
             raise CommandRejected(
-                f"engine is {engine!r}; there are {', '.join(map(repr, ENGINES))}", parameter="engine"
+                f"engine must be one of {', '.join(map(repr, ENGINES))}, got {engine!r}", parameter="engine"
             )
         if render_mode is not None:
-            raise CommandRejected(
-                f"render_mode is {render_mode!r}; only None is known", parameter="render_mode"
-            )
+            raise CommandRejected(f"render_mode must be None, got {render_mode!r}", parameter="render_mode")
         self.render_mode = None
         self.task = task or ReachTask(robot, action=action, feature=feature)
         self._space = observation_space(self.task)
@@ -99,14 +97,14 @@ class ReachEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is n
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin an episode.
+        """Start an episode.
 
         Args:
             seed: of what is drawn from now on.
             options: {"target": (x, y, z)} in the base frame [m] instead of a drawn one.
 
         Raises:
-            ShapeError: the target is no point.
+            ShapeError: the target does not have three numbers.
             CommandRejected: an unknown option.
         """
         super().reset(seed=seed)
@@ -129,7 +127,7 @@ class ReachEnv(gymnasium.Env[Any, Any]):  # type: ignore[misc]  # gymnasium is n
 
         Raises:
             ShapeError: another shape, or not finite.
-            NotReady: the episode has ended, or none was begun.
+            NotReady: the episode has ended, or has not started.
         """
         if not self._open:
             raise NotReady("no episode is running", hint="call reset()")

@@ -1,4 +1,4 @@
-"""How good a policy is in simulation: episodes on targets that training never saw."""
+"""Evaluation of a policy in simulation: episodes on targets that are not used in training."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _HELD_BACK = 0x4E1D
 
 
 def held_back(task: ReachTask, count: int, *, seed: int = 0) -> Array:
-    """Targets that no training draws, shape (count, 3) [m]."""
+    """Targets that training never draws, shape (count, 3) [m]."""
     return task.targets(np.random.default_rng([_HELD_BACK, seed]), count)
 
 
@@ -35,7 +35,7 @@ def evaluate(
     threads: int = 2,
     engine: Any = Engine,
 ) -> EpisodeReport:
-    """Run a policy, one episode a target.
+    """Run a policy, one episode per target.
 
     Args:
         policy: the policy, or any function of observations, shape (n, observations), to actions.
@@ -53,7 +53,7 @@ def evaluate(
     """
     known = policy.task if isinstance(policy, Policy) else task
     if known is None:
-        raise CommandRejected("a function does not say what its task is", parameter="task")
+        raise CommandRejected("task must be given with a function, which has none", parameter="task")
     task = task or known
     if isinstance(targets, int):
         if targets < 1:

@@ -1,4 +1,4 @@
-"""A short film, or a row of pictures, of an arm reaching: drawn from a report's recording with matplotlib alone."""
+"""A short film, or a row of pictures, of episodes: drawn from the recording of a report with matplotlib alone."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _WIDTHS = (13.0, 11.0, 9.0, 7.0)
 
 
 def film(report: EpisodeReport, path: str | os.PathLike[str], *, episodes: int = 4, every: int = 2) -> Path:
-    """Draw the first episodes of a report one after the other; returns the path.
+    """Draw the first episodes of a report one after the other; return the path.
 
     Args:
         report: with its recording.
@@ -34,7 +34,7 @@ def film(report: EpisodeReport, path: str | os.PathLike[str], *, episodes: int =
     """
     target = Path(path)
     if target.suffix not in (".gif", ".png"):
-        raise CommandRejected(f"{target.name!r} ends neither in .gif nor in .png", parameter="path")
+        raise CommandRejected(f"path must end in .gif or .png, got {target.name!r}", parameter="path")
     for name, value in (("episodes", episodes), ("every", every)):
         if value < 1:
             raise LimitError(f"{name} must be at least 1, got {value}", code=2, parameter=name)
@@ -65,7 +65,7 @@ def _gif(report: EpisodeReport, target: Path, figures: Any, episodes: int, every
 def _row(report: EpisodeReport, target: Path, figures: Any, pictures: int = 6) -> Path:
     figure = figures.Figure(figsize=(3.0 * pictures, 3.2))
     last = report.joints.shape[1] - 1
-    # most happens in the first second
+    # the largest motion is in the first second
     steps = np.unique(np.round(last * np.linspace(0, 1, pictures) ** 2).astype(int))
     for index, step in enumerate(steps.tolist()):
         axes = figure.add_subplot(1, len(steps), index + 1, projection="3d")
@@ -93,7 +93,7 @@ def _draw(axes: Any, report: EpisodeReport, episode: int, step: int) -> None:
 
 
 def chain(robot: RobotModel, q: Array) -> Array:
-    """Base, shoulder, elbow, wrist and flange of an arm whose joints are q [rad], shape (5, 3) [m]."""
+    """Positions of base, shoulder, elbow, wrist and flange at joint positions q [rad], shape (5, 3) [m]."""
     turn, points = np.eye(3), [np.zeros(3), np.array([0.0, 0.0, robot.d_bs])]
     axes = "zyzyzyz"
     signs = (1, 1, 1, -1, 1, 1, 1)

@@ -1,4 +1,4 @@
-"""A policy that lives on messages: joint states and targets come, commands go. For nodes of ROS and their like."""
+"""A policy driven by messages: joint states and targets in, commands out. For ROS nodes and similar programs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from heptarm.values.arrays import Array, array
 class Follower:
     """Follows the newest target with the newest joint states; without either it sends nothing, and the arm brakes.
 
-    One thread at a time.
+    Not thread-safe.
 
     Args:
         policy: what decides.
@@ -30,7 +30,7 @@ class Follower:
         self._pilot = Pilot(policy, self.guard)
         self._joints = tuple(joints)
         if len(set(self._joints)) != 7:
-            raise ShapeError(f"{list(joints)} are not seven different joints", parameter="joints")
+            raise ShapeError(f"joints must be seven different names, got {list(joints)}", parameter="joints")
         self._q = self._dq = np.full(7, nan)
         self._seen = -np.inf
         self._target: Array | None = None
@@ -45,13 +45,13 @@ class Follower:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How often the guard stepped in."""
+        """Number of interventions of the guard."""
         return dict(self._pilot.watch.counts)
 
     def on_joints(
         self, names: Sequence[str], position: Sequence[float], velocity: Sequence[float], now: float
     ) -> None:
-        """A joint state came.
+        """Take a joint state.
 
         Args:
             names: of its joints in any order; a message without all seven is another robot's and passed over.
@@ -69,7 +69,7 @@ class Follower:
         self._seen = now
 
     def on_target(self, target: npt.ArrayLike | None) -> None:
-        """A target came, base frame, shape (3,) [m]; None: hold.
+        """Take a target, base frame, shape (3,) [m]; None: hold.
 
         Raises:
             LimitError: outside the guard's box; the last target stays.
@@ -81,9 +81,9 @@ class Follower:
         self._target = self.guard.check(array(target, 3, "target"))
 
     def command(self, now: float) -> Array | None:
-        """The next commanded joints, shape (7,) [rad]; to be asked for `task.rate` times a second.
+        """The next commanded joint positions, shape (7,) [rad]; call it `task.rate` times per second.
 
-        None: there is no target, or no fresh joint state; send nothing then.
+        None: no target, or no fresh joint state; then send nothing.
         """
         if self._target is None or not now - self._seen <= self.guard.stale:
             self._under_way = False

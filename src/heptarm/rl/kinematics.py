@@ -1,4 +1,4 @@
-"""Kinematics of many arms at once: the flange's place, its rotation, a damped step towards a pose.
+"""Batched kinematics: position and rotation of the flange, and a damped step towards a pose.
 
 The chain is `heptarm.model.kinematics`'s, written over a leading batch axis. The end effector of the task is
 the flange, 35 mm past the origin of the seventh link, which libiiwa's environments (`iiwa_link_7`) measure.
@@ -18,7 +18,7 @@ DAMPING = 0.05
 def tip(robot: RobotModel, q: Array) -> Array:
     """Positions of the flange in the base frame.
 
-    The flange is carried backwards through the chain: seen from the wrist, from the elbow, from the base.
+    The flange is transformed backwards through the chain: to the wrist, the elbow, the base.
 
     Args:
         robot: the robot.
@@ -95,7 +95,7 @@ def jacobian(robot: RobotModel, q: Array) -> tuple[Array, Array, Array]:
 def step_towards(robot: RobotModel, q: Array, shift: Array, held: Array) -> Array:
     """Joint positions whose flange is shifted and turned back to a held rotation; one damped Newton step.
 
-    Where the pose is at the edge of the reach, rotation is given up before joints move far.
+    At the boundary of the workspace the rotation deviates before joints move far.
 
     Args:
         robot: the robot.

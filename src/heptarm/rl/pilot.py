@@ -1,4 +1,4 @@
-"""A policy in command: its decisions become commands that a guard has passed. No arm, no loop, no clock."""
+"""Turns decisions of a policy into commands that a guard has checked. Without arm, loop or clock."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class PolicyGuard:
         stale: an older state ends the deployment [s].
 
     Raises:
-        LimitError: a box without a volume, or a limit that is not positive.
+        LimitError: the box has no volume, or a limit is not positive.
     """
 
     _: KW_ONLY
@@ -40,13 +40,19 @@ class PolicyGuard:
 
     def __post_init__(self) -> None:
         if not all(a < b for a, b in zip(self.low, self.high, strict=True)):
-            raise LimitError(f"the box from {self.low} to {self.high} has no volume", code=2, parameter="low")
+            raise LimitError(
+                f"low must be below high so that the box has a volume, got {self.low} and {self.high} m",
+                code=2,
+                parameter="low",
+            )
         for name in ("speed", "stale"):
             if not getattr(self, name) > 0:
-                raise LimitError(f"{name} is {getattr(self, name)}; it is positive", code=2, parameter=name)
+                raise LimitError(
+                    f"{name} must be positive, got {getattr(self, name)}", code=2, parameter=name
+                )
 
     def check(self, target: Array) -> Array:
-        """A target, base frame, shape (3,) [m], if it is inside the box.
+        """Return a target, base frame, shape (3,) [m], if it is inside the box.
 
         Raises:
             LimitError: it is outside.
@@ -64,7 +70,7 @@ class PolicyGuard:
 
 
 class Watch:
-    """A guard on duty: passes commands on, or less than them, and counts what it did.
+    """An active guard: passes or limits commands, and counts its interventions.
 
     Args:
         guard: the limits.
@@ -82,10 +88,10 @@ class Watch:
         self.counts = Counter(joint=0, speed=0, box=0)
 
     def allow(self, last: Array, wanted: Array) -> Array:
-        """What may be commanded, shape (7,) [rad].
+        """The allowed command, shape (7,) [rad].
 
-        A command outside the joints' margins or faster than allowed is brought back; one that moves the flange out
-        of the box (or farther out of it) is not taken at all: the arm holds its last command.
+        A command beyond the joint margins or the speed limit is clamped; one that moves the flange out
+        of the box (or farther out of it) is rejected: the arm holds its last command.
         """
         allowed = np.minimum(np.maximum(wanted, self._low), self._high)
         self.counts["joint"] += bool((allowed != wanted).any())
@@ -97,13 +103,13 @@ class Watch:
         return bounded
 
     def _outside(self, q: Array) -> float:
-        """How far the flange is out of the box [m]; 0 inside."""
+        """Distance of the flange from the box [m]; 0 inside."""
         tip = kinematics.tip(self._robot, q)
         return float(np.maximum(np.maximum(self._guard.low - tip, tip - self._guard.high), 0.0).max())
 
 
 class Decides(Protocol):
-    """What can be deployed: a `Policy`, or anything else that decides."""
+    """Interface of what can be deployed: a `Policy`, or another function."""
 
     task: ReachTask
 
@@ -130,7 +136,7 @@ class Pilot:
         self._command = self._held = np.empty(0)
 
     def begin(self, q: Array) -> None:
-        """An episode begins here, shape (7,) [rad]."""
+        """Start an episode at joint positions, shape (7,) [rad]."""
         self._command, self._held = q, self.task.hold(q)
 
     def decide(self, q: Array, dq: Array, target: Array) -> Array:

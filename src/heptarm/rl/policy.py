@@ -19,12 +19,12 @@ Weights = npt.NDArray[np.float32]
 #: Scaled observations are clipped to this.
 CLIP = 5.0
 _FORMAT = 1
-#: Where the policies are that come with heptarm.
+#: Folder of the policies that are part of heptarm.
 SHIPPED = Path(__file__).parent / "policies"
 
 
 class Policy:
-    """Decides actions of a task.
+    """Computes the actions of a task.
 
     Args:
         task: the task it was trained for.
@@ -34,7 +34,7 @@ class Policy:
         facts: how it came about: seed, environment steps, randomisation, versions.
 
     Raises:
-        ShapeError: layers that do not fit together or to the task.
+        ShapeError: the layers do not fit each other or the task.
     """
 
     def __init__(
@@ -53,16 +53,16 @@ class Policy:
         width = task.observation_size
         if self.mean.shape != (width,) or self.std.shape != (width,) or not (self.std > 0).all():
             raise ShapeError(
-                f"mean and std have shapes {self.mean.shape} and {self.std.shape}; ({width},) is wanted"
+                f"mean and std must have shape ({width},), std above 0; got {self.mean.shape} and {self.std.shape}"
             )
         for index, (w, b) in enumerate(self.layers):
             if w.ndim != 2 or w.shape[0] != width or b.shape != (w.shape[1],):
                 raise ShapeError(
-                    f"layer {index} has shapes {w.shape} and {b.shape}; {width} inputs are wanted"
+                    f"layer {index} must have {width} inputs, got weights {w.shape} and biases {b.shape}"
                 )
             width = w.shape[1]
         if width != task.action_size:
-            raise ShapeError(f"the network has {width} outputs; this task has {task.action_size} actions")
+            raise ShapeError(f"the network must have {task.action_size} outputs, got {width}")
         # clipped in units of the observations, scaled by the first layer: two passes fewer over the numbers
         mean64, std64 = self.mean.astype(np.float64), self.std.astype(np.float64)
         self._low, self._high = _weights(mean64 - CLIP * std64), _weights(mean64 + CLIP * std64)
@@ -95,14 +95,16 @@ class Policy:
         return x
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write to a `.npz` file; returns its path. A reader never sees half a file.
+        """Write to a `.npz` file atomically; return its path.
 
         Raises:
             CommandRejected: the name does not end in `.npz`.
         """
         target = Path(path)
         if target.suffix != ".npz":
-            raise CommandRejected(f"{target.name!r} does not end in .npz", parameter="path", value=str(path))
+            raise CommandRejected(
+                f"path must end in .npz, got {target.name!r}", parameter="path", value=str(path)
+            )
         about = {"format": _FORMAT, "task": self.task.as_dict(), "facts": self.facts}
         arrays: dict[str, Any] = {"about": np.array(json.dumps(about)), "mean": self.mean, "std": self.std}
         for index, (w, b) in enumerate(self.layers):
@@ -115,7 +117,7 @@ class Policy:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Policy:
-        """Read a file of `save`.
+        """Read a file written by `save`.
 
         Raises:
             HeptarmError: the file does not exist, or is not a policy.
@@ -125,7 +127,9 @@ class Policy:
                 entries = {name: file[name] for name in file.files}
             about = json.loads(str(entries["about"]))
             if about["format"] != _FORMAT:
-                raise HeptarmError(f"{path} has format {about['format']}; this heptarm reads {_FORMAT}")
+                raise HeptarmError(
+                    f"{path} must have format {_FORMAT} for this heptarm, got format {about['format']}"
+                )
             count = sum(name.startswith("w") for name in entries)
             layers = [(entries[f"w{index}"], entries[f"b{index}"]) for index in range(count)]
             return cls(
@@ -148,7 +152,7 @@ class Policy:
 
 
 def shipped(*, feature: bool = False) -> Policy:
-    """The policy that comes with heptarm, for an iiwa 14: `heptarm rl train --seed 0` made it.
+    """The policy that is part of heptarm, for an iiwa 14, trained by `heptarm rl train --seed 0`.
 
     Args:
         feature: the one that also sees the way to the target (`--feature`).

@@ -1,4 +1,4 @@
-"""A report of a policy's episodes, simulated or not: figures, a plot, and the recording itself."""
+"""Report of episodes of a policy, simulated or real: figures, a plot, and the recording."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from heptarm.values.arrays import Array, frozen
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EpisodeReport:
-    """Episodes of a policy; n of them, t decisions each.
+    """Record of n episodes of a policy, of t decisions each.
 
     Attributes:
         task: the task.
@@ -50,7 +50,7 @@ class EpisodeReport:
         ):
             raise ShapeError(
                 f"distances {self.distances.shape}, targets {self.targets.shape}, paths {self.paths.shape} and "
-                f"joints {self.joints.shape} do not belong together"
+                f"joints {self.joints.shape} do not belong to the same episodes"
             )
 
     @property
@@ -60,13 +60,13 @@ class EpisodeReport:
 
     @property
     def time_to_reach(self) -> Array:
-        """When the flange first was within the radius, shape (n,) [s]; inf: never."""
+        """Time at which the flange first was within the radius, shape (n,) [s]; inf: never."""
         near = self.distances <= self.task.radius
         return np.where(near.any(axis=1), (near.argmax(axis=1) + 1) / self.task.rate, np.inf)
 
     @property
     def success(self) -> npt.NDArray[np.bool_]:
-        """Which ended within the radius, shape (n,)."""
+        """Whether an episode ended within the radius, shape (n,)."""
         result: npt.NDArray[np.bool_] = self.final <= self.task.radius
         return result
 
@@ -87,15 +87,15 @@ class EpisodeReport:
 
     @property
     def p95(self) -> float:
-        """What 95 % of the final distances stay below [m]."""
+        """95th percentile of the final distances [m]."""
         return float(np.percentile(self.final, 95))
 
     def reached_within(self, seconds: float) -> float:
-        """Fraction of the episodes that came within the radius in that time."""
+        """Fraction of the episodes that reached the radius within a time."""
         return float((self.time_to_reach <= seconds + 1e-9).mean())
 
     def as_dict(self) -> dict[str, Any]:
-        """The figures, for a file; never reached is None."""
+        """The figures, for a file; None: never reached."""
         reached = self.time_to_reach[np.isfinite(self.time_to_reach)]
         return {
             "episodes": len(self.final),
@@ -153,7 +153,7 @@ class EpisodeReport:
                 joints=self.joints,
             )
         else:
-            raise CommandRejected(f"{target.name!r} ends neither in .json nor in .npz", parameter="path")
+            raise CommandRejected(f"path must end in .json or .npz, got {target.name!r}", parameter="path")
         return target
 
     @classmethod
@@ -171,7 +171,7 @@ class EpisodeReport:
             )
 
     def plot(self, path: str | os.PathLike[str], *, most: int = 60) -> Path:
-        """Draw paths and distance over time into a picture; returns its path.
+        """Plot paths, and distance over time; return the path of the picture.
 
         Args:
             path: file to write, `.png`, `.svg` or `.pdf`.

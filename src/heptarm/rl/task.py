@@ -1,6 +1,6 @@
-"""The task: bring the flange to a point. Every number of it, and what the policy sees and does.
+"""The reach task: move the flange to a point. All its numbers, its observations and its actions.
 
-Training, the Gymnasium environment and deployment all call these functions, so that a policy meets the same
+Training, the Gymnasium environment and deployment all call these functions, so that a policy has the same
 observation, the same integration of its actions and the same success radius everywhere. State, action and
 reward are those of the libiiwa paper: s = [q, dq, target], a = joint step, r = -distance.
 """
@@ -19,7 +19,7 @@ from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel, robot
 
 ACTIONS = ("joint", "cartesian")
-#: Scales of the kinematic feature [m]: the way to the target, coarse, and clipped when near.
+#: Scales of the kinematic feature [m]: the vector to the target, coarse, and clipped near the target.
 COARSE = 0.2
 FINE = 0.02
 
@@ -46,8 +46,8 @@ class ReachTask:
         leash: farthest that commanded joints may be from the measured ones [rad].
 
     Raises:
-        CommandRejected: no such robot, action or feature.
-        LimitError: a number that makes no task.
+        CommandRejected: unknown robot, action or feature.
+        LimitError: a number outside its range.
     """
 
     robot: str = "iiwa14"
@@ -70,7 +70,7 @@ class ReachTask:
         for name, choices in (("action", ACTIONS), ("feature", ("", "kinematic"))):
             if getattr(self, name) not in choices:
                 raise CommandRejected(
-                    f"{name} is {getattr(self, name)!r}; there are {', '.join(map(repr, choices))}",
+                    f"{name} must be one of {', '.join(map(repr, choices))}, got {getattr(self, name)!r}",
                     parameter=name,
                     value=getattr(self, name),
                 )
@@ -78,12 +78,12 @@ class ReachTask:
             object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
             if len(getattr(self, name)) != length:
                 raise ShapeError(
-                    f"{name} is {getattr(self, name)}; {length} numbers are wanted", parameter=name
+                    f"{name} must have {length} numbers, got {getattr(self, name)}", parameter=name
                 )
         for name in ("rate", "steps", "radius", "joint_step", "cartesian_step", "leash"):
             if not 0 < getattr(self, name) < float("inf"):
                 raise LimitError(
-                    f"{name} is {getattr(self, name)}; a positive number is wanted",
+                    f"{name} must be a positive number, got {getattr(self, name)}",
                     code=2,
                     parameter=name,
                     value=getattr(self, name),
@@ -99,12 +99,12 @@ class ReachTask:
 
     @property
     def observation_size(self) -> int:
-        """Numbers that the policy sees."""
+        """Size of an observation."""
         return 23 if self.feature else 17
 
     @property
     def action_size(self) -> int:
-        """Numbers that it decides."""
+        """Size of an action."""
         return 7 if self.action == "joint" else 3
 
     # ------------------------------------------------------------------------------ drawing episodes
@@ -114,7 +114,7 @@ class ReachTask:
         return np.asarray(self.home) + random.uniform(-self.spread, self.spread, (count, 7))
 
     def targets(self, random: np.random.Generator, count: int) -> Array:
-        """Targets from the box, base frame, shape (count, 3) [m]."""
+        """Random targets in the box, base frame, shape (count, 3) [m]."""
         half = np.asarray(self.size) / 2
         return np.asarray(self.centre) + random.uniform(-half, half, (count, 3))
 
@@ -125,11 +125,11 @@ class ReachTask:
         return kinematics.tip(self.model, q)
 
     def hold(self, q: Array) -> Array:
-        """The rotation that a Cartesian episode keeps: the one it begins with; (..., 7) to (..., 3, 3)."""
+        """The rotation that a Cartesian episode keeps, that of its start; (..., 7) to (..., 3, 3)."""
         return kinematics.rotation(self.model, q)
 
     def observe(self, q: Array, dq: Array, target: Array) -> Array:
-        """What the policy sees.
+        """The observation.
 
         Args:
             q: measured joint positions, shape (..., 7) [rad].
@@ -152,9 +152,9 @@ class ReachTask:
         return result
 
     def advance(self, command: Array, q: Array, action: Array, held: Array | None = None) -> Array:
-        """The next commanded joints: the action is added to the last command, not to what was measured.
+        """The next commanded joint positions: the action is added to the last command, not to the measured positions.
 
-        A command that has run away from the arm (a stopped or pushed robot) is kept on a leash.
+        The distance of the command from the arm (of a stopped or pushed robot) is limited.
 
         Args:
             command: the last commanded joints, shape (..., 7) [rad].
@@ -173,7 +173,9 @@ class ReachTask:
         if self.action == "joint":
             wanted = command + self.joint_step * bounded
         elif held is None:
-            raise ShapeError("a Cartesian action needs the rotation that is held", parameter="held")
+            raise ShapeError(
+                "held must be the rotation of the flange for a Cartesian action, got None", parameter="held"
+            )
         else:
             wanted = kinematics.step_towards(model, command, self.cartesian_step * bounded, held)
             # a Cartesian step may not turn a joint faster than a joint action could twice over
@@ -183,13 +185,13 @@ class ReachTask:
         return result
 
     def distance(self, tip: Array, target: Array) -> Array:
-        """From the flange to the target, shapes (..., 3) to (...,) [m]."""
+        """Distance from the flange to the target, shapes (..., 3) to (...,) [m]."""
         offset = tip - target
         result: Array = np.sqrt((offset * offset).sum(axis=-1))
         return result
 
     def reward(self, distance: Array) -> Array:
-        """Of one decision: the negative distance after it, and nothing else."""
+        """Reward of one decision: the negative distance after it."""
         return -distance
 
     # ------------------------------------------------------------------------------ in files
@@ -208,7 +210,7 @@ class ReachTask:
         unknown = set(entries) - {field.name for field in fields(cls)}
         if unknown:
             raise CommandRejected(
-                f"the task has no {', '.join(sorted(unknown))}",
+                f"unknown entries of the task: {', '.join(sorted(unknown))}",
                 hint="the file may be of a newer heptarm",
             )
         given: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in entries.items()}

@@ -1,4 +1,4 @@
-"""Scenarios: what a robot can do, shown by measurement; on the virtual cabinet and, with care, on a robot.
+"""Scenarios: measurements of what a robot can do, on the virtual cabinet and, with care, on a robot.
 
 ::
 

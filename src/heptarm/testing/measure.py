@@ -110,7 +110,7 @@ def _text(value: npt.ArrayLike) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """The states pushed during a motion, in their order.
+    """The states pushed during a motion, in their order; in each one joints and pose were sampled again.
 
     Attributes:
         result: how it ended.
@@ -122,9 +122,13 @@ class Recording:
 
     @property
     def t(self) -> Array:
-        """Cabinet time since the first state, shape (n,) [s]."""
-        stamps = np.array([state.stamp for state in self.states], dtype=np.float64)
-        return np.asarray((stamps - stamps[0]) * 1e-9)
+        """Cabinet time of the joints since the first state, shape (n,) [s]."""
+        return _times([state.joints.stamp for state in self.states if state.joints is not None])
+
+    @property
+    def t_pose(self) -> Array:
+        """Cabinet time of the poses since the first state, shape (n,) [s]."""
+        return _times([state.groups.pose.stamp for state in self.states if state.groups.pose is not None])
 
     @property
     def q(self) -> Array:
@@ -154,13 +158,27 @@ class Recording:
     @property
     def speeds(self) -> Array:
         """Commanded speeds of the motion frame between two states, shape (n - 1,) [m/s]."""
-        return np.asarray(np.linalg.norm(np.diff(self.xyz_cmd, axis=0), axis=1) / np.diff(self.t))
+        return np.asarray(np.linalg.norm(np.diff(self.xyz_cmd, axis=0), axis=1) / np.diff(self.t_pose))
 
     @property
     def turns(self) -> Array:
         """Commanded turning speeds of the motion frame between two states, shape (n - 1,) [rad/s]."""
         pairs = zip(self.states, self.states[1:])
-        return np.array([b.pose_cmd.angle_to(a.pose_cmd) for a, b in pairs]) / np.diff(self.t)
+        return np.array([b.pose_cmd.angle_to(a.pose_cmd) for a, b in pairs]) / np.diff(self.t_pose)
+
+
+def _times(stamps: Sequence[int]) -> Array:
+    return np.asarray((np.array(stamps, dtype=np.float64) - stamps[0]) * 1e-9)
+
+
+def _is_newer(state: State, than: State | None) -> bool:
+    """Whether joints and pose were both sampled again: a cabinet sends a group again that takes long to read."""
+    if than is None or state.joints is None or than.joints is None:
+        return True
+    pose, before = state.groups.pose, than.groups.pose
+    return state.joints.stamp > than.joints.stamp and (
+        pose is None or before is None or pose.stamp > before.stamp
+    )
 
 
 def record(
@@ -175,17 +193,17 @@ def record(
     before = arm.state.stamp
     pushed = arm.states()  # from before the beginning: a slow machine would miss the first of them
     handle = arm.start(motion, mode=mode, until=until, speed=speed)
-    states: dict[int, State] = {}
+    states: list[State] = []
     end = None
     for state in pushed:
-        if state.stamp > before:
-            states[state.stamp] = state  # a group that is sampled less often makes two of one stamp
+        if state.stamp > before and _is_newer(state, states[-1] if states else None):
+            states.append(state)
         if end is None and handle.done:
             end = arm.state.stamp  # a slow machine has not seen all of them yet
         if state.stamp >= end if end is not None else state.stamp - before > handle.limit * 1e9:
             break
     pushed.close()
-    return Recording(handle.wait(), tuple(states.values()))
+    return Recording(handle.wait(), tuple(states))
 
 
 def fresh(arm: Arm, *, after: float = 0.03) -> State:

@@ -314,7 +314,11 @@ class State(Value):
 
     @property
     def stamp(self) -> int:
-        """Cabinet time of the newest group [ns]; 0 without any."""
+        """Cabinet time of the newest group [ns]; 0 without any.
+
+        Other groups may be older. The velocity of a value follows from the stamps of its own group, such as
+        `groups.pose.stamp` for `pose`.
+        """
         groups = (getattr(self.groups, name) for name in GROUP_NAMES)
         return max((group.stamp for group in groups if group is not None), default=0)
 

@@ -150,7 +150,7 @@ def unknown(name: str, parameter: str, known: tuple[str, ...]) -> CommandRejecte
     """The error of an unknown name."""
     listed = ", ".join(known) or "none"
     return CommandRejected(
-        f"{parameter} is {name!r}, which is unknown; there are: {listed}",
+        f"{parameter} must be one of {listed}, got {name!r}",
         code=42,
         parameter=parameter,
         value=name,

@@ -75,7 +75,9 @@ public class Breaking extends RoboticsAPIApplication {
         IMotionContainer up = lbr.move(linRel(0, 0, 80, lbr.getRootFrame()).setCartVelocity(100)
                 .breakWhen(touch.and(never)).breakWhen(new TorqueComponentCondition(lbr.getFlange(), CoordinateAxis.X, -50, 50)));
         say("without a firing there is no info", up.getFiredBreakConditionInfo() == null && !up.hasFired(touch));
-        ThreadUtil.milliSleep(200);
+        for (int i = 0; i < 3000 && edges.get() != 101; i++) { // listeners are called by a thread of their own
+            ThreadUtil.milliSleep(10);
+        }
         say("the observer heard both edges", edges.get() == 101 && observer.isEnabled());
         observers.removeConditionObserver(observer);
         say("a removed one hears nothing", !observer.isEnabled() && observers.getRegisteredConditionObservers().isEmpty());
@@ -104,7 +106,9 @@ public class Breaking extends RoboticsAPIApplication {
                 rising.incrementAndGet();
             }
         }).enable();
-        ThreadUtil.milliSleep(100);
+        for (int i = 0; i < 3000 && rising.get() == 0; i++) { // listeners are called by a thread of their own
+            ThreadUtil.milliSleep(10);
+        }
         say("an observer is told of what holds when it is enabled", rising.get() == 1);
         int refused = 0;
         for (int i = 0; i < 4; i++) {

@@ -91,7 +91,7 @@ public class Overlaying extends RoboticsAPIApplication implements IFRISessionLis
         say("a bad period throws", refused);
         FRISession session = new FRISession(configuration);
         session.addFRISessionListener(this);
-        session.await(10, TimeUnit.SECONDS);
+        session.await(60, TimeUnit.SECONDS);
         say("the client answers", session.getFRIChannelInformation().getLatency() >= 0);
         double before = lbr.getCurrentJointPosition().get(6);
         PositionHold hold = new PositionHold(new PositionControlMode(), -1, TimeUnit.SECONDS);
@@ -106,7 +106,9 @@ public class Overlaying extends RoboticsAPIApplication implements IFRISessionLis
         say("the client's outputs are the cabinet's", signals.offset() == -3 && signals.level() == 2.5);
         say("an output out of its range is not written", signals.count() == 0);
         container.cancel();
-        ThreadUtil.milliSleep(700);
+        for (int i = 0; i < 3000 && !container.isFinished(); i++) { // listeners are called by a thread of their own
+            ThreadUtil.milliSleep(10);
+        }
         say("cancelling the motion ends the overlay", container.isFinished() && !container.hasError());
         for (int i = 0; i < 200
                 && session.getFRIChannelInformation().getFRISessionState() != FRISessionState.MONITORING_READY; i++) {
@@ -115,7 +117,9 @@ public class Overlaying extends RoboticsAPIApplication implements IFRISessionLis
         say("the session monitors on",
                 session.getFRIChannelInformation().getFRISessionState() == FRISessionState.MONITORING_READY);
         session.close();
-        ThreadUtil.milliSleep(100);
+        for (int i = 0; i < 3000 && !seen.contains(FRISessionState.IDLE); i++) { // listeners are called by a thread of their own
+            ThreadUtil.milliSleep(10);
+        }
         say("all states were told", seen.contains(FRISessionState.COMMANDING_WAIT)
                 && seen.contains(FRISessionState.COMMANDING_ACTIVE) && seen.contains(FRISessionState.IDLE));
         configuration.setPortOnRemote(port + 1);

@@ -24,10 +24,28 @@ public class Oversleeping extends RoboticsAPIApplication {
             double fastest = watch();
             PrintWriter out = new PrintWriter((String) getApplicationData().getProcessData("sample.file").getValue(), "UTF-8");
             out.println(fastest);
+            double[] moved = hold();
+            out.println(moved[0]);
+            out.println(moved[1]);
             out.close();
         } catch (Exception e) {
             throw new IllegalStateException(e);
         }
+    }
+
+    /** How far A1 seems to turn in 0.4 s while the instant is held, and when it is released [rad]. */
+    private double[] hold() throws InterruptedException {
+        PlantClock clock = new PlantClock();
+        clock.hold(clock.sleepUntil(clock.nanos()));
+        long stamp = clock.stamp();
+        double before = lbr.getCommandedJointPosition().get(0);
+        Thread.sleep(400);
+        if (clock.stamp() != stamp) {
+            throw new IllegalStateException("the instant has moved");
+        }
+        double held = lbr.getCommandedJointPosition().get(0) - before;
+        clock.release();
+        return new double[] {held, lbr.getCommandedJointPosition().get(0) - before};
     }
 
     /** The fastest that A1 seems to turn [rad/s], on its way at 0.1 of its maximum. */

@@ -59,7 +59,9 @@ public class Triggering extends RoboticsAPIApplication {
         first.triggerWhen(middle, say("first"));
         second.triggerWhen(late, say("second"));
         IMotionContainer batch = lbr.move(new MotionBatch(first, second).triggerWhen(whole, say("whole")));
-        ThreadUtil.milliSleep(200);
+        for (int i = 0; i < 3000 && told.size() < 3; i++) { // listeners are called by a thread of their own
+            ThreadUtil.milliSleep(10);
+        }
         say("triggers of a batch's motions go off in order", told.toString().equals("[first, second, whole]"));
         say("the container knows", batch.hasFired(middle) && batch.hasFired(late) && batch.hasFired(whole));
 
@@ -92,7 +94,9 @@ public class Triggering extends RoboticsAPIApplication {
             current[0] |= block.getCurrentMotion() == spline;
             ThreadUtil.milliSleep(20);
         }
-        ThreadUtil.milliSleep(200);
+        for (int i = 0; i < 3000 && !told.contains("end"); i++) { // listeners are called by a thread of their own
+            ThreadUtil.milliSleep(10);
+        }
         say("a listener hears of segments", told.toString().equals("[+0, +1, curved, -1, +2, straight, -2, -0, end]"));
         say("the motion is the spline", current[0] && block.getLastExecutedMotion() == spline);
         try {

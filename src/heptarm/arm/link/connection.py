@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from heptarm import __version__
+from heptarm.arm.link.halt import BUSY, PAUSE, halt
 from heptarm.arm.link.link import Link
 from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.arm.link.state_stream import GROUPS, StateFeed, States, StateSample, groups_of
@@ -22,6 +23,7 @@ from heptarm.arm.translate.state import read_firing, read_result, read_robot, re
 from heptarm.arm.watchdog import CONNECTION
 from heptarm.errors import (
     CommandRejected,
+    ConnectFailed,
     ConnectionLost,
     HeptarmError,
     LocalProtocolError,
@@ -329,9 +331,19 @@ class Connection:
         return max(self.link.offset.rate, 0.001)
 
     def open(self) -> None:
-        """Make a link and subscribe to states."""
-        link = self._new_link(self.events.dispatch, self.feed.push, self._on_lost)
-        self._welcome = link.open(name=self.options.name, version=__version__, timeout=self.options.timeout)
+        """Make a link and subscribe to states; a cabinet that is too busy is asked again."""
+        deadline = self.clock.nanos() + round(self.options.timeout * 1e9)
+        while True:
+            link = self._new_link(self.events.dispatch, self.feed.push, self._on_lost)
+            try:
+                self._welcome = link.open(
+                    name=self.options.name, version=__version__, timeout=self.options.timeout
+                )
+                break
+            except ConnectFailed as error:
+                if error.code not in BUSY or self.clock.nanos() > deadline:
+                    raise
+            self.clock.sleep(PAUSE)
         self.controller = self._welcome.controller
         self.in_control = False
         self.events.forget_unclaimed()
@@ -511,22 +523,14 @@ class Connection:
                 raise
 
     def stop(self, kind: wire.StopKind) -> None:
-        """Stop the arm; through a new link if the old one was lost, since the arm may still move."""
-        message = wire.Stop(kind=kind)
+        """Stop the arm; without a session if this one was lost, since the arm may still move."""
         try:
-            self.request(message)
-        except ConnectionLost:
+            self.request(wire.Stop(kind=kind))
+        except (ConnectionLost, Timeout):
             if self.closed.is_set():
                 raise
             _log.warning("the connection is lost; stopping the arm through a new connection")
-            link = self._new_link(lambda _: None, lambda *_: None, lambda _: None)
-            try:
-                link.open(
-                    name=f"{self.options.name} (stop)", version=__version__, timeout=self.options.timeout
-                )
-                link.request(message, timeout=self.options.timeout)
-            finally:
-                link.close()
+            halt(self._dial, kind, clock=self.clock, timeout=self.options.timeout)
 
     @contextlib.contextmanager
     def stopping_on_interrupt(self) -> Iterator[None]:

@@ -510,6 +510,10 @@ class Link:
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(5.0)
 
+    def cut(self) -> None:
+        """End the connection at once and without a Goodbye, as a broken cable does."""
+        self._transport.close()
+
     def abandon(self, error: HeptarmError) -> None:
         """Give up the copy that a fork of the process has, without any message to the cabinet.
 

@@ -1,1 +1,1 @@
-"""The simulated arms that a policy is trained on: batched MuJoCo, the virtual cabinet's plant, MuJoCo Warp on a GPU."""
+"""Simulated arms for training: batched MuJoCo, the plant of the virtual cabinet, MuJoCo Warp on a GPU."""

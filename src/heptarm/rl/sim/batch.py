@@ -1,4 +1,4 @@
-"""Many arms at once on the shipped model with full dynamics; `mujoco.batch` steps them on a few threads."""
+"""Batched simulation of the included model with full dynamics; `mujoco.batch` steps it on a few threads."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Index: TypeAlias = npt.NDArray[np.integer[Any]]
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What a decision of all arms led to.
+    """Result of one decision of all arms.
 
     Attributes:
         observation: what each sees now, after a new episode began where one ended, shape (envs, n).
@@ -42,7 +42,7 @@ class Step:
 
 
 class Engine:
-    """Arms that follow commanded joints: the part that another engine may replace.
+    """Arms that follow commanded joint positions: the replaceable engine.
 
     Args:
         task: the task.
@@ -74,7 +74,7 @@ class Engine:
         self._steps = simulation.SUBSTEPS
 
     def payload(self, mass: Array) -> None:
-        """Hang unknown masses on the flanges, shape (envs,) [kg]; their weight pulls as a force."""
+        """Attach unknown masses to the flanges, shape (envs,) [kg]; their weight acts as a force."""
         self._batch.expand("body_mass")[:, -1] += mass
         self._batch.set_const()
         self._state["xfrc_applied"][:, -1, 2] = -simulation.GRAVITY * mass
@@ -100,7 +100,7 @@ class Engine:
         state["qacc_warmstart"][which] = 0.0
 
     def step(self, command: Array) -> None:
-        """Let one decision pass with commanded joints, shape (envs, 7) [rad]."""
+        """Simulate one decision with commanded joint positions, shape (envs, 7) [rad]."""
         self._state["ctrl"][:] = command
         self._batch.step(nstep=self._steps)
 
@@ -112,7 +112,7 @@ class Engine:
         return entries
 
     def load(self, entries: dict[str, Array]) -> None:
-        """Go on from `save`."""
+        """Restore what `save` returned."""
         for name, rows in self._state.items():
             rows[:] = entries[name]
         if "filter" in entries:
@@ -155,7 +155,7 @@ class BatchReach:
                     f"{name} must be at least 1, got {value}", code=2, parameter=name, value=value
                 )
         if starts not in ("staggered", "together"):
-            raise CommandRejected(f"starts is {starts!r}; 'staggered' or 'together' is wanted", value=starts)
+            raise CommandRejected(f"starts must be 'staggered' or 'together', got {starts!r}", value=starts)
         self.task, self.envs, self.randomisation = task, envs, randomisation
         self._random = np.random.default_rng(seed)
         self.engine = engine(task, envs=envs, threads=threads)
@@ -181,7 +181,7 @@ class BatchReach:
         return result
 
     def reset(self, targets: npt.ArrayLike | None = None, *, seed: int | None = None) -> Array:
-        """Begin an episode everywhere.
+        """Start an episode of every arm.
 
         Args:
             targets: shape (envs, 3) [m]; None: drawn.
@@ -202,7 +202,7 @@ class BatchReach:
             given = np.asarray(targets, dtype=np.float64)
             if given.shape != (self.envs, 3) or not np.isfinite(given).all():
                 raise ShapeError(
-                    f"targets has shape {given.shape}; {(self.envs, 3)}, all finite, is wanted",
+                    f"targets must have shape {(self.envs, 3)} and be finite, got shape {given.shape}",
                     parameter="targets",
                 )
             self.target[:] = given
@@ -223,7 +223,7 @@ class BatchReach:
             self.held[which] = task.hold(q)
 
     def observe(self) -> Array:
-        """What the policy sees now, shape (envs, n)."""
+        """The current observations, shape (envs, n)."""
         return self.task.observe(self.engine.q, self.engine.dq * self._noise, self.target)
 
     def step(self, action: npt.ArrayLike) -> Step:
@@ -239,7 +239,7 @@ class BatchReach:
         given = np.asarray(action, dtype=np.float64)
         if given.shape != (self.envs, task.action_size) or not np.isfinite(given).all():
             raise ShapeError(
-                f"action has shape {given.shape}; {(self.envs, task.action_size)}, all finite, is wanted",
+                f"action must have shape {(self.envs, task.action_size)} and be finite, got shape {given.shape}",
                 parameter="action",
             )
         self.command = task.advance(self.command, engine.q, given, self.held)
@@ -265,7 +265,7 @@ class BatchReach:
     # ------------------------------------------------------------------------------ interrupted training
 
     def save(self) -> dict[str, Any]:
-        """Everything needed to go on as if nothing had happened; arrays and one text."""
+        """The complete state, to resume later: arrays and one text."""
         arrays = {
             "target": self.target,
             "command": self.command,
@@ -283,13 +283,15 @@ class BatchReach:
         }
 
     def load(self, entries: dict[str, Any]) -> None:
-        """Go on from `save` of a simulation made with the same arguments.
+        """Restore what `save` returned, of a simulation with the same arguments.
 
         Raises:
-            ShapeError: it was of another number of arms.
+            ShapeError: it had another number of arms.
         """
         if np.shape(entries["target"]) != self.target.shape:
-            raise ShapeError(f"the saved simulation has {len(entries['target'])} arms, this one {self.envs}")
+            raise ShapeError(
+                f"the saved simulation must have {self.envs} arms, got {len(entries['target'])} arms"
+            )
         self.target[:], self.age[:] = entries["target"], entries["age"]
         self.command = np.array(entries["command"])
         self._latency[:], self._late[:] = entries["latency"], entries["late"]

@@ -1,6 +1,6 @@
 """The virtual cabinet's plant as an engine: the arm at 1 kHz, with the servo and the control laws of deployment.
 
-It knows nothing of the training simulator, so a policy that does well here does not lean on that one. Each arm
+It is independent of the training simulator, so good results here show that a policy does not exploit it. Each arm
 takes about a millisecond for a decision of 33.
 """
 
@@ -20,7 +20,7 @@ _SERVO = 1
 
 
 class PlantEngine:
-    """Plants side by side; same methods as `heptarm.rl.sim.batch.Engine`.
+    """Several plants; same methods as `heptarm.rl.sim.batch.Engine`.
 
     Args:
         task: the task.
@@ -41,13 +41,13 @@ class PlantEngine:
         self.q, self.dq = np.zeros((envs, 7)), np.zeros((envs, 7))
         self._name = task.robot
         self._period = 1.0 / task.rate
-        self._time = np.zeros(envs)  # that each plant should have lived [s]
+        self._time = np.zeros(envs)  # target time of each plant [s]
         self._stiffness: Array | None = None
         self._payload = np.zeros(envs)
         self.place(np.arange(envs), np.tile(np.asarray(task.home), (envs, 1)))
 
     def payload(self, mass: Array) -> None:
-        """Hang unknown weights on the flanges, shape (envs,) [kg]."""
+        """Attach unknown masses to the flanges, shape (envs,) [kg]."""
         self._payload = np.asarray(mass, dtype=np.float64)
         for plant, weight in zip(self.plants, self._payload, strict=True):
             plant.apply_wrench((0.0, 0.0, -GRAVITY * float(weight)))
@@ -58,7 +58,7 @@ class PlantEngine:
         self.place(np.arange(len(self.plants)), self.q.copy())
 
     def bandwidth(self, which: Index, values: Array) -> None:
-        """The plant's servo has its own; nothing changes."""
+        """No effect: the plant's servo has its own bandwidth."""
 
     def place(self, which: Index, q: Array) -> None:
         """Put some arms at rest at joint positions, shape (n, 7) [rad]; each is a new plant."""
@@ -77,7 +77,7 @@ class PlantEngine:
             self.q[index], self.dq[index] = start, 0.0
 
     def step(self, command: Array) -> None:
-        """Let one decision pass with commanded joints, shape (envs, 7) [rad]."""
+        """Simulate one decision with commanded joint positions, shape (envs, 7) [rad]."""
         self._time += self._period
         for index, plant in enumerate(self.plants):
             plant.shared.post(_SERVO, command[index])

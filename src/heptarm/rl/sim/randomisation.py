@@ -1,6 +1,6 @@
-"""Domain randomisation: what differs from robot to robot, drawn at random so that a policy does not depend on it.
+"""Domain randomisation: properties of the robots, drawn at random so that a policy does not depend on them.
 
-A precise policy trained without it swings around its target as soon as the robot answers later than the
+A precise policy trained without it oscillates around its target when the robot answers later than the
 simulation did.
 """
 
@@ -22,7 +22,7 @@ LATEST = 8
 
 @dataclass(frozen=True, slots=True)
 class Randomisation:
-    """Ranges from which each simulated robot draws; a range is (lowest, highest).
+    """Ranges of the properties of simulated robots; a range is (lowest, highest).
 
     Attributes:
         latency: decisions by which commands come late, drawn for each episode.
@@ -32,7 +32,7 @@ class Randomisation:
         stiffness: of joint impedance [Nm/rad], drawn for each robot, log-uniform; inf: position control.
 
     Raises:
-        LimitError: a range that is none.
+        LimitError: a range is empty or exceeds its bounds.
     """
 
     _: KW_ONLY
@@ -53,7 +53,7 @@ class Randomisation:
             low, high = getattr(self, name)
             if not least <= low <= high <= most:
                 raise LimitError(
-                    f"{name} is ({low}, {high}); two numbers in [{least:g}, {most:g}] are wanted, the lower first",
+                    f"{name} must be two ascending numbers in [{least:g}, {most:g}], got ({low}, {high})",
                     code=2,
                     parameter=name,
                     value=(low, high),
@@ -61,13 +61,13 @@ class Randomisation:
                 )
         if isfinite(self.stiffness[0]) != isfinite(self.stiffness[1]):
             raise LimitError(
-                f"stiffness is {self.stiffness}; either both ends are finite, or none",
+                f"stiffness must have two finite ends or none, got {self.stiffness}",
                 code=2,
                 parameter="stiffness",
             )
         if not 0.0 <= self.velocity_noise < 1.0:
             raise LimitError(
-                f"velocity_noise is {self.velocity_noise}; allowed is [0, 1)",
+                f"velocity_noise must be in [0, 1), got {self.velocity_noise}",
                 code=2,
                 parameter="velocity_noise",
                 value=self.velocity_noise,
@@ -102,7 +102,7 @@ def _logarithmic(random: np.random.Generator, bounds: tuple[float, float], count
 
 #: One known robot.
 NONE = Randomisation()
-#: A robot on the desk, its data roughly known.
+#: A robot with roughly known data.
 MILD = Randomisation(latency=(0, 1), bandwidth=(10.0, 40.0), velocity_noise=0.2, payload=(0.0, 1.0))
 #: Enough for late networks and compliant control.
 STRONG = Randomisation(latency=(0, 3), bandwidth=(5.0, 40.0), velocity_noise=0.5, payload=(0.0, 3.0))
@@ -114,11 +114,13 @@ def level(name: str) -> Randomisation:
     """The randomisation of that name.
 
     Raises:
-        CommandRejected: there is none.
+        CommandRejected: it does not exist.
     """
     try:
         return LEVELS[name]
     except KeyError:
         raise CommandRejected(
-            f"no randomisation {name!r}; there are {', '.join(LEVELS)}", parameter="randomisation", value=name
+            f"randomisation must be one of {', '.join(LEVELS)}, got {name!r}",
+            parameter="randomisation",
+            value=name,
         ) from None

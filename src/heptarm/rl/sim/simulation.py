@@ -1,9 +1,9 @@
-"""The arm as the trainers simulate it: the shipped model with full dynamics and the plant's servo.
+"""The simulated arm of training: the included model with full dynamics and the plant's servo.
 
 The plant closes its loop every millisecond in Python; for training the same gains become MuJoCo actuators, so
-that a decision of 1/30 s is eight steps of the engine without leaving it. Behind each stands a low-pass that
-plays the servo's interpolation. Gravity is taken as compensated, so it is switched off; what the controller
-does not know (a payload) pulls as an external force.
+that a decision of 1/30 s is eight steps inside the engine. Each has a low-pass filter that
+models the servo's interpolation. Gravity counts as compensated, so it is switched off; what the controller
+does not know (a payload) acts as an external force.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from stable_baselines3.common.vec_env import VecEnv  # noqa: E402  after the che
 
 
 class VectorReach(VecEnv):  # type: ignore[misc]  # stable_baselines3 is not looked into
-    """Many simulated robots that reach for points.
+    """Many simulated robots in the reach task.
 
     Args:
         arms: the simulation.
@@ -33,7 +33,7 @@ class VectorReach(VecEnv):  # type: ignore[misc]  # stable_baselines3 is not loo
         super().__init__(arms.envs, observation_space(arms.task), action_space(arms.task))
 
     def reset(self) -> Any:
-        """Begin episodes everywhere; returns observations, shape (envs, n)."""
+        """Start episodes of all arms; return the observations, shape (envs, n)."""
         seed = self._seeds[0]  # of `seed()`; one stream serves all arms
         self._reset_seeds()
         return self.arms.reset(seed=seed).astype(np.float32)
@@ -43,7 +43,7 @@ class VectorReach(VecEnv):  # type: ignore[misc]  # stable_baselines3 is not loo
         self._action = actions
 
     def step_wait(self) -> Any:
-        """Observations, rewards, which ended, and what is known besides."""
+        """Observations, rewards, ended episodes, and further information."""
         step = self.arms.step(self._action)
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         last = step.final.astype(np.float32)
@@ -58,7 +58,7 @@ class VectorReach(VecEnv):  # type: ignore[misc]  # stable_baselines3 is not loo
         return step.observation.astype(np.float32), step.reward.astype(np.float32), step.done, infos
 
     def close(self) -> None:
-        """Nothing is held."""
+        """No resources to release."""
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """An attribute, the same for all arms."""
@@ -78,7 +78,7 @@ class VectorReach(VecEnv):  # type: ignore[misc]  # stable_baselines3 is not loo
         Raises:
             CommandRejected: always.
         """
-        raise CommandRejected(f"there is no {method_name} of single arms", parameter=method_name)
+        raise CommandRejected(f"{method_name} of single arms cannot be called", parameter=method_name)
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """Nothing is wrapped."""

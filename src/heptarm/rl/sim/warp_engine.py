@@ -17,13 +17,13 @@ from heptarm.rl.sim.batch import Index
 from heptarm.rl.task import ReachTask
 from heptarm.values.arrays import Array
 
-#: Room for contacts and for rows of constraints of each arm: seven joint limits, and what touches.
+#: Capacity for contacts and constraint rows of each arm: seven joint limits, and contacts.
 CONTACTS = 8
 CONSTRAINTS = 40
 
 
 class WarpEngine:
-    """Arms that follow commanded joints; same methods as `heptarm.rl.sim.batch.Engine`.
+    """Arms that follow commanded joint positions; same methods as `heptarm.rl.sim.batch.Engine`.
 
     Args:
         task: the task.
@@ -63,7 +63,7 @@ class WarpEngine:
         self._sense()
 
     def payload(self, mass: Array) -> None:
-        """Hang unknown masses on the flanges, shape (envs,) [kg]; their weight pulls as a force."""
+        """Attach unknown masses to the flanges, shape (envs,) [kg]; their weight acts as a force."""
         masses = self._model.body_mass.numpy().copy()
         masses[:, -1] += mass
         self._model.body_mass.assign(masses)
@@ -95,7 +95,7 @@ class WarpEngine:
         self._sense()
 
     def step(self, command: Array) -> None:
-        """Let one decision pass with commanded joints, shape (envs, 7) [rad]."""
+        """Simulate one decision with commanded joint positions, shape (envs, 7) [rad]."""
         self._data.ctrl.assign(command.astype(np.float32))
         if self._graph is not None:
             self._warp.capture_launch(self._graph)
@@ -114,7 +114,7 @@ class WarpEngine:
         return {**entries, "filter": self._filter.copy()}
 
     def load(self, entries: dict[str, Array]) -> None:
-        """Go on from `save`."""
+        """Restore what `save` returned."""
         for name, rows in self._rows.items():
             rows.assign(entries[name])
         self._filter = np.array(entries["filter"])

@@ -1,1 +1,1 @@
-"""Training a policy: PPO in torch, its recipe, several workers. Nothing outside this package needs torch."""
+"""Training of a policy: PPO in torch, its settings, several workers. Nothing outside this package needs torch."""

@@ -1,7 +1,7 @@
-"""Several workers that train one policy: each simulates its own arms, all average what they learn.
+"""Several workers that train one policy: each simulates its own arms, all average their gradients.
 
 `torchrun` (or anything that sets RANK, WORLD_SIZE, MASTER_ADDR and MASTER_PORT) starts the workers, on one machine
-or on many; a single process is a team of one and needs none of it. Gloo carries the tensors between CPUs, NCCL
+or several; a single process needs none of it. Gloo transfers the tensors between CPUs, NCCL
 between GPUs.
 """
 
@@ -18,12 +18,12 @@ from torch import Tensor, nn
 
 from heptarm.errors import CommandRejected, LimitError
 
-#: How long a worker waits for the others [s].
+#: Longest wait of a worker for the others [s].
 PATIENCE = 120.0
 
 
 class Team:
-    """The workers of a training, seen from one of them.
+    """The workers of a training, from the view of one of them.
 
     Attributes:
         rank: number of this one; 0 writes the files.
@@ -36,7 +36,7 @@ class Team:
 
     @property
     def is_first(self) -> bool:
-        """This worker reports and writes."""
+        """Whether this worker reports and writes files."""
         return self.rank == 0
 
     def mean(self, values: Tensor) -> Tensor:
@@ -64,14 +64,14 @@ class Team:
 
 @contextmanager
 def team(device: str) -> Iterator[Team]:
-    """The team that the environment describes; left together.
+    """The team that the environment variables describe; all workers leave it together.
 
     Args:
         device: "cpu", "cuda" (each worker of a machine takes its own GPU) or "cuda:1".
 
     Raises:
-        CommandRejected: no such device here.
-        LimitError: RANK and WORLD_SIZE do not go together.
+        CommandRejected: the device is not available.
+        LimitError: RANK and WORLD_SIZE contradict each other.
     """
     size, rank = _number("WORLD_SIZE", 1), _number("RANK", 0)
     if not 0 <= rank < size:
@@ -103,7 +103,7 @@ def _number(name: str, otherwise: int) -> int:
     try:
         return int(text) if text else otherwise
     except ValueError:
-        raise LimitError(f"{name} is {text!r}; a number is wanted", parameter=name, value=text) from None
+        raise LimitError(f"{name} must be a number, got {text!r}", parameter=name, value=text) from None
 
 
 def _device(name: str) -> torch.device:
@@ -111,10 +111,10 @@ def _device(name: str) -> torch.device:
     if kind == "cpu" and not index:
         return torch.device("cpu")
     if kind != "cuda" or (index and not index.isdigit()):
-        raise CommandRejected(f"device is {name!r}; 'cpu', 'cuda' or 'cuda:0' is wanted", value=name)
+        raise CommandRejected(f"device must be 'cpu', 'cuda' or 'cuda:N', got {name!r}", value=name)
     if not torch.cuda.is_available():
         raise CommandRejected(
-            f"device is {name!r}, but torch finds no GPU here",
+            f"device {name!r} is not available: torch finds no GPU on this machine",
             parameter="device",
             value=name,
             hint="use device='cpu', or install a torch built for CUDA",

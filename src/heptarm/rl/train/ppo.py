@@ -1,4 +1,4 @@
-"""Proximal policy optimisation (Schulman et al. 2017) in torch, as small as it can be read.
+"""Proximal policy optimisation (Schulman et al. 2017) in torch, in a minimal form.
 
 Two separate networks give the mean action and the value; the action's spread does not depend on the state. The
 learning rate follows the distance that an update moves the policy (Kullback-Leibler divergence), and its
@@ -21,7 +21,7 @@ from heptarm.rl.policy import CLIP
 
 @dataclass(frozen=True, slots=True)
 class PpoSettings:
-    """Numbers of the algorithm.
+    """Parameters of the algorithm.
 
     Attributes:
         envs: arms simulated at once.
@@ -85,7 +85,7 @@ class PpoSettings:
     def _want(self, name: str, fine: bool, wanted: str) -> None:
         if not fine:
             raise LimitError(
-                f"{name} is {getattr(self, name)}; wanted: {wanted}",
+                f"{name} must be {wanted}, got {getattr(self, name)}",
                 code=2,
                 parameter=name,
                 value=getattr(self, name),
@@ -93,7 +93,7 @@ class PpoSettings:
             )
 
     def ceiling(self, progress: float) -> float:
-        """The most that `spread` may be after a fraction of the training, 0 to 1."""
+        """Upper limit of `spread` after a fraction of the training, 0 to 1."""
         left = min(1.0, 2.0 * (1.0 - min(1.0, progress)))
         return self.spread_end + (self.spread - self.spread_end) * left
 
@@ -121,7 +121,7 @@ class Scaler(nn.Module):  # type: ignore[misc]  # torch is not looked into
         return (self.square / self.count).sqrt().clamp_min(1e-3)
 
     def add(self, count: Tensor, mean: Tensor, square: Tensor) -> None:
-        """Take in samples by their number, mean and sum of squared deviations."""
+        """Add samples by their number, mean and sum of squared deviations."""
         total = self.count + count
         away = mean - self.mean
         self.mean += away * (count / total)
@@ -135,7 +135,7 @@ class Scaler(nn.Module):  # type: ignore[misc]  # torch is not looked into
 
 
 def network(inputs: int, hidden: tuple[int, ...], outputs: int, last: float) -> nn.Sequential:
-    """Layers with ELU between them, orthogonal at the beginning."""
+    """Layers with ELU between them, with orthogonal initialisation."""
     parts: list[nn.Module] = []
     widths = (inputs, *hidden, outputs)
     for index, (one, other) in enumerate(pairwise(widths)):
@@ -157,7 +157,7 @@ class Agent(nn.Module):  # type: ignore[misc]
         self.spread = nn.Parameter(torch.full((actions,), settings.spread))
 
     def likelihood(self, mean: Tensor, action: Tensor) -> Tensor:
-        """Logarithm of the likelihood of actions, but for a constant."""
+        """Log-likelihood of actions, up to a constant."""
         return (-0.5 * ((action - mean) * torch.exp(-self.spread)) ** 2 - self.spread).sum(-1)
 
 
@@ -176,7 +176,7 @@ class Samples:
 def advantages(reward: Tensor, value: Tensor, after: Tensor, done: Tensor, settings: PpoSettings) -> Tensor:
     """Generalised advantage estimates (Schulman et al. 2016), shape (horizon, envs).
 
-    Episodes end by their length only, so the value of what was seen last counts on: `after` holds it where an
+    Episodes end by their length only, so the value of the last observation continues: `after` holds it where an
     episode ended, and the value of the next decision elsewhere.
     """
     surprise = reward + settings.discount * after - value

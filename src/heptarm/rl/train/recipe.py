@@ -1,4 +1,4 @@
-"""What a training is made of: task, simulated robots, numbers of the algorithm, seed."""
+"""Settings of a training: task, simulated robots, parameters of the algorithm, seed."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ STEPS = {"": 2_200_000, "kinematic": 1_300_000}
 
 @dataclass(frozen=True, slots=True)
 class Recipe:
-    """Everything that a training is made of; saved with its checkpoints.
+    """All settings of a training; saved with its checkpoints.
 
-    The defaults make policies that bear late commands and a compliant arm; `exact` keeps to the paper.
+    The defaults train policies that tolerate late commands and a compliant arm; `exact` is that of the paper.
 
     Attributes:
         task: the task.
@@ -45,7 +45,7 @@ class Recipe:
 
     @classmethod
     def exact(cls, task: ReachTask | None = None, *, seed: int = 0) -> Recipe:
-        """The paper's reward to the letter: no action costs; robots that are roughly known."""
+        """Exactly the paper's reward, without action costs; robots with roughly known data."""
         settings = ppo.PpoSettings(action_cost=0.0)
         return cls(task or ReachTask(), seed=seed, randomisation=MILD, settings=settings)
 

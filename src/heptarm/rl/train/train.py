@@ -1,4 +1,4 @@
-"""Training: simulate, update, and again; with a learning curve, checkpoints and a way to go on."""
+"""Training: simulate and update repeatedly, with a learning curve, and checkpoints to resume from."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Trained:
-    """What came of a training.
+    """Result of a training.
 
     Attributes:
         policy: the policy, as numpy.
@@ -75,11 +75,11 @@ class Trained:
 
     @property
     def seconds(self) -> float:
-        """Wall time, everything but imports [s]."""
+        """Wall time without imports [s]."""
         return self.history[-1].seconds if self.history else 0.0
 
     def plot(self, path: str | os.PathLike[str]) -> Path:
-        """Draw the learning curve into a picture; returns its path.
+        """Plot the learning curve; return the path of the picture.
 
         Raises:
             MissingExtra: matplotlib is not installed.
@@ -99,7 +99,7 @@ class Trained:
 
 
 class Training:
-    """A training under way.
+    """A running training.
 
     Args:
         recipe: what to do.
@@ -133,7 +133,7 @@ class Training:
 
     @property
     def done(self) -> bool:
-        """All steps were taken."""
+        """Whether all steps are done."""
         return self.steps >= self.recipe.steps
 
     def update(self) -> Row:
@@ -215,7 +215,7 @@ class Training:
         }
 
     def policy(self) -> Policy:
-        """The policy as it is now."""
+        """The current policy."""
         agent, recipe = self.agent, self.recipe
         layers = [
             (layer.weight.detach().cpu().numpy().T, layer.bias.detach().cpu().numpy())
@@ -242,7 +242,7 @@ class Training:
     # ------------------------------------------------------------------------------ checkpoints
 
     def save(self, path: Path) -> None:
-        """Write the policy, and beside it what is needed to go on."""
+        """Write the policy, and a checkpoint beside it."""
         if self.team.is_first:
             path.parent.mkdir(parents=True, exist_ok=True)
             self.policy().save(path)
@@ -266,7 +266,7 @@ class Training:
         half.replace(target)
 
     def load(self, state: dict[str, Any]) -> None:
-        """Go on from what `save` wrote."""
+        """Resume from the files of `save`."""
         self.agent.load_state_dict(state["agent"])
         self.learner.optimiser.load_state_dict(state["optimiser"])
         self.learner.rate = state["rate"]
@@ -278,7 +278,7 @@ class Training:
 
 
 def beside(path: Path, rank: int = 0) -> Path:
-    """Where the state of a training lies, beside its policy's `.npz`."""
+    """Path of the checkpoint of a training, beside the `.npz` of its policy."""
     return path.with_name(f"{path.stem}.train{rank or ''}.pt")
 
 
@@ -311,16 +311,16 @@ def train(
         engine: class of the simulation's engine.
 
     Raises:
-        CommandRejected: arguments that do not go together.
-        HeptarmError: nothing to go on from, or no such file.
+        CommandRejected: arguments that contradict each other.
+        HeptarmError: no checkpoint to resume from, or no such file.
         MissingExtra: torch or `mujoco.batch` is not installed.
     """
     path = Path(out) if out is not None else Path(resume) if resume is not None else None
     if path is not None and path.suffix != ".npz":
-        raise CommandRejected(f"{path.name!r} does not end in .npz", parameter="out", value=str(path))
+        raise CommandRejected(f"out must end in .npz, got {path.name!r}", parameter="out", value=str(path))
     if checkpoint < 1:
         raise LimitError(f"checkpoint must be at least 1, got {checkpoint}", code=2, parameter="checkpoint")
-    torch.set_num_threads(1)  # more threads only fight with the simulation's
+    torch.set_num_threads(1)  # more threads would compete with those of the simulation
     from heptarm.rl.train import distributed
 
     with distributed.team(device) as team:

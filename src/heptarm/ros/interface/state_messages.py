@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 from heptarm.model.kinematics import forward
 from heptarm.ros.interface import messages
@@ -65,6 +65,13 @@ _SAFETY = (
 _STAMP_STEP = 1000
 
 
+class _Sampled(Protocol):
+    """A group of a state."""
+
+    @property
+    def stamp(self) -> int: ...
+
+
 class StateMessages:
     """Makes messages of states, status and diagnostics.
 
@@ -93,27 +100,33 @@ class StateMessages:
         self._stamp = 0
 
     def states(self, state: State, *, full: bool) -> Iterator[tuple[str, Any]]:
-        """Make the messages of a state by topic, stamped with the ROS time of its measurement.
+        """Make the messages of a state by topic, each stamped with the ROS time at which its group was measured.
 
         Args:
             state: the state.
             full: also the topic with the full state.
         """
-        ros = self._ros
-        self._stamp = max(self._stamp + _STAMP_STEP, _measured(ros, state))
+        ros, groups = self._ros, state.groups
+        self._stamp = max(self._stamp + _STAMP_STEP, _measured(ros, state, groups.joints))
         stamp = ros.time(self._stamp)
         yield "joint_states", _stamped(messages.joint_state(ros, state, self._joints), stamp)
         if state.torques is not None:
             external = ros.joint_state(name=list(self._joints), effort=state.tau_ext.tolist())
-            yield "external_torques", _stamped(external, stamp)
-        if state.groups.pose is not None:
+            yield "external_torques", _stamped(external, self._time_of(groups.torques, state))
+        if groups.pose is not None:
             pose = self._pose_stamped(pose=messages.pose_message(ros, state.pose))
-            yield "pose", _stamped(pose, stamp, self._base)
-        if state.groups.wrench is not None:
+            yield "pose", _stamped(pose, self._time_of(groups.pose, state), self._base)
+        if groups.wrench is not None:
             wrench = self._wrench_stamped(wrench=messages.wrench_message(ros, state))
-            yield "wrench", _stamped(wrench, stamp, self._base)
+            yield "wrench", _stamped(wrench, self._time_of(groups.wrench, state), self._base)
         if full:
             yield "state", _stamped(self._robot_state(state), stamp, self._base)
+
+    def _time_of(self, group: _Sampled | None, state: State) -> Any:
+        """Stamp of a group, by the stamp of the joints that are sent with it."""
+        if group is None or state.joints is None:
+            return self._ros.time(self._stamp)
+        return self._ros.time(max(0, self._stamp + group.stamp - state.joints.stamp))
 
     def _robot_state(self, state: State) -> Any:
         ros = self._ros
@@ -184,9 +197,10 @@ def preset_message(ros: RosAdapter, entry: PresetName, state: State, names: Sequ
     if entry.role is NameRole.WRENCH:
         return None if state.groups.wrench is None else messages.wrench_message(ros, state)
     message = messages.joint_state(ros, state, names, external=entry.external)
-    return _stamped(message, ros.time(_measured(ros, state)))
+    return _stamped(message, ros.time(_measured(ros, state, state.groups.joints)))
 
 
-def _measured(ros: RosAdapter, state: State) -> int:
-    """Convert the time of measurement to the ROS clock [ns]; at least 0, for a simulated clock that just started."""
-    return max(0, ros.now() - max(0, round(state.age * 1e9)))
+def _measured(ros: RosAdapter, state: State, group: _Sampled | None) -> int:
+    """Convert the time of a group's measurement to the ROS clock [ns]; at least 0, for a clock that just started."""
+    older = 0 if group is None else state.stamp - group.stamp
+    return max(0, ros.now() - max(0, round(state.age * 1e9)) - older)

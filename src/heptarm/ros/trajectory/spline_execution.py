@@ -90,6 +90,11 @@ class _SplineGoal:
         self.tau = min(float(times[int(distances.argmin())]), self.trajectory.duration)
 
 
+def _joint_stamp(state: State) -> int:
+    """Cabinet time of the joint positions [ns]."""
+    return state.stamp if state.joints is None else state.joints.stamp
+
+
 class SplineExecution(ExecutionThread):
     """Executes goals as joint splines of the cabinet; a new one waits until the arm is at rest. See `Execution`.
 
@@ -257,7 +262,7 @@ class SplineExecution(ExecutionThread):
         active.advance_to(state.q_cmd)
         desired = active.trajectory.sample(active.tau)
         # a spline has no times, so velocities are compared with those that the cabinet commands
-        commanded = replace(desired, dq=active.command_speed(state.stamp, state.q_cmd))
+        commanded = replace(desired, dq=active.command_speed(_joint_stamp(state), state.q_cmd))
         self._judge(active, commanded, state, moving=True)
         count = len(active.trajectory.times)
         index = max(active.trajectory.index(active.tau), min(1, count - 1))

@@ -7,7 +7,7 @@ from heptarm.sim.planning.command import Order, PlanError
 from heptarm.sim.planning.plan import Plan
 from heptarm.sim.planning.program import plan_motions
 from heptarm.sim.planning.spline import plan_joint_spline, plan_spline
-from heptarm.sim.planning.targets import LINES, check_speeds
+from heptarm.sim.planning.targets import LINES, check_numbers
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 
@@ -27,7 +27,7 @@ def plan(robot: RobotModel, order: Order, start: Array) -> Plan:
         PlanError: a joint limit, an unreachable pose, a path through a singularity, or values that make no sense.
     """
     try:
-        check_speeds(order)
+        check_numbers(order)
         if order.kind in ("hold", "guide") or order.is_servo:
             return Plan(order, start, start)
         if order.kind not in _PLANNERS:

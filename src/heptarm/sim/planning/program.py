@@ -24,7 +24,7 @@ from heptarm.sim.planning.targets import (
     LINES,
     STILL,
     cartesian_path,
-    check_speeds,
+    check_numbers,
     joint_target,
     programmed_speed,
     segment_limits,
@@ -168,7 +168,7 @@ def plan_motions(robot: RobotModel, order: Order, start: Array) -> Plan:
     here = start
     for index, one in enumerate(order.parts):
         try:
-            check_speeds(one)
+            check_numbers(one)
             motion = _motion(robot, replace(one, tcp=order.tcp), here, is_alone=len(order.parts) == 1)
         except PlanError as error:
             raise PlanError(error.kind, f"{error} (motion {index + 1} of the batch)") from None

@@ -18,7 +18,7 @@ from heptarm.sim.planning.plan import Plan, timed
 from heptarm.sim.planning.targets import (
     CARTESIAN_DEFAULT,
     ORIENTATION_DEFAULT,
-    check_speeds,
+    check_numbers,
     joint_target,
     or_default,
     segment_limits,
@@ -291,7 +291,7 @@ def _segments(order: Order, origin: Pose) -> tuple[list[_SplineSegment], Orienta
     here, quat, place = origin.xyz, origin.quat, 0.0
     known = [(place, quat)]
     for index, one in enumerate(order.parts):
-        check_speeds(one)
+        check_numbers(one)
         if one.kind not in ("spl", "lin", "circ") or one.pose is None:
             raise PlanError(
                 "planning", f"Can not plan motion: a spline cannot have a segment of kind {one.kind!r}"
@@ -403,7 +403,7 @@ def plan_joint_spline(robot: RobotModel, order: Order, start: Array) -> Plan:
     """
     points, lengths, orders = [start], [], []
     for index, one in enumerate(order.parts):
-        check_speeds(one)
+        check_numbers(one)
         if one.kind != "ptp":
             raise PlanError(
                 "planning", f"Can not plan motion: a joint spline cannot have a segment of kind {one.kind!r}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import inf, isnan, sqrt
+from typing import NoReturn
 
 import numpy as np
 
@@ -30,22 +31,31 @@ ORIENTATION_DEFAULT = (1.5, 6.0, 60.0)
 LINES = ("lin", "lin_rel", "circ")
 #: A path shorter than this [m or rad] does not move.
 STILL = 1e-7
+#: Smallest speed, acceleration or jerk: a fraction of the axes' maxima, or along a path in SI units.
+SLOWEST = 1e-6
+#: Farthest position of a target or of a tool frame [m].
+FARTHEST = 100.0
 
 
-def check_speeds(order: Order) -> None:
-    """Refuse speeds that no profile can have; the caller checks the largest Cartesian ones."""
+def check_numbers(order: Order) -> None:
+    """Refuse speeds and positions that no motion can have, before anything divides by them or squares them."""
     fractions = (*order.joint_velocity, *order.joint_acceleration, *order.joint_jerk)
-    if not all(0.0 < value <= 1.0 for value in fractions):
-        wrong = next(value for value in fractions if not 0.0 < value <= 1.0)
-        raise PlanError("planning", f"Can not plan motion: relative speeds must be in (0, 1], got {wrong:g}")
     line = (order.cart_velocity, order.cart_acceleration, order.cart_jerk)
     turn = (order.ori_velocity, order.ori_acceleration, order.ori_jerk)
-    if not all(isnan(value) or 0.0 < value < inf for value in (*line, *turn)):
-        wrong = next(value for value in (*line, *turn) if not (isnan(value) or 0.0 < value < inf))
-        raise PlanError(
-            "planning",
-            f"Can not plan motion: Cartesian speeds must be finite and greater than 0, got {wrong:g}",
-        )
+    for value in fractions:
+        if not SLOWEST <= value <= 1.0:
+            _refuse_number("relative speeds", value, f"in [{SLOWEST:g}, 1]")
+    for value in (*line, *turn):
+        if not (isnan(value) or SLOWEST <= value < inf):
+            _refuse_number("Cartesian speeds", value, f"finite and at least {SLOWEST:g}")
+    for place in (order.pose, order.via, order.offset, order.tcp):
+        for value in place or ():
+            if not abs(value) <= FARTHEST:
+                _refuse_number("positions", value, f"in [{-FARTHEST:g}, {FARTHEST:g}] m")
+
+
+def _refuse_number(what: str, value: float, allowed: str) -> NoReturn:
+    raise PlanError("planning", f"Can not plan motion: {what} must be {allowed}, got {value:g}")
 
 
 def _pose(values: tuple[float, ...]) -> Pose:

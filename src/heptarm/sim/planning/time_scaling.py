@@ -34,6 +34,8 @@ _GRIP = 0.97
 #: Time between two samples of a tabulated profile [s], unless the section takes very long.
 _STEP = 1e-3
 _MOST_SAMPLES = 100_000
+#: Most samples of the moving average; where the jerk needs more, the whole profile becomes slower instead.
+_MOST_AVERAGED = 10_000
 _ROUNDS = 8
 _TOLERANCE = 1.01
 _TINY = 1e-12
@@ -338,7 +340,7 @@ class _Search:
         speed = np.sqrt(np.array(x))
         times = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(s) / (speed[1:] + speed[:-1]))])
         step = max(_STEP, float(times[-1]) / _MOST_SAMPLES)
-        count = max(1, round(window / step))
+        count = min(max(1, round(window / step)), _MOST_AVERAGED)
         grid = np.arange(0.0, times[-1] + step, step)
         padded = np.concatenate([np.zeros(count), np.interp(grid, times, speed, right=0.0), np.zeros(count)])
         total = np.concatenate([[0.0], np.cumsum(padded)])

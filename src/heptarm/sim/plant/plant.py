@@ -17,7 +17,7 @@ from heptarm.sim.control.controller import ActiveLaw
 from heptarm.sim.control.laws import MeasuredState, PositionLaw, Superposition
 from heptarm.sim.controller.interpolator import Interpolator
 from heptarm.sim.controller.safety import SafetyController, StopRequest
-from heptarm.sim.planning.command import TICK, Order
+from heptarm.sim.planning.command import TICK
 from heptarm.sim.plant.drive_monitor import DriveMonitor
 from heptarm.sim.plant.external_load import ExternalLoad
 from heptarm.sim.plant.io_image import IoImage
@@ -129,6 +129,9 @@ class Plant:
         q: joint positions at the start, shape (7,) [rad].
         boxes: fixed boxes around it.
         monitored: whether drives trip; see `heptarm.sim.plant.drive_monitor`.
+
+    Attributes:
+        submit: plans a command and queues it; see `heptarm.sim.controller.queue.MotionQueue.submit`.
     """
 
     def __init__(
@@ -170,6 +173,7 @@ class Plant:
             self.robot, _Inputs(self.shared), self._sensed, self._load, self._control, self.safety
         )
         self.condition_monitor = self.interpolator.condition_monitor
+        self.submit = self.interpolator.queue.submit
         self._write(0, 0.0, nan)
 
     def _views(self) -> None:
@@ -202,17 +206,6 @@ class Plant:
     def idle(self) -> bool:
         """Whether no command is running or waiting."""
         return self.interpolator.queue.idle
-
-    def submit(self, order: Order) -> None:
-        """Plan a command from the end of the queue and append it.
-
-        While the arm brakes, its final position is not known; then the command is planned when its turn comes, and
-        its listener receives a planning error.
-
-        Raises:
-            PlanError: it cannot be planned; nothing has changed.
-        """
-        self.interpolator.queue.submit(order)
 
     def cancel(self, order_id: int | None = None) -> None:
         """Cancel a command (None: all): the running one brakes on its path, waiting ones are dropped."""

@@ -102,17 +102,17 @@ class Trace:
     """Writes the state after each tick to a file, with which readings of the state can be compared.
 
     Args:
-        ring: where the states are.
+        shared: where the states are.
         path: of the file, which is replaced.
     """
 
-    def __init__(self, ring: SharedState, path: Path) -> None:
-        self._ring = ring
+    def __init__(self, shared: SharedState, path: Path) -> None:
+        self._shared = shared
         self._file = path.open("wb", buffering=1 << 18)
 
     def append(self) -> None:
         """Write the newest state; called after each tick."""
-        self._file.write(self._ring.ints[int(self._ring.header[HeaderWords.NEWEST]) % SLOTS].data)
+        self._file.write(self._shared.ints[int(self._shared.header[HeaderWords.NEWEST]) % SLOTS].data)
 
     def close(self) -> None:
         """Write what is left."""

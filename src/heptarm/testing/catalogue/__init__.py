@@ -1,4 +1,4 @@
-"""The scenarios: what a robot can do, one module per topic, each a function that measures what it shows.
+"""The scenarios, one module per topic; each is a function that measures a property of the robot.
 
 The names of a module and its functions are the scenarios' names, as in `heptarm check motions.ptp_joints`.
 """

@@ -1,4 +1,4 @@
-"""Scenarios: programs in the cabinet itself, in Java; they need a Java compiler and simulators of their own."""
+"""Scenarios: Java programs on the cabinet; they need a Java compiler and separate simulators."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from heptarm.testing.measure import Unfit, holds
 from heptarm.testing.scenario import Risk, scenario
 
 _PATIENCE = 120.0
-#: An application as a Sunrise programmer writes it, knowing nothing of heptarm.
+#: A Sunrise application that does not use heptarm.
 _FOREIGN = """
 package lab;
 
@@ -42,7 +42,7 @@ public class Nod extends RoboticsAPIApplication {
     }
 }
 """
-#: One on heptarm's core: SI units, results with causes, refusals with names; no network.
+#: An application on heptarm's core: SI units, results with causes, refusals with parameters; no network.
 _OWN = """
 package lab;
 
@@ -84,10 +84,10 @@ _PROJECT = """
 
 
 def _sim(name: str, source: str) -> str:
-    """Compile and run an application in a simulator of its own; what it logged.
+    """Compile and run an application in a separate simulator; return its log.
 
     Raises:
-        Unfit: there is no Java compiler here.
+        Unfit: no Java compiler is installed.
     """
     if shutil.which("javac") is None:
         raise Unfit("there is no javac here")
@@ -104,7 +104,7 @@ def _sim(name: str, source: str) -> str:
 
 @scenario(line=13, risk=Risk.STILL, virtual=True)
 def foreign(arm: Arm) -> None:
-    """Somebody else's Sunrise application is compiled and run as it is, with its own process data."""
+    """A Sunrise application of other people compiles and runs unchanged, with its own process data."""
     said = _sim("Nod", _FOREIGN)
     holds("lifted by 40 mm" in said, "it measured its line: 40 mm")
     holds("reported 2 times" in said, "it read its process data")
@@ -112,7 +112,7 @@ def foreign(arm: Arm) -> None:
 
 @scenario(line=12, risk=Risk.STILL, virtual=True)
 def own(arm: Arm) -> None:
-    """An application on heptarm's core, without any network: motions, their results, a refusal."""
+    """An application on heptarm's core, without a network: motions, results, a refusal."""
     said = _sim("Own", _OWN)
     holds("FINISHED, lifted by 50 mm" in said, "its line was 50 mm long")
     holds("A2 must be in" in said, "what cannot be done was refused by name")

@@ -1,4 +1,4 @@
-"""Scenarios: what ends a motion before its end, looked at by the cabinet."""
+"""Scenarios: break conditions, monitored by the cabinet."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from heptarm.values.result import Cause
 
 @scenario(line=4, rows="H3 H5 B14", risk=Risk.CONTACT, operator=True, space=0.05, needs=("conditions",))
 def forces(arm: Arm) -> None:
-    """Force: its magnitude, along an axis, across one, a component; each fires at its push and at no other."""
+    """Force: magnitude, along an axis, across an axis, component; each condition fires only at its push."""
     base = Force(frame="base")
     leaves: tuple[tuple[Condition, tuple[float, float, float]], ...] = (
         (force > 15, (0.0, 11.0, 14.0)),
@@ -47,7 +47,7 @@ def forces(arm: Arm) -> None:
 
 @scenario(line=4, rows="H2 H3", risk=Risk.CONTACT, operator=True, space=0.05, needs=("conditions",))
 def torques(arm: Arm) -> None:
-    """Torque of a joint, and of the flange about an axis; the result names what fired, and where the arm was."""
+    """Torque of a joint, and about an axis of the flange; the result has the fired condition and the state."""
     either = (abs(torque[0]) > 6) | (torque.about("z") > 50)
     handle = arm.start(lin_rel(y=0.1, frame="base", speed_mps=0.02), until=either)
     arm.wait_until(lambda s: np.linalg.norm(s.dq) > 0.01, timeout=20.0)
@@ -62,7 +62,7 @@ def torques(arm: Arm) -> None:
 
 @scenario(line=4, rows="H4 H14", risk=Risk.CONTACT, space=0.3, needs=("conditions", "lin_rel"))
 def touch(arm: Arm) -> None:
-    """A relative line goes down until it touches the table; what follows does not begin."""
+    """A relative line moves down until contact with the table; the next motion does not start."""
     from heptarm.testing.measure import Unfit
     from heptarm.testing.stage import DEEPEST
 
@@ -84,7 +84,7 @@ def touch(arm: Arm) -> None:
 
 @scenario(line=4, rows="H3", space=0.15, needs=("conditions", "lin_rel"))
 def combined(arm: Arm) -> None:
-    """And, or, not; a point on the path by distance and by time; the part that held is named."""
+    """And, or, not; a point on the path by distance and by time; the result names the fired part."""
     start = arm.wait_for_rest().pose
     half = path.after(0.04)
     recording = record(arm, lin_rel(y=0.1, frame="base", speed_mps=0.06), until=half | (force > 500))
@@ -115,7 +115,7 @@ def button(arm: Arm) -> None:
 
 @scenario(line=4, rows="H3", risk=Risk.CONTACT, operator=True, space=0.2, needs=("conditions", "servo_pose"))
 def servo(arm: Arm) -> None:
-    """A condition ends a servo motion as well; how long that takes is measured."""
+    """A condition ends a servo motion; its delay is measured."""
     contact = Force(frame="base").along("y") < -10
     with arm.servo("pose", rate=50, speed=0.3, acceleration=0.5, watchdog=2.0, until=contact) as stream:
         start, first = stream.start.pose, arm.state.stamp

@@ -1,4 +1,4 @@
-"""Scenarios: people and things that the arm touches."""
+"""Scenarios: contacts with people and objects."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _LONG = 60.0
     needs=("conditions", "joint_impedance"),
 )
 def reaction(arm: Arm) -> None:
-    """A bump ends a motion at once, then the arm is compliant; the result is the collision flag."""
+    """A collision ends a motion at once, then the arm is compliant; the result shows the collision."""
     bump = force > 20
     handle = arm.start(lin_rel(y=0.15, frame="base", speed_mps=0.03), until=bump)
     arm.wait_until(lambda s: np.linalg.norm(s.dq) > 0.01, timeout=20.0)
@@ -61,13 +61,13 @@ def plane(arm: Arm) -> None:
     below(abs(float(offset[2])), 0.006, "across it by", unit="m")
     arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
     back = arm.start(ptp(HOME, speed=0.3), when="replace")
-    holds(compliant.wait().cause is Cause.REPLACED and back.wait().arrived, "it went back")
+    holds(compliant.wait().cause is Cause.REPLACED and back.wait().arrived, "it returned")
     near(arm.wait_for_rest().q, HOME, 2e-3, "home", unit="rad")
 
 
 @scenario(line=8, rows="H14 H18", risk=Risk.CONTACT, operator=True, space=0.02)
 def waits(arm: Arm) -> None:
-    """The arm waits for a touch, seen in the pushed states."""
+    """The arm waits for a contact in the pushed states."""
     arm.operator.push((0.0, 0.0, -12.0), duration=0.5)
     state = arm.wait_until(lambda s: s.wrench.force[2] < -8.0, timeout=20.0)
     near(state.wrench.force[:2], (0.0, 0.0), 2.0, "it came from above: force across", unit="N")
@@ -77,7 +77,7 @@ def waits(arm: Arm) -> None:
 @scenario(line=8, rows="H15 H13 I5", risk=Risk.CONTACT, operator=True, space=0.3,
           needs=("conditions", "workpieces", "io"), signals=("MediaFlange.UserButton",))  # fmt: skip
 def pick(arm: Arm) -> None:
-    """Pick and place: down to the table, up with a workpiece, wait for a person's button, put it down."""
+    """Pick and place: down to the table, up with a workpiece, wait for a button, put it down."""
     start = arm.wait_for_rest().pose
     contact = Force(frame="base").along("z") > 8
     part = Workpiece("scenario-part", mass=0.8, com=(0.0, 0.0, 0.03))
@@ -93,7 +93,7 @@ def pick(arm: Arm) -> None:
         waiting = arm.start(hold(_LONG), until=io.user_button)
         arm.wait_until(lambda _: waiting.started, timeout=20.0)
         arm.operator.set_signal("UserButton", True)
-        holds(waiting.wait().stopped_by == io.user_button, "a person said go on")
+        holds(waiting.wait().stopped_by == io.user_button, "a person pressed the button")
         arm.operator.set_signal("UserButton", False)
         holds(arm.move(down, until=contact).stopped_by == contact, "put down on the table")
         arm.wait_for_rest()
@@ -113,5 +113,5 @@ def led(arm: Arm) -> None:
         while servo.tick() and arm.state.stamp < first + 1.5e9:
             servo.set(arm.state.q)
     there = arm.wait_for_rest()
-    above(there.pose.distance_to(start.pose), 0.02, "led by", unit="m")
+    above(there.pose.distance_to(start.pose), 0.02, "guided by", unit="m")
     near(fresh(arm, after=0.2).pose.xyz, there.pose.xyz, 2e-3, "and it stays there", unit="m")

@@ -1,4 +1,4 @@
-"""Scenarios: guiding, tapping and teaching the arm; intended contacts and collisions."""
+"""Scenarios: hand guiding, taps and teaching; intended contacts and collisions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LONG = 120.0
 
 
 def _guide(arm: Arm, push: tuple[float, float, float], offset: float) -> None:
-    """Push until a joint has turned so far [rad]."""
+    """Push until a joint has turned by this angle [rad]."""
     before = arm.state.q
     arm.operator.push(push, duration=_LONG)
     arm.wait_until(lambda s: np.abs(s.q - before).max() > offset, timeout=60.0)
@@ -34,13 +34,13 @@ def _guide(arm: Arm, push: tuple[float, float, float], offset: float) -> None:
 
 @scenario(line=8, rows="H9", risk=Risk.CONTACT, operator=True, space=0.6, needs=("hand_guide",))
 def by_hand(arm: Arm) -> None:
-    """KUKA's hand guiding: while the device's switch is held the arm is led; let go, it rests where it is."""
+    """KUKA's hand guiding: the arm follows the hand while the switch is held, and stops when it is released."""
     handle = arm.start(hand_guide(cartesian_velocity=0.3))
     handle.wait_started(20.0)
     arm.operator.guide()
     arm.wait_until(lambda s: s.safety.hand_guiding_switch, timeout=20.0)
     _guide(arm, (0.0, 15.0, 15.0), 0.2)
-    holds(not handle.done, "it goes on while the switch is held")
+    holds(not handle.done, "it continues while the switch is held")
     arm.operator.let_go()
     holds(handle.wait(timeout=30.0).arrived, "it ends when the switch is let go")
     rests = arm.wait_for_rest()
@@ -50,14 +50,14 @@ def by_hand(arm: Arm) -> None:
 
 @scenario(line=8, rows="H10", risk=Risk.CONTACT, operator=True, space=0.3, needs=("cartesian_impedance",))
 def precise(arm: Arm) -> None:
-    """Led along one axis only, all other directions held, without any device."""
+    """Hand guiding along one axis without a hand guiding device; all other directions are held."""
     start = arm.wait_for_rest().pose
     handle = arm.start(hold(_LONG), mode=compliance("y", frame="base"))
     handle.wait_started(20.0)
     _guide(arm, (10.0, 10.0, 10.0), 0.1)
     let_go(arm, handle)
     end = arm.wait_for_rest().pose
-    above(float(end.xyz[1] - start.xyz[1]), 0.01, "led by", unit="m")
+    above(float(end.xyz[1] - start.xyz[1]), 0.01, "guided by", unit="m")
     below(float(np.abs((end.xyz - start.xyz)[[0, 2]]).max()), 5e-3, "across by", unit="m")
     below(end.angle_to(start), 0.02, "turned by", unit="rad")
 
@@ -80,7 +80,7 @@ def touched(arm: Arm) -> None:
 
 @scenario(line=8, rows="H12 H13", risk=Risk.CONTACT, operator=True, space=0.1, needs=("ptp",))
 def taps(arm: Arm) -> None:
-    """A motion is interrupted by a tap and goes on after two more."""
+    """A tap interrupts a motion, two more resume it."""
     from heptarm.values.condition.force import force
 
     target = ptp(HOME + deg(0, 0, 0, 0, 0, 0, 60), speed=0.2)
@@ -102,15 +102,15 @@ def taps(arm: Arm) -> None:
     finally:
         done.set()
         hand.join()
-    note("two taps were felt")
+    note("two taps were detected")
     arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
     arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 1.0, timeout=20.0)
-    holds(arm.move(target).arrived, "then it goes on to its end")
+    holds(arm.move(target).arrived, "then it continues to its end")
 
 
 @scenario(line=8, rows="H6 G18", risk=Risk.CONTACT, space=0.3, virtual=True, needs=("conditions",))
 def guard(arm: Arm) -> None:
-    """A guard round the torques at rest lets free motions through and ends one that hits the table, by joint."""
+    """A collision guard passes free motions and ends one that hits the table; it names the joint."""
     with arm.guarded(arm.collision_guard(12.0)):
         holds(arm.move(lin_rel(z=0.03, frame="base", speed_mps=0.15)).arrived, "a free motion arrives")
         try:

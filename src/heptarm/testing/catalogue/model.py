@@ -1,4 +1,4 @@
-"""Scenarios: the model on this side against what the robot measures."""
+"""Scenarios: the client's model compared with the measurements of the robot."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _GAP = 4
 
 @scenario(line=11, rows="K1 K13 K14 G8 G9", risk=Risk.STILL)
 def forward(arm: Arm) -> None:
-    """Forward kinematics gives the pose that the cabinet reports, as matrix, quaternion and angles."""
+    """Forward kinematics equals the pose that the cabinet reports, as matrix, quaternion and angles."""
     state = arm.wait_for_rest()
     reported = arm.pose("flange")
     made = Pose.from_matrix(model.forward(arm.robot, state.q))
@@ -43,7 +43,7 @@ def forward(arm: Arm) -> None:
 
 @scenario(line=11, rows="K4 K5", risk=Risk.STILL)
 def inverse(arm: Arm) -> None:
-    """Inverse kinematics finds the present joints, all other arm positions, and the nearest to a hint."""
+    """Inverse kinematics finds the current joint positions, all other configurations, and the one nearest to a hint."""
     q = arm.wait_for_rest().q
     pose = Pose.from_matrix(model.forward(arm.robot, q))
     near(
@@ -68,12 +68,13 @@ def inverse(arm: Arm) -> None:
 
 @scenario(line=11, rows="K2 K3 K6 G2", space=0.15, needs=("ptp",))
 def jacobian(arm: Arm) -> None:
-    """The Jacobian turns measured joint speeds into the measured velocity of the flange and of a point on it."""
+    """The Jacobian maps measured joint velocities to the measured velocity of the flange and of a point on it."""
     recording = record(arm, ptp(HOME + deg(12, 4, -6, 5, 6, 8, 10), speed=0.25))
     middle = len(recording.states) // 2
     a, b = recording.states[middle - _GAP], recording.states[middle + _GAP]
-    seconds = (b.stamp - a.stamp) * 1e-9
-    q, dq = (a.q_cmd + b.q_cmd) / 2, (b.q_cmd - a.q_cmd) / seconds
+    seconds = float(recording.t_pose[middle + _GAP] - recording.t_pose[middle - _GAP])
+    q = (a.q_cmd + b.q_cmd) / 2
+    dq = (b.q_cmd - a.q_cmd) / float(recording.t[middle + _GAP] - recording.t[middle - _GAP])
     matrix = model.jacobian(arm.robot, q)
     velocity = (b.pose_cmd.xyz - a.pose_cmd.xyz) / seconds
     above(float(np.linalg.norm(velocity)), 0.005, "speed of the flange", unit="m/s")
@@ -95,20 +96,20 @@ def jacobian(arm: Arm) -> None:
 
 @scenario(line=11, rows="K10 G3", risk=Risk.STILL, virtual=True)
 def gravity(arm: Arm) -> None:
-    """At rest the measured torques are gravity's, as the model has them."""
+    """At rest the measured torques equal the gravity torques of the model."""
     state = arm.wait_for_rest()
     near(state.tau, model.gravity(arm.robot, state.q), 0.5, "measured torques", unit="Nm")
 
 
 @scenario(line=11, rows="K7 K8 K9 K11 K12", space=0.5, virtual=True, needs=("ptp",))
 def dynamics(arm: Arm) -> None:
-    """Mass matrix, Coriolis and centrifugal torques explain what the joints measure in a fast motion, and back."""
+    """Mass matrix, Coriolis and centrifugal torques explain the measured torques of a fast motion, and vice versa."""
     recording = record(arm, ptp(HOME + deg(50, -20, 10, 30, 20, -20, 40), speed=0.8))
     middle = [k for k in range(_GAP, len(recording.states) - _GAP) if 0.15 < k / len(recording.states) < 0.85]
     worst, largest = 0.0, 0.0
     for k in middle:
         a, here, b = recording.states[k - _GAP], recording.states[k], recording.states[k + _GAP]
-        half = (b.stamp - a.stamp) * 0.5e-9
+        half = 0.5 * float(recording.t[k + _GAP] - recording.t[k - _GAP])
         dq = (b.q_cmd - a.q_cmd) / (2 * half)
         ddq = (b.q_cmd - 2 * here.q_cmd + a.q_cmd) / half**2
         made = model.inverse_dynamics(arm.robot, here.q, dq, ddq)
@@ -124,7 +125,7 @@ def dynamics(arm: Arm) -> None:
 
 @scenario(line=11, rows="K15 F13 B15", risk=Risk.STILL, needs=("ptp", "lin_rel"))
 def limits(arm: Arm) -> None:
-    """Joint limits are known here: what breaks them is refused, and nothing moves."""
+    """The client knows the joint limits: targets beyond them are refused, and nothing moves."""
     from heptarm.errors import HeptarmError, LimitError
 
     before = arm.wait_for_rest().q

@@ -1,4 +1,4 @@
-"""Scenarios: how the arm holds on to its set-points."""
+"""Scenarios: control modes."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ _LONG = 60.0
 
 
 def held(arm: Arm, mode: Mode) -> MotionHandle:
-    """A hold under a control mode that is in force."""
+    """A running hold in a control mode."""
     handle = arm.start(hold(_LONG), mode=mode)
     arm.wait_until(lambda s: handle.started or handle.done, timeout=20.0)
     return handle
 
 
 def let_go(arm: Arm, handle: MotionHandle) -> None:
-    """End a hold; raises what ended it before."""
+    """End a hold; raise the error that ended it earlier."""
     handle.cancel()
     handle.wait()
     arm.wait_for_rest()
 
 
 def bent(arm: Arm, seconds: float = 0.3) -> Array:
-    """How far the flange is off its set-point, base axes, the mean of so many cabinet seconds, shape (3,) [m]."""
+    """Mean deviation of the flange from its set-point over some cabinet seconds, base axes, shape (3,) [m]."""
     return np.asarray(np.mean([s.pose.xyz - s.pose_cmd.xyz for s in watch(arm, seconds)], axis=0))
 
 
 def settled(arm: Arm, *, seconds: float = 0.3) -> None:
-    """Wait until no joint has moved for so many cabinet seconds."""
+    """Wait until no joint has moved for some cabinet seconds."""
     quiet = arm.state.stamp
 
     def rests(state: State) -> bool:
@@ -62,7 +62,7 @@ def settled(arm: Arm, *, seconds: float = 0.3) -> None:
 
 @scenario(line=3, rows="D1 D25", risk=Risk.CONTACT, operator=True, space=0.02)
 def stiff(arm: Arm) -> None:
-    """In position control the arm does not yield to a push; under impedance it does, until that ends."""
+    """The arm is stiff in position control and compliant in impedance control."""
     push = np.array([15.0, 0.0, 0.0])
     moved = []
     for mode in (Position(), JointImpedance(500.0), Position()):
@@ -78,7 +78,7 @@ def stiff(arm: Arm) -> None:
 
 @scenario(line=3, rows="D2 D3 H11", risk=Risk.CONTACT, operator=True, space=0.1, needs=("joint_impedance",))
 def joints(arm: Arm) -> None:
-    """Joint impedance: each joint deflects by its torque over its stiffness, and returns as it is damped."""
+    """Joint impedance: each joint deflects by torque over stiffness, and returns with its damping."""
     stiffness = np.array([400.0, 600.0, 400.0, 600.0, 200.0, 200.0, 100.0])
     over = []
     for damping in (0.1, 1.0):
@@ -101,7 +101,7 @@ def joints(arm: Arm) -> None:
         after = np.array([s.q[0] - s.q_cmd[0] for s in watch(arm, 1.0)])
         over.append(float((-np.sign(offset[0]) * after).max()))
         let_go(arm, handle)
-    above(over[0], 2.0 * max(over[1], 1e-4), "let go, A1 swings over by, hardly damped", unit="rad")
+    above(over[0], 2.0 * max(over[1], 1e-4), "overshoot of A1 after the release, lightly damped", unit="rad")
 
 
 @scenario(line=3, rows="D4 D5 D8 D20 H1", space=0.1, virtual=True, needs=("cartesian_impedance",))
@@ -137,7 +137,7 @@ def nullspace(arm: Arm) -> None:
     line=3, rows="D9 D10 D11", risk=Risk.CONTACT, space=0.1, operator=True, needs=("cartesian_impedance",)
 )
 def bounds(arm: Arm) -> None:
-    """The largest force caps what the control exerts, or ends the motion; so do largest speed and deviation."""
+    """The largest force limits the controller or ends the motion; the largest speed and deviation end it."""
     compliant = (500.0, 500.0, 500.0, *_TURNING)
     far = (1e3, 1e3, 1e3, 10.0, 10.0, 10.0)
     offsets = []
@@ -167,7 +167,7 @@ def bounds(arm: Arm) -> None:
 
 @scenario(line=3, rows="D21 C15", space=0.2, needs=("cartesian_impedance", "spline", "circ"))
 def motions(arm: Arm) -> None:
-    """Lines, circles, ellipses and PTP under impedance: the set-points arrive, the arm close to them."""
+    """Lines, circles, ellipses and PTP in impedance control: the set-points arrive, and the arm close to them."""
     start = arm.wait_for_rest().pose
     centre = start.xyz + [0.0, 0.05, 0.0]
     end = Pose(start.xyz + [0.0, 0.1, 0.0], start.quat)
@@ -189,7 +189,7 @@ def motions(arm: Arm) -> None:
 
 @scenario(line=3, rows="D22 D23 E11", space=0.1, virtual=True, needs=("cartesian_impedance", "servo"))
 def online(arm: Arm) -> None:
-    """While the arm follows a stream, its stiffness is changed, and its deflection with it."""
+    """The stiffness, and with it the deflection, changes while the arm follows a stream."""
 
     def mode(stiffness: float) -> CartesianImpedance:
         force = (0.0, 12.0, 0.0, 0, 0, 0)
@@ -199,7 +199,7 @@ def online(arm: Arm) -> None:
         start = servo.start.q
 
         def follow(wanted: float, by: float) -> float:
-            """Follow until the flange is where it should be, or 10 s have passed; where it is then."""
+            """Follow until the flange has arrived, or 10 s have passed; return its position."""
             first = arm.state.stamp
             offset = np.inf
             while servo.tick() and abs(offset - wanted) > by and arm.state.stamp < first + 10e9:
@@ -224,7 +224,7 @@ def online(arm: Arm) -> None:
     line=3, rows="D24", risk=Risk.CONTACT, operator=True, space=0.02, needs=("joint_impedance", "servo")
 )
 def validation(arm: Arm) -> None:
-    """Impedance does not begin while the joints feel more than the declared load explains."""
+    """Impedance control does not start while the external torques exceed what the declared load explains."""
     arm.operator.push((0.0, 0.0, -40.0), duration=_LONG)
     # Force and torques are read one after the other: wait for both, lest what follows sees torques of before.
     arm.wait_until(lambda s: s.wrench.force[2] < -35.0 and np.abs(s.tau_ext).max() > 12.0, timeout=20.0)
@@ -235,7 +235,7 @@ def validation(arm: Arm) -> None:
         holds("load" in error.text, error.text)
     arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
     arm.wait_until(lambda s: np.abs(s.tau_ext).max() < 1.0, timeout=20.0)
-    settled(arm)  # let go, the arm rings: it is slow at every turn, and rests only later
+    settled(arm)  # after the release the arm oscillates: it is slow at every turning point, and rests only later
     with arm.servo("joint", mode=JointImpedance(500.0), watchdog=2.0) as servo:
         servo.tick()
         servo.set(servo.start.q)

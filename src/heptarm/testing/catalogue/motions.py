@@ -15,7 +15,7 @@ from heptarm.values.motion.motion import hold
 from heptarm.values.motion.ptp import ptp, ptp_home
 from heptarm.values.pose import Pose, Redundancy, deg
 
-#: How exactly a motion ends [m], [rad].
+#: Accuracy at the end of a motion [m], [rad].
 _PLACE, _ANGLE = 5e-4, 2e-3
 #: KUKA's transport position.
 TRANSPORT: Array = deg(0, 25, 0, 90, 0, 0, 0)
@@ -30,7 +30,7 @@ def _off_line(points: Array, start: Array, end: Array) -> float:
 
 @scenario(line=1, rows="C1 B1 E1 G1", needs=("ptp",))
 def ptp_joints(arm: Arm) -> None:
-    """PTP to joint positions: the call returns when the arm is there."""
+    """PTP to joint positions: the call returns when the arm has arrived."""
     target = HOME + deg(12, -4, 6, 8, -5, 6, 15)
     result = arm.move(ptp(target))
     holds(result.arrived, f"the result is: {result.cause.value}")
@@ -41,7 +41,7 @@ def ptp_joints(arm: Arm) -> None:
 
 @scenario(line=1, rows="C2 C23 G13", needs=("ptp_pose",))
 def ptp_pose(arm: Arm) -> None:
-    """PTP to a pose, and to the same pose with another arm angle: the flange stays, the elbow goes."""
+    """PTP to a pose, and to the same pose with another arm angle: the flange stays, the elbow moves."""
     start = arm.wait_for_rest()
     target = start.pose @ Pose.xyz_abc(0.02, 0.06, -0.05, *deg(20, 5, 0))
     arm.move(ptp(target, near=HOME))
@@ -59,7 +59,7 @@ def ptp_pose(arm: Arm) -> None:
 
 @scenario(line=1, rows="C3 F5", needs=("lin",))
 def straight(arm: Arm) -> None:
-    """LIN: the flange goes straight, at the wanted speed, turning along."""
+    """LIN: the flange moves on a straight line at the programmed speed while it rotates."""
     start = arm.wait_for_rest().pose
     target = start @ Pose.xyz_abc(0.03, 0.12, -0.02, *deg(25, 0, 0))
     recording = record(arm, lin(target, speed_mps=0.06))
@@ -99,7 +99,7 @@ def relative(arm: Arm) -> None:
 
 
 def near_pose(arm: Arm, wanted: Pose, what: str) -> None:
-    """The arm rests, and its motion frame is at a pose."""
+    """Check that the arm is at rest with its motion frame at a pose."""
     pose = arm.wait_for_rest().pose
     near(pose.xyz, wanted.xyz, _PLACE, f"place, {what}", unit="m")
     near(pose.angle_to(wanted), 0.0, _ANGLE, f"orientation, {what}, is off by", unit="rad")
@@ -133,7 +133,7 @@ def named(arm: Arm) -> None:
 
 @scenario(line=1, rows="C19", space=1.3, virtual=True, needs=("ptp_home",))
 def project_home(arm: Arm) -> None:
-    """PTP to the home position of the cabinet's project, which nobody has to know here."""
+    """PTP to the home position of the cabinet's project, which the client need not know."""
     first = arm.move(ptp_home()).arrived
     there = arm.wait_for_rest().q
     arm.move(ptp(HOME))
@@ -143,7 +143,7 @@ def project_home(arm: Arm) -> None:
 
 @scenario(line=1, rows="C21", space=0.02, needs=("hold",))
 def position_hold(arm: Arm) -> None:
-    """A hold is a motion that lasts as long as it is wanted, and keeps the place."""
+    """A hold lasts for its duration and keeps the position."""
     recording = record(arm, hold(0.5))
     near(recording.result.duration, 0.5, 0.1, "duration", unit="s")
     below(float(np.abs(recording.q - recording.q[0]).max()), 1e-3, "no joint moves by more than", unit="rad")
@@ -151,7 +151,7 @@ def position_hold(arm: Arm) -> None:
 
 @scenario(line=1, rows="C22", space=0.15, needs=("ptp",))
 def one_axis(arm: Arm) -> None:
-    """What shall stay is taken from the state: one axis moves, six do not."""
+    """A target built from the state moves one axis; the other six stay."""
     target = arm.wait_for_rest().q_cmd.copy()
     target[4] += 0.3
     recording = record(arm, ptp(target))
@@ -190,7 +190,7 @@ def path_speeds(arm: Arm) -> None:
         arm, lin_rel(y=0.08, frame="base", speed_mps=0.07, acceleration_mps2=0.2, jerk_mps3=50.0)
     )
     near(float(recording.speeds.max()), 0.07, 0.003, "top speed", unit="m/s")
-    rates = np.diff(recording.speeds[::3]) / np.diff(recording.t[:-1][::3])
+    rates = np.diff(recording.speeds[::3]) / np.diff(recording.t_pose[:-1][::3])
     near(float(np.abs(rates).max()), 0.2, 0.03, "largest acceleration", unit="m/s²")
     gentle = record(arm, lin_rel(y=-0.08, frame="base", speed_mps=0.07, acceleration_mps2=0.2, jerk_mps3=0.5))
     above(gentle.result.duration, recording.result.duration + 0.2, "with a small jerk it takes", unit="s")
@@ -206,7 +206,7 @@ def path_speeds(arm: Arm) -> None:
 
 @scenario(line=1, rows="F12", space=0.2, needs=("ptp", "override"))
 def override(arm: Arm) -> None:
-    """The application override slows down what runs, at once."""
+    """The application override slows down the running motion at once."""
     fraction = min(0.3, arm.speed)
     handle = arm.start(ptp(HOME + deg(0, 0, 0, 0, 0, 0, 60), speed=fraction))
     full = fraction * arm.robot.dq_max[6]
@@ -221,7 +221,7 @@ def override(arm: Arm) -> None:
 
 @scenario(line=1, rows="C23", risk=Risk.STILL)
 def reach(arm: Arm) -> None:
-    """Whether a pose can be reached, and by which arms, is known before anything moves."""
+    """Reachability of a pose, and its arm angles, are known before anything moves."""
     from heptarm.errors import Unreachable
 
     pose = Pose.from_matrix(model.forward(arm.robot, HOME))

@@ -15,7 +15,7 @@ from heptarm.values.motion.line import lin
 from heptarm.values.motion.spline import ellipse, spl, spline, spline_joints
 from heptarm.values.pose import Pose, deg
 
-#: How far a path may be from its geometry [m].
+#: Tolerance of a path [m].
 _TRUE = 5e-4
 
 
@@ -38,7 +38,7 @@ def _misses(t: Array, points: Array, knot: Array) -> float:
 
 @scenario(line=1, rows="C7 C8 C9", needs=("circ",))
 def circle(arm: Arm) -> None:
-    """CIRC through a point: on the circle, turning evenly, or with the tangent."""
+    """CIRC through a point: on the circle, with a uniform rotation or one that follows the tangent."""
     start = arm.wait_for_rest().pose
     centre = start.xyz + [0.0, 0.06, 0.0]
     via = Pose(centre + [-0.06, 0.0, 0.0], start.quat)
@@ -46,7 +46,7 @@ def circle(arm: Arm) -> None:
     recording = record(arm, circ(via, end, speed_mps=0.1))
     radii = np.linalg.norm(recording.xyz - centre, axis=1)
     near(radii, np.full(len(radii), 0.06), _TRUE, "radii", unit="m")
-    below(_misses(recording.t, recording.xyz, via.xyz), _TRUE, "it passes the point at", unit="m")
+    below(_misses(recording.t_pose, recording.xyz, via.xyz), _TRUE, "it passes the point at", unit="m")
     near_pose(arm, end, "at the end")
     half = recording.states[int(np.argmin(np.linalg.norm(recording.xyz - via.xyz, axis=1)))].pose
     near(half.angle_to(start), np.radians(10), 0.03, "halfway it has turned half", unit="rad")
@@ -65,7 +65,7 @@ def circle(arm: Arm) -> None:
 
 @scenario(line=1, rows="C10 C11 C12", needs=("circ",))
 def arcs(arm: Arm) -> None:
-    """Arcs by centre, plane and angle, in three planes and one aslant; one without a radius is refused here."""
+    """Arcs by centre, plane and angle, in three planes and an oblique one; an arc without a radius is refused."""
     from heptarm.errors import CommandRejected
 
     planes: tuple[str | tuple[float, float, float], ...] = ("xy", "xz", "yz", (1.0, 1.0, 1.0))
@@ -91,14 +91,16 @@ def arcs(arm: Arm) -> None:
 
 @scenario(line=1, rows="C16 C17 B13", needs=("spline",))
 def splines(arm: Arm) -> None:
-    """A spline of curved, straight and round segments passes through its points and does not stop there."""
+    """A spline of curved, straight and circular segments passes through its points without a stop."""
     start = arm.wait_for_rest().pose
     knots = [_moved(start, 0.03, 0.04, 0.02), _moved(start, 0.0, 0.09, 0.03), _moved(start, 0.0, 0.13, 0.03)]
     far, end = _moved(start, -0.04, 0.17, 0.03), _moved(start, -0.08, 0.13, 0.03)
     path = spline([knots[0], spl(knots[1]), lin(knots[2]), circ(far, end)], speed_mps=0.08)
     recording = record(arm, path)
     for place, knot in enumerate((*knots, far, end)):
-        below(_misses(recording.t, recording.xyz, knot.xyz), _TRUE, f"it misses point {place} by", unit="m")
+        below(
+            _misses(recording.t_pose, recording.xyz, knot.xyz), _TRUE, f"it misses point {place} by", unit="m"
+        )
     near_pose(arm, end, "at the end")
     moving = recording.speeds[
         np.flatnonzero(recording.speeds > 0.04)[0] : np.flatnonzero(recording.speeds > 0.04)[-1]
@@ -108,7 +110,7 @@ def splines(arm: Arm) -> None:
 
 @scenario(line=1, rows="C18 B17", needs=("spline_joints",))
 def joint_splines(arm: Arm) -> None:
-    """A path given as a matrix of joint positions is passed row by row, without a halt."""
+    """A matrix of joint positions is followed row by row, without a stop."""
     rows = HOME + np.outer(np.sin(np.linspace(0, np.pi, 9))[1:], deg(12, 5, 8, 6, 0, 8, 25))
     rows = np.vstack([rows[:-1], HOME + deg(0, 0, 0, 0, 0, 0, 1)])
     recording = record(arm, spline_joints(list(rows), speed=0.4))
@@ -121,7 +123,7 @@ def joint_splines(arm: Arm) -> None:
 
 @scenario(line=1, rows="C13 C14 C26", needs=("spline",))
 def ellipses(arm: Arm) -> None:
-    """Ellipses in three planes and one aslant, with ramps of speed at their ends."""
+    """Ellipses in three planes and an oblique one, with ramps of speed at their ends."""
     planes: tuple[str | tuple[float, float, float], ...] = ("xy", "xz", "yz", (0.0, 0.6, 0.8))
     for plane in planes:
         start = arm.wait_for_rest().pose
@@ -136,7 +138,7 @@ def ellipses(arm: Arm) -> None:
         near(ones, np.ones(len(ones)), 0.04, f"equation of the ellipse, {plane}")
         near(lever @ normal, np.zeros(len(lever)), _TRUE, f"offset out of {plane}", unit="m")
         if plane == "xy":
-            below(_misses(recording.t, recording.xyz, start.xyz), _TRUE, "closed within", unit="m")
+            below(_misses(recording.t_pose, recording.xyz, start.xyz), _TRUE, "closed within", unit="m")
             ramp = recording.speeds[:3]
             below(float(ramp.min()), 0.075, "it begins slowly", unit="m/s")
         else:
@@ -145,7 +147,7 @@ def ellipses(arm: Arm) -> None:
 
 @scenario(line=1, rows="C8", needs=("circ", "lin"), risk=Risk.FREE)
 def orientations(arm: Arm) -> None:
-    """How the orientation is led: from start to end, constant, or by the joints."""
+    """Interpolation of the orientation: from start to end, constant, or by the joints."""
     start = arm.wait_for_rest().pose
     target = _moved(start, y=0.06) @ Pose.xyz_abc(0, 0, 0, *deg(15, 0, 0))
     for control, turned in (("constant", 0.0), ("variable", np.radians(15)), ("joint", np.radians(15))):

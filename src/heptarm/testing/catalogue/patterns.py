@@ -1,4 +1,4 @@
-"""Scenarios: forces that are laid over an impedance."""
+"""Scenarios: forces superimposed on impedance control."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ _NEEDS = ("sine_impedance",)
 
 
 def _offsets(states: tuple[State, ...]) -> Array:
-    """How far the flange was off its set-point, base axes, shape (n, 3) [m]."""
+    """Deviation of the flange from its set-point, base axes, shape (n, 3) [m]."""
     return np.array([s.pose.xyz - s.pose_cmd.xyz for s in states])
 
 
 def _times(states: tuple[State, ...]) -> Array:
-    return np.array([(s.stamp - states[0].stamp) * 1e-9 for s in states])
+    stamps = [s.groups.pose.stamp for s in states if s.groups.pose is not None]
+    return np.array([(stamp - stamps[0]) * 1e-9 for stamp in stamps])
 
 
 def _fit(t: Array, x: Array, frequency: float) -> tuple[float, float]:
@@ -47,7 +48,7 @@ def force(arm: Arm) -> None:
 
 @scenario(line=3, rows="D13 D16", space=0.1, virtual=True, needs=_NEEDS)
 def sine(arm: Arm) -> None:
-    """A force that swings about a bias: amplitude, frequency and bias as requested."""
+    """A sine force about a bias: amplitude, frequency and bias as requested."""
     handle = held(arm, SineImpedance.sine("y", frequency=1.0, amplitude=30.0, bias=10.0, base=_BASE))
     watch(arm, 0.6)
     states = watch(arm, 2.0)
@@ -71,7 +72,7 @@ def lissajous(arm: Arm) -> None:
 
 @scenario(line=3, rows="D15 D18 D19", space=0.1, virtual=True, needs=_NEEDS)
 def spiral(arm: Arm) -> None:
-    """A spiral that rises for half of its time and falls for the other; the motion waits for its end."""
+    """A spiral that rises for half of its time and falls for the other half; the motion waits for its end."""
     pattern = SineImpedance.spiral("xy", frequency=1.25, amplitude=25.0, total_time=1.6, base=_BASE)
     timed = pattern.timed(rise_time=0.8, hold_time=0.0, fall_time=0.8, stay_active=True)
     recording = record(arm, hold(0.3), mode=timed)
@@ -85,7 +86,7 @@ def spiral(arm: Arm) -> None:
 
 @scenario(line=3, rows="D16 D17", space=0.1, virtual=True, needs=_NEEDS)
 def limits(arm: Arm) -> None:
-    """Amplitude, frequency, phase and bias of each direction by themselves, and the limits on force and offset."""
+    """Amplitude, frequency, phase and bias of each direction, and the limits of force and offset."""
     mode = SineImpedance(
         _BASE,
         amplitude=(20, 0, 20, 0, 0, 0),

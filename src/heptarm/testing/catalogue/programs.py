@@ -38,7 +38,7 @@ def _under_way(arm: Arm, handle: MotionHandle) -> None:
 
 @scenario(line=2, rows="B2 B3 B4 B5 B7 B8 G15", space=0.1, needs=("ptp",))
 def queue(arm: Arm) -> None:
-    """Motions are started, wait for each other on the cabinet, and can be awaited; states flow meanwhile."""
+    """Started motions are queued on the cabinet and can be awaited; states arrive meanwhile."""
     pushed = arm.states()
     first, second = arm.start(_turned(20), speed=0.15), arm.start(_turned(0))
     holds(not first.done and not second.done, "both calls return before anything is done")
@@ -69,7 +69,7 @@ def queue(arm: Arm) -> None:
 
 @scenario(line=2, rows="B9 B16", space=0.1, needs=("ptp",))
 def replace(arm: Arm) -> None:
-    """A new motion replaces what runs and what waits; one that shall not do so is refused."""
+    """A new motion replaces the running and queued ones, or is refused, as requested."""
     first, waiting = arm.start(_turned(60)), arm.start(_turned(30))
     _under_way(arm, first)
     try:
@@ -99,7 +99,7 @@ def cancel(arm: Arm) -> None:
 
 @scenario(line=2, rows="B10 B11 B15", space=0.1, needs=("ptp", "joint_impedance"))
 def stop(arm: Arm) -> None:
-    """A stop from another thread ends a blocking move with an error; the arm holds its place, stiff, then compliant."""
+    """A stop from another thread ends a blocking move with an error; the arm holds, stiff, then compliant."""
 
     def stopping() -> None:
         arm.wait_until(lambda s: abs(s.q[6] - HOME[6]) > 0.03, timeout=20.0)
@@ -121,7 +121,7 @@ def stop(arm: Arm) -> None:
 
 @scenario(line=2, rows="F12", space=0.2, needs=("lin_rel", "pause"))
 def pause(arm: Arm) -> None:
-    """A motion pauses on its path, and goes on along it."""
+    """A motion pauses on its path, and continues along it."""
     start = arm.wait_for_rest().pose
     handle = arm.start(lin_rel(y=0.12, frame="base", speed_mps=0.06))
     arm.wait_until(lambda s: s.pose.distance_to(start) > 0.02, timeout=20.0)
@@ -159,7 +159,7 @@ def blending(arm: Arm) -> None:
 
 @scenario(line=2, rows="B6 B5", space=0.1, needs=("ptp",))
 def progress(arm: Arm) -> None:
-    """Progress grows, the time to the destination shrinks as time passes."""
+    """Progress increases, and the time to the destination decreases with time."""
     pushed = arm.states()  # from before the beginning: a slow machine would miss the first of them
     handle = arm.start(_turned(60))
     seen = []
@@ -223,7 +223,7 @@ def error(arm: Arm) -> None:
 
 @scenario(line=2, rows="F1", space=0.1, needs=("ptp",))
 def ceiling(arm: Arm) -> None:
-    """No motion is faster than the arm's ceiling, whatever its own speed."""
+    """No motion exceeds the speed limit of the arm, whatever its own speed."""
     before, limit = arm.speed, 0.5 * min(arm.speed, 0.4)
     arm.speed = limit
     try:

@@ -59,12 +59,12 @@ def stops(arm: Arm) -> None:
         arm.operator.clear()
         arm.wait_until(lambda s: not s.safety.protective_stop, timeout=20.0)
         holds(arm.recover(timeout=10.0).done, "then software may recover")
-        holds(arm.move(ptp(HOME)).arrived, "and it goes on")
+        holds(arm.move(ptp(HOME)).arrived, "and it continues")
 
 
 @scenario(line=10, rows="G17", risk=Risk.FAULT, operator=True, space=0.8)
 def modes(arm: Arm) -> None:
-    """T1 is slow and needs the enabling switch: let go, the arm pauses; held and recovered, the motion goes on."""
+    """T1 is slow and requires the enabling switch: released, the arm pauses; held and recovered, it continues."""
     arm.operator.choose("t1")
     arm.operator.hold()
     arm.wait_until(lambda s: s.safety.mode is OperationMode.T1 and s.safety.enabling_switch, timeout=20.0)
@@ -81,12 +81,12 @@ def modes(arm: Arm) -> None:
     rests = arm.wait_until(lambda s: s.safety.paused and np.abs(s.dq).max() < 1e-3, timeout=20.0)
     holds(not handle.done and not rests.safety.ready_to_move, "it pauses")
     arm.operator.hold()
-    holds(arm.recover(timeout=10.0).done and handle.wait().arrived, "it goes on and arrives")
+    holds(arm.recover(timeout=10.0).done and handle.wait().arrived, "it continues and arrives")
 
 
 @scenario(line=10, rows="G20 B15", risk=Risk.FAULT, operator=True, space=0.5)
 def errors(arm: Arm) -> None:
-    """Errors of the drives, of a joint limit, of a singularity end a motion, each with its code."""
+    """Drive errors, joint limits and singularities end a motion, each with its code."""
     for words, expected, code in (
         ("drive_error 3", "drive error in A3", 62),
         ("joint_limit 4", "limit A4", 50),
@@ -103,7 +103,7 @@ def errors(arm: Arm) -> None:
 
 @scenario(line=10, rows="F12", risk=Risk.FAULT, operator=True, space=0.2)
 def manual_override(arm: Arm) -> None:
-    """The override at the smartPAD slows down as well."""
+    """The override of the smartPAD also slows motions down."""
     there = ptp(HOME + deg(0, 0, 0, 0, 0, 0, 30), speed=0.3)
     full = arm.move(there).duration
     arm.operator.override(0.3)
@@ -114,11 +114,11 @@ def manual_override(arm: Arm) -> None:
 
 @scenario(line=10, rows="B10", risk=Risk.FREE, space=0.5, virtual=True, needs=("ptp",))
 def observer(arm: Arm) -> None:
-    """Another client watches, may not move the arm, and stops it."""
+    """Another client observes, cannot move the arm, and can stop it."""
     from heptarm.arm.connect import connect
     from heptarm.errors import NotInControl
 
-    host = arm._connection.link.peer
+    host = arm.connection.link.peer
     with connect(host, control=False, name="scenario-observer", timeout=20.0) as other:
         try:
             other.move(ptp(HOME))
@@ -134,7 +134,7 @@ def observer(arm: Arm) -> None:
 
 @scenario(line=10, rows="", risk=Risk.FREE, space=0.5, needs=("ptp",))
 def kinds(arm: Arm) -> None:
-    """A stop after the motion lets it finish and drops the rest."""
+    """A stop after the motion finishes it and drops the queue."""
     first, second = arm.start(ptp(HOME + deg(0, 0, 0, 0, 0, 0, 20))), arm.start(ptp(HOME))
     arm.stop("after_motion")
     holds(first.wait().arrived, "what runs finishes")

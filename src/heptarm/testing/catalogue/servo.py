@@ -38,7 +38,7 @@ def stream(
 
 
 def _swing(arm: Arm, servo: JointServo, start: Array) -> float:
-    """A7 is led away, and back when it has got there; how far it went [rad]."""
+    """Move A7 away and back; return the largest distance [rad]."""
     far = 0.0
     for begin, end in ((0.0, 0.15), (0.15, 0.0)):
 
@@ -58,7 +58,7 @@ def _swing(arm: Arm, servo: JointServo, start: Array) -> float:
 
 @scenario(line=5, rows="E2 E12 E13", space=0.1, needs=("servo",))
 def joints(arm: Arm) -> None:
-    """SmartServo, joint targets: the arm follows; targets are not answered, state flows beside them."""
+    """SmartServo, joint targets: the arm follows; targets are not acknowledged, states arrive meanwhile."""
     with arm.servo("joint", rate=_RATE, speed=0.5, acceleration=1.0, watchdog=_PATIENT) as servo:
         start = servo.start.q
         far = _swing(arm, servo, start)
@@ -72,7 +72,7 @@ def joints(arm: Arm) -> None:
 
 @scenario(line=5, rows="E5", space=0.1, needs=("servo_direct",))
 def direct(arm: Arm) -> None:
-    """DirectServo, joint targets: the arm goes straight for them."""
+    """DirectServo, joint targets: the arm moves directly to them."""
     with arm.servo(
         "joint", rate=_RATE, engine="direct", speed=0.8, acceleration=1.0, watchdog=_PATIENT
     ) as servo:
@@ -130,7 +130,7 @@ def velocities(arm: Arm) -> None:
 
 @scenario(line=5, rows="E9", space=0.15, needs=("servo_pose",))
 def twist(arm: Arm) -> None:
-    """A stream of Cartesian velocities, made of poses: the flange moves and turns as commanded."""
+    """A stream of Cartesian velocities, as poses: the flange moves and turns as commanded."""
     speed, turn = 0.04, 0.1
     with arm.servo("pose", rate=_RATE, speed=0.5, acceleration=1.0, watchdog=_PATIENT) as servo:
         start = servo.start.pose
@@ -152,7 +152,7 @@ def twist(arm: Arm) -> None:
 
 @scenario(line=5, rows="E14 E15 F10", space=0.15, needs=("servo",))
 def jump(arm: Arm) -> None:
-    """A target far away is approached within the limits of speed and acceleration, and not faster than it may be."""
+    """The arm approaches a distant target within the limits of speed and acceleration."""
     tops, times = [], []
     for fraction, acceleration, shortest in ((0.1, 0.5, None), (0.1, 0.02, None), (0.3, 1.0, 1.0)):
         with arm.servo(
@@ -183,7 +183,7 @@ def jump(arm: Arm) -> None:
 
 @scenario(line=5, rows="E14", space=0.1, risk=Risk.FAULT, virtual=True, needs=("servo",))
 def starved(arm: Arm) -> None:
-    """When no target comes in time, the arm comes to rest, and the block gives the reason."""
+    """When no target arrives in time, the arm stops, and the block raises an error with the reason."""
     try:
         with arm.servo("joint", rate=_RATE, watchdog=0.3) as servo:
             servo.tick()
@@ -198,7 +198,7 @@ def starved(arm: Arm) -> None:
 
 @scenario(line=5, rows="B14 F13", space=0.1, needs=("servo", "ptp"))
 def exclusive(arm: Arm) -> None:
-    """While a stream is followed, another motion is refused; targets beyond limits are brought back."""
+    """During a servo motion another motion is refused; targets beyond the limits are clamped."""
     from heptarm.values.motion.ptp import ptp
 
     with arm.servo("joint", rate=_RATE, watchdog=_PATIENT) as servo:
@@ -214,12 +214,12 @@ def exclusive(arm: Arm) -> None:
             note(error.text)
         servo.tick()
         servo.set(servo.start.q)
-        holds(servo.active, "and the stream goes on")
+        holds(servo.active, "and the stream continues")
 
 
 @scenario(line=5, rows="E4 F11", space=0.2, needs=("servo_lin",))
 def lines(arm: Arm) -> None:
-    """SmartServoLIN: pose targets are approached on straight lines, no faster along an axis than allowed."""
+    """SmartServoLIN: the flange approaches pose targets on straight lines, within the limits along each axis."""
     limit = 0.06
     with arm.servo(
         "lin", rate=_RATE, speed_mps=limit / arm.speed, acceleration_mps2=1.0, watchdog=_PATIENT

@@ -36,7 +36,7 @@ def outputs(arm: Arm) -> None:
 @scenario(line=7, rows="J4 J5", risk=Risk.STILL, operator=True, needs=("io",),
           signals=("MediaFlange.UserButton", "MediaFlange.InputX3Pin3"))  # fmt: skip
 def inputs(arm: Arm) -> None:
-    """Inputs of the flange and its button are seen as they change."""
+    """The state shows changes of the flange's inputs and its button."""
     for name in ("UserButton", "InputX3Pin3"):
         arm.io.wait(name, False, timeout=_PATIENCE)
         arm.operator.set_signal(name, True)
@@ -63,7 +63,7 @@ def lamp(arm: Arm) -> None:
     line=7, rows="J6", risk=Risk.STILL, virtual=True, needs=("io",), signals=("Cell.Offset", "Cell.Level")
 )
 def groups(arm: Arm) -> None:
-    """Signals of other groups: numbers with a sign, analog ones; what a signal cannot be is refused."""
+    """Signals of other groups: signed and analog ones; values outside their ranges are refused."""
     arm.io.set({"Cell.Offset": -300, "Cell.Level": 2.5})
     arm.io.wait("Cell.Offset", -300.0, timeout=_PATIENCE)
     near(float(arm.io["Cell.Level"]), 2.5, 0.01, "analog output")
@@ -78,11 +78,11 @@ def groups(arm: Arm) -> None:
 
 @scenario(line=7, rows="J7", risk=Risk.STILL, operator=True, needs=("user_keys",))
 def keys(arm: Arm) -> None:
-    """User keys of the smartPAD: set by the client, pressed by a person, heard by the client."""
+    """User keys of the smartPAD: configured by the client, pressed by a person, reported to the client."""
     heard: list[tuple[int, bool]] = []
     end = arm.pad.on_key(lambda slot, down: heard.append((slot, down)))
     arm.pad.set_key(2, "next part", led="green")
-    listeners = arm._connection.events.key_listeners
+    listeners = arm.connection.events.key_listeners
 
     def press() -> None:
         arm.wait_until(lambda _: len(listeners) == 2, timeout=_PATIENCE)  # somebody waits for it
@@ -105,7 +105,7 @@ def keys(arm: Arm) -> None:
 
 @scenario(line=7, rows="J8", risk=Risk.STILL)
 def message(arm: Arm) -> None:
-    """A text is shown in the smartPAD's log; one that is too long is refused."""
+    """The smartPAD's log shows a text; a text that is too long is refused."""
     arm.pad.show("heptarm: hello from a scenario")
     try:
         arm.pad.show("x" * 513)
@@ -116,7 +116,7 @@ def message(arm: Arm) -> None:
 
 @scenario(line=7, rows="", risk=Risk.STILL, virtual=True, needs=("process_data",))
 def process_data(arm: Arm) -> None:
-    """Process data of the project are read and changed, and keep their types; heptarm's own are not changed."""
+    """Process data of the project can be read and changed, with their types; heptarm's own cannot be changed."""
     name = "cell.count"
     try:
         before = arm.pad.process_data(name)

@@ -23,7 +23,7 @@ _PART = Workpiece("scenario-part", mass=1.0, com=(0.0, 0.0, 0.05), frames={"peg"
 
 @scenario(line=6, rows="I1 I2", virtual=True, risk=Risk.STILL, needs=("tools",))
 def template(arm: Arm) -> None:
-    """A tool template of the project is attached by its name, moves its own frame, and is taken off."""
+    """A tool template of the project is attached by its name, defines the motion frame, and is detached."""
     if not arm.tools:
         raise Unfit("the project has no tool templates")
     name, tool = next(iter(arm.tools.items()))
@@ -40,7 +40,7 @@ def template(arm: Arm) -> None:
 
 @scenario(line=6, rows="I3 I6 C5", virtual=True, space=0.25, needs=("tools", "lin_rel"))
 def tip(arm: Arm) -> None:
-    """A tool that is defined here: its tip moves, along its own axes, or another frame that is named."""
+    """A tool defined by the client: motions refer to its tip, along its own axes, or to another of its frames."""
     with arm.tool(_GRIPPER):
         start = fresh(arm).pose
         arm.move(lin_rel(z=0.04, speed_mps=0.2))
@@ -60,7 +60,7 @@ def tip(arm: Arm) -> None:
 
 @scenario(line=6, rows="I4 I5", virtual=True, space=0.02, needs=("tools", "workpieces", "hold"))
 def load(arm: Arm) -> None:
-    """Mass and centre of mass of tool and workpiece: the motors carry them, nothing is felt as a force."""
+    """Mass and centre of mass of tool and workpiece are compensated: they cause no external force."""
     before = fresh(arm)
     with arm.tool(_GRIPPER):
         arm.move(hold(0.4))
@@ -79,7 +79,7 @@ def load(arm: Arm) -> None:
 
 @scenario(line=6, rows="I6 G10", virtual=True, operator=True, risk=Risk.CONTACT, space=0.02, needs=("tools",))
 def wrench(arm: Arm) -> None:
-    """The wrench at the tip, at the flange, in the axes of either."""
+    """The wrench at the tip and at the flange, in the axes of either."""
     push = np.array([0.0, 14.0, -6.0])
     with arm.tool(_GRIPPER):
         arm.move(hold(0.3))

@@ -6,7 +6,7 @@ import heptarm.wire.Groups;
 import heptarm.wire.Protocol;
 import heptarm.wire.Welcome;
 
-/** How this cabinet introduces itself: its pre-shared key and the Welcome. */
+/** How this cabinet introduces itself. */
 final class CabinetIdentity {
     private static final int ALL_GROUPS = Groups.JOINTS | Groups.TORQUES | Groups.POSE | Groups.WRENCH | Groups.MOTION
             | Groups.SAFETY | Groups.IO | Groups.MODE;
@@ -21,11 +21,6 @@ final class CabinetIdentity {
         this.robot = robot;
         this.tools = tools;
         this.authority = authority;
-    }
-
-    /** Pre-shared key; empty: none. */
-    String key() {
-        return settings.key;
     }
 
     /** The Welcome, without a proof of the key. */

@@ -25,6 +25,7 @@ import heptarm.wire.Welcome;
  * the oldest are dropped; a connection whose events pile up is closed.
  */
 final class ClientConnection implements ControlAuthority.Controller, StateSampler.Subscriber {
+    private static final int BUFFER = 16384;
     private static final int MAX_EVENTS = 4096;
     private static final int MAX_STATES = 64;
     private static final long LINGER_MS = 500;
@@ -34,6 +35,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     private final int session;
     private final Socket socket;
     private final Handshake handshake;
+    private final CabinetIdentity identity;
     private final RequestDispatcher dispatcher;
     private final Owner owner;
     private final FrameEncoder frames;
@@ -46,6 +48,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     private final ArrayDeque<byte[]> events = new ArrayDeque<byte[]>();
     private final ArrayDeque<byte[]> states = new ArrayDeque<byte[]>();
     private boolean writing;
+    private volatile boolean open;
     private volatile boolean ending;
     private long dropped;
 
@@ -55,10 +58,10 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     private FrameTag theirs;
     private FrameTag ours;
     private byte[] tagged = new byte[0];
+    private byte[] unread;
     private long arrived;
     private Thread reader;
     private Thread writer;
-    private final long connected;
     private volatile boolean gone;
     private volatile long lastReceived;
     private long silenceBefore;
@@ -74,21 +77,24 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         void closed(ClientConnection client, String why);
     }
 
-    ClientConnection(Socket socket, int session, CabinetIdentity identity, RequestDispatcher dispatcher, Owner owner, FrameEncoder frames,
-            Clock clock, Log log) throws IOException {
+    ClientConnection(Newcomer newcomer, int session, CabinetIdentity identity, RequestDispatcher dispatcher, Owner owner,
+            FrameEncoder frames, Clock clock, Log log) throws IOException {
+        this.identity = identity;
         this.dispatcher = dispatcher;
         this.owner = owner;
         this.frames = frames;
         this.clock = clock;
         this.log = log;
-        this.socket = socket;
+        this.socket = newcomer.socket;
         this.session = session;
         this.in = socket.getInputStream();
         this.out = socket.getOutputStream();
-        this.handshake = new Handshake(identity, this);
-        this.connected = clock.nanos();
-        this.lastReceived = connected;
-        this.lastSent = connected;
+        this.handshake = newcomer.handshake;
+        this.expected = newcomer.received();
+        this.seq = newcomer.sent();
+        this.unread = newcomer.unread();
+        this.lastReceived = clock.nanos();
+        this.lastSent = lastReceived;
     }
 
     void start() {
@@ -121,17 +127,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     }
 
     public boolean isOpen() {
-        return handshake.isOpen() && !ending && !gone;
-    }
-
-    /** Whether the handshake is not complete yet. */
-    boolean isNew() {
-        return !handshake.isOpen() && !ending;
-    }
-
-    /** Cabinet time at which the client connected. */
-    long connected() {
-        return connected;
+        return open && !ending && !gone;
     }
 
     /** Cabinet time of the last bytes from the client. */
@@ -168,10 +164,15 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     // ------------------------------------------------------------------------------------------- reading
 
     private void readAll() {
-        byte[] buffer = new byte[65536];
-        int filled = 0;
+        byte[] buffer = new byte[BUFFER];
+        System.arraycopy(unread, 0, buffer, 0, unread.length);
+        int filled = unread.length;
+        unread = null;
         String why = "the connection was closed";
         try {
+            welcome();
+            arrived = lastReceived;
+            filled -= handleFrames(buffer, filled); // a client without a key may say more than Hello at once
             while (!gone) {
                 if (filled == buffer.length) {
                     byte[] larger = new byte[Math.min(buffer.length * 4, Protocol.HEADER + Protocol.MAX_BODY + Protocol.TAG)];
@@ -212,7 +213,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     private int handleFrames(byte[] data, int filled) {
         int pos = 0;
         while (filled - pos >= Protocol.HEADER && !ending && !gone) {
-            int length = int32(data, pos + 6);
+            int length = FrameEncoder.getInt(data, pos + 6);
             if (((data[pos] & 0xFF) << 8 | data[pos + 1] & 0xFF) != Protocol.MAGIC || length < 0 || length > Protocol.MAX_BODY) {
                 goodbye(Code.BAD_FRAME, "it sent bytes that are not a heptarm frame");
                 return filled;
@@ -230,12 +231,11 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
                 forged("a frame has a wrong tag");
                 return filled;
             }
-            int version = data[pos + 2] & 0xFF;
             int type = (data[pos + 4] & 0xFF) << 8 | data[pos + 5] & 0xFF;
-            long request = int32(data, pos + 14) & 0xFFFFFFFFL;
-            if (int32(data, pos + FrameEncoder.SEQUENCE) != expected) {
+            long request = FrameEncoder.getInt(data, pos + 14) & 0xFFFFFFFFL;
+            if (FrameEncoder.getInt(data, pos + FrameEncoder.SEQUENCE) != expected) {
                 forged("frame " + (expected & 0xFFFFFFFFL) + " was expected, frame "
-                        + (int32(data, pos + FrameEncoder.SEQUENCE) & 0xFFFFFFFFL) + " came");
+                        + (FrameEncoder.getInt(data, pos + FrameEncoder.SEQUENCE) & 0xFFFFFFFFL) + " came");
                 return filled;
             }
             expected++;
@@ -243,12 +243,13 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
                 theirs.beginRound();
             }
             lastReceived = arrived;
-            if (handshake.isOpen()) {
-                long stamp = (long) int32(data, pos + 18) << 32 | int32(data, pos + 22) & 0xFFFFFFFFL;
-                dispatcher.handle(this, type, request, stamp, data, pos + Protocol.HEADER, length);
-            } else {
-                handshake.handle(version, type, data, pos + Protocol.HEADER, length);
+            if ((data[pos + 2] & 0xFF) != Protocol.MAJOR) {
+                goodbye(Code.WRONG_VERSION, "a frame has protocol version " + (data[pos + 2] & 0xFF) + ", this cabinet has "
+                        + Protocol.MAJOR);
+                return filled;
             }
+            long stamp = (long) FrameEncoder.getInt(data, pos + 18) << 32 | FrameEncoder.getInt(data, pos + 22) & 0xFFFFFFFFL;
+            dispatcher.handle(this, type, request, stamp, data, pos + Protocol.HEADER, length);
             pos = end;
         }
         return ending ? filled : pos;
@@ -257,10 +258,6 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     /** End a session in which a frame is not the next one of the client. */
     private void forged(String what) {
         goodbye(Code.FORGED_FRAME, what + ": it was forged, changed, repeated, reordered or lost on its way");
-    }
-
-    private static int int32(byte[] data, int at) {
-        return (data[at] & 0xFF) << 24 | (data[at + 1] & 0xFF) << 16 | (data[at + 2] & 0xFF) << 8 | data[at + 3] & 0xFF;
     }
 
     // ------------------------------------------------------------------------------------------- writing
@@ -292,26 +289,18 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         writeFrame(frame, ours);
     }
 
-    /** Claim the connection: other frames wait until {@link #writeClaimed}. False: the connection is ending. */
-    boolean claim() {
+    /** Open the session: the Welcome goes out first, and reflects all events before it; every later frame has a tag. */
+    private void welcome() {
         synchronized (outbox) {
-            if (writing || ending) {
-                return false;
+            if (ending || gone) {
+                return;
             }
             writing = true;
-            return true;
         }
-    }
-
-    /**
-     * Write the Welcome over the claimed connection and free it; every later frame has a tag.
-     *
-     * @param incoming tags of the client's frames, null: none
-     * @param outgoing tags of the frames to the client, null: none
-     */
-    void open(byte[] welcome, FrameTag incoming, FrameTag outgoing) {
-        theirs = incoming; // before the Welcome, after which the client sends tagged frames
-        writeFrame(frames.frame(Welcome.TYPE, welcome), outgoing);
+        theirs = handshake.clientTag(); // before the Welcome, after which the client sends tagged frames
+        open = true; // events are queued from here on
+        byte[] body = handshake.prove(identity.welcome(session).body());
+        writeFrame(frames.frame(Welcome.TYPE, body), handshake.cabinetTag());
     }
 
     private void writeFrame(byte[] frame, FrameTag next) {
@@ -369,20 +358,6 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
             outbox.notify();
         }
         owner.ending(this, code, text);
-    }
-
-    /** Refuse a connection. */
-    void refuse(int code, String text) {
-        start(); // the writer sends the refusal, then closes
-        handshake.refuse(code, text);
-    }
-
-    /** End the connection after the outbox is written. */
-    void endAfterWriting() {
-        synchronized (outbox) {
-            ending = true;
-            outbox.notify();
-        }
     }
 
     private void writeAll() {

@@ -13,7 +13,8 @@ final class FrameEncoder {
     static final int TAGGED = 1;
     /** Offset of the sequence number in the header. */
     static final int SEQUENCE = 10;
-    private static final int LENGTH = 6;
+    /** Offset of the length of the body in the header. */
+    static final int LENGTH = 6;
     /** Initial buffer size [bytes]; most frames fit into it. */
     private static final int CAPACITY = 1024;
 
@@ -53,6 +54,10 @@ final class FrameEncoder {
     private static byte[] withLength(byte[] frame) {
         putInt(frame, LENGTH, frame.length - Protocol.HEADER);
         return frame;
+    }
+
+    static int getInt(byte[] data, int at) {
+        return (data[at] & 0xFF) << 24 | (data[at + 1] & 0xFF) << 16 | (data[at + 2] & 0xFF) << 8 | data[at + 3] & 0xFF;
     }
 
     static void putInt(byte[] data, int at, int value) {

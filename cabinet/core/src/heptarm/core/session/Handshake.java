@@ -9,54 +9,54 @@ import heptarm.core.key.FrameTag;
 import heptarm.core.key.KeyExchange;
 import heptarm.wire.Challenge;
 import heptarm.wire.Code;
+import heptarm.wire.Halt;
 import heptarm.wire.Hello;
 import heptarm.wire.Message;
 import heptarm.wire.Messages;
 import heptarm.wire.Proof;
 import heptarm.wire.Protocol;
-import heptarm.wire.Refusal;
 import heptarm.wire.SessionState;
 import heptarm.wire.SessionTransitions;
 import heptarm.wire.Violation;
 import heptarm.wire.Welcome;
 import heptarm.wire.WireException;
 
-/** The first frames of a connection: versions, the key, the Welcome. The schema's table lists which message is legal when. */
+/**
+ * The first messages of a connection: versions and the key, or a Halt. The schema's table lists which message is legal when. It
+ * sends nothing itself.
+ */
 final class Handshake {
     private static final SecureRandom RANDOM = new SecureRandom();
 
-    private final CabinetIdentity identity;
-    private final ClientConnection client;
-    private volatile SessionState state = SessionState.START;
+    private final KeyExchange exchange;
+    private SessionState state = SessionState.START;
     private String name = "a client";
     private Hello hello;
     private byte[] nonce;
-    private KeyExchange exchange;
 
-    Handshake(CabinetIdentity identity, ClientConnection client) {
-        this.identity = identity;
-        this.client = client;
+    /** Without a key for an empty one. */
+    Handshake(String key) {
+        exchange = key.length() == 0 ? null : new KeyExchange(key);
     }
 
-    boolean isOpen() {
-        return state == SessionState.OPEN;
-    }
-
+    /** Name of the client, for others. */
     String name() {
         return name;
     }
 
-    /** Handle one frame of a session that is not open yet; an illegal one ends the connection with a reason. */
-    void handle(int version, int type, byte[] data, int offset, int length) {
-        try {
-            step(version, type, data, offset, length);
-        } catch (CommandRejected e) {
-            refuse(e.code, e.getMessage());
-        }
+    /** Whether the client has done everything that it must before the Welcome. */
+    boolean isDone() {
+        return state == (exchange == null ? SessionState.HELLO : SessionState.PROVED);
     }
 
-    private void step(int version, int type, byte[] data, int offset, int length) throws CommandRejected {
-        if (version != Protocol.MAJOR) {
+    /** Whether the client has said goodbye, or was refused. */
+    boolean isClosed() {
+        return state == SessionState.CLOSED;
+    }
+
+    /** Handle a message of the client; returns the Challenge to send, the Halt to execute, or null. */
+    Message receive(int version, int type, byte[] data, int offset, int length) throws CommandRejected {
+        if (version != Protocol.MAJOR && type != Halt.TYPE) {
             throw new CommandRejected(Code.WRONG_VERSION, versions(version + ".x"));
         }
         Message message = read(type, data, offset, length);
@@ -65,22 +65,21 @@ final class Handshake {
             throw new CommandRejected(Code.UNEXPECTED_MESSAGE,
                     "message " + type + " is illegal in session state " + state + "; send Hello first");
         }
-        state = next;
-        if (message instanceof Hello && identity.key().length() > 0) {
-            exchange = new KeyExchange(identity.key());
-        }
-        if (exchange != null && message instanceof Hello) {
-            exchange.add(type, data, offset, length);
-        }
+        state = SessionState.CLOSED; // what is refused below opens nothing
         if (message instanceof Hello) {
             greet((Hello) message);
-        } else if (message instanceof Proof) {
-            verify((Proof) message);
-            exchange.add(type, data, offset, length);
-            welcome();
-        } else {
-            client.leave("it said goodbye");
+        } else if (message instanceof Proof && !MessageDigest.isEqual(exchange.clientMac(), ((Proof) message).mac)) {
+            throw new CommandRejected(Code.WRONG_KEY, "the pre-shared key is wrong; use the one in the process data heptarm.key");
         }
+        state = next;
+        if (message instanceof Halt) {
+            return message;
+        }
+        if (exchange == null) {
+            return null;
+        }
+        exchange.add(type, data, offset, length);
+        return message instanceof Hello ? challenge() : null;
     }
 
     private static Message read(int type, byte[] data, int offset, int length) throws CommandRejected {
@@ -104,23 +103,16 @@ final class Handshake {
         if (message.major != Protocol.MAJOR) {
             throw new CommandRejected(Code.WRONG_VERSION, versions(message.major + "." + message.minor));
         }
-        if (exchange == null) {
-            welcome();
-            return;
-        }
+    }
+
+    private Challenge challenge() {
         nonce = new byte[Protocol.NONCE];
         RANDOM.nextBytes(nonce);
         Challenge challenge = new Challenge(nonce);
         byte[] body = challenge.body();
         exchange.add(Challenge.TYPE, body, 0, body.length);
-        sent(Challenge.TYPE);
-        client.answer(challenge, 0);
-    }
-
-    private void verify(Proof proof) throws CommandRejected {
-        if (!MessageDigest.isEqual(exchange.clientMac(), proof.mac)) {
-            throw new CommandRejected(Code.WRONG_KEY, "the pre-shared key is wrong; use the one in the process data heptarm.key");
-        }
+        state = SessionTransitions.next(state, Challenge.TYPE);
+        return challenge;
     }
 
     private static String versions(String theirs) {
@@ -128,40 +120,28 @@ final class Handshake {
                 + " (heptarm " + ServerSettings.VERSION + "); install matching versions on both";
     }
 
-    private void welcome() {
-        if (!client.claim()) {
-            return; // the cabinet application is closing
-        }
-        sent(Welcome.TYPE); // events are queued from here on; the Welcome goes out first and reflects all earlier ones
-        byte[] body = identity.welcome(client.session()).body();
-        FrameTag theirs = null;
-        FrameTag ours = null;
-        if (exchange != null) {
-            body = withMac(body, exchange.cabinetMac(Welcome.TYPE, body));
-            theirs = exchange.clientTag(hello.nonce, nonce);
-            ours = exchange.cabinetTag(hello.nonce, nonce);
-        }
-        client.open(body, theirs, ours);
-    }
+    // ------------------------------------------------------------------------------------------ the session
 
-    /** The body of a Welcome, whose last field is an empty mac, with its mac. */
-    private static byte[] withMac(byte[] body, byte[] mac) {
-        byte[] whole = new byte[body.length + mac.length];
-        System.arraycopy(body, 0, whole, 0, body.length);
-        FrameEncoder.putInt(whole, body.length - 4, mac.length);
-        System.arraycopy(mac, 0, whole, body.length, mac.length);
+    /** The body of a Welcome with the cabinet's proof of the key, if there is one. */
+    byte[] prove(byte[] welcome) {
+        if (exchange == null) {
+            return welcome;
+        }
+        byte[] mac = exchange.cabinetMac(Welcome.TYPE, welcome);
+        byte[] whole = new byte[welcome.length + mac.length]; // the mac is the last field, so far empty
+        System.arraycopy(welcome, 0, whole, 0, welcome.length);
+        FrameEncoder.putInt(whole, welcome.length - 4, mac.length);
+        System.arraycopy(mac, 0, whole, welcome.length, mac.length);
         return whole;
     }
 
-    void refuse(int code, String text) {
-        sent(Refusal.TYPE);
-        client.answer(new Refusal(code, text, Protocol.MAJOR, Protocol.MINOR), 0);
-        client.endAfterWriting();
+    /** Tags of the client's frames after the Welcome; null: they have none. */
+    FrameTag clientTag() {
+        return exchange == null ? null : exchange.clientTag(hello.nonce, nonce);
     }
 
-    /** This side sends a message of the handshake. */
-    private void sent(int type) {
-        SessionState next = SessionTransitions.next(state, type);
-        state = next == null ? SessionState.CLOSED : next;
+    /** Tags of the cabinet's frames after the Welcome; null: they have none. */
+    FrameTag cabinetTag() {
+        return exchange == null ? null : exchange.cabinetTag(hello.nonce, nonce);
     }
 }

@@ -11,8 +11,6 @@ import heptarm.wire.Ping;
 final class LinkWatchdog implements Watchdog.Check {
     /** Longest write to a client [s]. */
     private static final double MAX_WRITE = 2.0;
-    /** Time for the handshake [s]. */
-    private static final double MAX_HANDSHAKE = 5.0;
     private static final int SILENT_HEARTBEATS = 5;
 
     private final List<ClientConnection> clients;
@@ -35,10 +33,6 @@ final class LinkWatchdog implements Watchdog.Check {
             long writing = client.writeBegan();
             if (writing != 0 && (now - writing) * scale > MAX_WRITE) {
                 client.leave("it does not read what it subscribed to");
-            } else if (client.isNew()) {
-                if ((now - client.connected()) * scale > MAX_HANDSHAKE) { // from the connection on: single bytes are no Hello
-                    client.leave("it did not send Hello within " + Math.round(MAX_HANDSHAKE) + " s");
-                }
             } else if (silence > SILENT_HEARTBEATS * heartbeat) {
                 client.goodbye(Code.SILENT, "silent for " + Math.round(silence * 1000) + " ms, at most "
                         + Math.round(SILENT_HEARTBEATS * heartbeat * 1000) + " ms are allowed");
