@@ -37,6 +37,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "close": (LIFE,),
         "collision_guard": ("~/collision_guard",),
         "connected": ("~/status",),
+        "connection": ("no counterpart: it is for tools and tests",),
         "controller": ("~/info",),
         "detach_tool": ("~/detach_tool",),
         "detach_workpiece": ("~/detach_workpiece",),
@@ -194,6 +195,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "heptarm.modes": {
         "CartesianImpedance": ("~/mode/cartesian_impedance",),
+        "HandGuiding": ("the node reports no control mode",),
         "JointImpedance": ("~/mode/joint_impedance",),
         "Position": ("~/mode/position",),
         "compliance": ("~/guide", "~/teach", "~/mode/cartesian_impedance"),

@@ -12,7 +12,7 @@ from bench.measure.cabinet import Cabinet
 from bench.measure.figure import Figure, benchmark
 from heptarm.wire import messages
 
-FRAMES = int(os.environ.get("BENCH_FRAMES", "100000"))
+FRAMES = int(os.environ.get("BENCH_FRAMES", "1000000" if os.environ.get("LONG") else "100000"))
 _PER_CONNECTION = 250
 
 

@@ -2,7 +2,15 @@
 
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
-from heptarm.values.mode.mode import Mode, Position
+from heptarm.values.mode.mode import HandGuiding, Mode, Position
 from heptarm.values.mode.sine import SineImpedance
 
-__all__ = ["CartesianImpedance", "JointImpedance", "Mode", "Position", "SineImpedance", "compliance"]
+__all__ = [
+    "CartesianImpedance",
+    "HandGuiding",
+    "JointImpedance",
+    "Mode",
+    "Position",
+    "SineImpedance",
+    "compliance",
+]

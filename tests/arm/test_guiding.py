@@ -14,6 +14,7 @@ from heptarm.values.condition.force import force
 from heptarm.values.condition.signals import path
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.mode.impedance import JointImpedance
+from heptarm.values.mode.mode import HandGuiding, Position
 from heptarm.wire import messages as wire
 from tests.retry import retry, starved
 
@@ -56,6 +57,7 @@ def test_led_by_hand_until_the_switch_is_let_go(arm: ha.Arm) -> None:
     assert "hand_guide" in arm.capabilities
     handle = arm.start(ha.hand_guide(cartesian_velocity=0.3))
     assert handle.wait_started(20.0)
+    arm.wait_until(lambda state: state.mode == HandGuiding())
     arm.operator.guide()
     assert arm.wait_until(lambda state: state.safety.hand_guiding_switch).safety.enabling_switch
     lead(arm, [0, 15, 15], 0.2)
@@ -65,6 +67,9 @@ def test_led_by_hand_until_the_switch_is_let_go(arm: ha.Arm) -> None:
     assert result.arrived and np.isfinite(result.residual)
     assert np.abs(arm.wait_for_rest().q - HOME).max() > 0.03
     assert not arm.wait_until(lambda state: not state.safety.hand_guiding_switch).safety.enabling_switch
+    assert arm.wait_until(lambda state: state.motion.id == 0).mode == Position()
+    with pytest.raises(ha.ShapeError, match="mode must be a control mode"):
+        arm.move(ha.hold(0.1), mode=HandGuiding())  # type: ignore[arg-type]
 
 
 def test_a_condition_ends_it(arm: ha.Arm) -> None:

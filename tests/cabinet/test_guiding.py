@@ -35,6 +35,11 @@ def one(axis: int, value: float) -> tuple[float, ...]:
         (guide(q_min=one(3, math.inf)), Code.NOT_FINITE, "items[1].motion.q_min[3]"),
         (guide(joint_velocity=0.0), Code.OUT_OF_RANGE, "items[1].motion.joint_velocity"),
         (guide(cartesian_velocity=-1.0), Code.OUT_OF_RANGE, "items[1].motion.cartesian_velocity"),
+        (
+            wire.Item(motion=wire.Hold(duration=1.0), mode=wire.HandGuidingMode()),
+            Code.UNSUPPORTED,
+            "items[1].mode",
+        ),
         (guide(mode=SPRING), Code.MODE_CONFLICT, "items[1].mode"),
         (guide(POINT), Code.BAD_CONDITION, "items[1].until"),
     ],

@@ -181,6 +181,8 @@ import javax.xml.bind.DatatypeConverter;
 import com.kuka.roboticsAPI.applicationModel.RoboticsAPIApplication;
 import com.sun.org.apache.bcel.internal.generic.NEW;
 import sun.awt.geom.*;
+import com.kuka.roboticsAPI.geometricModel.physics.*;
+import com.kuka.roboticsAPI.conditionModel.IConditionListener;
 
 // Überwachung in °C
 public class Wild extends RoboticsAPIApplication {

@@ -63,6 +63,13 @@ def test_sim_can_be_connected_to_and_ends_on_ctrl_c() -> None:
     assert run("state", "--target", ready["target"]).returncode == 1
 
 
+def test_an_error_of_the_host_ends_with_a_line_of_heptarm() -> None:
+    done = run("sim", "--port", "0", JAVA_TOOL_OPTIONS="-XX:+NoSuchOption")
+    assert done.returncode == 1 and "Traceback" not in done.stderr
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith("heptarm: the virtual cabinet does not start") and "--port" not in last
+
+
 def test_sim_on_a_taken_port_says_so() -> None:
     with sim() as ready:
         done = run("sim", "--port", str(ready["port"]))

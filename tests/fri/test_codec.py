@@ -163,7 +163,7 @@ def test_what_a_version_cannot_carry_is_refused_on_writing() -> None:
         (m.Command(header, io=(signal,) * 11), Version.V1_15, "at most 10"),
         (m.Command(header, pose=m.Transformation("p", joints)), Version.V1_15, "Cartesian pose"),
         (m.Command(header, q=(0.0,) * 6), Version.V1_15, "must have 7 values"),
-        (m.Command(header, io=(replace(signal, name="x" * 64),)), Version.V1_15, "1 to 63"),
+        (m.Command(header, io=(replace(signal, name="x" * 64),)), Version.V1_15, "at most 63"),
     ):
         with pytest.raises(ValueError, match=text):
             codec.encode_command(value, wire)

@@ -83,5 +83,5 @@ def test_what_a_command_leaves_out_stays_as_it_was() -> None:
 
 
 def test_negative_durations_are_refused() -> None:
-    with pytest.raises(LimitError, match="patience must be at least 0 s, got -1 s"):
+    with pytest.raises(LimitError, match="patience must be in .* s, got -1 s"):
         Policy(patience=-1.0)

@@ -20,6 +20,8 @@ TOLD_APART: dict[str, str] = {
     "MotionStatus": "the running program, as the cabinet samples it (Java) and as a state has it (Python)",
     "CommandRejected": "the refusal of a request, as the cabinet throws it (Java) and the client raises it (Python)",
     "Watchdog": "the thread that looks for silence (Java), and the longest silence that it accepts (Python)",
+    "FrameTag": "the tag of a frame, which each side of the protocol makes and checks in its language",
+    "KeyExchange": "the proofs of the key, which each side of the protocol makes and checks in its language",
     "Clock": "the seam to time in both languages",
     "RealClock": "the implementation of Clock on the machine's time in both languages",
     "Plant": "the interface in Java is implemented by the plant in Python",

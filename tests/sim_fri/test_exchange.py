@@ -184,6 +184,18 @@ def test_a_client_of_another_version_is_named(cabinet: Version, client: Version,
     assert len(rig.told) == 1 and text in rig.told[0]
 
 
+def test_an_answer_that_only_another_version_can_read_names_both() -> None:
+    rig = Rig(Version.V2_5)
+    rig.controller.open()
+    rig.run(1)
+    frame = m.Transformation("base", (0.0,) * 12)
+    rig.controller.receive(
+        encode_command(m.Command(m.Header(300, 0), transformations=(frame,)), Version.V1_15), rig.now
+    )
+    rig.run(1)
+    assert "likely cause: the client speaks FRI 1.14-1.16, this cabinet FRI 2.5" in rig.told[0]
+
+
 def test_garbage_is_counted_and_told_of_at_most_twenty_times() -> None:
     rig = Rig().active()
     generator = random.Random(1)

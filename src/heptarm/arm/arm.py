@@ -26,16 +26,15 @@ from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
 from heptarm.arm.motion.servo import JointServo, PoseServo, ServoKeywords, ServoRequest, documented
 from heptarm.arm.translate.conditions import condition_message
-from heptarm.arm.translate.modes import mode_message
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
 from heptarm.skills import collision_guard as guarding
 from heptarm.skills import replay as replaying
 from heptarm.skills import teaching
 from heptarm.skills import touch as touching
-from heptarm.values.arrays import within
+from heptarm.values.arrays import callback, instance, integer, within, word
 from heptarm.values.condition.condition import Condition, check_condition
-from heptarm.values.frames import BASE, TOOL
-from heptarm.values.mode.mode import Mode
+from heptarm.values.frames import BASE, TOOL, check_name
+from heptarm.values.mode.mode import MODES, Mode, check_mode
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose
 from heptarm.values.result import Recovery, Result
@@ -51,6 +50,7 @@ _log = logging.getLogger("heptarm.arm")
 
 #: States that a stream of all states keeps for a slow loop.
 _STREAM_SIZE = 2000
+_LONGEST_STREAM = 1_000_000
 #: Longest wait, after an error, for the arm to rest so that its tool can be changed [s].
 _TOOL_PATIENCE = 5.0
 _STOPS = {kind.name.lower(): kind for kind in wire.StopKind}
@@ -281,7 +281,7 @@ class Arm:
         return self._connection.stream(
             rate=None if rate is None else within(rate, "rate", 0.0, 1e4, above=True, unit="Hz"),
             duration=None if duration is None else within(duration, "duration", 0.0, 1e9, unit="s"),
-            size=size,
+            size=integer(size, "size", 1, _LONGEST_STREAM),
         )
 
     def wait_until(self, condition: Callable[[State], object], *, timeout: float = 30.0) -> State:
@@ -298,7 +298,7 @@ class Arm:
             Timeout: it did not hold in time.
             ConnectionLost: the connection has ended.
         """
-        return self._wait_for(condition, timeout)
+        return self._wait_for(callback(condition, "condition"), timeout)
 
     def subscribe(self, *, rate: float = STATE_RATE, groups: Sequence[str] = GROUPS) -> None:
         """Choose the pushed states; a new choice replaces the old one.
@@ -415,7 +415,7 @@ class Arm:
         Raises:
             ShapeError: not a control mode.
         """
-        mode_message(mode)
+        instance(mode, MODES, "mode", hint="make one with heptarm.modes, for example JointImpedance(300.0)")
         outer, self._mode = self._mode, mode
         try:
             yield
@@ -436,6 +436,8 @@ class Arm:
         Raises:
             ShapeError: not a condition.
         """
+        if error is not None:
+            callback(error, "error")
         rule = BreakRule(check_condition(condition, "condition"), error)
         self._breaks = (*self._breaks, rule)
         try:
@@ -468,7 +470,7 @@ class Arm:
             self._tooling,
             motions,
             ceiling=ceiling,
-            mode=mode or self._mode,
+            mode=self._mode if mode is None else mode,
             until=self._until(until, breaks),
             when=when,
             breaks=breaks,
@@ -495,7 +497,8 @@ class Arm:
             ModeConflict: another motion runs (when the block begins).
         """
         breaks = self._breaks
-        settings["mode"] = settings.get("mode") or self._mode
+        settings["mode"] = self._mode if settings.get("mode") is None else settings["mode"]
+        check_mode(settings["mode"])
         request = ServoRequest(kind, **settings)
         message = request.message(self._speed)
         self._tooling.check_motion_frame(request.moving, "moving")
@@ -541,7 +544,9 @@ class Arm:
             CommandRejected: this cabinet does not support the session; ModeConflict: not in this control mode.
             LimitError: a value outside its range.
         """
-        settings["mode"] = settings.get("mode") or (None if kind == "monitor" else self._mode)
+        if settings.get("mode") is None:
+            settings["mode"] = None if word(kind, "kind", fri_settings.KINDS) == "monitor" else self._mode
+        check_mode(settings["mode"])
         self._tooling.check_mode(settings["mode"])
         return Fri(self._connection, fri_settings.request(self._connection, kind, **settings))
 
@@ -561,13 +566,7 @@ class Arm:
         Raises:
             ConnectionLost: the cabinet cannot be reached.
         """
-        if kind not in _STOPS:
-            raise ShapeError(
-                f"kind must be one of {', '.join(map(repr, _STOPS))}, got {kind!r}",
-                parameter="kind",
-                value=kind,
-            )
-        self._connection.stop(_STOPS[kind])
+        self._connection.stop(_STOPS[word(kind, "kind", _STOPS)])
 
     def recover(self, *, timeout: float = 0.0) -> Recovery:
         """Make the robot ready again, as far as software may, and list the steps left to a person.
@@ -710,7 +709,9 @@ class Arm:
             CommandRejected: no such frame is known; the text lists them.
             StaleState: as `state`.
         """
-        seen = self.state if state is None else state
+        check_name(frame, "frame")
+        check_name(reference, "reference")
+        seen = self.state if state is None else instance(state, State, "state")
         pose = self._tooling.pose(seen, frame)
         return pose if reference == BASE else self._tooling.pose(seen, reference).inverse() @ pose
 
@@ -726,7 +727,10 @@ class Arm:
             CommandRejected: no such frame is known; the text lists them.
             StaleState: as `state`.
         """
-        return self._tooling.wrench(self.state if state is None else state, frame, axes)
+        check_name(frame, "frame")
+        check_name(axes, "axes")
+        seen = self.state if state is None else instance(state, State, "state")
+        return self._tooling.wrench(seen, frame, axes)
 
     # ------------------------------------------------------------------------------------ skills
     # Functions of heptarm.skills, which use only what is public above; each takes the arm first.

@@ -12,7 +12,7 @@ from typing import Literal
 from heptarm.arm.arm import Arm
 from heptarm.arm.link.connection import STATE_RATE, TIMEOUT, Connection, Options
 from heptarm.arm.link.local_simulator import PrivateCabinet
-from heptarm.arm.link.state_stream import GROUPS
+from heptarm.arm.link.state_stream import GROUPS, groups_of
 from heptarm.arm.link.target import parse_target, target_from_env
 from heptarm.arm.translate.text import printable
 from heptarm.arm.watchdog import CONNECTION
@@ -21,7 +21,8 @@ from heptarm.io import tcp
 from heptarm.io.clock import RealClock
 from heptarm.io.keys import find_key
 from heptarm.io.transport import Transport
-from heptarm.values.arrays import within
+from heptarm.values.arrays import finite, flag, instance, within, word
+from heptarm.wire import messages as wire
 
 _log = logging.getLogger("heptarm.arm")
 
@@ -80,12 +81,12 @@ def connect(
         NotInControl: another client controls the robot; the text names it.
         CommandRejected: an argument is not allowed: the key is too weak, or other users can read its file.
     """
-    if on_disconnect not in ("stop", "finish"):
-        raise ShapeError(
-            f'on_disconnect must be "stop" or "finish", got {on_disconnect!r}',
-            parameter="on_disconnect",
-            value=on_disconnect,
-        )
+    word(on_disconnect, "on_disconnect", ("stop", "finish"))
+    flag(control, "control")
+    for given, what in ((target, "target"), (name, "name"), (key, "key")):
+        if given is not None:
+            instance(given, str, what)
+    groups_of(groups, ~wire.Groups.NONE)
     if name is not None and len(name.encode()) > _MAX_NAME:
         raise ShapeError(
             f"name must have at most {_MAX_NAME} bytes, got {len(name.encode())}: {name!r}",
@@ -107,7 +108,7 @@ def connect(
         rate=within(state_rate, "state_rate", 0.0, 1000.0, unit="Hz"),
         groups=groups,
         finishes=on_disconnect == "finish",
-        watchdog=CONNECTION.time(watchdog),
+        watchdog=CONNECTION.time(finite(watchdog, "watchdog", unit="s")),
     )
     private = PrivateCabinet.start(chosen, key=found) if chosen.is_private else None
     host, port = (chosen.host, chosen.port) if private is None else (private.host, private.port)

@@ -591,6 +591,7 @@ def _ready(child: subprocess.Popen[str], otherwise: str) -> dict[str, Any]:
     ready = _first(child, otherwise)
     if not ready.get("ready"):
         raise ConnectFailed(
-            f"{otherwise}: {ready.get('error')}", hint="choose another port with --port, or 0 for any"
+            f"{otherwise}: {ready.get('error')}",
+            hint="" if ready.get("host") else "choose another port with --port, or 0 for any",
         )
     return ready

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.values.arrays import Array, array
+from heptarm.values.arrays import Array, array, instance
 from heptarm.values.robot import Body, RobotModel, symmetric
 
 #: Acceleration of gravity in the frame of an upright base [m/s²].
@@ -58,7 +58,7 @@ class _Posture:
 
 
 def _posture(robot: RobotModel, q: npt.ArrayLike, load: Body | None) -> _Posture:
-    links = robot.links
+    links = instance(robot, RobotModel, "robot").links
     turn, place = np.eye(3), np.zeros(3)
     turns, axis, origin = np.empty((7, 3, 3)), np.empty((7, 3)), np.empty((7, 3))
     for index, angle in enumerate(array(q, 7, "q").tolist()):
@@ -70,6 +70,7 @@ def _posture(robot: RobotModel, q: npt.ArrayLike, load: Body | None) -> _Posture
     com = origin + (turns @ links.com[:, :, None])[:, :, 0]
     moves = np.tri(7)
     if load is not None:
+        instance(load, Body, "load")
         at_flange = place + turn @ (links.flange + load.com)
         mass, com = np.append(mass, load.mass), np.vstack([com, at_flange])
         inertia = np.concatenate([inertia, (turn @ symmetric(load.inertia) @ turn.T)[None]])

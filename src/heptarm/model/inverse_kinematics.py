@@ -15,10 +15,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from heptarm.errors import Unreachable
+from heptarm.errors import ShapeError, Unreachable
 from heptarm.model.kinematics import Columns, Vec, flange
 from heptarm.model.null_space import events
-from heptarm.values.arrays import Array, array
+from heptarm.values.arrays import Array, array, finite, finite_entries, instance, integer, numbers
 from heptarm.values.pose import Pose, Redundancy
 from heptarm.values.robot import RobotModel
 
@@ -37,7 +37,13 @@ _USUAL_STATUS = 2
 
 def rows(pose: Pose | Array) -> tuple[Rows, Vec]:
     """Rotation rows and position of a pose or a homogeneous matrix, as floats."""
-    m = (pose.matrix if isinstance(pose, Pose) else pose).tolist()
+    if not isinstance(pose, Pose):
+        given = finite_entries(numbers(pose, "pose", "a Pose or a matrix of shape (4, 4)"), "pose")
+        if given.shape not in ((4, 4), (3, 4)):
+            raise ShapeError(f"pose must have shape (4, 4), got {given.shape}", parameter="pose", value=pose)
+        m = given.tolist()
+    else:
+        m = pose.matrix.tolist()
     return (tuple(m[0][:3]), tuple(m[1][:3]), tuple(m[2][:3])), (m[0][3], m[1][3], m[2][3])
 
 
@@ -237,6 +243,7 @@ def arm_angle(robot: RobotModel, q: Sequence[float], behind: bool) -> float:
 
 def redundancy(robot: RobotModel, q: Sequence[float]) -> Redundancy:
     """E1, Status and Turn of a joint position, shape (7,) [rad]."""
+    instance(robot, RobotModel, "robot")
     values = array(q, 7, "q").tolist()
     status = status_of(robot, values)
     turn = sum((value < 0) << index for index, value in enumerate(values))
@@ -259,7 +266,7 @@ def intervals(robot: RobotModel, pose: Pose | Array, status: int) -> list[tuple[
         Unreachable: out of reach.
     """
     r, p = rows(pose)
-    return _intervals(robot, r, p, status)
+    return _intervals(instance(robot, RobotModel, "robot"), r, p, integer(status, "status", 0, 7))
 
 
 def _intervals(robot: RobotModel, r: Rows, p: Vec, status: int) -> list[tuple[float, float]]:
@@ -322,6 +329,7 @@ def solve(
         LimitError: a value is outside its range, such as Status 8.
         Unreachable: no solution within the joint limits; the text names the cause.
     """
+    instance(robot, RobotModel, "robot")
     r, p = rows(pose)
     hint = None if near is None else array(near, 7, "near").tolist()
     given = Redundancy(nan if e1 is None else e1, -1 if status is None else status)
@@ -389,7 +397,9 @@ def solve_all(robot: RobotModel, pose: Pose | Array, *, e1: float | None = None)
     Raises:
         Unreachable: out of reach.
     """
+    instance(robot, RobotModel, "robot")
     r, p = rows(pose)
+    e1 = None if e1 is None else finite(e1, "e1", unit="rad")
     found: list[tuple[float, ...]] = []
     for status in range(8):
         angles = [(a + b) / 2 for a, b in _intervals(robot, r, p, status)] if e1 is None else [e1]

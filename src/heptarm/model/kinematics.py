@@ -15,7 +15,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.values.arrays import Array, array
+from heptarm.values.arrays import Array, array, instance
 from heptarm.values.robot import RobotModel
 
 Vec: TypeAlias = tuple[float, float, float]
@@ -71,6 +71,7 @@ def forward(robot: RobotModel, q: npt.ArrayLike) -> Array:
         ShapeError: `q` has not seven entries.
         LimitError: one is not finite.
     """
+    instance(robot, RobotModel, "robot")
     columns, position = flange(robot, array(q, 7, "q").tolist())
     result = np.eye(4)
     result[:3, :3] = np.array(columns).T
@@ -107,8 +108,9 @@ def jacobian(robot: RobotModel, q: npt.ArrayLike, point: npt.ArrayLike | None = 
     Returns:
         Shape (6, 7): rows vx vy vz [m/rad], wx wy wz.
     """
+    instance(robot, RobotModel, "robot")
     axes, points, tip = joints(robot, array(q, 7, "q").tolist())
-    target = np.asarray(tip if point is None else point, dtype=np.float64)
+    target = np.asarray(tip) if point is None else array(point, 3, "point")
     z = np.array(axes)
     return np.vstack([np.cross(z, target - np.array(points)).T, z.T])
 
@@ -119,6 +121,7 @@ def jacobian_derivative(robot: RobotModel, q: npt.ArrayLike, dq: npt.ArrayLike) 
     dz_i = w_i x z_i with w_i the velocity of the link that carries axis i; the lever's derivative is the
     difference of the tip's and the point's velocities.
     """
+    instance(robot, RobotModel, "robot")
     axes, points, tip = joints(robot, array(q, 7, "q").tolist())
     z, p, rates = np.array(axes), np.array(points), array(dq, 7, "dq")
     lever = np.asarray(tip) - p

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CollisionDetected, HeptarmError, ModeConflict, NotReady, StaleState, Timeout
-from heptarm.values.arrays import within
+from heptarm.values.arrays import callback, instance, within
 from heptarm.values.condition.collision import Collision, CollisionGuard
 from heptarm.values.result import Result
 from heptarm.values.state import State
@@ -91,7 +91,9 @@ def guarded(
     """
     if arm in _guarded:
         raise ModeConflict("a collision guard is in force already", hint="leave its block first")
-    bands = collision_guard(arm) if guard is None else guard
+    if on_collision is not None:
+        callback(on_collision, "on_collision")
+    bands = collision_guard(arm) if guard is None else instance(guard, CollisionGuard, "guard")
     _guarded.add(arm)
     try:
         block = _watched if bands.is_moving else _broken_off

@@ -10,7 +10,7 @@ import numpy as np
 
 from heptarm.arm.watchdog import REPLAY
 from heptarm.errors import CommandRejected, LimitError, MotionAborted, ShapeError, StaleState
-from heptarm.values.arrays import Array, Value, within
+from heptarm.values.arrays import Array, Value, callback, instance, within, word
 from heptarm.values.condition.condition import Condition
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.ptp import ptp
@@ -83,9 +83,13 @@ def replay(
         LimitError: a position beyond the joints' limits, or a speed above `arm.speed`.
         MotionAborted: ended early.
     """
+    instance(trajectory, Trajectory, "trajectory")
     _check(trajectory, arm.robot)
-    if by not in ("servo", "spline"):
-        raise ShapeError(f"by must be 'servo' or 'spline', got {by!r}", parameter="by", value=by)
+    word(by, "by", ("servo", "spline"))
+    within(approach, "approach", 0.0, 1.0, above=True)
+    if on_progress is not None:
+        callback(on_progress, "on_progress")
+    arm.servo(rate=rate, watchdog=watchdog, mode=mode, until=until)  # raises before anything moves
     if by == "spline":
         within(speed_scaling, "speed_scaling", 0.0, 1.0, above=True)
     elif within(speed_scaling, "speed_scaling", 0.0, 100.0, above=True):

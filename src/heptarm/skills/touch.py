@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import LimitError, MotionAborted, NoContact, ShapeError, Timeout
+from heptarm.errors import LimitError, MotionAborted, NoContact, Timeout
 from heptarm.skills.taps import TapWatch
-from heptarm.values.arrays import Array, within
+from heptarm.values.arrays import Array, integer, optional, within, word
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.contact import Contact, direction_of
 from heptarm.values.condition.force import force as force_signal
-from heptarm.values.frames import TOOL
-from heptarm.values.mode.mode import Mode
+from heptarm.values.frames import TOOL, check_name
+from heptarm.values.mode.mode import Mode, check_mode
 from heptarm.values.motion.line import lin_rel
 from heptarm.values.result import Cause, Result
 from heptarm.values.state import State
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 #: States averaged for the baseline, and the longest time that they may take to arrive [s].
 _SAMPLES = 8
 _PATIENCE = 5.0
+#: Highest speed of an approach or a retreat [m/s].
+_FASTEST = 10.0
 
 
 def touch(
@@ -67,6 +69,13 @@ def touch(
         NoContact: no contact within the distance, or the motion ended otherwise.
         LimitError: a value outside its range.
     """
+    check_name(frame, "frame")
+    check_mode(mode)
+    word(baseline, "baseline", ("rest", "zero"))
+    within(speed_mps, "speed_mps", 0.0, _FASTEST, above=True, unit="m/s")
+    within(retreat_mps, "retreat_mps", 0.0, _FASTEST, above=True, unit="m/s")
+    optional(timeout, "timeout", 0.0, 1e9, unit="s")
+    optional(retreat, "retreat", 0.0, 2.0, unit="m")
     approach = _Approach(
         arm,
         direction_of(direction),
@@ -74,12 +83,6 @@ def touch(
         force=within(force, "force", 0.0, TapWatch.STRONGEST, above=True, unit="N"),
         frame=frame,
     )
-    if retreat is not None:
-        within(retreat, "retreat", 0.0, 2.0, unit="m")
-    if baseline not in ("rest", "zero"):
-        raise ShapeError(
-            f"baseline must be 'rest' or 'zero', got {baseline!r}", parameter="baseline", value=baseline
-        )
     contact = approach.run(speed_mps, from_rest=baseline == "rest", mode=mode, timeout=timeout)
     if retreat is not None:
         approach.retreat(contact, retreat, retreat_mps)
@@ -125,7 +128,9 @@ def touch_twice(
         LimitError: a value outside its range, or a second approach faster than the first.
     """
     off = within(back, "back", 0.0, 0.5, above=True, unit="m")
-    if within(slow_mps, "slow_mps", 0.0, 10.0, above=True, unit="m/s") > fast_mps:
+    within(fast_mps, "fast_mps", 0.0, _FASTEST, above=True, unit="m/s")
+    optional(retreat, "retreat", 0.0, 2.0, unit="m")
+    if within(slow_mps, "slow_mps", 0.0, _FASTEST, above=True, unit="m/s") > fast_mps:
         raise LimitError(
             f"slow_mps must be slower than fast_mps of {fast_mps:g} m/s, got {slow_mps:g} m/s",
             code=2,
@@ -179,10 +184,7 @@ def wait_for_taps(
     Raises:
         Timeout: it was not tapped in time.
     """
-    if not isinstance(count, int) or isinstance(count, bool) or count < 1:
-        raise ShapeError(
-            f"count must be a whole number from 1, got {count!r}", parameter="count", value=count
-        )
+    integer(count, "count", 1, 1000)
     taps = TapWatch(force=force, gap=gap)
     for state in arm.states(duration=within(timeout, "timeout", 0.0, 1e6, unit="s")):
         if taps.see(state.wrench.stamp * 1e-9, state.wrench.force) >= count:

@@ -1,10 +1,11 @@
-"""Checked, read-only arrays: every number that a user gives passes through these checks."""
+"""Checked, read-only arrays, numbers and words: what a user gives passes through these checks."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Collection
 from dataclasses import Field
-from typing import Any, ClassVar, TypeAlias
+from typing import Any, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +13,14 @@ import numpy.typing as npt
 from heptarm.errors import LimitError, ShapeError
 
 Array: TypeAlias = npt.NDArray[np.float64]
+
+_Kind = TypeVar("_Kind")
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+#: Longest text of a value in an error.
+_LONGEST_TEXT = 200
+#: Largest integer that a double can be near to.
+_LARGEST_INTEGER = int(np.finfo(np.float64).max)
+_HUGE = "an integer is too large for a double"
 
 
 class Value:
@@ -45,6 +54,69 @@ def frozen(values: npt.ArrayLike) -> Array:
     return result
 
 
+def shown(value: object) -> str:
+    """A value in an error's text: short, and whatever the value is."""
+    if isinstance(value, int) and not isinstance(value, bool) and value.bit_length() > 64:
+        return f"an integer of {value.bit_length()} bits"
+    try:
+        text = repr(value)
+    except Exception:  # a repr of another library
+        return f"a {type(value).__name__}"
+    return text if len(text) <= _LONGEST_TEXT else f"{text[:_LONGEST_TEXT]}..."
+
+
+def numbers(value: npt.ArrayLike, name: str, wanted: str = "numbers") -> Array:
+    """A copy of `value` as doubles, of any shape, unchecked but for its type.
+
+    Args:
+        value: a number, or numbers in lists, tuples and arrays.
+        name: of the parameter, for the error.
+        wanted: what it must be, for the error.
+
+    Raises:
+        ShapeError: it is something else: text, booleans, masked entries, lists of different lengths.
+        LimitError: an integer too large for a double.
+    """
+    reason = _defect(value)
+    if not reason:
+        try:
+            given = np.asarray(value)
+            if given.dtype.kind in "iuf":
+                with np.errstate(over="ignore"):  # of numbers longer than doubles: infinite then
+                    # + 0.0: -0.0 becomes 0.0, so that equal arrays hash alike
+                    return given.astype(np.float64) + 0.0
+        except (TypeError, ValueError):
+            pass
+        except OverflowError:
+            reason = _HUGE
+    if reason == _HUGE:
+        raise LimitError(
+            f"{name} must be finite, got {shown(value)}: {reason}", code=1, parameter=name, value=value
+        )
+    because = f": {reason}" if reason else ""
+    raise ShapeError(f"{name} must be {wanted}, got {shown(value)}{because}", parameter=name, value=value)
+
+
+def _defect(value: object, depth: int = 0) -> str:
+    """Why numpy must not convert something that it would convert; empty: it may try."""
+    if isinstance(value, np.ndarray):
+        return "masked entries have no value" if np.ma.is_masked(value) else ""
+    if isinstance(value, (list, tuple)):
+        for entry in value:
+            if type(entry) is float:  # the usual case
+                continue
+            if isinstance(entry, (bool, np.bool_)):
+                return "a boolean is no number"
+            if isinstance(entry, int) and abs(entry) > _LARGEST_INTEGER:
+                return _HUGE
+            if reason := "lists in lists in lists" if depth > 2 else _defect(entry, depth + 1):
+                return reason
+        return ""
+    if isinstance(value, (bool, np.bool_)):
+        return "a boolean is no number"
+    return _HUGE if isinstance(value, int) and abs(value) > _LARGEST_INTEGER else ""
+
+
 def array(value: npt.ArrayLike, size: int, name: str, *, nan: bool = False) -> Array:
     """A read-only copy of `value`, shape (size,).
 
@@ -58,41 +130,43 @@ def array(value: npt.ArrayLike, size: int, name: str, *, nan: bool = False) -> A
         ShapeError: it is not a vector of that size.
         LimitError: an entry is infinite, or NaN where that is not allowed.
     """
-    try:
-        given = np.asarray(value)
-        if given.dtype.kind not in "iuf":
-            raise ShapeError("not numeric")
-        result = given.astype(np.float64) + 0.0  # + 0.0: -0.0 becomes 0.0, so that equal arrays hash alike
-    except (TypeError, ValueError):
-        raise ShapeError(
-            f"{name} must be {size} numbers, got {value!r}", parameter=name, value=value
-        ) from None
+    result = numbers(value, name, f"{size} numbers")
     if result.shape != (size,):
         raise ShapeError(f"{name} must have shape ({size},), got {result.shape}", parameter=name, value=value)
+    return finite_entries(result, name, nan=nan)
+
+
+def finite_entries(result: Array, name: str, *, nan: bool = False) -> Array:
+    """The same array, read-only, after a check of its entries.
+
+    Raises:
+        LimitError: an entry is infinite, or NaN where that is not allowed.
+    """
     wrong = np.isinf(result) if nan else ~np.isfinite(result)
     if wrong.any():
-        index = int(np.argmax(wrong))
+        place = np.unravel_index(int(np.argmax(wrong)), result.shape)
+        at = f"{name}[{', '.join(map(str, place))}]"
         raise LimitError(
-            f"{name}[{index}] must be finite, got {result[index]}",
-            code=1,
-            parameter=f"{name}[{index}]",
-            value=float(result[index]),
+            f"{at} must be finite, got {result[place]}", code=1, parameter=at, value=float(result[place])
         )
     result.flags.writeable = False
     return result
 
 
-def within(
-    value: float | None, name: str, low: float, high: float, *, above: bool = False, unit: str = ""
-) -> float:
-    """A number in [low, high] (or (low, high] with `above`); None becomes NaN, "keep the default".
+def one_or_each(value: npt.ArrayLike, size: int, name: str, *, nan: bool = False) -> Array:
+    """One number for all, or one for each, shape (size,). Raises as `array` does."""
+    given = numbers(value, name, f"one number or {size} numbers")
+    return array(np.full(size, given) if given.ndim == 0 else given, size, name, nan=nan)
+
+
+def within(value: float, name: str, low: float, high: float, *, above: bool = False, unit: str = "") -> float:
+    """A number in [low, high] (or (low, high] with `above`).
 
     Raises:
-        LimitError: it is outside, or not a number.
+        ShapeError: it is no number.
+        LimitError: it is outside, or NaN.
     """
-    if value is None:
-        return math.nan
-    number = scalar(value, name)
+    number = scalar(value, name, unit=unit)
     if not (low < number if above else low <= number) or not number <= high:
         of_unit = f" {unit}" if unit else ""
         bounds = f"{'(' if above else '['}{low:g}, {high:g}]{of_unit}"
@@ -106,15 +180,117 @@ def within(
     return number
 
 
-def scalar(value: object, name: str) -> float:
-    """One number.
+def optional(
+    value: float | None, name: str, low: float, high: float, *, above: bool = False, unit: str = ""
+) -> float:
+    """As `within`; None becomes NaN, "keep the default"."""
+    return math.nan if value is None else within(value, name, low, high, above=above, unit=unit)
+
+
+def scalar(value: object, name: str, *, unit: str = "") -> float:
+    """One number; it may be infinite or NaN.
+
+    Raises:
+        ShapeError: it is something else.
+        LimitError: it is too large for a double.
+    """
+    if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
+        try:
+            return float(value) + 0.0
+        except OverflowError:
+            of_unit = f" {unit}" if unit else ""
+            raise LimitError(
+                f"{name} must be finite, got {shown(value)}{of_unit}", code=1, parameter=name, value=value
+            ) from None
+    raise ShapeError(f"{name} must be a number, got {shown(value)}", parameter=name, value=value)
+
+
+def finite(value: object, name: str, *, unit: str = "") -> float:
+    """One finite number.
+
+    Raises:
+        ShapeError: it is no number.
+        LimitError: it is infinite or NaN.
+    """
+    number = scalar(value, name, unit=unit)
+    if not math.isfinite(number):
+        of_unit = f" {unit}" if unit else ""
+        raise LimitError(
+            f"{name} must be finite, got {number:g}{of_unit}", code=1, parameter=name, value=number
+        )
+    return number
+
+
+def integer(value: object, name: str, low: int, high: int) -> int:
+    """An integer in [low, high].
+
+    Raises:
+        ShapeError: it is no integer.
+        LimitError: it is outside.
+    """
+    if not isinstance(value, (int, np.integer)) or isinstance(value, bool):
+        raise ShapeError(f"{name} must be an integer, got {shown(value)}", parameter=name, value=value)
+    if not low <= value <= high:
+        raise LimitError(
+            f"{name} must be in [{low}, {high}], got {shown(value)}",
+            code=2,
+            parameter=name,
+            value=value,
+            allowed=f"[{low}, {high}]",
+        )
+    return int(value)
+
+
+def instance(value: object, kind: type[_Kind] | tuple[type, ...], name: str, hint: str = "") -> _Kind:
+    """Something of a type.
 
     Raises:
         ShapeError: it is something else.
     """
-    if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
-        return float(value) + 0.0
-    raise ShapeError(f"{name} must be a number, got {value!r}", parameter=name, value=value)
+    if not isinstance(value, kind):
+        kinds = kind if isinstance(kind, tuple) else (kind,)
+        wanted = " or ".join(one.__name__ for one in kinds)
+        article = "an" if wanted[0] in "AEIOU" else "a"
+        raise ShapeError(
+            f"{name} must be {article} {wanted}, got {shown(value)}", parameter=name, value=value, hint=hint
+        )
+    return value  # type: ignore[return-value]
+
+
+def word(value: str, name: str, allowed: Collection[str]) -> str:
+    """One of some words.
+
+    Raises:
+        ShapeError: it is something else.
+    """
+    if not isinstance(value, str) or value not in allowed:
+        listed = ", ".join(map(repr, allowed))
+        raise ShapeError(
+            f"{name} must be one of {listed}, got {shown(value)}", parameter=name, value=value, allowed=listed
+        )
+    return value
+
+
+def flag(value: bool, name: str) -> bool:
+    """True or False.
+
+    Raises:
+        ShapeError: it is something else.
+    """
+    if not isinstance(value, (bool, np.bool_)):
+        raise ShapeError(f"{name} must be True or False, got {shown(value)}", parameter=name, value=value)
+    return bool(value)
+
+
+def callback(value: _Function, name: str) -> _Function:
+    """A function.
+
+    Raises:
+        ShapeError: it cannot be called.
+    """
+    if not callable(value):
+        raise ShapeError(f"{name} must be a function, got {shown(value)}", parameter=name, value=value)
+    return value
 
 
 def fractions(value: npt.ArrayLike | None, name: str, *, nan: bool = False) -> Array:
@@ -131,7 +307,7 @@ def fractions(value: npt.ArrayLike | None, name: str, *, nan: bool = False) -> A
     """
     if value is None:
         return frozen(np.full(7, np.nan))
-    result = array(np.full(7, value) if np.ndim(value) == 0 else value, 7, name, nan=nan)
+    result = one_or_each(value, 7, name, nan=nan)
     for index, entry in enumerate(result.tolist()):
         if entry == entry:  # not NaN
             within(entry, f"{name}[{index}]", 0.0, 1.0, above=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from heptarm.errors import ShapeError
+from heptarm.values.arrays import shown
 
 #: The tool frame: the attached tool's default frame (its TCP); without a tool the flange.
 TOOL = "tool"
@@ -24,7 +25,7 @@ def check_name(value: str, parameter: str) -> str:
     """
     if not isinstance(value, str) or not 1 <= len(value.encode()) <= _LONGEST_NAME:
         raise ShapeError(
-            f"{parameter} must be a name of 1 to {_LONGEST_NAME} bytes, got {value!r}",
+            f"{parameter} must be a name of 1 to {_LONGEST_NAME} bytes, got {shown(value)}",
             code=3,
             parameter=parameter,
             value=value,

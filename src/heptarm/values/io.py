@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from heptarm.errors import CommandRejected
-from heptarm.values.arrays import Value
+from heptarm.errors import CommandRejected, ShapeError
+from heptarm.values.arrays import Value, shown
 
 #: Value of a signal: boolean or number.
 SignalValue: TypeAlias = bool | float
@@ -41,7 +41,12 @@ def find_name(name: str, names: Sequence[str]) -> int:
 
     Raises:
         CommandRejected: there is none of that name, or more than one.
+        ShapeError: it is no name.
     """
+    if not isinstance(name, str):
+        raise ShapeError(
+            f"name must be the name of a signal, got {shown(name)}", parameter="name", value=name
+        )
     if name in names:
         return names.index(name)
     plain = _plain(name)

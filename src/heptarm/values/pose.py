@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, scalar, within
+from heptarm.values.arrays import Array, Value, array, finite, finite_entries, numbers, scalar, shown, within
 
 #: Largest arm angle that is accepted [rad].
 _LARGEST = 1000.0
@@ -40,9 +40,9 @@ class Redundancy(Value):
         if not isnan(e1):
             within(e1, "e1", -_LARGEST, _LARGEST, unit="rad")
         for name, value, last in (("status", self.status, 7), ("turn", self.turn, 127)):
-            if not (isinstance(value, int) and -1 <= value <= last):
+            if isinstance(value, bool) or not (isinstance(value, int) and -1 <= value <= last):
                 raise LimitError(
-                    f"{name} must be 0 to {last}, or -1 for not given, got {value!r}",
+                    f"{name} must be 0 to {last}, or -1 for not given, got {shown(value)}",
                     code=2,
                     parameter=name,
                     value=value,
@@ -63,14 +63,21 @@ def near_of(near: npt.ArrayLike | None, redundancy: Redundancy | None) -> Array 
         )
     if redundancy is not None and not isinstance(redundancy, Redundancy):
         raise ShapeError(
-            f"redundancy must be a Redundancy, got {redundancy!r}", parameter="redundancy", value=redundancy
+            f"redundancy must be a Redundancy, got {shown(redundancy)}",
+            parameter="redundancy",
+            value=redundancy,
         )
     return None if near is None else array(near, 7, "near")
 
 
 def deg(*angles: float) -> Array:
-    """Degrees to radians, shape (n,)."""
-    return np.radians(np.array(angles, dtype=np.float64))
+    """Degrees to radians, shape (n,).
+
+    Raises:
+        ShapeError: an angle is no number.
+        LimitError: an angle is infinite or NaN.
+    """
+    return np.radians([finite(angle, f"angles[{index}]", unit="deg") for index, angle in enumerate(angles)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,21 +121,22 @@ class Pose(Value):
     @classmethod
     def at(cls, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Pose:
         """Pure translation [m]."""
-        return cls.of((x, y, z))
+        return cls.of([finite(value, name, unit="m") for name, value in (("x", x), ("y", y), ("z", z))])
 
     @classmethod
     def xyz_abc(
         cls, x: float = 0.0, y: float = 0.0, z: float = 0.0, a: float = 0.0, b: float = 0.0, c: float = 0.0
     ) -> Pose:
         """KUKA's notation in SI: translation [m], then R = Rz(a) Ry(b) Rx(c) [rad]."""
-        (sa, ca), (sb, cb), (sc, cc) = ((math.sin(t / 2), math.cos(t / 2)) for t in (a, b, c))
+        angles = [finite(value, name, unit="rad") for name, value in (("a", a), ("b", b), ("c", c))]
+        (sa, ca), (sb, cb), (sc, cc) = ((math.sin(t / 2), math.cos(t / 2)) for t in angles)
         quat = (
             sc * cb * ca - cc * sb * sa,
             cc * sb * ca + sc * cb * sa,
             cc * cb * sa - sc * sb * ca,
             cc * cb * ca + sc * sb * sa,
         )
-        return cls.of((x, y, z), quat)
+        return cls.of(cls.at(x, y, z).xyz, quat)
 
     @classmethod
     def from_matrix(cls, matrix: npt.ArrayLike) -> Pose:
@@ -136,9 +144,19 @@ class Pose(Value):
 
         The quaternion follows the largest of its components, so it is accurate everywhere.
         """
-        m = np.asarray(matrix, dtype=np.float64)
+        m = numbers(matrix, "matrix", "a matrix of shape (4, 4)")
         if m.shape not in ((4, 4), (3, 4)):
-            raise ShapeError(f"matrix must have shape (4, 4), got {m.shape}")
+            raise ShapeError(
+                f"matrix must have shape (4, 4), got {m.shape}", parameter="matrix", value=matrix
+            )
+        finite_entries(m, "matrix")
+        turned = m[:3, :3]
+        if np.abs(turned @ turned.T - np.eye(3)).max() > 2e-3 or np.linalg.det(turned) < 0:
+            raise ShapeError(
+                f"the rotation of matrix must be orthonormal and right-handed, got {turned.tolist()}",
+                parameter="matrix",
+                value=matrix,
+            )
         return cls.of(m[:3, 3], quaternion(m[:3, :3]))
 
     @property
@@ -185,6 +203,7 @@ class Pose(Value):
 
     def __matmul__(self, other: Pose) -> Pose:
         """Chain of poses: T_ac = T_ab @ T_bc."""
+        check_pose(other, "other")
         return Pose(self.xyz + self.rotation @ other.xyz, multiply(self.quat, other.quat))
 
     def inverse(self) -> Pose:
@@ -194,10 +213,12 @@ class Pose(Value):
 
     def distance_to(self, other: Pose) -> float:
         """Distance of the origins [m]."""
+        check_pose(other, "other")
         return float(np.linalg.norm(self.xyz - other.xyz))
 
     def angle_to(self, other: Pose) -> float:
         """Angle between the orientations [rad], in [0, pi]."""
+        check_pose(other, "other")
         difference = multiply(self.quat * np.array([-1.0, -1.0, -1.0, 1.0]), other.quat)
         return 2.0 * math.atan2(float(np.linalg.norm(difference[:3])), abs(float(difference[3])))
 
@@ -215,7 +236,7 @@ def check_pose(pose: Pose, parameter: str = "pose") -> None:
     """
     if not isinstance(pose, Pose):
         raise ShapeError(
-            f"{parameter} must be a Pose, got {pose!r}",
+            f"{parameter} must be a Pose, got {shown(pose)}",
             parameter=parameter,
             value=pose,
             hint="build one with Pose.xyz_abc(x, y, z, a, b, c)",

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from heptarm.errors import CommandRejected, LimitError
-from heptarm.values.arrays import Array, Value, array, frozen, within
+from heptarm.values.arrays import Array, Value, array, frozen, shown, within
 from heptarm.values.pose import deg
 
 
@@ -284,7 +284,7 @@ def robot(name: str) -> RobotModel:
     if known is None:
         names = ", ".join(ROBOTS)
         raise CommandRejected(
-            f"robot must be one of {names}, got {name!r}",
+            f"robot must be one of {names}, got {shown(name)}",
             parameter="model",
             value=name,
             allowed=names,

@@ -87,6 +87,12 @@ class SimulatorOptions:
             metavar="ADDRESS=ADDRESS",
         ),
     )
+    drive_monitoring: str = field(
+        default="on",
+        metadata=_about(
+            '"off": drives never trip, whatever speed, torque or position', metavar="on|off", in_target=True
+        ),
+    )
     fault: tuple[str, ...] = field(
         default=(),
         metadata=_about(

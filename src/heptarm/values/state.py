@@ -17,7 +17,7 @@ import numpy as np
 from heptarm.errors import StaleState
 from heptarm.values.arrays import Array, Value, frozen
 from heptarm.values.io import SignalValues
-from heptarm.values.mode.mode import Mode
+from heptarm.values.mode.mode import HandGuiding, Mode
 from heptarm.values.pose import Pose, Redundancy
 
 _T = TypeVar("_T")
@@ -237,14 +237,15 @@ class Control(Value):
 
     Attributes:
         stamp: cabinet time of the sample [ns].
-        mode: active control mode with its parameters; position control while nothing runs.
+        mode: active control mode with its parameters; `HandGuiding()` while the arm is guided by hand, position control
+            while nothing runs.
         tool: name of the attached tool; empty: none.
         workpiece: name of the attached workpiece; empty: none.
         frame: the motion frame unless a motion names another: a frame of the tool, or "flange".
     """
 
     stamp: int
-    mode: Mode
+    mode: Mode | HandGuiding
     tool: str = ""
     workpiece: str = ""
     frame: str = "flange"
@@ -378,8 +379,8 @@ class State(Value):
         return _of(self.groups.wrench, "wrench")
 
     @property
-    def mode(self) -> Mode:
-        """Active control mode, with its parameters."""
+    def mode(self) -> Mode | HandGuiding:
+        """Active control mode, with its parameters; `HandGuiding()` while the arm is guided by hand."""
         return _of(self.groups.mode, "mode").mode
 
     @property

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, within
+from heptarm.values.arrays import Array, Value, array, shown, within
 from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.robot import Body
@@ -150,7 +150,7 @@ def unknown(name: str, parameter: str, known: tuple[str, ...]) -> CommandRejecte
     """The error of an unknown name."""
     listed = ", ".join(known) or "none"
     return CommandRejected(
-        f"{parameter} must be one of {listed}, got {name!r}",
+        f"{parameter} must be one of {listed}, got {shown(name)}",
         code=42,
         parameter=parameter,
         value=name,
@@ -161,7 +161,7 @@ def unknown(name: str, parameter: str, known: tuple[str, ...]) -> CommandRejecte
 def _frames(tcp: Pose | None, more: Mapping[str, Pose]) -> tuple[tuple[str, Pose], ...]:
     if not isinstance(more, Mapping):
         raise ShapeError(
-            f"frames must be poses by name, got {more!r}",
+            f"frames must be poses by name, got {shown(more)}",
             parameter="frames",
             value=more,
             hint='for example {"tip": Pose.at(0, 0, 0.1)}',
@@ -195,14 +195,14 @@ def _frames(tcp: Pose | None, more: Mapping[str, Pose]) -> tuple[tuple[str, Pose
 def _checked(name: str, parameter: str, longest: int) -> str:
     if not isinstance(name, str) or not 1 <= len(name.encode()) <= longest:
         raise ShapeError(
-            f"{parameter} must be a name of 1 to {longest} bytes, got {name!r}",
+            f"{parameter} must be a name of 1 to {longest} bytes, got {shown(name)}",
             code=3,
             parameter=parameter,
             value=name,
         )
     if SEPARATOR in name:
         raise LimitError(
-            f'{parameter} must not contain "{SEPARATOR}", got {name!r}',
+            f'{parameter} must not contain "{SEPARATOR}", got {shown(name)}',
             code=2,
             parameter=parameter,
             value=name,

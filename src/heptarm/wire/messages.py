@@ -1114,6 +1114,24 @@ class SpiralPattern:
         codec.check(self.total_time, path + "total_time", 0.0, 1000000.0, True, False)
 
 
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HandGuidingMode:
+    """Hand guiding, as a state reports it; no request may ask for it."""
+
+
+    def _write(self, out: list[bytes]) -> None:
+        pass
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[HandGuidingMode, int]:
+        return cls(), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+
 _ForceAbove_0 = Struct(">dd")
 
 
@@ -1686,13 +1704,14 @@ def _read_Motion(data: bytes, pos: int) -> tuple[Motion, int]:
     raise DecodeError(f"Motion has tag {tag}; legal are [1, 2, 3, 4, 5, 6, 7, 8, 9, 10]")
 
 
-Mode: TypeAlias = PositionMode | JointImpedance | CartesianImpedance | SineImpedance | SpiralPattern
+Mode: TypeAlias = PositionMode | JointImpedance | CartesianImpedance | SineImpedance | SpiralPattern | HandGuidingMode
 _Mode_TAGS = {
     PositionMode: 1,
     JointImpedance: 2,
     CartesianImpedance: 3,
     SineImpedance: 4,
     SpiralPattern: 5,
+    HandGuidingMode: 6,
 }
 
 
@@ -1713,7 +1732,9 @@ def _read_Mode(data: bytes, pos: int) -> tuple[Mode, int]:
         return SineImpedance._read(data, pos)
     if tag == 5:
         return SpiralPattern._read(data, pos)
-    raise DecodeError(f"Mode has tag {tag}; legal are [1, 2, 3, 4, 5]")
+    if tag == 6:
+        return HandGuidingMode._read(data, pos)
+    raise DecodeError(f"Mode has tag {tag}; legal are [1, 2, 3, 4, 5, 6]")
 
 
 

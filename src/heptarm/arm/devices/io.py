@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.translate.triggers import output_message
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.arrays import within
+from heptarm.values.arrays import finite, shown, within, word
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
@@ -75,6 +75,13 @@ class Io(Mapping[str, SignalValue]):
             CommandRejected: no such output.
             LimitError: a value outside the range of the output.
         """
+        if not isinstance(values, Mapping):
+            raise ShapeError(
+                f"values must be values by name, got {shown(values)}",
+                parameter="values",
+                value=values,
+                hint='arm.io.set({"LEDBlue": True})',
+            )
         if not values:
             raise ShapeError(
                 "values must name at least one output",
@@ -95,10 +102,11 @@ class Io(Mapping[str, SignalValue]):
             CommandRejected: there is no such signal.
         """
         full = self._find(name).name
+        wanted = value if isinstance(value, bool) else finite(value, "value")
         seconds = within(timeout, "timeout", 0.0, 1e9, unit="s")
         with self._connection.stopping_on_interrupt():
             return self._wait(
-                lambda state: state.groups.io is not None and state.groups.io[full] == value, seconds
+                lambda state: state.groups.io is not None and state.groups.io[full] == wanted, seconds
             )
 
     @property
@@ -110,10 +118,11 @@ class Io(Mapping[str, SignalValue]):
     @led.setter
     def led(self, colour: str) -> None:
         lamps = self._lamps
+        word(colour, "led", _COLOURS)
         if colour not in (*lamps, "off"):
-            known = ", ".join((*lamps, "off")) if colour in _COLOURS else ", ".join(_COLOURS)
+            known = ", ".join((*lamps, "off"))
             raise CommandRejected(
-                f"led must be one of {known} on this media flange, got {colour!r}",
+                f"led must be one of {known} on this media flange, got {shown(colour)}",
                 parameter="led",
                 value=colour,
                 allowed=known,

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, TypeAlias, get_args
 
 import numpy.typing as npt
 
 from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.errors import CommandRejected
-from heptarm.values.arrays import array, within
+from heptarm.values.arrays import array, finite, instance, integer, within, word
+from heptarm.values.frames import check_name
+
+Fault: TypeAlias = Literal[
+    "emergency_stop",
+    "external_emergency_stop",
+    "operator_safety",
+    "protective_stop",
+    "drive_error",
+    "joint_limit",
+    "singularity",
+]
 
 
 class Operator:
@@ -26,28 +37,20 @@ class Operator:
         Raises:
             CommandRejected: there is no such command; the text lists them.
         """
-        reply = self._cabinet.operate(words)
+        reply = self._cabinet.operate(instance(words, str, "words"))
         if reply:
             raise CommandRejected(reply, parameter="words", value=words)
 
     def fault(
         self,
-        name: Literal[
-            "emergency_stop",
-            "external_emergency_stop",
-            "operator_safety",
-            "protective_stop",
-            "drive_error",
-            "joint_limit",
-            "singularity",
-        ],
+        name: Fault,
     ) -> None:
         """Inject a fault; stops stay active until `clear`."""
-        self.do(name)
+        self.do(word(name, "name", get_args(Fault)))
 
     def clear(self, name: str = "") -> None:
         """End a stop and acknowledge it; all of them without a name. Execution stays paused."""
-        self.do(f"clear {name}")
+        self.do(f"clear {instance(name, str, 'name')}")
 
     def hold(self) -> None:
         """Hold the enabling switch."""
@@ -67,14 +70,7 @@ class Operator:
 
     def choose(self, mode: Literal["t1", "t2", "aut"]) -> None:
         """Choose the operation mode."""
-        if mode not in ("t1", "t2", "aut"):
-            raise CommandRejected(
-                f"mode must be one of t1, t2, aut, got {mode!r}",
-                parameter="mode",
-                value=mode,
-                allowed="t1, t2, aut",
-            )
-        self.do(mode)
+        self.do(word(mode, "mode", ("t1", "t2", "aut")))
 
     def override(self, factor: float) -> None:
         """Set the override at the smartPAD, [0, 1]; it multiplies the application override."""
@@ -90,7 +86,9 @@ class Operator:
         Raises:
             CommandRejected: there is no signal of that name.
         """
-        self.do(f"set {name} {str(value).lower() if isinstance(value, bool) else repr(float(value))}")
+        check_name(name, "name")
+        text = str(value).lower() if isinstance(value, bool) else repr(finite(value, "value"))
+        self.do(f"set {name} {text}")
 
     def press_key(self, slot: int, *, bar: str = "client") -> None:
         """Press and release a user key.
@@ -102,7 +100,7 @@ class Operator:
         Raises:
             CommandRejected: there is no such key, or it is disabled.
         """
-        self.do(f"press {slot} {bar}")
+        self.do(f"press {integer(slot, 'slot', 0, 3)} {instance(bar, str, 'bar')}")
 
     def push(self, force: npt.ArrayLike, *, duration: float) -> None:
         """Push the flange.

@@ -8,10 +8,14 @@ from typing import Literal
 
 from heptarm.arm.link.connection import Connection
 from heptarm.errors import RemoteProtocolError, ShapeError, Timeout
-from heptarm.values.arrays import within
+from heptarm.values.arrays import callback as check_callback
+from heptarm.values.arrays import finite, flag, instance, integer, within, word
+from heptarm.values.frames import check_name
 from heptarm.wire import messages as wire
 
 _SLOTS = 4
+_SEVERITIES = {one.name.lower(): one for one in wire.Severity}
+_LEDS = {one.name.lower(): one for one in wire.KeyLed}
 
 
 class Pad:
@@ -22,7 +26,10 @@ class Pad:
 
     def show(self, text: str, *, severity: Literal["info", "warning", "error"] = "info") -> None:
         """Show a text of up to 512 bytes in the smartPAD's log."""
-        self._connection.request(wire.ShowMessage(severity=_severity(severity), text=text))
+        word(severity, "severity", _SEVERITIES)
+        self._connection.request(
+            wire.ShowMessage(severity=_SEVERITIES[severity], text=_text(text, "text", 512))
+        )
 
     def set_key(
         self,
@@ -44,15 +51,13 @@ class Pad:
             LimitError: a slot outside 0 to 3.
             CommandRejected: this cabinet has no user keys.
         """
-        within(slot, "slot", 0, _SLOTS - 1)
-        if led.upper() not in wire.KeyLed.__members__:
-            raise ShapeError(
-                f"led must be one of {', '.join(map(repr, map(str.lower, wire.KeyLed.__members__)))}, got {led!r}",
-                parameter="led",
-                value=led,
-            )
-        lamp = wire.KeyLed[led.upper()]
-        self._connection.request(wire.SetKey(slot=int(slot), text=text, led=lamp, enabled=enabled))
+        message = wire.SetKey(
+            slot=integer(slot, "slot", 0, _SLOTS - 1),
+            text=_text(text, "text", 64),
+            led=_LEDS[word(led, "led", _LEDS)],
+            enabled=flag(enabled, "enabled"),
+        )
+        self._connection.request(message)
 
     def on_key(self, callback: Callable[[int, bool], None]) -> Callable[[], None]:
         """Call `callback(slot, down)` when a key is pressed or released; from the link's thread, so it must not block.
@@ -60,6 +65,7 @@ class Pad:
         Returns:
             A function that removes the callback.
         """
+        check_callback(callback, "callback")
         listeners = self._connection.events.key_listeners
         listeners.append(callback)
 
@@ -82,6 +88,8 @@ class Pad:
         Raises:
             Timeout: no key was pressed in time.
         """
+        for slot in slots:
+            integer(slot, "slots", 0, _SLOTS - 1)
         seconds = within(timeout, "timeout", 0.0, 1e9, unit="s")
         self._connection.check_may_wait("arm.pad.wait_for_key()")
         pressed: queue.SimpleQueue[int] = queue.SimpleQueue()
@@ -105,6 +113,7 @@ class Pad:
         Raises:
             CommandRejected: the project has no process data of that name.
         """
+        check_name(name, "name")
         connection = self._connection
         answer = connection.link.request(wire.GetProcessData(name=name), timeout=connection.options.timeout)
         if not isinstance(answer, wire.ProcessData):
@@ -113,22 +122,34 @@ class Pad:
             )
         return answer.value
 
-    def set_process_data(self, name: str, value: str | float) -> None:
+    def set_process_data(self, name: str, value: str | bool | float) -> None:
         """Change a value of the project's process data; it keeps its type.
 
         Raises:
             CommandRejected: the project has no process data of that name, or it is a setting of heptarm.
             LimitError: the value does not fit its type.
         """
-        text = str(value).lower() if isinstance(value, bool) else str(value)
+        check_name(name, "name")
+        if isinstance(value, str):
+            text = value
+        elif isinstance(value, bool):
+            text = str(value).lower()
+        else:
+            text = str(
+                value
+                if isinstance(value, int) and finite(value, "value") == value
+                else finite(value, "value")
+            )
         self._connection.request(wire.SetProcessData(name=name, value=text))
 
 
-def _severity(name: str) -> wire.Severity:
-    if name.upper() not in wire.Severity.__members__:
+def _text(text: str, name: str, longest: int) -> str:
+    """A text of limited length. Raises ShapeError."""
+    if len(instance(text, str, name).encode(errors="replace")) > longest:
         raise ShapeError(
-            f"severity must be one of 'info', 'warning', 'error', got {name!r}",
-            parameter="severity",
-            value=name,
+            f"{name} must have at most {longest} bytes, got {len(text.encode(errors='replace'))}",
+            code=3,
+            parameter=name,
+            value=text,
         )
-    return wire.Severity[name.upper()]
+    return text

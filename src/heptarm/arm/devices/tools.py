@@ -9,8 +9,9 @@ from heptarm.arm.link.connection import Connection
 from heptarm.arm.translate.tools import known_tool, read_pose, tool_message
 from heptarm.errors import ShapeError
 from heptarm.model.kinematics import forward
+from heptarm.values.arrays import instance
 from heptarm.values.condition.condition import Condition
-from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL
+from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL, check_name
 from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.values.mode.mode import Mode
 from heptarm.values.mode.sine import SineImpedance
@@ -83,6 +84,8 @@ class Tooling:
 
     def attach(self, tool: Tool | str, frame: str | None) -> None:
         """Attach a tool, after defining it if it is a `Tool`; see `Arm.attach_tool`."""
+        if frame is not None:
+            check_name(frame, "frame")
         if isinstance(tool, Tool):
             main = frame if frame is not None else (tool.frame_names or (FLANGE,))[0]
             if frame is not None:
@@ -109,10 +112,7 @@ class Tooling:
 
     def attach_workpiece(self, workpiece: Workpiece) -> None:
         """Attach a workpiece; see `Arm.attach_workpiece`."""
-        if not isinstance(workpiece, Workpiece):
-            raise ShapeError(
-                f"workpiece must be a Workpiece, got {workpiece!r}", parameter="workpiece", value=workpiece
-            )
+        instance(workpiece, Workpiece, "workpiece")
         before = self.attached
         self._connection.request(wire.AttachLoad(load=tool_message(workpiece), attached=True))
         self._workpiece = workpiece
@@ -120,6 +120,7 @@ class Tooling:
 
     def detach_workpiece(self, workpiece: Workpiece) -> None:
         """Detach a workpiece; see `Arm.detach_workpiece`."""
+        instance(workpiece, Workpiece, "workpiece")
         before = self.attached
         self._connection.request(wire.AttachLoad(load=tool_message(workpiece), attached=False))
         self._workpiece = None

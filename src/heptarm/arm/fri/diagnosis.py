@@ -26,7 +26,7 @@ def advice(client: Client, *, host: str) -> str:
     """
     stats = client.stats
     if not client.is_running:
-        return "the loop's process has ended: check whether it was killed, or ran out of memory"
+        return f"the FRI loop has ended: {client.trouble}"
     if not stats.received:
         return strangers(client) if stats.malformed else silence(host, client.port)
     if client.trouble:

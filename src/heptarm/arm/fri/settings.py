@@ -15,12 +15,12 @@ from heptarm.errors import CommandRejected, ConnectFailed, LimitError, ModeConfl
 from heptarm.fri.guard.fallback import Policy
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.pose_guard import PoseLimits
-from heptarm.fri.loop.client import Client
+from heptarm.fri.loop.client import Client, check_settings
 from heptarm.fri.loop.user_api import Output, Params
 from heptarm.fri.loop.user_api import State as FriState
 from heptarm.fri.protocol.messages import MAX_IO, MAX_NAME
 from heptarm.io.udp import UdpSocket
-from heptarm.values.arrays import within
+from heptarm.values.arrays import instance, integer, scalar, shown, within, word
 from heptarm.values.io import find_name
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import Mode, Position
@@ -115,10 +115,7 @@ def request(
         ModeConflict: this kind is not possible in this control mode.
         LimitError: a value outside its range.
     """
-    if kind not in KINDS:
-        raise ShapeError(
-            f"kind must be one of {', '.join(map(repr, KINDS))}, got {kind!r}", parameter="kind", value=kind
-        )
+    word(kind, "kind", KINDS)
     _check_kind(kind, connection.welcome.capabilities)
     period = (PERIOD_MONITOR if kind == "monitor" else PERIOD) if period_ms is None else period_ms
     _check_period(kind, period, multiplier)
@@ -132,10 +129,20 @@ def request(
         )
     if params is not None and law is None:
         raise ShapeError("params need a law, and none was given", parameter="params", hint="give law=...")
-    if port is not None and not 0 <= port < 1 << 16:
-        raise LimitError(
-            f"port must be in [0, 65535], got {port}", parameter="port", value=port, allowed="[0, 65535]"
-        )
+    if port is not None:
+        integer(port, "port", 0, 65535)
+    instance(host, str, "host")
+    check_settings(
+        version=version,
+        limits=limits,
+        pose_limits=pose_limits,
+        policy=policy,
+        law=law,
+        params=params,
+        history=history,
+        realtime=realtime,
+        cpu=cpu,
+    )
     message = wire.FriOpen(
         host=host,
         period=round(period) * 1e-3,
@@ -192,9 +199,12 @@ def _check_kind(kind: str, capabilities: tuple[str, ...]) -> None:
 
 def _signals(names: Sequence[str], connection: Connection) -> tuple[str, ...]:
     """Full names of the signals of the session, checked as the cabinet does."""
-    if isinstance(names, str):
+    if isinstance(names, str) or not isinstance(names, Sequence):
         raise ShapeError(
-            f"io must be a list of names, got {names!r}", parameter="io", value=names, hint=f'io=["{names}"]'
+            f"io must be a list of names, got {shown(names)}",
+            parameter="io",
+            value=names,
+            hint=f'io=["{names}"]' if isinstance(names, str) else 'for example io=["LEDBlue"]',
         )
     if not names:
         return ()
@@ -235,6 +245,7 @@ def _signals(names: Sequence[str], connection: Connection) -> tuple[str, ...]:
 
 
 def _check_period(kind: str, period: float, multiplier: int) -> None:
+    period = scalar(period, "period_ms", unit="ms")
     if not isfinite(period) or period != round(period) or not 1 <= period <= 100:
         raise LimitError(
             f"period_ms must be a whole number from 1 to 100 ms, got {period:g}",
@@ -243,14 +254,7 @@ def _check_period(kind: str, period: float, multiplier: int) -> None:
             value=period,
             allowed="1, 2, ... 100 ms",
         )
-    if multiplier not in range(1, 101):
-        raise LimitError(
-            f"multiplier must be a whole number from 1 to 100, got {multiplier}",
-            code=int(Code.OUT_OF_RANGE),
-            parameter="multiplier",
-            value=multiplier,
-            allowed="1, 2, ... 100",
-        )
+    integer(multiplier, "multiplier", 1, 100)
     answers, most = period * multiplier, _MAX_ANSWER_TIME[kind]
     if answers > most:
         what = "a monitoring client" if kind == "monitor" else f"a client that commands {kind}"
@@ -271,7 +275,7 @@ def check_mode(kind: str, mode: Mode | None) -> None:
     """
     if kind == "monitor":
         return
-    mode = mode or Position()
+    mode = Position() if mode is None else mode
     name = type(mode).__name__
     if isinstance(mode, SineImpedance):
         needs, example = "an overlay is not possible with a superposed sine force", _EXAMPLE_MODE

@@ -7,8 +7,9 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-from heptarm.errors import CommandRejected, HeptarmError
+from heptarm.errors import CommandRejected, HeptarmError, ShapeError
 from heptarm.io.clock import Clock
+from heptarm.values.arrays import shown
 from heptarm.values.state import GROUP_NAMES, State
 from heptarm.wire import messages as wire
 
@@ -23,12 +24,19 @@ def groups_of(names: Sequence[str], offered: wire.Groups) -> wire.Groups:
         CommandRejected: the cabinet does not offer one of them; the text lists those that it offers.
     """
     chosen = wire.Groups.NONE
+    if isinstance(names, str) or not isinstance(names, Sequence):
+        raise ShapeError(
+            f"groups must be a list of names, got {shown(names)}",
+            parameter="groups",
+            value=names,
+            hint='for example ("joints", "pose")',
+        )
     for name in names:
         group = wire.Groups.__members__.get(str(name).upper(), wire.Groups.NONE)
         if not group & offered:
             known = ", ".join(one.name.lower() for one in wire.Groups if one & offered and one.name)
             raise CommandRejected(
-                f"the cabinet offers no state group {name!r}",
+                f"the cabinet offers no state group {shown(name)}",
                 parameter="groups",
                 value=name,
                 allowed=known,
@@ -178,6 +186,7 @@ class States(Iterator[State]):
         duration: float | None,
         size: int,
     ) -> None:
+        self._queue: SampleQueue | None = None
         self._feed = feed
         self._clock = clock
         self._build = build

@@ -31,6 +31,7 @@ from heptarm.errors import (
     Starved,
     Timeout,
 )
+from heptarm.values.arrays import callback as check_callback
 from heptarm.values.arrays import scalar, within
 from heptarm.values.condition.condition import Condition, condition_nodes
 from heptarm.values.condition.trigger import Trigger
@@ -303,6 +304,7 @@ class MotionHandle:
 
     def add_event_callback(self, callback: Callable[[MotionEvent], None]) -> None:
         """Call `callback(event)` for each event, past ones first; from the link's thread, so it must not block."""
+        check_callback(callback, "callback")
         with self._changed:
             self._listeners.append(callback)
             for event in self._events:
@@ -346,7 +348,7 @@ class MotionHandle:
 
     def wait_started(self, timeout: float) -> bool:
         """Wait until the first motion has begun or the program has ended; False if neither happened in time [s]."""
-        return self._begun.wait(timeout)
+        return self._begun.wait(check_timeout(timeout))
 
     def cancel(self) -> None:
         """End it: a running motion brakes on its path, a waiting one is dropped. Calling it again has no effect."""
@@ -357,6 +359,7 @@ class MotionHandle:
 
         The handle has either a `result` or an `error`.
         """
+        check_callback(callback, "callback")
         self._future.add_done_callback(lambda _: callback(self))
 
     def __await__(self) -> Generator[Any, None, Result]:

@@ -17,13 +17,13 @@ from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.handle import Block, BreakRule, MotionHandle
 from heptarm.arm.translate.modes import mode_message
 from heptarm.arm.watchdog import FIRST_TARGET, TARGETS
-from heptarm.errors import CommandRejected, HeptarmError, LocalProtocolError, ShapeError, Timeout
+from heptarm.errors import CommandRejected, HeptarmError, LocalProtocolError, Timeout
 from heptarm.io.tcp import WarmUpConnection
-from heptarm.values.arrays import Array, array, within
-from heptarm.values.condition.condition import Condition
+from heptarm.values.arrays import Array, array, instance, within, word
+from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.frames import TOOL, check_name
-from heptarm.values.mode.mode import Mode
-from heptarm.values.pose import Pose
+from heptarm.values.mode.mode import MODES, Mode
+from heptarm.values.pose import Pose, check_pose
 from heptarm.values.result import Result
 from heptarm.values.state import State
 from heptarm.wire import messages as wire
@@ -120,19 +120,11 @@ class ServoRequest:
     until: Condition | None = None
 
     def __post_init__(self) -> None:
-        if self.engine not in ENGINES:
-            raise ShapeError(
-                f"engine must be one of {', '.join(map(repr, ENGINES))}, got {self.engine!r}",
-                parameter="engine",
-                value=self.engine,
-            )
+        word(self.engine, "engine", ENGINES)
         check_name(self.moving, "moving")
-        if self.kind not in KINDS:
-            raise ShapeError(
-                f"kind must be one of {', '.join(map(repr, KINDS))}, got {self.kind!r}",
-                parameter="kind",
-                value=self.kind,
-            )
+        word(self.kind, "kind", KINDS)
+        if self.until is not None:
+            check_condition(self.until)
         self._refuse_foreign_limits()
         within(self.rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
         TARGETS.time(self.watchdog, period=self.period)
@@ -162,7 +154,9 @@ class ServoRequest:
         given = {
             "min_trajectory_time": shortest,
             "goal_timeout": self.goal_timeout,
-            "speed_timeout": _DEFAULT.timing.speed_timeout if self.speed_timeout is None else self.speed_timeout,
+            "speed_timeout": _DEFAULT.timing.speed_timeout
+            if self.speed_timeout is None
+            else self.speed_timeout,
         }
         message = wire.ServoOpen(
             frame="" if self.moving == TOOL else self.moving,
@@ -457,7 +451,7 @@ class Servo(Block):
         Raises:
             ModeConflict: another kind of mode than the one with which the servo motion began.
         """
-        message = mode_message(mode)
+        message = mode_message(instance(mode, MODES, "mode"))
         assert message is not None
         _ = self.start  # raises unless it has begun
         self._connection.request(wire.ServoSettings(servo=self._number, mode=message))
@@ -575,9 +569,6 @@ class PoseServo(Servo):
             ShapeError: not a Pose.
         """
         began = self._clock.nanos()
-        if not isinstance(pose, Pose):
-            raise ShapeError(
-                f"pose must be a Pose, got {pose!r}", parameter="pose", value=pose, hint="Pose.of(xyz, quat)"
-            )
+        check_pose(pose)
         self._send(began, wire.ServoPose, pose.xyz.tolist() + pose.quat.tolist())
         return pose

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any, cast
 
 from heptarm.arm.translate.fields import NAMES, message_of, value_of
-from heptarm.errors import ShapeError
 from heptarm.values.frames import TOOL
 from heptarm.values.mode.impedance import CartesianImpedance
-from heptarm.values.mode.mode import MODES, Mode, Position
+from heptarm.values.mode.mode import MODES, HandGuiding, Mode, Position, check_mode
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.wire import messages as wire
 
@@ -21,22 +20,18 @@ def mode_message(mode: Mode | None) -> wire.Mode | None:
     Raises:
         ShapeError: it is no mode.
     """
+    check_mode(mode)
     if mode is None:
         return None
-    if not isinstance(mode, MODES):
-        raise ShapeError(
-            f"mode must be a control mode, got {mode!r}",
-            parameter="mode",
-            value=mode,
-            hint="make one with heptarm.modes, for example JointImpedance(300.0)",
-        )
     if isinstance(mode, Position):
         return wire.PositionMode()
     return cast("wire.Mode", message_of(NAMES[type(mode).__name__], mode))
 
 
-def read_mode(message: wire.Mode) -> Mode:
+def read_mode(message: wire.Mode) -> Mode | HandGuiding:
     """The mode of a message."""
+    if isinstance(message, wire.HandGuidingMode):
+        return HandGuiding()
     if isinstance(message, wire.SpiralPattern):
         return SineImpedance.spiral(
             message.plane.name.lower(),

@@ -7,7 +7,7 @@ from math import isfinite
 
 from heptarm.arm.translate.conditions import condition_message
 from heptarm.errors import CommandRejected, HeptarmError, LimitError
-from heptarm.values.arrays import scalar, within
+from heptarm.values.arrays import scalar, shown, within
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.signals import PathReached, SignalOutside
 from heptarm.values.condition.trigger import Action, SetOutput
@@ -85,7 +85,7 @@ def output_message(name: str, value: SignalValue, signals: Sequence[Signal]) -> 
     if isinstance(value, bool) != (signal.kind == "boolean") and number not in (0.0, 1.0):
         allowed = "True or False" if signal.kind == "boolean" else f"in [{signal.low:g}, {signal.high:g}]"
         raise LimitError(
-            f"{signal.name} is {signal.kind} and must be {allowed}, got {value!r}",
+            f"{signal.name} is {signal.kind} and must be {allowed}, got {shown(value)}",
             code=2,
             parameter=signal.name,
             value=value,

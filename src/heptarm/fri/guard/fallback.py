@@ -6,8 +6,11 @@ import enum
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from heptarm.errors import LimitError
 from heptarm.fri.guard.pose_guard import between, moved
+from heptarm.values.arrays import instance, within
+
+#: Longest duration of a policy [s].
+LONGEST = 1e9
 
 
 class Missing(enum.Enum):
@@ -33,7 +36,8 @@ class Policy:
         over: duration of an extrapolation, and of a ramp of torques to zero [s].
 
     Raises:
-        LimitError: a duration is negative.
+        ShapeError: a value of another type.
+        LimitError: a duration is negative or longer than 1e9 s.
     """
 
     missing: Missing = Missing.RAMP_DOWN
@@ -41,11 +45,9 @@ class Policy:
     over: float = 0.1
 
     def __post_init__(self) -> None:
+        instance(self.missing, Missing, "missing", hint="for example Missing.HOLD")
         for name in ("patience", "over"):
-            if not getattr(self, name) >= 0.0:
-                raise LimitError(
-                    f"{name} must be at least 0 s, got {getattr(self, name):g} s", parameter=name
-                )
+            within(getattr(self, name), name, 0.0, LONGEST, unit="s")
 
 
 class CommandFallback:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from heptarm.errors import LimitError
+from heptarm.values.arrays import array, finite, instance, scalar, within
 from heptarm.values.robot import RobotModel
 
 AXES = 7
@@ -28,6 +29,19 @@ _LIMIT_UNITS = {
     "dwrench_max": "N/s or Nm/s",
     "reach": "rad",
 }
+
+
+def positive(value: object, name: str, unit: str) -> float:
+    """A positive number; it may be infinite.
+
+    Raises:
+        ShapeError: it is no number.
+        LimitError: it is not positive, or NaN.
+    """
+    number = scalar(value, name, unit=unit)
+    if not number > 0.0:
+        raise LimitError(f"{name} must be positive, got {number:g} {unit}", parameter=name, value=number)
+    return number
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,16 +77,13 @@ class Limits:
 
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
-            if name in ("q_min", "q_max"):
+            if name == "reach":
+                positive(self.reach, name, "rad")
                 continue
-            values = getattr(self, name)
-            for value in (values,) if name == "reach" else values:
-                if not value > 0.0:
-                    raise LimitError(
-                        f"{name} must be positive, got {value:g} {_LIMIT_UNITS[name]}",
-                        parameter=name,
-                        value=value,
-                    )
+            values = array(getattr(self, name), 6 if "wrench" in name else AXES, name).tolist()
+            object.__setattr__(self, name, tuple(values))
+            for value in () if name in ("q_min", "q_max") else values:
+                positive(value, name, _LIMIT_UNITS[name])
         for axis, (low, high) in enumerate(zip(self.q_min, self.q_max, strict=True), 1):
             if not low < high:
                 raise LimitError(
@@ -101,6 +112,9 @@ class Limits:
         Raises:
             LimitError: an argument makes a limit zero or a position range empty.
         """
+        instance(robot, RobotModel, "robot")
+        fraction = within(fraction, "fraction", 0.0, 1.0, above=True)
+        margin = finite(margin, "margin", unit="rad")
         tau = tuple(float(value) * fraction for value in robot.tau_max)
         return cls(
             q_min=tuple(float(value) + margin for value in robot.q_min),
@@ -236,6 +250,15 @@ class JointGuard:
     def stop(self) -> None:
         """Note that commands are no longer effective; `start` before the next one."""
         self.is_started = False
+
+    @property
+    def sent(self) -> tuple[list[float], ...]:
+        """Copies of what was sent last and of its motion; assign them to go back to that cycle."""
+        return (self.q[:], self.v[:], self.a[:], self.r[:], self.tau[:], self.wrench[:])
+
+    @sent.setter
+    def sent(self, kept: tuple[list[float], ...]) -> None:
+        self.q, self.v, self.a, self.r, self.tau, self.wrench = (one[:] for one in kept)
 
     @property
     def is_still(self) -> bool:

@@ -16,11 +16,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from heptarm.errors import LimitError
-from heptarm.fri.guard.joint_guard import PLANNED, ROUNDING
+from heptarm.fri.guard.joint_guard import PLANNED, ROUNDING, positive
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
+_Motion = tuple[Vector, Quaternion, tuple[Vector, Quaternion], Vector, Vector, float, float, float]
 
 #: Parts of a pose that are limited separately, as the report names them.
 PARTS = ("flange", "rotation", "elbow")
@@ -82,13 +82,7 @@ class PoseLimits:
 
     def __post_init__(self) -> None:
         for name in self.__dataclass_fields__:
-            value = getattr(self, name)
-            if not value > 0.0:
-                raise LimitError(
-                    f"{name} must be positive, got {value:g} {_LIMIT_UNITS[name]}",
-                    parameter=name,
-                    value=value,
-                )
+            positive(getattr(self, name), name, _LIMIT_UNITS[name])
 
 
 class PoseReport:
@@ -207,6 +201,15 @@ class PoseGuard:
     def sent(self) -> tuple[float, ...]:
         """Pose sent last, shape (7,)."""
         return (*self.xyz, *self.quat)
+
+    @property
+    def motion(self) -> _Motion:
+        """What was sent last and its motion; assign it to go back to that cycle."""
+        return (self.xyz, self.quat, self.goal, self.v, self.w, self.e1, self.u, self._e1_goal)
+
+    @motion.setter
+    def motion(self, kept: _Motion) -> None:
+        self.xyz, self.quat, self.goal, self.v, self.w, self.e1, self.u, self._e1_goal = kept
 
     @property
     def is_still(self) -> bool:

@@ -29,13 +29,58 @@ from heptarm.fri.loop.user_api import Params
 from heptarm.fri.protocol.version import Version
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import ALL_INTERFACES, own_address
-from heptarm.values.arrays import array, scalar
+from heptarm.values.arrays import array, callback, finite, flag, instance, integer, within
+from heptarm.values.frames import check_name
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel, robot
 
 #: Default UDP port of FRI.
 PORT = 30200
+#: Longest time limit [s].
+LONGEST = 1e9
+
+
+def check_settings(
+    *,
+    version: str | None,
+    limits: Limits | None,
+    pose_limits: PoseLimits | None,
+    policy: Policy | None,
+    law: Law | None,
+    params: Mapping[str, npt.ArrayLike] | None,
+    history: int,
+    realtime: bool,
+    cpu: int | None,
+) -> None:
+    """Check the settings of a loop; see `Client`.
+
+    Raises:
+        ShapeError: one is of another type.
+        CommandRejected: one is outside its range.
+    """
+    if version is not None:
+        try:
+            Version.of(instance(version, str, "version"))
+        except ValueError as error:
+            if isinstance(error, CommandRejected):
+                raise
+            raise CommandRejected(str(error), parameter="version", value=version) from None
+    for value, kind, name in (
+        (limits, Limits, "limits"),
+        (pose_limits, PoseLimits, "pose_limits"),
+        (policy, Policy, "policy"),
+    ):
+        if value is not None:
+            instance(value, kind, name)
+    if law is not None:
+        callback(law, "law")
+    if params is not None:
+        Params.flat(params)
+    integer(history, "history", 16, 1 << 20)
+    flag(realtime, "realtime")
+    if cpu is not None:
+        integer(cpu, "cpu", 0, 65535)
 
 
 class Client(Reader):
@@ -45,7 +90,7 @@ class Client(Reader):
 
     Args:
         port: UDP port to bind.
-        host: own address to bind; "0.0.0.0" for all. None: the one that reaches `remote`; all without a remote.
+        host: own address to bind; "0.0.0.0" for all. None: that of the interface to `remote`; all without a remote.
         remote: address of the controller; None accepts any.
         version: FRI release such as "1.15"; None recognises it from the first datagram.
         model: robot, for the limits.
@@ -87,18 +132,28 @@ class Client(Reader):
         cpu: int | None = None,
         timeout: float = 30.0,
     ) -> None:
-        self._limits = limits or Limits.of(robot(model) if isinstance(model, str) else model)
-        if not 16 <= history <= 1 << 20:
-            raise CommandRejected(
-                f"history must be 16 to {1 << 20} states, got {history}", parameter="history", value=history
-            )
+        check_settings(
+            version=version,
+            limits=limits,
+            pose_limits=pose_limits,
+            policy=policy,
+            law=law,
+            params=params,
+            history=history,
+            realtime=realtime,
+            cpu=cpu,
+        )
+        integer(port, "port", 0, 65535)
+        for address, what in ((host, "host"), (remote, "remote")):
+            if address is not None:
+                instance(address, str, what)
+        within(timeout, "timeout", 0.0, LONGEST, above=True, unit="s")
+        arm = robot(model) if isinstance(model, str) else instance(model, RobotModel, "model")
+        self._limits = limits or Limits.of(arm)
         name = process.importable(law)
         sent = b"" if law is None or name else process.by_value(law)
         values, schema = Params.flat(params or {})
-        try:
-            wire = None if version is None else Version.of(version).value
-        except ValueError as error:
-            raise CommandRejected(str(error), parameter="version", value=version) from None
+        wire = None if version is None else Version.of(version).value
         self._values = values
         block = MemoryBlock(at.Layout.words(history=history, params=values.size))
         super().__init__(at.Layout(block, history=history, params=values.size))
@@ -111,6 +166,7 @@ class Client(Reader):
                     "remote": remote,
                     "version": wire,
                     "limits": asdict(self._limits),
+                    "positions": (arm.q_min.tolist(), arm.q_max.tolist()),
                     "pose_limits": asdict(pose_limits or PoseLimits()),
                     "policy": _plain(policy or Policy()),
                     "law": name,
@@ -161,6 +217,14 @@ class Client(Reader):
         """Whether the loop's process runs, or the client was closed."""
         return self._closed or self._worker.is_alive()
 
+    @property
+    def trouble(self) -> str:
+        """Why there is no session, or why the loop has ended, as text; empty if there is a session."""
+        if self._closed or self._worker.is_alive():
+            return super().trouble
+        failed = self._header[at.STATUS] == at.Status.FAILED
+        return (super().trouble if failed else "") or self._worker.ending
+
     # ---------------------------------------------------------------------------------------------- commands
 
     def command(
@@ -203,7 +267,7 @@ class Client(Reader):
             parts[at.C_POSE : at.C_POSE + 7] = _seven(pose)
             given |= at.GIVEN_POSE
         if e1 is not None:
-            parts[at.C_E1] = scalar(e1, "e1")
+            parts[at.C_E1] = finite(e1, "e1", unit="rad")
             given |= at.GIVEN_E1
         self._check()
         ints = parts.view(np.int64)
@@ -245,6 +309,7 @@ class Client(Reader):
             ShapeError: the array does not have seven numbers, or the quaternion's norm is further than 1e-3 from 1.
             ConnectionLost: the client is closed, or its loop has ended.
         """
+        check_name(name, "name")
         requested = self.wanted_frames
         if name not in requested:
             raise CommandRejected(
@@ -271,10 +336,11 @@ class Client(Reader):
             raise ConnectionLost("the FRI client is closed")
         super()._check()
         if not self._worker.is_alive():
-            raise ConnectionLost("the FRI loop has ended: its process has ended")
+            raise ConnectionLost(f"the FRI loop has ended: {self.trouble}")
 
     def close(self, *, timeout: float = 5.0) -> None:
         """Brake the arm to a stop and end the loop. Closing twice is allowed."""
+        within(timeout, "timeout", 0.0, LONGEST, unit="s")
         if self._closed:
             return
         self._closed = True

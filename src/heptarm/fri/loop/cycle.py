@@ -25,7 +25,7 @@ from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.fast_codec import Sample
 from heptarm.fri.protocol.version import Version
 from heptarm.fri.session.answers import NOTHING, Setpoint
-from heptarm.fri.session.session import Session
+from heptarm.fri.session.session import Positions, Session
 from heptarm.fri.session.statistics import Histogram
 from heptarm.values.pose import Pose
 
@@ -39,6 +39,8 @@ MIN_GAP = 25_000_000
 GRACE = 50_000_000
 #: Beginning of the text of the event after a failure of the law.
 LAW_FAILED = "the law failed, the arm brakes: "
+#: Beginning of the text of the event after a failure of the loop itself.
+LOOP_FAILED = "the loop failed, the arm brakes: "
 #: Largest number of answers that repeat an output until the cabinet shows it.
 REPEATS = 50
 #: Number of answers that repeat an analog output, which the cabinet may round; an answer may be lost.
@@ -356,9 +358,11 @@ class Cycle:
         policy: behaviour without fresh commands.
         law: called in every cycle of COMMANDING_ACTIVE; None uses the commands of the user's process.
         params: parameters of the law.
+        positions: position limits of the robot [rad], see `Session`.
 
     Attributes:
         layout, session, guard, pose_commander, fallback, exchange, record, law: its parts.
+        failure: why the loop has to end, in one line; empty as long as nothing failed in it.
         is_ending: whether it brakes to end, regardless of commands.
         mirrored: last mirrored position and the counter of its message; None outside COMMANDING_WAIT.
         slope: velocity of the interpolator at that time [rad/s].
@@ -376,9 +380,16 @@ class Cycle:
         policy: Policy,
         law: Law | None = None,
         params: Params | None = None,
+        positions: Positions | None = None,
     ) -> None:
         self.layout = layout
-        self.session = Session(version, latency=Histogram(layout.latency), jitter=Histogram(layout.jitter))
+        self.failure = ""
+        self.session = Session(
+            version,
+            latency=Histogram(layout.latency),
+            jitter=Histogram(layout.jitter),
+            positions=positions,
+        )
         self.guard = JointGuard(limits)
         self.pose_commander = PoseCommander(pose_limits or PoseLimits())
         self.fallback = CommandFallback(policy)
@@ -403,10 +414,44 @@ class Cycle:
     def turn(self, datagram: bytes, received: int) -> bytes | None:
         """Process a datagram and make its answer; call `finish` next.
 
+        An error never gets out: it is reported, the arm brakes from then on, and the loop ends with its cause.
+
         Args:
             datagram: the datagram.
             received: time of receipt, monotonic clock [ns].
         """
+        kept = self.guard.sent, self.pose_commander.guard.motion
+        try:
+            return self._turn(datagram, received)
+        except Exception as error:
+            self._fail(error, received)
+        self.guard.sent, self.pose_commander.guard.motion = kept
+        try:
+            return self._safe_answer()
+        except Exception:  # the controller stops the arm itself when no answer arrives
+            return None
+
+    def _fail(self, error: Exception, now: int) -> None:
+        """Report an error of the loop, and end the loop once the arm is at rest."""
+        if not self.failure:
+            self.failure = LOOP_FAILED + describe(error)
+            self.record.report(now, self.failure)
+        self.end()
+        self.layout.header[at.STOP] = 1
+
+    def _safe_answer(self) -> bytes | None:
+        """Answer that brakes where commands are effective, and mirrors the interpolator elsewhere."""
+        session, self.record.sent = self.session, NOTHING_SENT
+        setpoint = NOTHING
+        if session.is_commanding and session.mode in _JOINT_MODES and self.guard.is_started:
+            setpoint = Setpoint(q=tuple(self.guard.position(None)))
+        elif session.is_commanding and self.pose_commander.guard.is_started:
+            setpoint = Setpoint(pose=self.pose_commander.command(None, 0))
+        answer = session.answer(setpoint)
+        self._answered = answer is not None
+        return answer
+
+    def _turn(self, datagram: bytes, received: int) -> bytes | None:
         session, record, exchange = self.session, self.record, self.exchange
         record.flags, record.sent, self._answered, before = 0, NOTHING_SENT, False, session.received
         last = session.sample
@@ -438,7 +483,7 @@ class Cycle:
             setpoint = exchange.add(setpoint, session.version, lambda text: record.report(received, text))
         try:
             answer = session.answer(setpoint)
-        except CommandRejected as refusal:
+        except (CommandRejected, ValueError) as refusal:  # unknown names, or too many for one datagram
             exchange.forget()
             record.report(received, str(refusal))
             answer = session.answer(replace(setpoint, io=(), transformations=()))
@@ -452,7 +497,13 @@ class Cycle:
         self.session.counters.filled += bool(self.record.flags & at.FILLED)
 
     def finish(self, now: int) -> None:
-        """Publish the cycle, after its answer was sent at `now` [ns]."""
+        """Publish the cycle, after its answer was sent at `now` [ns]; an error ends the loop as in `turn`."""
+        try:
+            self._publish(now)
+        except Exception as error:
+            self._fail(error, now)
+
+    def _publish(self, now: int) -> None:
         session, header = self.session, self.layout.header
         if self._answered:
             session.answered(now)
@@ -666,12 +717,13 @@ class Cycle:
                 self._params.replace(words[1:])
         try:
             self.law(state, out, self._params)
-        except Exception as error:
-            self.record.report(now, LAW_FAILED + _describe(error))
+        except BaseException as error:  # sys.exit() as well: the arm has to brake first
+            self.record.report(now, LAW_FAILED + describe(error))
             self.end()
 
 
-def _describe(error: Exception) -> str:
+def describe(error: BaseException) -> str:
     """Describe an error in one line, with its place."""
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{type(error).__name__}: {error} ({place.filename.rpartition('/')[2]}, line {place.lineno})"
+    trace = traceback.extract_tb(error.__traceback__)
+    place = f" ({trace[-1].filename.rpartition('/')[2]}, line {trace[-1].lineno})" if trace else ""
+    return f"{type(error).__name__}: {error}{place}"

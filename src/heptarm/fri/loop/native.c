@@ -130,6 +130,14 @@ struct seen {
     uint64_t sequence, reflected;
 };
 
+/* Whether an array that may be sent back has positions that the robot can have, if the message has the array. */
+static int is_plausible(struct loop *l, int array) {
+    if (!(l->t_known & KNOWN(array))) return 1;
+    for (int i = 0; i < AXES; i++)
+        if (!(l->plausible_low[i] <= ARRAY(array)[i] && ARRAY(array)[i] <= l->plausible_high[i])) return 0;
+    return 1;
+}
+
 /* Read a message into the t_ members; 0 if it differs from the previous one in more than numbers. */
 static int read_message(struct loop *l, const uint8_t *data, int size, struct seen *seen) {
     struct part p = {data, data + size}, one;
@@ -210,13 +218,12 @@ static int read_message(struct loop *l, const uint8_t *data, int size, struct se
     if (id != MONITORING_ID || seen->sequence >> 32 || seen->reflected >> 32) return 0;
     if (!(tags & 1 << 4) || (!(tags & 1 << 2)) != (l->robot_size < 0)) return 0;
     if (!(tags & 1 << 5) && (l->mode || l->overlay >= 0)) return 0;
-    for (int array = 0; array < STATE_ARRAYS; array += STATE_ARRAYS - 1) { /* measured, interpolator */
+    if (l->t_known & KNOWN(S_Q)) {
         double sum = 0.0;
-        if (!(l->t_known >> array & 1)) continue;
-        for (int i = 0; i < AXES; i++) sum += l->t_arrays[AXES * array + i];
+        for (int i = 0; i < AXES; i++) sum += ARRAY(S_Q)[i];
         if (!isfinite(sum)) return 0;
     }
-    return 1;
+    return is_plausible(l, S_Q_CMD) && is_plausible(l, S_Q_IPO);
 }
 
 /* ------------------------------------------------------------------------------------------------------ guard */

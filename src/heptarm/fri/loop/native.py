@@ -69,6 +69,8 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ("real", AXES, "low high top_v top_a top_j near dq_max ddq_max dddq_max tau_max tau_step"),
     ("real", 6, "wrench_max wrench_step"),
     ("real", 1, "reach step"),
+    # plausible positions
+    ("real", AXES, "plausible_low plausible_high"),
     # fallback for missing commands
     ("word", 1, "f_at f_has_q f_has_slope f_has_tau f_has_wrench f_missing"),
     ("real", AXES, "f_q f_slope f_tau"),
@@ -189,6 +191,7 @@ class Native:
         for name in ("dq_max", "ddq_max", "dddq_max", "tau_max", "wrench_max"):
             getattr(memory, name)[:] = getattr(limits, name)
         memory.reach = limits.reach
+        memory.plausible_low[:], memory.plausible_high[:] = cycle.session.low, cycle.session.high
         memory.f_missing = MISSING.index(policy.missing)
         memory.patience, memory.over = policy.patience, policy.over
 

@@ -195,6 +195,7 @@ struct loop {
     double low[7], high[7], top_v[7], top_a[7], top_j[7], near[7], dq_max[7], ddq_max[7], dddq_max[7], tau_max[7], tau_step[7];
     double wrench_max[6], wrench_step[6];
     double reach, step;
+    double plausible_low[7], plausible_high[7];
     word f_at, f_has_q, f_has_slope, f_has_tau, f_has_wrench, f_missing;
     double f_q[7], f_slope[7], f_tau[7];
     double f_wrench[6];

@@ -26,12 +26,12 @@ from typing import Any
 import cloudpickle
 import numpy as np
 
-from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost
+from heptarm.errors import CommandRejected, ConnectFailed, ConnectionLost, HeptarmError
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.pose_guard import PoseLimits
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.loop.cycle import Cycle, Law
+from heptarm.fri.loop.cycle import LOOP_FAILED, Cycle, Law, describe
 from heptarm.fri.loop.native import CALL_LAW, CHECK, HANDED_BACK, SOCKET_ERROR, TIMEOUT, Native, Unavailable
 from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol.messages import SessionState
@@ -193,6 +193,16 @@ class Worker:
             return
         self._reader.join(1.0)
 
+    @property
+    def ending(self) -> str:
+        """How it ended, in words."""
+        code = self._process.poll()
+        if code is None:
+            return "it runs"
+        if code < 0:
+            return f"its process was killed by signal {-code} ({signal.Signals(-code).name})"
+        return f"its process has ended with status {code}"
+
     def kill(self) -> None:
         """Kill it."""
         self._process.kill()
@@ -225,6 +235,7 @@ class Loop:
             ),
             law=law or _imported(config["law"]),
             params=Params(np.zeros(config["size"]), schema),
+            positions=(tuple(config["positions"][0]), tuple(config["positions"][1])),
         )
         self._parent: int = config["parent"]
         self._peer: Address | None = None
@@ -232,7 +243,11 @@ class Loop:
         self._last = b""
 
     def run(self) -> None:
-        """Answer until the user's process stops the loop or has ended, and the arm is at rest."""
+        """Answer until the user's process stops the loop or has ended, and the arm is at rest.
+
+        Raises:
+            ConnectionLost: the port or the loop itself has failed; the text gives the cause.
+        """
         try:
             native = Native(self.cycle)
         except Unavailable as reason:
@@ -241,6 +256,8 @@ class Loop:
         else:
             self.layout.header[at.NATIVE] = 1
             self._run_native(native)
+        if self.cycle.failure:
+            raise ConnectionLost(self.cycle.failure)
 
     def _run_native(self, native: Native) -> None:
         """Run the native part, which answers frequent messages; handle here what it hands back."""
@@ -386,8 +403,8 @@ def main(path: str) -> int:
     header[at.PID] = os.getpid()
     try:
         loop = Loop(first, config, law=_received_law())
-    except (ConnectFailed, ImportError, AttributeError, pickle.UnpicklingError) as error:
-        first.trouble.write(str(error))
+    except BaseException as error:  # also of the module of the law, which may do anything when it is imported
+        first.trouble.write(str(error) if isinstance(error, HeptarmError) else describe(error))
         has_port = not isinstance(error, ConnectFailed) or error.parameter != "port"
         header[at.STATUS] = at.Status.FAILED if has_port else at.Status.NO_PORT
         return 1
@@ -396,8 +413,8 @@ def main(path: str) -> int:
     header[at.STATUS] = at.Status.RUNNING
     try:
         loop.run()
-    except ConnectionLost as error:
-        first.trouble.write(str(error))
+    except BaseException as error:  # never without a cause: the user's process reads it
+        first.trouble.write(str(error) if isinstance(error, HeptarmError) else LOOP_FAILED + describe(error))
         header[at.STATUS] = at.Status.FAILED
         return 1
     finally:

@@ -22,6 +22,7 @@ from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.fast_codec import Sample
 from heptarm.fri.protocol.messages import Quality, SessionState
 from heptarm.fri.session.session import Event, Kind, Session
+from heptarm.values.arrays import instance, integer, within, word
 from heptarm.values.io import SignalValue
 
 NAN7, NAN6 = (math.nan,) * 7, (math.nan,) * 6
@@ -172,6 +173,8 @@ class Record:
 
 #: Polling period for a state that is due [s].
 _POLL = 1e-4
+#: Longest time limit [s].
+_LONGEST = 1e9
 _NO_MESSAGES = (
     "check that the FRI application runs on the cabinet and sends to this machine's address and this port, that both "
     "are in one network (address and netmask), and that no firewall blocks UDP"
@@ -232,6 +235,8 @@ class Reader:
 
     def history(self, size: int | None = None) -> list[State]:
         """Get the last states, oldest first, without those that were overwritten in the meantime."""
+        if size is not None:
+            integer(size, "size", 0, 1 << 20)
         ring = self._layout.states
         count = ring.count
         first = max(0, count - (len(ring.ints) - 1 if size is None else size))
@@ -246,6 +251,7 @@ class Reader:
             Timeout: no message received; the text names possible causes.
             ConnectionLost: the client is closed, or its loop has ended.
         """
+        within(timeout, "timeout", 0.0, _LONGEST, unit="s")
         header, deadline = self._header, time.monotonic() + timeout
         while header[at.STATES] <= self._seen:
             self._check()
@@ -283,7 +289,11 @@ class Reader:
         Raises:
             Timeout: the session did not reach the state; the text names possible causes.
         """
-        target = SessionState[session] if isinstance(session, str) else session
+        if isinstance(session, str):
+            target = SessionState[word(session, "session", SessionState.__members__)]
+        else:
+            target = instance(session, SessionState, "session")
+        within(timeout, "timeout", 0.0, _LONGEST, unit="s")
         deadline = time.monotonic() + timeout
         while (rest := deadline - time.monotonic()) > 0.0:
             state = self.next(timeout=rest)
@@ -367,6 +377,4 @@ class Reader:
             ConnectionLost: the loop has ended.
         """
         if self._header[at.STATUS] in (at.Status.ENDED, at.Status.FAILED):
-            raise ConnectionLost(
-                f"the FRI loop has ended: {self._layout.trouble.read() or 'its process has ended'}"
-            )
+            raise ConnectionLost(f"the FRI loop has ended: {self.trouble or 'its process has ended'}")

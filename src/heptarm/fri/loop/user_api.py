@@ -29,6 +29,8 @@ from heptarm.fri.protocol.messages import (
     SessionState,
 )
 from heptarm.fri.session.statistics import Counters, Histogram
+from heptarm.values.arrays import finite_entries, instance, numbers, scalar, shown
+from heptarm.values.frames import check_name
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
 from heptarm.values.pose import Pose
 
@@ -97,6 +99,7 @@ class Signals:
             LimitError: the value is outside the range of the output.
         """
         outputs = ", ".join(one.name for one in self._signals if one.is_output) or "none"
+        check_name(name, "name")
         try:
             signal = self._signals[find_name(name, self.names)]
         except CommandRejected as error:
@@ -115,7 +118,7 @@ class Signals:
                 value=name,
                 allowed=outputs,
             )
-        number = float(value)
+        number = float(value) if isinstance(value, bool) else scalar(value, "value")
         low, high = signal.low, signal.high
         whole = signal.kind == "analog" or number == round(number) if math.isfinite(number) else False
         if not (low <= number <= high) or not whole:
@@ -123,7 +126,7 @@ class Signals:
                 signal.kind, "a finite number"
             )
             raise LimitError(
-                f"{signal.name} ({signal.kind}) must be {allowed}, got {value!r}",
+                f"{signal.name} ({signal.kind}) must be {allowed}, got {shown(value)}",
                 parameter=signal.name,
                 value=value,
                 allowed=allowed,
@@ -156,6 +159,14 @@ class Outputs:
         self.written[full] = number
 
 
+def _vector(value: npt.ArrayLike, size: int, name: str) -> Floats:
+    """A vector that a law assigns; the guard handles entries that are not finite."""
+    result = numbers(value, name, f"{size} numbers")
+    if result.shape != (size,):
+        raise ShapeError(f"{name} must have shape ({size},), got {result.shape}", parameter=name, value=value)
+    return result
+
+
 class Output:
     """Command of a law; reset before every call.
 
@@ -169,15 +180,42 @@ class Output:
         io: outputs of the cabinet, `out.io["LEDBlue"] = True`; others keep their values.
     """
 
-    __slots__ = ("_pose", "e1", "io", "q", "tau", "wrench")
+    __slots__ = ("_e1", "_pose", "_q", "_tau", "_wrench", "io")
 
     def __init__(self, outputs: Outputs | None = None) -> None:
-        self.io = Outputs() if outputs is None else outputs
-        self.e1 = math.nan
-        self.q: Floats = np.zeros(7)
-        self.tau: Floats = np.zeros(7)
-        self.wrench: Floats = np.zeros(6)
+        self.io = Outputs() if outputs is None else instance(outputs, Outputs, "outputs")
+        self._e1 = math.nan
+        self._q: Floats = np.zeros(7)
+        self._tau: Floats = np.zeros(7)
+        self._wrench: Floats = np.zeros(6)
         self._pose: Floats = np.full(7, np.nan)
+
+    @property
+    def q(self) -> Floats:
+        """Target position, shape (7,) [rad]."""
+        return self._q
+
+    @q.setter
+    def q(self, value: npt.ArrayLike) -> None:
+        self._q[:] = _vector(value, 7, "out.q")
+
+    @property
+    def tau(self) -> Floats:
+        """Target torques, shape (7,) [Nm]."""
+        return self._tau
+
+    @tau.setter
+    def tau(self, value: npt.ArrayLike) -> None:
+        self._tau[:] = _vector(value, 7, "out.tau")
+
+    @property
+    def wrench(self) -> Floats:
+        """Target wrench, shape (6,) [N, Nm]."""
+        return self._wrench
+
+    @wrench.setter
+    def wrench(self, value: npt.ArrayLike) -> None:
+        self._wrench[:] = _vector(value, 6, "out.wrench")
 
     @property
     def pose(self) -> Floats:
@@ -186,13 +224,24 @@ class Output:
 
     @pose.setter
     def pose(self, value: Pose | npt.ArrayLike) -> None:
-        self._pose[:] = value.array if isinstance(value, Pose) else value
+        self._pose[:] = value.array if isinstance(value, Pose) else _vector(value, 7, "out.pose")
+
+    @property
+    def e1(self) -> float:
+        """Target redundancy angle of the pose [rad]."""
+        return self._e1
+
+    @e1.setter
+    def e1(self, value: float) -> None:
+        self._e1 = value if isinstance(value, float) else scalar(value, "out.e1")
 
     @classmethod
     def on(cls, q: Any, tau: Any, wrench: Any) -> Output:
         """Make an output on existing memory."""
         made = cls()
-        made.q, made.tau, made.wrench = (np.frombuffer(part, dtype=np.float64) for part in (q, tau, wrench))
+        made._q, made._tau, made._wrench = (
+            np.frombuffer(part, dtype=np.float64) for part in (q, tau, wrench)
+        )
         return made
 
 
@@ -245,7 +294,7 @@ class Params:
             raise AttributeError("parameters are read-only in a law")
         checked = []
         for name, value in values.items():
-            given: Floats = np.asarray(value, dtype=np.float64)
+            given = finite_entries(numbers(value, name), name, nan=True)
             if name not in self._schema:
                 raise AttributeError(f"no parameter {name!r}; there are {', '.join(self._schema) or 'none'}")
             shape, start = self._schema[name]
@@ -270,16 +319,17 @@ class Params:
         Raises:
             ShapeError: a value is neither a number nor an array of numbers.
         """
+        if not isinstance(values, Mapping):
+            raise ShapeError(
+                f"params must be numbers and arrays by name, got {shown(values)}",
+                parameter="params",
+                value=values,
+            )
         parts: list[Floats] = []
         schema: dict[str, tuple[tuple[int, ...], int]] = {}
         start = 0
         for name, value in values.items():
-            try:
-                given: Floats = np.asarray(value, dtype=np.float64)
-            except (TypeError, ValueError):
-                raise ShapeError(
-                    f"{name} must be a number or an array of numbers, got {value!r}", parameter=name
-                ) from None
+            given = numbers(value, name, "a number or an array of numbers")
             schema[name] = (given.shape, start)
             parts.append(given.reshape(-1))
             start += given.size

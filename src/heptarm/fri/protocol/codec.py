@@ -47,8 +47,8 @@ def _put_joints(tag: int, values: m.Joints | None) -> bytes:
 
 
 def _put_name(name: str) -> bytes:
-    if not 0 < len(name.encode()) <= MAX_NAME:
-        raise ValueError(f"a name must have 1 to {MAX_NAME} bytes, got {len(name.encode())}: {name!r}")
+    if len(name) > MAX_NAME:  # as in decoding: what a controller sends can be sent back
+        raise ValueError(f"a name must have at most {MAX_NAME} characters, got {len(name)}: {name!r}")
     return put_bytes(1, name.encode())
 
 

@@ -14,7 +14,7 @@ Joints = tuple[float, ...]
 JOINTS = 7
 MAX_IO = 10
 MAX_TRANSFORMATIONS = 5
-#: Largest length of a name.
+#: Largest number of characters of a name; it may be empty.
 MAX_NAME = 63
 
 

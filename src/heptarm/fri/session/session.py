@@ -12,6 +12,7 @@ from heptarm.fri.protocol.protobuf import MalformedMessage, read_varint
 from heptarm.fri.protocol.version import Version, recognise
 from heptarm.fri.session.answers import NOTHING, Answers, Setpoint
 from heptarm.fri.session.statistics import Counters, Histogram
+from heptarm.values.robot import ROBOTS
 
 
 class Kind(enum.Enum):
@@ -54,8 +55,34 @@ MAX_GAP = 500_000_000
 #: Largest number of events kept until they are read.
 MAX_EVENTS = 256
 
+#: An arm may stop this far beyond its position limits [rad].
+OVERRUN = 0.05
+#: Largest coordinate of a flange pose [mm].
+MAX_COORDINATE = 10_000.0
+#: Largest deviation of a quaternion's norm from 1.
+MAX_NORM_ERROR = 0.05
+
+_NO_KNOWN_VERSION = (
+    "datagrams arrive, but none is a message of FRI 1.11 to 2.7: likely cause: the controller speaks another version, "
+    "or another program sends to this port"
+)
 _WRAP = 1 << 32
 _QUALITIES = ("poor", "fair", "good", "excellent")
+
+
+class ImplausibleMessage(MalformedMessage):
+    """A legal message whose positions no robot can have: a damaged datagram."""
+
+
+#: Lowest and highest position of each axis [rad].
+Positions = tuple[tuple[float, ...], tuple[float, ...]]
+
+
+def widest() -> Positions:
+    """Position range that contains the ranges of all known robots, 7 lowest and 7 highest positions [rad]."""
+    low = [min(float(one.q_min[axis]) for one in ROBOTS.values()) for axis in range(m.JOINTS)]
+    high = [max(float(one.q_max[axis]) for one in ROBOTS.values()) for axis in range(m.JOINTS)]
+    return tuple(low), tuple(high)
 
 
 class Session:
@@ -66,8 +93,11 @@ class Session:
         counters: counters to use; None creates them.
         latency: histogram of the times from receipt to answer; None creates one.
         jitter: histogram of the deviations from the send period; None creates one.
+        positions: position limits of the robot [rad]; a message with a position that would be sent back and is further
+            than `OVERRUN` beyond them counts as damaged. None: the limits of all known robots.
 
     Attributes:
+        low, high: plausible positions of the axes [rad].
         version: wire format; None until the first message.
         state: state in the last message; IDLE before the first one.
         quality: quality in the last message.
@@ -85,8 +115,11 @@ class Session:
         counters: Counters | None = None,
         latency: Histogram | None = None,
         jitter: Histogram | None = None,
+        positions: Positions | None = None,
     ) -> None:
         self._configured = version
+        low, high = positions or widest()
+        self.low, self.high = [value - OVERRUN for value in low], [value + OVERRUN for value in high]
         self.counters = counters or Counters()
         self.latency = latency or Histogram()
         self.jitter = jitter or Histogram()
@@ -142,11 +175,7 @@ class Session:
             sample = self._read(datagram, now)
         except MalformedMessage as error:
             self.counters.malformed += 1
-            if not _is_legal(datagram):
-                self._report(Kind.MALFORMED, str(error), now)
-            elif self.trouble != str(error):  # once, not in every cycle
-                self.trouble = str(error)
-                self._report(Kind.WRONG_VERSION, self.trouble, now)
+            self._diagnose(error, datagram, now)
             return None
         if not self._count(sample, now):
             return None
@@ -200,6 +229,65 @@ class Session:
 
     # ------------------------------------------------------------------------------------------ receiving
 
+    def _diagnose(self, error: MalformedMessage, datagram: bytes, now: int) -> None:
+        """Report a datagram that is no message; keep the likely cause as `trouble` until the next message."""
+        spoken = None if isinstance(error, ImplausibleMessage) else _spoken(datagram)
+        if spoken is None:
+            self._report(Kind.MALFORMED, str(error), now)
+            if isinstance(error, ImplausibleMessage):
+                self.trouble = str(error)
+            elif self.sample is None:
+                self.trouble = f"{error}; {_NO_KNOWN_VERSION}"
+            return
+        trouble = str(error)
+        expected = self._configured or self.version
+        if "speaks FRI" not in trouble and expected is not None and spoken is not expected:
+            trouble += (
+                f"; likely cause: the controller speaks FRI {spoken.value}, this client is set to "
+                f"{expected.value}"
+            )
+        if self.trouble != trouble:  # once, not in every cycle
+            self.trouble = trouble
+            self._report(Kind.WRONG_VERSION, trouble, now)
+
+    def _check_plausible(self, sample: Sample) -> None:
+        """Check what an answer may send back: positions and poses that the robot can have.
+
+        Raises:
+            ImplausibleMessage: it cannot; the text names the value.
+        """
+        if sample.q is not None and not math.isfinite(sum(sample.q)):
+            raise ImplausibleMessage("FRI message: joint positions must be finite; the datagram is damaged")
+        for name, values in (("interpolated", sample.q_ipo), ("commanded", sample.q_cmd)):
+            if values is None:
+                continue
+            for axis, (value, low, high) in enumerate(zip(values, self.low, self.high, strict=True), 1):
+                if not low <= value <= high:
+                    raise ImplausibleMessage(
+                        f"FRI message: the {name} position of A{axis} must be in [{low + OVERRUN:.4g}, "
+                        f"{high - OVERRUN:.4g}] rad, got {value:.4g} rad: the datagram is damaged, or the client's "
+                        "model is another robot"
+                    )
+        ipo = sample.message.ipo if sample.is_full else None
+        if (
+            ipo is None or ipo.command_mode is not m.CommandMode.CARTESIAN_POSE
+        ):  # only then is a pose sent back
+            return
+        if ipo.pose is not None:
+            norm = math.sqrt(sum(value * value for value in ipo.pose.values[3:]))
+            if not all(abs(value) <= MAX_COORDINATE for value in ipo.pose.values[:3]) or not (
+                abs(norm - 1.0) <= MAX_NORM_ERROR
+            ):
+                raise ImplausibleMessage(
+                    f"FRI message: the interpolated pose must be within {MAX_COORDINATE:g} mm with a quaternion of "
+                    f"norm 1, got {ipo.pose.values}: the datagram is damaged"
+                )
+        if ipo.redundancy is not None and not abs(ipo.redundancy.value) <= math.tau:
+            raise ImplausibleMessage(
+                f"FRI message: the interpolated redundancy angle must be in [-2π, 2π] rad, got "
+                f"{ipo.redundancy.value:.4g} rad: the datagram is damaged"
+            )
+
     def _read(self, datagram: bytes, now: int) -> Sample:
         if self._reader is None:
             sample = self._begin(datagram, now)
@@ -211,9 +299,7 @@ class Session:
                 if self._configured is not None or recognise(datagram) is self.version:
                     raise
                 sample = self._begin(datagram, now)
-        for values in (sample.q, sample.q_ipo):
-            if values is not None and not math.isfinite(sum(values)):
-                raise MalformedMessage("FRI message: joint positions must be finite")
+        self._check_plausible(sample)
         return sample
 
     def _begin(self, datagram: bytes, now: int) -> Sample:
@@ -320,10 +406,9 @@ def reflected_in(datagram: bytes, *, framed: bool) -> int:
     return reflected if reflected < _WRAP else -1
 
 
-def _is_legal(datagram: bytes) -> bool:
-    """Whether a datagram is a legal message of any version."""
+def _spoken(datagram: bytes) -> Version | None:
+    """Version of a legal message; None for any other datagram."""
     try:
-        recognise(datagram)
+        return recognise(datagram)
     except MalformedMessage:
-        return False
-    return True
+        return None

@@ -85,6 +85,21 @@ class DatagramCounts:
     refused: int = 0
 
 
+def _likely_cause(trouble: str, datagram: bytes, version: Version) -> str:
+    """What to add to the trouble with an answer that another version could read; otherwise empty."""
+    if "speaks FRI" in trouble:
+        return ""
+    for other in (Version.V1_15, Version.V2_5, Version.V2_7):
+        if other is version:
+            continue
+        try:
+            decode_command(datagram, other)
+        except MalformedMessage:
+            continue
+        return f"; likely cause: the client speaks FRI {other.value}, this cabinet FRI {version.value}"
+    return ""
+
+
 class Controller:
     """The controller side of one session.
 
@@ -207,7 +222,7 @@ class Controller:
         try:
             command = decode_command(datagram, self.configuration.version)
         except MalformedMessage as error:
-            self._refuse(error.text)
+            self._refuse(error.text + _likely_cause(error.text, datagram, self.configuration.version))
             if self.traffic.refused >= FOREIGN and not self.traffic.taken:
                 self._report_refusal(self._foreign(datagram))
             return

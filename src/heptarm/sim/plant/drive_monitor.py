@@ -17,8 +17,9 @@ SPEED = 1.5
 BEYOND = np.radians(0.5)
 #: Range of a torque sensor, relative to the highest torque of its axis; impacts that end sooner are not seen [ticks].
 TORQUE, TORQUE_TICKS = 1.2, 5
-#: Largest distance between set-point and measured position in position control [rad].
-LAG = 0.1
+#: Largest distance between set-point and measured position in position control [rad]: about where the torque of the
+#: last axis is exhausted.
+LAG = 0.05
 
 
 class DriveMonitor:
@@ -76,6 +77,10 @@ class DriveMonitor:
         speed, position, torque, distance = loads.max(axis=1).tolist()
         self._overloaded = self._overloaded + 1 if torque > 1.0 else 0
         robot = self._robot
+        if distance > 1.0 and lag is not None:
+            axis = int(loads[3].argmax())
+            found, most = np.degrees((lag[axis], LAG))
+            return f"drive error in A{axis + 1}: {found:.1f} deg behind its set-point, maximum {most:.1f} deg"
         if speed > 1.0:
             axis = int(loads[0].argmax())
             found, most = np.degrees((dq[axis], robot.dq_max[axis]))
@@ -88,8 +93,4 @@ class DriveMonitor:
             axis = int(loads[2].argmax())
             found, most = tau[axis], TORQUE * robot.tau_max[axis]
             return f"drive error in A{axis + 1}: torque {found:.0f} Nm, range of the sensor {most:.0f} Nm"
-        if distance > 1.0 and lag is not None:
-            axis = int(loads[3].argmax())
-            found, most = np.degrees((lag[axis], LAG))
-            return f"drive error in A{axis + 1}: {found:.1f} deg behind its set-point, maximum {most:.1f} deg"
         return ""

@@ -30,7 +30,9 @@ _LEFT_OUT = ("bin", "KUKAJavaLib")
 _PACKAGE = re.compile(r"^\s*package\s+([\w.]+)\s*;", re.MULTILINE)
 #: A comment, or a literal in which the signs of a comment mean nothing.
 _COMMENT = re.compile(r"""("(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*')|/\*.*?\*/|//[^\n]*""", re.DOTALL)
-_INTERNAL = re.compile(r"^[ \t]*import\s+(?:static\s+)?((?:com\.)?sun\.[\w.]+?)\.(\w+|\*)\s*;", re.MULTILINE)
+_INTERNAL = re.compile(
+    r"^[ \t]*import\s+(?:static\s+)?((?:com\.)?sun\.[\w.]+?|com\.kuka\.[\w.]+?)\.(\w+|\*)\s*;", re.MULTILINE
+)
 #: Packages of these names that a JDK of today still offers.
 _STILL_THERE = re.compile(
     r"com\.sun\.(net\.httpserver|management|jdi|source|tools|security|nio\.sctp)\b|sun\.(misc|reflect)$"
@@ -128,14 +130,28 @@ def unused_addresses(folder: Path, data: Path | None, addresses: AddressMap) -> 
     return addresses.unused([*literals, read_source(data) if data is not None else ""])
 
 
-def _modern(text: str) -> str:
-    """Blank the unused imports of packages inside old JREs; every line keeps its number."""
+def _modern(text: str, own: frozenset[str] = frozenset()) -> str:
+    """Blank unused imports of packages inside old JREs, and of classes of Sunrise that the doubles lack.
+
+    Every line keeps its number.
+
+    Args:
+        text: of a source.
+        own: full names of the project's classes.
+    """
     if not _INTERNAL.search(text):
         return text
     code = _INTERNAL.sub("", _without_comments(text))
 
     def kept(match: re.Match[str]) -> str:
-        if match[2] == "*":
+        if match[1].startswith("com.kuka."):
+            known = own | _sunrise_names()
+            if match[2] == "*":
+                unused = not any(name.startswith(f"{match[1]}.") for name in known)
+            else:
+                named = f"{match[1]}.{match[2]}" in known or match[1] in known  # a member of a class
+                unused = not named and re.search(rf"\b{match[2]}\b", code) is None
+        elif match[2] == "*":
             unused = not _STILL_THERE.match(match[1])
         else:
             unused = re.search(rf"\b{match[2]}\b", code) is None
@@ -200,6 +216,11 @@ def compile_application(
     return Application(chosen, out, data, tuple(tasks), jars, tuple(left_out))
 
 
+def _full_name(source: Path, text: str) -> str:
+    package = _PACKAGE.search(_without_comments(text))
+    return f"{package[1]}.{source.stem}" if package else source.stem
+
+
 class _Copies:
     """Sources as UTF-8 in folders that fit their packages, as javac's source path needs them."""
 
@@ -207,8 +228,10 @@ class _Copies:
         self.roots: list[Path] = []
         self.names: dict[str, Path] = {}
         self._origin: dict[str, str] = {}
-        for source in sources:
-            text = _in_literals(_modern(read_source(source)), addresses)
+        texts = {source: read_source(source) for source in sources}
+        own = frozenset(_full_name(source, text) for source, text in texts.items())
+        for source, original in texts.items():
+            text = _in_literals(_modern(original, own), addresses)
             package = _PACKAGE.search(_without_comments(text))
             path = Path(*(package[1].split(".") if package else ()), source.name)
             # two files of one name keep apart, so that javac reports the duplicate
@@ -342,16 +365,21 @@ def _sunrise(location: str) -> str:
 
 
 @cache
-def _sunrise_classes() -> dict[str, str]:
-    """Full names of the doubles' classes by simple name."""
-    found = {}
+def _sunrise_names() -> frozenset[str]:
+    """Full names of the doubles' classes."""
+    found = set()
     for jar in _resources.jars():
         with zipfile.ZipFile(jar) as file:
             for entry in file.namelist():
                 if entry.startswith("com/kuka/") and entry.endswith(".class"):
-                    full = entry.removesuffix(".class").replace("/", ".").replace("$", ".")
-                    found[full.rpartition(".")[2]] = full
-    return found
+                    found.add(entry.removesuffix(".class").replace("/", ".").replace("$", "."))
+    return frozenset(found)
+
+
+@cache
+def _sunrise_classes() -> dict[str, str]:
+    """Full names of the doubles' classes by simple name."""
+    return {full.rpartition(".")[2]: full for full in sorted(_sunrise_names())}
 
 
 def _chosen(found: list[str], main: str, folder: Path) -> str:

@@ -22,6 +22,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
+from heptarm.errors import HeptarmError
 from heptarm.fri.protocol.version import Version
 from heptarm.io.keys import find_key
 from heptarm.sim.fri.sessions import Sessions
@@ -101,7 +102,11 @@ class VirtualCabinet:
         from heptarm.sim.runtime import java_plant, jvm
 
         self.options = options
-        self.plant = Plant(options.model, boxes=[Box.of(text) for text in options.box])
+        self.plant = Plant(
+            options.model,
+            boxes=[Box.of(text) for text in options.box],
+            monitored=options.drive_monitoring == "on",
+        )
         self.sessions = Sessions(
             self.plant,
             version=Version.of(options.fri_version),
@@ -278,13 +283,20 @@ def main(argv: list[str] | None = None) -> int:
             Box.of(text)
         if options.payload:
             parse_payload(options.payload)
+        if options.drive_monitoring not in ("on", "off"):
+            raise ValueError(f"drive_monitoring must be on or off, got {options.drive_monitoring!r}")
         if options.project is not None:
             project.read_project(options.project)
     except (ValueError, OSError) as error:  # a CommandRejected is a ValueError
         print(json.dumps({"ready": False, "error": str(error)}), flush=True)
         return 2
-    with batch_scheduled():
-        cabinet = VirtualCabinet(options, data)
+    try:
+        with batch_scheduled():
+            cabinet = VirtualCabinet(options, data)
+    except Exception as error:  # of the JVM, of a jar, of the machine: the parent prints it
+        log.debug("the virtual cabinet does not start", exc_info=True)
+        print(json.dumps({"ready": False, "error": _described(error), "host": True}), flush=True)
+        os._exit(2)  # a JVM that has started may wait for its own threads
     stopping = threading.Event()
     failed: list[str] = []
 
@@ -300,17 +312,28 @@ def main(argv: list[str] | None = None) -> int:
     if options.parent_pipe:
         threading.Thread(target=_read_standard_input, args=(cabinet.operator, end), daemon=True).start()
     announcer = threading.Thread(target=_announce, args=(cabinet, stopping, failed), daemon=True)
-    with batch_scheduled():
-        cabinet.start()
-    announcer.start()
-    cabinet.loop.run()
-    stopping.set()
-    _end(cabinet)
+    try:
+        with batch_scheduled():
+            cabinet.start()
+        announcer.start()
+        cabinet.loop.run()
+        stopping.set()
+        _end(cabinet)
+    except Exception as error:  # an error of the simulator itself
+        log.debug("the virtual cabinet has failed", exc_info=True)
+        stopping.set()
+        failed.insert(0, f"the virtual cabinet has failed: {_described(error)}")
     if failed:
         print(json.dumps({"ready": False, "error": failed[0]}), flush=True)
     # the JVM's shutdown may wait for its own threads; everything is closed, so exit at once
     sys.stdout.flush()
     os._exit(1 if failed else 0)
+
+
+def _described(error: Exception) -> str:
+    """An error of the host in one line."""
+    text = " ".join(str(error).split())
+    return text if isinstance(error, HeptarmError) else f"{type(error).__name__}: {text}"
 
 
 def _end(cabinet: VirtualCabinet) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import LimitError
-from heptarm.values.arrays import Array, Value, array, frozen, within
+from heptarm.errors import LimitError, ShapeError
+from heptarm.values.arrays import Array, Value, array, frozen, instance, integer, one_or_each, shown, within
 from heptarm.values.condition.condition import AnyOf, Condition
 from heptarm.values.condition.force import JOINT, JointTorqueOutside
 from heptarm.values.state import State
@@ -52,6 +53,23 @@ class CollisionGuard(Value):
     baseline: Array = field(default_factory=_nothing)
     margin: Array = field(default_factory=_nothing)
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "threshold", _each(self.threshold, "threshold", above=True))
+        object.__setattr__(self, "baseline", array(self.baseline, 7, "baseline"))
+        object.__setattr__(self, "margin", _each(self.margin, "margin"))
+        far = np.abs(self.baseline) + self.threshold > JOINT
+        if far.any():
+            axis = int(far.argmax())
+            room = JOINT - abs(float(self.baseline[axis]))
+            raise LimitError(
+                f"threshold[{axis}] must be in (0, {room:g}] Nm beside the baseline of A{axis + 1}, got "
+                f"{self.threshold[axis]:g} Nm",
+                code=2,
+                parameter=f"threshold[{axis}]",
+                value=float(self.threshold[axis]),
+                allowed=f"(0, {room:g}] Nm",
+            )
+
     @staticmethod
     def of(
         threshold: npt.ArrayLike, *, baseline: npt.ArrayLike = (0.0,) * 7, margin: npt.ArrayLike = 0.0
@@ -62,21 +80,7 @@ class CollisionGuard(Value):
             ShapeError: neither one number nor seven.
             LimitError: a threshold that is not positive, a negative margin, or a band beyond the largest joint torque.
         """
-        guard = CollisionGuard(
-            _each(threshold, "threshold", above=True), array(baseline, 7, "baseline"), _each(margin, "margin")
-        )
-        far = np.abs(guard.baseline) + guard.threshold > JOINT
-        if far.any():
-            axis = int(far.argmax())
-            raise LimitError(
-                f"threshold[{axis}] must be in (0, {JOINT - abs(guard.baseline[axis]):g}] Nm beside the baseline of "
-                f"A{axis + 1}, got {guard.threshold[axis]:g} Nm",
-                code=2,
-                parameter=f"threshold[{axis}]",
-                value=float(guard.threshold[axis]),
-                allowed=f"(0, {JOINT - abs(guard.baseline[axis]):g}] Nm",
-            )
-        return guard
+        return CollisionGuard(cast("Array", threshold), cast("Array", baseline), cast("Array", margin))
 
     @property
     def is_moving(self) -> bool:
@@ -100,6 +104,7 @@ class CollisionGuard(Value):
         Raises:
             StaleState: the state lacks torques or, with a margin, joints.
         """
+        instance(state, State, "state")
         allowed = self.threshold
         if self.is_moving:
             allowed = allowed + self.margin * np.abs(np.nan_to_num(state.dq))
@@ -109,19 +114,25 @@ class CollisionGuard(Value):
 
     def named(self, part: Condition, state: State | None) -> Collision:
         """The collision that one of `parts` stands for."""
-        joint = self.parts.index(part)
+        parts = self.parts
+        if not isinstance(part, Condition) or part not in parts:
+            raise ShapeError(
+                f"part must be one of this guard's, got {shown(part)}", parameter="part", value=part
+            )
+        joint = parts.index(part)
         if state is None:
             return Collision(joint, float("nan"), float(self.threshold[joint]))
         return self.seen(joint, state)
 
     def seen(self, joint: int, state: State, *, allowed: float | None = None) -> Collision:
         """The collision of a joint in a state."""
-        torque = float(state.tau_ext[joint] - self.baseline[joint])
+        joint = integer(joint, "joint", 0, 6)
+        torque = float(instance(state, State, "state").tau_ext[joint] - self.baseline[joint])
         return Collision(joint, torque, float(self.threshold[joint]) if allowed is None else allowed, state)
 
 
 def _each(value: npt.ArrayLike, name: str, *, above: bool = False) -> Array:
-    result = array(np.full(7, value) if np.ndim(value) == 0 else value, 7, name)
+    result = one_or_each(value, 7, name)
     for index, entry in enumerate(result.tolist()):
         within(entry, f"{name}[{index}]", 0.0, JOINT, above=above, unit="Nm")
     return result

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arrays import Value, within
+from heptarm.values.arrays import Value, shown, within
 
 
 def check_band(low: float, high: float, limit: float, unit: str) -> None:
@@ -69,7 +69,7 @@ class Condition(Value):
 def _condition(other: object) -> Condition:
     if not isinstance(other, Condition):
         raise ShapeError(
-            f"condition must be a Condition, got {other!r}",
+            f"condition must be a Condition, got {shown(other)}",
             parameter="condition",
             value=other,
             hint="put comparisons in brackets: (force > 10) | (torque[3] > 8)",
@@ -92,7 +92,7 @@ def check_condition(condition: object, parameter: str = "until") -> Condition:
     """
     if not isinstance(condition, Condition):
         raise ShapeError(
-            f"{parameter} must be a condition, got {condition!r}",
+            f"{parameter} must be a condition, got {shown(condition)}",
             parameter=parameter,
             value=condition,
             hint="build one with heptarm.when, for example force > 10",

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import Array, Value, array, frozen
+from heptarm.values.arrays import Array, Value, array, frozen, shown
 from heptarm.values.pose import Pose
 from heptarm.values.result import Result
 
@@ -29,7 +29,7 @@ def direction_of(value: str | npt.ArrayLike) -> Array:
     if isinstance(value, str):
         if value not in _AXES:
             raise ShapeError(
-                f"direction must be 'x', '-x', 'y', '-y', 'z', '-z' or a vector, got {value!r}",
+                f"direction must be 'x', '-x', 'y', '-y', 'z', '-z' or a vector, got {shown(value)}",
                 parameter="direction",
                 value=value,
             )
@@ -38,7 +38,7 @@ def direction_of(value: str | npt.ArrayLike) -> Array:
     length = float(np.linalg.norm(vector))
     if length < 1e-9:
         raise ShapeError(
-            f"direction must not be the zero vector, got {value!r}", parameter="direction", value=value
+            f"direction must not be the zero vector, got {shown(value)}", parameter="direction", value=value
         )
     return frozen(vector / length)
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from math import isnan, nan
 from typing import ClassVar
 
-from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arrays import within
+from heptarm.errors import LimitError
+from heptarm.values.arrays import shown, within, word
 from heptarm.values.condition.condition import Condition, band_text, check_band
 from heptarm.values.frames import TOOL, check_name
 
@@ -41,9 +41,7 @@ class _Estimated(Condition):
 
     def __post_init__(self) -> None:
         self._check()
-        check_name(self.frame, "frame")
-        if not (isinstance(self.tolerance, float) and isnan(self.tolerance)):
-            within(self.tolerance, "tolerance", 0.0, FORCE, above=True, unit=self.UNIT)
+        _check_estimate(self.frame, self.tolerance, self.UNIT)
 
     def _check(self) -> None:
         """Check the fields of the subclass."""
@@ -147,8 +145,27 @@ class TorqueOutside(_AxisOutside):
 
 
 def _check_axis(axis: str) -> None:
-    if axis not in _AXES:
-        raise ShapeError(f"axis must be 'x', 'y' or 'z', got {axis!r}", parameter="axis", value=axis)
+    """Refuse what is no axis. Raises ShapeError."""
+    word(axis, "axis", _AXES)
+
+
+def _check_joint(joint: int) -> None:
+    """Refuse what is no joint, 0 for A1 to 6 for A7. Raises LimitError."""
+    if not isinstance(joint, int) or isinstance(joint, bool) or not 0 <= joint <= 6:
+        raise LimitError(
+            f"joint must be 0 (A1) to 6 (A7), got {shown(joint)}",
+            code=2,
+            parameter="joint",
+            value=joint,
+            allowed="[0, 6]",
+        )
+
+
+def _check_estimate(frame: str, tolerance: float, unit: str) -> None:
+    """Refuse what is no frame, or no tolerance of an estimate."""
+    check_name(frame, "frame")
+    if not (isinstance(tolerance, float) and isnan(tolerance)):
+        within(tolerance, "tolerance", 0.0, FORCE, above=True, unit=unit)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,14 +183,7 @@ class JointTorqueOutside(Condition):
     high: float
 
     def __post_init__(self) -> None:
-        if not isinstance(self.joint, int) or isinstance(self.joint, bool) or not 0 <= self.joint <= 6:
-            raise LimitError(
-                f"joint must be 0 (A1) to 6 (A7), got {self.joint!r}",
-                code=2,
-                parameter="joint",
-                value=self.joint,
-                allowed="[0, 6]",
-            )
+        _check_joint(self.joint)
         check_band(self.low, self.high, JOINT, "Nm")
 
     def __str__(self) -> str:
@@ -234,6 +244,9 @@ class Force:
     frame: str = TOOL
     tolerance: float = nan
 
+    def __post_init__(self) -> None:
+        _check_estimate(self.frame, self.tolerance, "N")
+
     def __call__(self, *, frame: str = TOOL, tolerance: float = nan) -> Force:
         """The same force with other axes, or with a tolerance."""
         return Force(frame, tolerance)
@@ -246,18 +259,21 @@ class Force:
 
     def along(self, axis: str) -> Component:
         """Its component along an axis, with sign."""
+        _check_axis(axis)
         return Component(
             lambda low, high: ForceOutside(axis, low, high, frame=self.frame, tolerance=self.tolerance), FORCE
         )
 
     def normal(self, axis: str) -> Magnitude:
         """Its magnitude along an axis, in either direction."""
+        _check_axis(axis)
         return Magnitude(
             lambda threshold: NormalForceAbove(axis, threshold, frame=self.frame, tolerance=self.tolerance)
         )
 
     def shear(self, axis: str) -> Magnitude:
         """Its magnitude across an axis."""
+        _check_axis(axis)
         return Magnitude(
             lambda threshold: ShearForceAbove(axis, threshold, frame=self.frame, tolerance=self.tolerance)
         )
@@ -275,18 +291,24 @@ class Torque:
     frame: str = TOOL
     tolerance: float = nan
 
+    def __post_init__(self) -> None:
+        _check_estimate(self.frame, self.tolerance, "Nm")
+
     def __call__(self, *, frame: str = TOOL, tolerance: float = nan) -> Torque:
         """The same torque with other axes, or with a tolerance."""
         return Torque(frame, tolerance)
 
     def __getitem__(self, joint: int) -> Component:
         """External torque of a joint, 0 for A1 to 6 for A7."""
+        _check_joint(joint)
         return Component(lambda low, high: JointTorqueOutside(joint, low, high), JOINT)
 
     def about(self, axis: str) -> Component:
         """Its component about an axis of the frame."""
+        _check_axis(axis)
         return Component(
-            lambda low, high: TorqueOutside(axis, low, high, frame=self.frame, tolerance=self.tolerance), TORQUE
+            lambda low, high: TorqueOutside(axis, low, high, frame=self.frame, tolerance=self.tolerance),
+            TORQUE,
         )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import within
+from heptarm.values.arrays import finite, shown, within, word
 from heptarm.values.condition.condition import Condition, band_text, check_band
 from heptarm.values.frames import check_name
 
@@ -30,7 +30,7 @@ class SignalIs(Condition):
     def __post_init__(self) -> None:
         check_name(self.signal, "signal")
         if not isinstance(self.value, bool):
-            raise ShapeError(f"value must be True or False, got {self.value!r}", parameter="value")
+            raise ShapeError(f"value must be True or False, got {shown(self.value)}", parameter="value")
 
     def __gt__(self, other: float) -> SignalOutside:
         return SignalOutside(self.signal, -UNBOUNDED, other)
@@ -86,12 +86,7 @@ class PathReached(Condition):
     reference: str = "start"
 
     def __post_init__(self) -> None:
-        if self.reference not in ("start", "destination"):
-            raise ShapeError(
-                f"reference must be 'start' or 'destination', got {self.reference!r}",
-                parameter="reference",
-                value=self.reference,
-            )
+        word(self.reference, "reference", ("start", "destination"))
         low, high = (0.0, PATH) if self.reference == "start" else (-PATH, 0.0)
         within(self.distance, "distance", low, high, unit="m")
         within(self.delay, "delay", -DELAY, DELAY, unit="s")
@@ -134,7 +129,8 @@ class Path:
         Raises:
             ShapeError: negative seconds: after the end there is no motion.
         """
-        if seconds < 0:
+        finite(metres, "metres", unit="m")
+        if finite(seconds, "seconds", unit="s") < 0:
             raise ShapeError(
                 f"seconds must not be negative before the end, got {seconds:g} s",
                 parameter="seconds",

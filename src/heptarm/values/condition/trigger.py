@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import Value, scalar
+from heptarm.values.arrays import Value, finite, shown
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.frames import check_name
 from heptarm.values.io import SignalValue
@@ -29,7 +29,7 @@ class SetOutput(Value):
     def __post_init__(self) -> None:
         check_name(self.signal, "signal")
         if not isinstance(self.value, bool):
-            scalar(self.value, "value")
+            finite(self.value, "value")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +45,7 @@ class Notify(Value):
     def __post_init__(self) -> None:
         if not isinstance(self.label, str) or len(self.label.encode()) > _LONGEST_LABEL:
             raise ShapeError(
-                f"label must be a text of at most {_LONGEST_LABEL} bytes, got {self.label!r}",
+                f"label must be a text of at most {_LONGEST_LABEL} bytes, got {shown(self.label)}",
                 code=3,
                 parameter="label",
                 value=self.label,
@@ -74,7 +74,7 @@ class Trigger(Value):
         check_condition(self.condition, "condition")
         if not isinstance(self.action, SetOutput | Notify):
             raise ShapeError(
-                f"action must be an action of heptarm.do, got {self.action!r}",
+                f"action must be an action of heptarm.do, got {shown(self.action)}",
                 parameter="action",
                 value=self.action,
                 hint="make one with heptarm.do, for example notify('half way') or set_output('LEDBlue', True)",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.errors import ShapeError
+from heptarm.values.arrays import shown
 from heptarm.values.frames import TOOL
 from heptarm.values.mode.directions import DIRECTIONS, one
 from heptarm.values.mode.impedance import STIFFEST, CartesianImpedance
@@ -44,7 +45,7 @@ def compliance(
         or not set(free) <= set(DIRECTIONS)
     ):
         raise ShapeError(
-            f"free must be letters of 'xyzabc', each at most once, got {free!r}",
+            f"free must be letters of 'xyzabc', each at most once, got {shown(free)}",
             parameter="free",
             value=free,
             hint='for example "z", "xy", or "a" for turning about z',

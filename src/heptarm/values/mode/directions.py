@@ -12,8 +12,8 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, frozen, within
+from heptarm.errors import ShapeError
+from heptarm.values.arrays import Array, Value, array, frozen, one_or_each, shown, within
 
 #: Index of a direction by its name.
 DIRECTIONS = {"x": 0, "y": 1, "z": 2, "c": 3, "b": 4, "a": 5}
@@ -35,10 +35,7 @@ def one(value: float, name: str, low: float, high: float, unit: str = "", *, abo
         LimitError: it is outside, or not given.
         ShapeError: it is no number.
     """
-    number = within(value, name, low, high, above=above, unit=unit)
-    if isnan(number):
-        raise LimitError(f"{name} must be a number, got {value!r}", code=1, parameter=name, value=value)
-    return number
+    return within(value, name, low, high, above=above, unit=unit)
 
 
 def each(value: npt.ArrayLike, size: int, name: str, low: float, high: float, unit: str = "") -> Array:
@@ -48,7 +45,7 @@ def each(value: npt.ArrayLike, size: int, name: str, low: float, high: float, un
         LimitError: one is outside; the text names it.
         ShapeError: neither one number nor that many.
     """
-    result = array(np.full(size, value) if np.ndim(value) == 0 else value, size, name)
+    result = one_or_each(value, size, name)
     for index, entry in enumerate(result.tolist()):
         within(entry, f"{name}[{index}]", low, high, unit=unit)
     return result
@@ -85,17 +82,6 @@ def limit(
     return result
 
 
-def flag(value: bool, name: str) -> bool:
-    """True or False.
-
-    Raises:
-        ShapeError: it is something else.
-    """
-    if not isinstance(value, (bool, np.bool_)):
-        raise ShapeError(f"{name} must be True or False, got {value!r}", parameter=name, value=value)
-    return bool(value)
-
-
 def choice(name: str, parameter: str, choices: dict[str, _T]) -> _T:
     """The choice of that name.
 
@@ -106,7 +92,7 @@ def choice(name: str, parameter: str, choices: dict[str, _T]) -> _T:
         return choices[name]
     allowed = ", ".join(choices)
     raise ShapeError(
-        f"{parameter} must be one of {allowed}, got {name!r}",
+        f"{parameter} must be one of {allowed}, got {shown(name)}",
         parameter=parameter,
         value=name,
         allowed=allowed,

@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.arrays import Array, Value, array, within
+from heptarm.values.arrays import Array, Value, array, flag, numbers, shown, within
 from heptarm.values.frames import TOOL, check_name
-from heptarm.values.mode.directions import FORCE, LENGTH, SPEED, each, flag, limit, one, put, six
+from heptarm.values.mode.directions import FORCE, LENGTH, SPEED, each, limit, one, put, six
 
 #: Largest stiffness of a joint [Nm/rad].
 STIFFEST_JOINT = 5000.0
@@ -129,9 +129,9 @@ class CartesianImpedance(Value):
 
 
 def _stiffness(value: npt.ArrayLike) -> Array:
-    if np.ndim(value) == 0:
+    if numbers(value, "stiffness", "6 numbers").ndim == 0:
         raise ShapeError(
-            f"stiffness must be 6 numbers, got {value!r}",
+            f"stiffness must be 6 numbers, got {shown(value)}",
             parameter="stiffness",
             value=value,
             hint="three along the axes [N/m], three about them [Nm/rad]",

@@ -12,11 +12,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias, get_args
 
-from heptarm.values.arrays import Value
+from heptarm.errors import ShapeError
+from heptarm.values.arrays import Value, shown
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.sine import SineImpedance
 
-__all__ = ["CartesianImpedance", "JointImpedance", "Mode", "Position", "SineImpedance"]
+__all__ = ["CartesianImpedance", "HandGuiding", "JointImpedance", "Mode", "Position", "SineImpedance"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,6 +25,26 @@ class Position(Value):
     """Stiff position control, the default."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class HandGuiding(Value):
+    """Guided by hand: what `state.mode` is while a `hand_guide` motion runs; no motion can be given it."""
+
+
 Mode: TypeAlias = Position | JointImpedance | CartesianImpedance | SineImpedance
 #: The same as classes, for isinstance.
 MODES: tuple[type, ...] = get_args(Mode)
+
+
+def check_mode(mode: Mode | None) -> None:
+    """Refuse what is neither a control mode nor None.
+
+    Raises:
+        ShapeError: it is something else.
+    """
+    if mode is not None and not isinstance(mode, MODES):
+        raise ShapeError(
+            f"mode must be a control mode, got {shown(mode)}",
+            parameter="mode",
+            value=mode,
+            hint="make one with heptarm.modes, for example JointImpedance(300.0)",
+        )

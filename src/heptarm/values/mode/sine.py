@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.arrays import Array, Value, within
+from heptarm.values.arrays import Array, Value, finite, flag, optional, shown
 from heptarm.values.mode.directions import (
     DIRECTIONS,
     FORCE,
@@ -21,7 +21,6 @@ from heptarm.values.mode.directions import (
     PLANES,
     at,
     choice,
-    flag,
     limit,
     one,
     put,
@@ -157,7 +156,8 @@ class SineImpedance(Value):
         Raises:
             LimitError: a value outside its range.
         """
-        bias = six((x, y, z, c, b, a), "bias", -STRONGEST, STRONGEST, FORCE)
+        acting = zip("xyzcba", (x, y, z, c, b, a), strict=True)
+        bias = six([finite(value, name) for name, value in acting], "bias", -STRONGEST, STRONGEST, FORCE)
         return cls(_with(base, stiffness, np.flatnonzero(bias).tolist()), bias=bias)
 
     @classmethod
@@ -293,14 +293,16 @@ class SineImpedance(Value):
 def _time(value: float | None, name: str) -> float:
     if isinstance(value, float) and isnan(value):
         return nan
-    return within(value, name, 0.0, _LONGEST_TIME, unit="s")
+    return optional(value, name, 0.0, _LONGEST_TIME, unit="s")
 
 
 def _base(value: CartesianImpedance | None) -> CartesianImpedance:
     if value is None:
         return CartesianImpedance()
     if not isinstance(value, CartesianImpedance):
-        raise ShapeError(f"base must be a CartesianImpedance, got {value!r}", parameter="base", value=value)
+        raise ShapeError(
+            f"base must be a CartesianImpedance, got {shown(value)}", parameter="base", value=value
+        )
     return value
 
 
@@ -311,6 +313,7 @@ def _with(
     under = _base(base)
     if stiffness is None:
         return under
+    stiffness = finite(stiffness, "stiffness")
     changed = under.stiffness.tolist()
     for index in directions:
         changed[index] = stiffness

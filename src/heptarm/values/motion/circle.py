@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.arrays import Array, array, within
+from heptarm.values.arrays import Array, array, shown, within
 from heptarm.values.frames import TOOL, check_name
 from heptarm.values.motion.dynamics import PathMotion, PathSettings, keywords, settings
 from heptarm.values.motion.orientation import VARIABLE, Orientation, orientation_of
@@ -153,7 +153,7 @@ def arc(
             parameter="angle" if radius >= _TOO_CLOSE else "centre",
             hint="move the centre away from the start, or give a larger angle",
         )
-    turns = reference == "path"
+    turns = orientation_of(orientation, reference).reference == "path"
     return circ(
         _turned(start, middle, axis, angle / 2, turns=turns),
         _turned(start, middle, axis, angle, turns=turns),
@@ -176,7 +176,8 @@ def normal_of(plane: str | npt.ArrayLike) -> Array:
     if isinstance(plane, str):
         if plane not in _PLANES:
             raise CommandRejected(
-                f"plane must be one of {', '.join(map(repr, _PLANES))} or a normal of three numbers, got {plane!r}",
+                f"plane must be one of {', '.join(map(repr, _PLANES))} or a normal of three numbers, got "
+                f"{shown(plane)}",
                 parameter="plane",
                 value=plane,
             )
@@ -185,7 +186,7 @@ def normal_of(plane: str | npt.ArrayLike) -> Array:
     length = float(np.linalg.norm(normal))
     if length < 1e-9:
         raise ShapeError(
-            f"plane must be a normal with a direction, got {plane!r}",
+            f"plane must be a normal with a direction, got {shown(plane)}",
             parameter="plane",
             value=plane,
             hint='for example "xy"',

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.arrays import Array, Value, fractions, frozen, within
+from heptarm.values.arrays import Array, Value, fractions, frozen, instance, optional, shown, within
 from heptarm.values.motion.motion import Triggered
 from heptarm.values.robot import RobotModel
 
@@ -136,7 +136,7 @@ def _checked(name: str, value: Any) -> Any:
     """A limit, checked under the name that the user gave it."""
     if name in _PATH:
         high, unit = _PATH[name]
-        return within(value, name, 0.0, high, above=True, unit=unit)
+        return optional(value, name, 0.0, high, above=True, unit=unit)
     return fractions(value, name)
 
 
@@ -212,6 +212,7 @@ class Dynamics(Value):
 
     def filled_from(self, whole: Dynamics) -> Dynamics:
         """The same, where it keeps a default with the limit of another one."""
+        instance(whole, Dynamics, "whole")
         limits = {name: (getattr(self, name), getattr(whole, name)) for name in (*_PATH, *_JOINTS)}
         return Dynamics(**{name: np.where(np.isnan(a), b, a)[()] for name, (a, b) in limits.items()})
 
@@ -342,7 +343,7 @@ def _base(function: str, allowed: Mapping[str, str], dynamics: Dynamics | None) 
         return DEFAULT
     if not isinstance(dynamics, Dynamics):
         raise ShapeError(
-            f"dynamics must be a Dynamics, got {dynamics!r}",
+            f"dynamics must be a Dynamics, got {shown(dynamics)}",
             parameter="dynamics",
             value=dynamics,
             hint="for example Dynamics(speed_mps=0.1, joint_speed=0.3)",

@@ -8,8 +8,8 @@ from math import nan
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import LimitError, ShapeError
-from heptarm.values.arrays import Array, array, frozen, within
+from heptarm.errors import LimitError
+from heptarm.values.arrays import Array, array, frozen, optional, word
 from heptarm.values.motion.motion import Motion
 
 #: What stops at a limit; what happens to a joint that is beyond its limit at the start.
@@ -83,17 +83,13 @@ def hand_guide(
             value=float(low[axis]),
             allowed=f"below {high[axis]:g} rad",
         )
-    for word, name, words in ((at_limit, "at_limit", AT_LIMIT), (outside, "outside", OUTSIDE)):
-        if word not in words:
-            allowed = ", ".join(map(repr, words))
-            raise ShapeError(
-                f"{name} must be one of {allowed}, got {word!r}", parameter=name, value=word, allowed=allowed
-            )
+    for chosen, name, words in ((at_limit, "at_limit", AT_LIMIT), (outside, "outside", OUTSIDE)):
+        word(chosen, name, words)
     return HandGuide(
         low,
         high,
-        within(joint_velocity, "joint_velocity", 0.0, _FASTEST, above=True, unit="rad/s"),
-        within(cartesian_velocity, "cartesian_velocity", 0.0, _FASTEST, above=True, unit="m/s"),
+        optional(joint_velocity, "joint_velocity", 0.0, _FASTEST, above=True, unit="rad/s"),
+        optional(cartesian_velocity, "cartesian_velocity", 0.0, _FASTEST, above=True, unit="m/s"),
         at_limit,
         outside,
     )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy.typing as npt
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import Array, array
+from heptarm.values.arrays import Array, array, shown
 from heptarm.values.frames import TOOL, check_name
 from heptarm.values.motion.dynamics import PathMotion, PathSettings, keywords, settings
 from heptarm.values.motion.orientation import VARIABLE, Orientation, orientation_of
@@ -61,7 +61,7 @@ class LinRel(PathMotion):
     def __post_init__(self) -> None:
         if not isinstance(self.offset, Pose):
             raise ShapeError(
-                f"offset must be a Pose, got {self.offset!r}", parameter="offset", value=self.offset
+                f"offset must be a Pose, got {shown(self.offset)}", parameter="offset", value=self.offset
             )
         check_name(self.frame, "frame")
         check_name(self.moving, "moving")

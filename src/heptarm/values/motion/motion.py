@@ -93,7 +93,7 @@ class Hold(Triggered):
     duration: float = inf
 
     def __post_init__(self) -> None:
-        if self.duration != inf:
+        if not (isinstance(self.duration, float) and self.duration == inf):
             object.__setattr__(
                 self, "duration", within(self.duration, "seconds", 0.0, _LONGEST_HOLD, above=True, unit="s")
             )

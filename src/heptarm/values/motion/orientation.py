@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from heptarm.errors import CommandRejected
-from heptarm.values.arrays import Value
+from heptarm.values.arrays import Value, shown
 
 #: From the start's to the end's orientation; the start's throughout; interpolated from the neighbours in a spline; as
 #: the joints turn it in a PTP. In the order of the protocol.
@@ -34,9 +34,9 @@ class Orientation(Value):
             ("orientation", self.type, TYPES),
             ("reference", self.reference, REFERENCES),
         ):
-            if value not in allowed:
+            if not isinstance(value, str) or value not in allowed:
                 raise CommandRejected(
-                    f"{name} must be one of {', '.join(map(repr, allowed))}, got {value!r}",
+                    f"{name} must be one of {', '.join(map(repr, allowed))}, got {shown(value)}",
                     code=2,
                     parameter=name,
                     value=value,

@@ -92,6 +92,7 @@ def ptp(
     chosen = settings("ptp", JointSettings, limits)
     if isinstance(target, Pose):
         return PtpPose(target, near_of(near, redundancy), redundancy, moving, **chosen)
+    check_name(moving, "moving")
     given = {"near": near is not None, "redundancy": redundancy is not None, "moving": moving != TOOL}
     if any(given.values()):
         names = ", ".join(name for name, is_given in given.items() if is_given)

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, within
+from heptarm.values.arrays import Array, Value, array, shown, within
 from heptarm.values.frames import TOOL, check_name
 from heptarm.values.motion.circle import Circ, normal_of
 from heptarm.values.motion.dynamics import (
@@ -177,7 +177,7 @@ def _segment(one: object, index: int) -> Segment:
         return one
     if not isinstance(one, Lin | Circ):
         raise ShapeError(
-            f"{name} must be a segment of a spline, got {one!r}",
+            f"{name} must be a segment of a spline, got {shown(one)}",
             parameter=name,
             value=one,
             hint="give a pose, spl(...), lin(...) or circ(...)",
@@ -267,7 +267,7 @@ def ellipse(
     angle = within(angle, "angle", -20 * pi, 20 * pi, unit="rad")
     if not isinstance(points, int) or not 12 <= points <= 360:
         raise LimitError(
-            f"points must be in [12, 360], got {points!r}",
+            f"points must be in [12, 360], got {shown(points)}",
             code=2,
             parameter="points",
             value=points,

@@ -5,12 +5,13 @@ from __future__ import annotations
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, frozen, within
+from heptarm.values.arrays import Array, Value, finite, finite_entries, frozen, instance, numbers, within
 from heptarm.values.motion.spline import JointSpline, spline_joints
 
 #: Marks a file as a trajectory, so that another .npz is not mistaken for one.
@@ -33,6 +34,21 @@ class Trajectory(Value):
     q: Array
     robot: str = ""
 
+    def __post_init__(self) -> None:
+        t, points = numbers(self.times, "times"), numbers(self.q, "q")
+        if t.ndim != 1 or len(t) < 2 or points.shape != (len(t), 7):
+            raise ShapeError(
+                f"times and q must have shapes (n,) and (n, 7) with n >= 2, got {t.shape} and {points.shape}",
+                parameter="q",
+            )
+        finite_entries(t, "times")
+        finite_entries(points, "q")
+        if not (np.diff(t) > 0).all():
+            raise LimitError("times must be strictly ascending", code=2, parameter="times")
+        instance(self.robot, str, "robot")
+        object.__setattr__(self, "times", frozen(t - t[0]))
+        object.__setattr__(self, "q", points)
+
     @staticmethod
     def of(times: npt.ArrayLike, q: npt.ArrayLike, *, robot: str = "") -> Trajectory:
         """A trajectory from times and joint positions; its time starts at 0.
@@ -41,17 +57,7 @@ class Trajectory(Value):
             ShapeError: fewer than two points, or shapes that do not fit.
             LimitError: a number that is not finite, or times that do not ascend.
         """
-        t, points = np.array(times, dtype=np.float64), np.array(q, dtype=np.float64)
-        if t.ndim != 1 or len(t) < 2 or points.shape != (len(t), 7):
-            raise ShapeError(
-                f"times and q must have shapes (n,) and (n, 7) with n >= 2, got {t.shape} and {points.shape}",
-                parameter="q",
-            )
-        if not (np.isfinite(t).all() and np.isfinite(points).all()):
-            raise LimitError("times and q must be finite", code=1, parameter="q")
-        if not (np.diff(t) > 0).all():
-            raise LimitError("times must be strictly ascending", code=2, parameter="times")
-        return Trajectory(frozen(t - t[0]), frozen(points), robot)
+        return Trajectory(cast("Array", times), cast("Array", q), robot)
 
     def __len__(self) -> int:
         """Number of points."""
@@ -73,6 +79,7 @@ class Trajectory(Value):
 
     def at(self, t: float) -> tuple[Array, Array]:
         """Positions [rad] and velocities [rad/s] at a time [s], shape (7,) each; before and after, it is at rest."""
+        t = finite(t, "t", unit="s")
         piece = int(np.searchsorted(self.times, t, side="right")) - 1
         if piece < 0 or t >= self.duration:
             return self.q[0 if piece < 0 else -1], np.zeros(7)
@@ -81,6 +88,9 @@ class Trajectory(Value):
 
     def positions(self, times: Array) -> Array:
         """Positions at times of shape (m,) [s], shape (m, 7) [rad]."""
+        times = finite_entries(numbers(times, "times"), "times")
+        if times.ndim != 1:
+            raise ShapeError(f"times must have shape (m,), got {times.shape}", parameter="times", value=times)
         return np.stack([np.interp(times, self.times, column) for column in self.q.T], axis=1)
 
     def trimmed(self, *, still: float = 1e-3) -> Trajectory:
@@ -92,6 +102,7 @@ class Trajectory(Value):
         Raises:
             CommandRejected: nothing moves at all.
         """
+        within(still, "still", 0.0, 1.0, unit="rad")
         away = np.flatnonzero(np.abs(self.q - self.q[0]).max(axis=1) > still)
         before = np.flatnonzero(np.abs(self.q - self.q[-1]).max(axis=1) > still)
         if not len(away) or not len(before):
@@ -150,7 +161,7 @@ class Trajectory(Value):
         Raises:
             OSError: the file cannot be written.
         """
-        file = Path(path).with_suffix(".npz")
+        file = Path(instance(path, (str, Path), "path")).with_suffix(".npz")
         np.savez_compressed(file, format=FORMAT, times=self.times, q=self.q, robot=self.robot)
         return file
 
@@ -162,6 +173,7 @@ class Trajectory(Value):
             OSError: the file does not exist or cannot be read.
             CommandRejected: the file is no trajectory of heptarm.
         """
+        path = Path(instance(path, (str, Path), "path"))
         try:
             # numpy leaves a broken archive open that it has opened itself
             with Path(path).open("rb") as raw, np.load(raw, allow_pickle=False) as file:

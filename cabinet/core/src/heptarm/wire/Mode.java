@@ -22,6 +22,8 @@ public abstract class Mode {
                 return SineImpedance.read(in);
             case 5:
                 return SpiralPattern.read(in);
+            case 6:
+                return HandGuidingMode.read(in);
             default:
                 throw new WireException("Mode has tag " + tag);
         }

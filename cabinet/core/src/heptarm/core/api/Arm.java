@@ -295,7 +295,7 @@ public final class Arm implements EventBus.Listener {
         return service.robot.motion.override();
     }
 
-    /** Control mode of the running motion with its parameters; position control while none is running. */
+    /** Control mode of the running motion with its parameters; HandGuidingMode while the arm is guided by hand, position control while none is running. */
     public Mode mode() {
         return service.executor.status().mode;
     }

@@ -3,6 +3,7 @@ package heptarm.core.checks;
 import heptarm.core.CommandRejected;
 import heptarm.wire.CartesianImpedance;
 import heptarm.wire.Code;
+import heptarm.wire.HandGuidingMode;
 import heptarm.wire.Mode;
 import heptarm.wire.SineImpedance;
 
@@ -21,6 +22,9 @@ public final class ModeChecks {
             SineImpedance pattern = (SineImpedance) mode;
             check(pattern.base, path + "base.");
             check(pattern, path);
+        } else if (mode instanceof HandGuidingMode) {
+            throw new CommandRejected(Code.UNSUPPORTED, path.substring(0, path.length() - 1), "HandGuidingMode", "",
+                    "hand guiding is reported as a mode, but it is started as a motion; run HandGuide");
         }
     }
 

@@ -18,6 +18,7 @@ import heptarm.wire.Code;
 import heptarm.wire.Condition;
 import heptarm.wire.FriOpen;
 import heptarm.wire.HandGuide;
+import heptarm.wire.HandGuidingMode;
 import heptarm.wire.Item;
 import heptarm.wire.Mode;
 import heptarm.wire.PositionMode;
@@ -158,7 +159,8 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
         if (running != null && running.activity != null) {
             mode = running.activity.mode();
         } else if (running != null) {
-            mode = running.run.items[running.item].mode;
+            Item item = running.run.items[running.item];
+            mode = item.motion instanceof HandGuide ? new HandGuidingMode() : item.mode;
         }
         return orPosition(mode);
     }
