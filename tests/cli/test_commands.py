@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from heptarm.wire.messages import MAJOR, MINOR
 from tests.cli.running import objects, run, sim
 from tests.retry import retry, starved
 
@@ -176,7 +177,7 @@ def test_doctor_names_what_to_do_when_nobody_answers() -> None:
 def test_install_cabinet_writes_sources_and_steps_once(tmp_path: Path) -> None:
     out = tmp_path / "cabinet"
     (told,) = objects("install-cabinet", "--out", str(out))
-    assert told["protocol"] == "1.0"
+    assert told["protocol"] == f"{MAJOR}.{MINOR}"
     assert (out / "src/heptarm/app/HeptarmApplication.java").exists()
     assert (out / "src/heptarm/wire/Messages.java").exists()
     assert (

@@ -131,6 +131,8 @@ def test_every_command_uses_the_key(
 ) -> None:
     if name == "rl deploy":
         monkeypatch.setattr("heptarm.cli.rl._load", lambda *_: None)
+    if name == "stop":  # stops before it connects, without a key
+        monkeypatch.setattr("heptarm.cli.stop.halt", lambda *_, **__: None)
     if name == "replay":
         ha.Trajectory.of([0.0, 1.0], [[0.0] * 7, [0.1] * 7]).save(tmp_path / "recorded.npz")
     used: list[str | None] = []
@@ -161,11 +163,12 @@ def test_every_command_uses_the_key(
 def test_a_keyed_cabinet_from_the_command_line(key_file: Path, config: Path) -> None:
     with sim("--key-file", str(key_file)) as ready:
         target = ready["target"]
-        refused = run("stop", "--target", target)
+        refused = run("state", "--target", target)
         assert refused.returncode == 1 and "heptarm key set" in refused.stderr
-        assert run("stop", "--target", target, HEPTARM_KEY=OTHER).returncode == 1
-        assert run("stop", "--target", target, HEPTARM_KEY=KEY).returncode == 0
-        assert run("stop", "--target", target, "--key-file", str(key_file)).returncode == 0
+        assert run("state", "--target", target, HEPTARM_KEY=OTHER).returncode == 1
+        assert run("state", "--target", target, HEPTARM_KEY=KEY).returncode == 0
+        (stopped,) = objects("stop", "--target", target, "--key-file", str(key_file))
+        assert stopped == {"stopped": True, "at_rest": True}, "with the key, a stop sees the arm come to rest"
         assert run("key", "set", "--target", target, "--key-file", str(key_file)).returncode == 0
         (seen,) = objects("state", "--target", target)
         assert seen["virtual"]
