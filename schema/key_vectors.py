@@ -84,7 +84,7 @@ Welcome on every frame is protected. Nothing is encrypted. `‖` joins bytes, `H
 1. The nonces of Hello and Challenge are {p["nonce"]} random bytes. A client refuses a Challenge with its own nonce.
 2. `Proof.mac = HMAC(key, "heptarm client" ‖ 00 ‖ part(Hello) ‖ part(Challenge))`
 3. `Welcome.mac = HMAC(key, "heptarm cabinet" ‖ 00 ‖ part(Hello) ‖ part(Challenge) ‖ part(Proof) ‖ part(Welcome with an
-   empty mac))`. So each side proves its own role, and neither hello (versions, names, capabilities) can be changed on its way.
+   empty mac))`. So each side proves its own role, and neither hello (versions, names, capabilities) can be changed unnoticed.
    A client that was given a key accepts no Welcome without this proof.
 4. The session has two keys, by HKDF-SHA-256 (RFC 5869) with the salt `Hello.nonce ‖ Challenge.nonce`, 32 bytes each:
    the info is `"heptarm client to cabinet"` or `"heptarm cabinet to client"`.

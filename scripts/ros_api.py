@@ -37,6 +37,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "close": (LIFE,),
         "collision_guard": ("~/collision_guard",),
         "connected": ("~/status",),
+        "connection": ("no counterpart: it is for tools and tests",),
         "controller": ("~/info",),
         "detach_tool": ("~/detach_tool",),
         "detach_workpiece": ("~/detach_workpiece",),

@@ -32,7 +32,7 @@ fi
 pip() { $venv/bin/python -m pip "$@"; }
 export PIP_DISABLE_PIP_VERSION_CHECK=1
 
-# Installs exactly the files whose SHA-256 a lock file names. If they are not to be had here, it says so and fails; a file
+# Installs exactly the files whose SHA-256 a lock file names. If they are not to be had here, it reports that and fails; a file
 # with another content ends the set-up.
 locked() {
     name=$1

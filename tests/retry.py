@@ -78,9 +78,15 @@ def starved(outcome: object) -> str:
     return "servo targets came late" if type(outcome).__name__ == "Starved" else ""
 
 
+def silent(outcome: object) -> str:
+    """The cause of a program that the cabinet took for lost, since it heard nothing of it for its watchdog time."""
+    failed = isinstance(outcome, subprocess.CompletedProcess) and outcome.returncode != 0
+    return "a controller was silent" if failed and "its watchdog time is" in str(outcome.stderr) else ""  # type: ignore[union-attr]
+
+
 def busy(outcome: object) -> str:
-    """The cause of a program or a call that this machine was too busy for, in a servo motion or with FRI."""
-    return answers_late(outcome) or starved(outcome)
+    """The cause of a program that this machine was too busy for: its servo targets, its FRI answers, or all of it."""
+    return answers_late(outcome) or starved(outcome) or silent(outcome)
 
 
 def _again(cause: str, left: int) -> bool:

@@ -173,11 +173,13 @@ def test_nothing_else_may_run_and_a_servo_is_used_once(arm: ha.Arm) -> None:
 
 
 def test_the_cabinets_own_time_out_is_renewed_with_the_next_target(arm: ha.Arm) -> None:
-    with arm.servo("joint", watchdog=5.0, goal_timeout=0.1, speed=0.5, acceleration=1.0) as sv:
+    with arm.servo("joint", watchdog=2.0, goal_timeout=0.1, speed=0.5, acceleration=1.0) as sv:
         first = sv.start.q + 0.05 * A7
         sv.set(first)
-        reached = arm.wait_until(lambda state: np.abs(state.q - first).max() < TOUCH)
-        arm.wait_until(lambda state: state.stamp > reached.stamp + 300_000_000)  # timed out
+        arm.wait_until(lambda state: np.abs(state.q - first).max() < TOUCH)
+        sv.set(first)
+        sent = arm.state.stamp
+        arm.wait_until(lambda state: state.stamp > sent + 300_000_000)  # timed out
         goal = sv.start.q - 0.05 * A7
         sv.set(goal)
         arm.wait_until(lambda state: np.abs(state.q - goal).max() < TOUCH, timeout=20.0)

@@ -45,7 +45,7 @@ def test_poses_are_followed_on_straight_lines(arm: ha.Arm) -> None:
 
 def test_a_straight_servo_is_soft_and_renewed_after_its_time_out(arm: ha.Arm) -> None:
     soft = CartesianImpedance((1500.0,) * 3 + (150.0,) * 3, damping=0.7)
-    with arm.servo("lin", watchdog=5.0, goal_timeout=0.1, mode=soft, speed_mps=0.2) as sv:
+    with arm.servo("lin", watchdog=2.0, goal_timeout=0.1, mode=soft, speed_mps=0.2) as sv:
         start = sv.start.pose
         sv.set(start)
         sent = arm.state.stamp

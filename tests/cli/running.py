@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from typing import IO, Any
 
 from tests.interrupts import ctrl_c_interrupts
+from tests.retry import retry, silent
 
 #: Environment variables that would change what a command does.
 _OURS = ("HEPTARM_TARGET", "HEPTARM_KEY")
@@ -21,8 +22,12 @@ HEPTARM = [sys.executable, "-m", "heptarm.cli.main"]
 def run(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     """One command, to its end."""
     variables = {name: value for name, value in os.environ.items() if name not in _OURS} | environment
-    return subprocess.run(
-        [*HEPTARM, *arguments], capture_output=True, text=True, timeout=120, env=variables, check=False
+    command = [*HEPTARM, *arguments]
+    return retry(
+        lambda: subprocess.run(
+            command, capture_output=True, text=True, timeout=120, env=variables, check=False
+        ),
+        silent,
     )
 
 

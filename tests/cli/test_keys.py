@@ -95,7 +95,7 @@ def test_every_command_names_its_target_and_its_key_in_one_way() -> None:
     for name in CONNECTING:
         arguments = EVERY[name].assemble_argument_collection()
         kinds = [argument.hint for argument in arguments]
-        assert options.Target in kinds, f"heptarm {name} connects without cli.options.Target"
+        assert options.CommandTarget in kinds, f"heptarm {name} connects without cli.options.CommandTarget"
         names = {one for argument in arguments for one in argument.names}
         assert {"--target", "--key-file"} <= names, name
 
@@ -108,7 +108,7 @@ def test_no_command_connects_by_itself() -> None:
             if isinstance(node, ast.ImportFrom) and node.module == "heptarm.arm.connect"
         ]
         assert not found or file.name == "options.py", (
-            f"{file.name} must connect by cli.options.Target.connect"
+            f"{file.name} must connect by cli.options.CommandTarget.connect"
         )
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from tests.retry import busy, retry
-from tests.simulators import PATCH
+from tests.simulators import PATIENT, PATIENT_AND_FASTER
 
 ROOT = Path(__file__).resolve().parents[2]
 BLOCK = re.compile(r"^( *)```(?:python|\{code-block\} python)([^\n]*)\n(.*?)^\1```", re.S | re.M)
@@ -66,7 +66,7 @@ def test_snippets_run(page: Path, tmp_path: Path) -> None:
             files.append(tmp_path / f"{page.stem}-line-{line}.py")
             files[-1].write_text(source, encoding="utf-8")
 
-    program = RUNNER if page.name in REAL_TIME else PATCH + RUNNER
+    program = (PATIENT if page.name in REAL_TIME else PATIENT_AND_FASTER) + RUNNER
 
     def run_page() -> subprocess.CompletedProcess[str]:
         return subprocess.run(

@@ -127,14 +127,14 @@ def test_a_tour_through_sunrise(tmp_path: Path, project: Path) -> None:
         ["javac", "-proc:none", "--release", "17", "-cp", path, "-d", str(tmp_path), *sources], check=True
     )
     said = tmp_path / "said.txt"
-    command = _command("sample.Touring", tmp_path, f"sample.file={said}", f"recordings={tmp_path}", speed=2.0)
+    command = _command("sample.Touring", tmp_path, f"sample.file={said}", f"recordings={tmp_path}", speed=1.0)
     command += ["--project", str(project), "--parent-pipe"]
     command += ["--background", "sample.Counting", "--background", "sample.Waiting"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None and '"ready": true' in process.stdout.readline()
         _until(said, "STOP ME", process)
         assert '"error": ""' in _do("protective_stop", process)
-        time.sleep(0.25)  # the arm stands for a while
+        time.sleep(0.5)  # the arm stands for a while
         assert '"error": ""' in _do("clear", process)
         _until(said, "PRESS ME", process)
         assert '"error": ""' in _do("press 2 tour second", process)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.retry import busy, retry
-from tests.simulators import FASTER, PATCH
+from tests.simulators import FASTER, PATIENT, PATIENT_AND_FASTER
 
 #: Of the virtual cabinet that the examples share.
 SPEED = FASTER
@@ -32,14 +32,14 @@ EXAMPLES = sorted(
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.name)
 def test_example(example: Path, request: pytest.FixtureRequest) -> None:
     if example.name in REAL_TIME:
-        target, program = "sim://iiwa14", [str(example)]
+        target, before = "sim://iiwa14", PATIENT
     else:
-        target, program = request.getfixturevalue("cabinet").target, ["-c", PATCH + RUNNER, str(example)]
+        target, before = request.getfixturevalue("cabinet").target, PATIENT_AND_FASTER
     environment = os.environ | {"HEPTARM_TARGET": target}
 
     def run() -> subprocess.CompletedProcess[str]:
         return subprocess.run(
-            [sys.executable, *program],
+            [sys.executable, "-c", before + RUNNER, str(example)],
             capture_output=True,
             text=True,
             timeout=140,

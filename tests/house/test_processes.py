@@ -18,7 +18,7 @@ def pytest_sessionstart():
     from tests import processes
     from tests import hangs
     processes.GRACE = 0.3
-    hangs.AHEAD = 1.0
+    hangs.AHEAD = 57.0
 """
 _HEAD = """
 import os, pathlib, signal, subprocess, sys, time
@@ -99,7 +99,7 @@ def wait_for_nobody(program):
 def test_hangs():
     wait_for_nobody("import time\\ndef sit_there():\\n    time.sleep(60)\\nsit_there()")
 """
-    done, _ = run(tmp_path, body, "--timeout=4", *options)
+    done, _ = run(tmp_path, body, "--timeout=60", *options)
     assert "1 failed" in done.stdout, done.stdout
     log = done.stdout + done.stderr  # what a test's processes print is shown with its failure
     assert "test_it.py::test_hangs hangs; its processes:" in log and "sit_there()" in log, log

@@ -124,7 +124,7 @@ def test_joints_blend_with_lines_and_arcs() -> None:
     assert ear.causes == ["started", "done"] and ear.parts == [1, 2, 3, 4]
     check_limits(track, plant)
     fastest = np.abs(track.dq).max(axis=1)
-    assert fastest[300:-300].min() > 0.02, "it stopped on its way"
+    assert fastest[300:-300].min() > 0.02, "it stopped in transit"
     assert np.abs(plant.snapshot.q - READY).max() <= 1e-4
 
 

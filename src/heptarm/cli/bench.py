@@ -17,12 +17,12 @@ from heptarm.arm.fri.settings import PORTS
 from heptarm.cli.options import (
     FRI,
     NO_TARGET,
+    CommandTarget,
     FriListen,
     FriPeriod,
     FriPort,
     FriVersion,
     Json,
-    Target,
     Yes,
 )
 from heptarm.cli.output import confirm, emit
@@ -80,7 +80,7 @@ def bench(
     duration: Annotated[float, Parameter(help="How long to measure [s].")] = 10.0,
     plot: Annotated[Path | None, Parameter(help="Save a histogram and the time series as a picture.")] = None,
     yes: Yes = False,
-    target: Target = NO_TARGET,
+    target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Measure how fast and how reliably FRI messages are answered, and name the main disturbance."""
@@ -108,7 +108,7 @@ def bench(
 
 @contextmanager
 def _asked(
-    target: Target,
+    target: CommandTarget,
     command: Literal["monitor", "position"],
     period_ms: int,
     settings: dict[str, Any],

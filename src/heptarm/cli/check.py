@@ -14,8 +14,8 @@ from heptarm import testing
 from heptarm.arm.watchdog import CHECK
 from heptarm.cli.options import (
     NO_TARGET,
+    CommandTarget,
     Json,
-    Target,
     Yes,
 )
 from heptarm.cli.output import confirm, emit
@@ -40,7 +40,7 @@ def check(
     sim_speed: Annotated[float, Parameter(help="Without a target: simulated seconds per second.")] = 2.0,
     junit: Annotated[Path | None, Parameter(help="Write a report for CI systems, JUnit XML.")] = None,
     yes: Yes = False,
-    target: Target = NO_TARGET,
+    target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Show what a robot can do, scenario by scenario, by measurement; exit code 1 if one fails.

@@ -17,8 +17,8 @@ from rich.table import Table
 from heptarm.arm.arm import Arm
 from heptarm.cli.options import (
     NO_TARGET,
+    CommandTarget,
     Json,
-    Target,
 )
 from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected, require
@@ -70,7 +70,7 @@ class _Recorder:
 def demo(
     *,
     plot: Annotated[Path, Parameter(help="Where to save the plot.")] = Path("heptarm-demo.png"),
-    target: Target = NO_TARGET,
+    target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Move a virtual arm through the whole stack; a table and a plot show the result."""

@@ -26,12 +26,12 @@ from heptarm.arm.translate.text import printable
 from heptarm.cli.options import (
     FRI,
     NO_TARGET,
+    CommandTarget,
     FriListen,
     FriPeriod,
     FriPort,
     FriVersion,
     Json,
-    Target,
 )
 from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected, ConnectFailed, HeptarmError, Timeout
@@ -94,7 +94,7 @@ def doctor(
     fri_period: FriPeriod = 1,
     fri_version: FriVersion = None,
     seconds: Annotated[float, Parameter(group=FRI, help="How long to check FRI [s].")] = 5.0,
-    target: Target = NO_TARGET,
+    target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Check the installation, and a target if one is given: one verdict and one remedy per line.
@@ -203,7 +203,7 @@ def _port() -> CheckResult:
     return CheckResult("port", "ok", f"{PORT} is free for heptarm sim")
 
 
-def _target(target: Target, text: str) -> Iterator[CheckResult]:
+def _target(target: CommandTarget, text: str) -> Iterator[CheckResult]:
     parsed = parse_target(text)
     if not parsed.is_private:
         try:
@@ -302,7 +302,7 @@ def _safety(arm: Arm) -> CheckResult:
     return CheckResult("safety", "note", found, remedy)
 
 
-def _fri(settings: Look, *, target: Target | None) -> Iterator[CheckResult]:
+def _fri(settings: Look, *, target: CommandTarget | None) -> Iterator[CheckResult]:
     """Check FRI of a target; without one, of any controller that sends to this machine."""
     if not 0.1 <= settings.seconds <= _LONGEST:
         raise CommandRejected(
@@ -372,7 +372,7 @@ def _names_version(text: str) -> bool:
     return "speaks FRI" in text
 
 
-def _opened(settings: Look, target: Target) -> Iterator[CheckResult]:
+def _opened(settings: Look, target: CommandTarget) -> Iterator[CheckResult]:
     """Open a monitoring session of heptarm's application, beside any running motion."""
     try:
         arm = target.connect()

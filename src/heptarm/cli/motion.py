@@ -12,7 +12,7 @@ from cyclopts import Parameter
 
 from heptarm.arm.motion.servo import ServoStats
 from heptarm.arm.translate.motions import items
-from heptarm.cli.options import NO_TARGET, Access, Json, MoveOptions, Speed, Target
+from heptarm.cli.options import NO_TARGET, Access, CommandTarget, Json, MoveOptions, Speed
 from heptarm.cli.output import confirm, emit, state_data
 from heptarm.errors import CommandRejected, NotReady
 from heptarm.values.arrays import within
@@ -239,7 +239,7 @@ def replay(
 def recover(
     *,
     timeout: Annotated[float, Parameter(help="How long to wait for a person to do the rest [s].")] = 0.0,
-    target: Target = NO_TARGET,
+    target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Make the robot ready again after a stop; exit code 1 if a person has to do the rest, which is printed."""

@@ -40,7 +40,7 @@ KeyFile = Annotated[
 
 @Parameter(name="*")
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Target:
+class CommandTarget:
     """What a command connects to. Every command connects by `connect`, so that none can forget the key.
 
     Attributes:
@@ -58,7 +58,7 @@ class Target:
     ] = None
     key_file: KeyFile = None
 
-    def or_else(self, default: str | None) -> Target:
+    def or_else(self, default: str | None) -> CommandTarget:
         """Complete it: as given, else HEPTARM_TARGET, else this default."""
         from heptarm.arm.link.target import VARIABLE
 
@@ -96,7 +96,7 @@ class Target:
 
 
 #: No target was given on the command line.
-NO_TARGET = Target()
+NO_TARGET = CommandTarget()
 
 Json = Annotated[
     bool, Parameter(name="--json", group=COMMON, negative="", help="Print one JSON object per line.")
@@ -115,7 +115,7 @@ class Access:
     """Options of every command that moves the arm."""
 
     yes: Yes = False
-    target: Target = NO_TARGET
+    target: CommandTarget = NO_TARGET
     as_json: Json = False
 
 

@@ -12,10 +12,10 @@ from cyclopts import Parameter
 
 from heptarm.cli.options import (
     NO_TARGET,
+    CommandTarget,
     Json,
     Model,
     Speed,
-    Target,
     Yes,
 )
 from heptarm.cli.output import confirm, emit
@@ -166,7 +166,7 @@ def deploy(
         bool, Parameter(negative="", help="With --out: also a film of the first episodes.")
     ] = False,
     yes: Yes = False,
-    target: Target = NO_TARGET,
+    target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Let a policy control an arm at 30 Hz with a servo motion; needs no torch."""

@@ -241,7 +241,7 @@ def sim(
     if fri is not None:
         from heptarm.cli import fri_sim
 
-        own = {"--view": view, "--key": bool(key), "--project": project is not None}
+        own = {"--view": view, "--key-file": key_file is not None, "--project": project is not None}
         for name, present in own.items():
             if present:
                 raise CommandRejected(

@@ -14,8 +14,8 @@ from rich.text import Text
 from heptarm.arm.arm import Arm
 from heptarm.cli.options import (
     NO_TARGET,
+    CommandTarget,
     Json,
-    Target,
 )
 from heptarm.cli.output import emit, state_data
 from heptarm.values.state import State
@@ -26,7 +26,7 @@ def state(
     watch: Annotated[bool, Parameter(negative="", help="Repeat until Ctrl-C.")] = False,
     rate: Annotated[float, Parameter(help="States per second.")] = 10.0,
     duration: Annotated[float | None, Parameter(help="Watch for this long [s].")] = None,
-    target: Target = NO_TARGET,
+    target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Show the state of the arm."""

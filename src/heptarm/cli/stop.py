@@ -1,10 +1,10 @@
-"""`heptarm stop`: imports little before it has stopped the arm; `Target.connect` imports much more."""
+"""`heptarm stop`: imports little before it has stopped the arm; `CommandTarget.connect` imports much more."""
 
 from __future__ import annotations
 
 from heptarm.arm.link.halt import halt
 from heptarm.arm.link.target import parse_target, target_from_env
-from heptarm.cli.options import NO_TARGET, Json, Target
+from heptarm.cli.options import NO_TARGET, CommandTarget, Json
 from heptarm.cli.output import emit
 from heptarm.errors import ConnectFailed, HeptarmError
 from heptarm.io import tcp
@@ -15,7 +15,7 @@ from heptarm.wire.messages import StopKind
 _PATIENCE = 5.0
 
 
-def stop(*, target: Target = NO_TARGET, as_json: Json = False) -> int:
+def stop(*, target: CommandTarget = NO_TARGET, as_json: Json = False) -> int:
     """Stop the arm; needs no control, no key and no place among the clients."""
     chosen = parse_target(target_from_env() if target.text is None else target.text)
     if chosen.is_private:
@@ -39,7 +39,7 @@ def stop(*, target: Target = NO_TARGET, as_json: Json = False) -> int:
     return 0
 
 
-def _rests(target: Target, *, as_json: bool) -> bool:
+def _rests(target: CommandTarget, *, as_json: bool) -> bool:
     """Wait until the arm rests; False if it cannot be observed."""
     try:
         with target.connect(control=False, timeout=_PATIENCE) as arm:

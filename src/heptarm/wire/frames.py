@@ -147,7 +147,7 @@ class FrameReader:
 def forged(text: str) -> RemoteProtocolError:
     """The error of a frame that is not the next one of the other side."""
     return RemoteProtocolError(
-        f"{text}: it was forged, changed, repeated, reordered or lost on its way",
+        f"{text}: it was forged, changed, repeated, reordered or lost in transit",
         code=int(Code.FORGED_FRAME),
         hint="check who else is on the network, then connect again",
     )

@@ -291,7 +291,7 @@ class Session:
         return Received(message, frame.request, frame.time)
 
     def _check_handshake(self, message: Message, body: bytes) -> None:
-        """Check what a message of the handshake says about the key."""
+        """Check the part of a handshake message that concerns the key."""
         exchange = self._exchange
         if isinstance(message, Hello | Challenge):
             if len(message.nonce) != NONCE:

@@ -48,7 +48,7 @@ public class Oversleeping extends RoboticsAPIApplication {
         return new double[] {held, lbr.getCommandedJointPosition().get(0) - before};
     }
 
-    /** The fastest that A1 seems to turn [rad/s], on its way at 0.1 of its maximum. */
+    /** The fastest that A1 seems to turn [rad/s], in transit at 0.1 of its maximum. */
     private double watch() throws InterruptedException {
         PlantClock clock = new PlantClock();
         lbr.moveAsync(ptp(1.0, 0, 0, 0, 0, 0, 0).setJointVelocityRel(0.1));

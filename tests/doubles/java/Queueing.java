@@ -69,7 +69,8 @@ public class Queueing extends RoboticsAPIApplication implements IErrorHandler, I
         }
         say("listener", events);
 
-        IMotionContainer slow = lbr.moveAsync(ptp(0.0, 0.5, 0.0, -1.2, 0.0, 0.9, 0.0).setJointVelocityRel(0.2));
+        // slow enough for a machine that is busy with something else
+        IMotionContainer slow = lbr.moveAsync(ptp(0.0, 0.5, 0.0, -1.2, 0.0, 0.9, 0.0).setJointVelocityRel(0.03));
         IMotionContainer waiting = lbr.moveAsync(ptp(0.1, 0.5, 0.0, -1.2, 0.0, 0.9, 0.0));
         say("two are active", service.getActiveMotionContainerCount() == 2);
         waiting.cancel();

@@ -90,7 +90,7 @@ class Client(Reader):
 
     Args:
         port: UDP port to bind.
-        host: own address to bind; "0.0.0.0" for all. None: the one that routes to `remote`; all without a remote.
+        host: own address to bind; "0.0.0.0" for all. None: that of the interface to `remote`; all without a remote.
         remote: address of the controller; None accepts any.
         version: FRI release such as "1.15"; None recognises it from the first datagram.
         model: robot, for the limits.

@@ -67,7 +67,7 @@ class Server:
         arm: the arm under the overlays.
         client: destination of the messages, IPv4.
         port: source port; None, or the client's own on this machine: see `source_port`; 0: any free one.
-        bind: own address; empty: the one that routes to the client.
+        bind: own address; empty: that of the interface to the client.
         speed: seconds of the arm's time per second; 0: the arm's time does not depend on the clock.
         clock: monotonic time [ns].
         scenario: faults to inject.
@@ -247,7 +247,7 @@ def _resolved(client: Address) -> Address:
 
 
 def _towards(client: Address) -> str:
-    """Own address from which the client is reached; empty, which means all, while there is no route to it."""
+    """Own address towards the client; empty, which means all, while no interface reaches it."""
     try:
         return own_address(client[0])
     except ConnectFailed:

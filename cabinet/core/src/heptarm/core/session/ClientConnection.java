@@ -257,7 +257,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
 
     /** End a session in which a frame is not the next one of the client. */
     private void forged(String what) {
-        goodbye(Code.FORGED_FRAME, what + ": it was forged, changed, repeated, reordered or lost on its way");
+        goodbye(Code.FORGED_FRAME, what + ": it was forged, changed, repeated, reordered or lost in transit");
     }
 
     // ------------------------------------------------------------------------------------------- writing
