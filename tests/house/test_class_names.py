@@ -27,8 +27,6 @@ TOLD_APART: dict[str, str] = {
     "Plant": "the interface in Java is implemented by the plant in Python",
     "MotionListener": "the interface in Java is called through the one in Python",
     "SharedState": "the two sides of one memory, written by Python and read by Java",
-    "KeyExchange": "the same handshake with a key, computed by each side of the protocol",
-    "FrameTag": "the same tags of frames, computed by each side of the protocol",
     "Violation": "a field outside the schema's range, in the codecs of both languages",
     "IoDirection": "FRI's own enumeration beside the protocol's; heptarm.fri.protocol tells them apart",
     "IoType": "FRI's own enumeration beside the protocol's; heptarm.fri.protocol tells them apart",
