@@ -56,7 +56,7 @@ LOSSES = (
     Loss(
         "servo",
         """
-with arm.servo(rate=100, watchdog=0.2) as servo:
+with arm.servo(rate=100, watchdog=0.2, speed=1.0, acceleration=1.0) as servo:
     while servo.tick():
         servo.set(home + side * min(1.0, 0.5 * servo.t) * np.eye(7)[0])
 """,
