@@ -121,7 +121,7 @@ def test_the_guard_makes_a_step_a_motion_and_names_what_it_limited(arm: ha.Arm) 
         for s in rt:
             if abs(s.q[6] - goal[6]) < 2e-3:
                 break
-        sent = {s.sequence: s.q_sent[6] for s in rt.history() if s.is_answered}
+        sent = {s.sequence: s.q_sent[6] for s in rt.history() if s.is_answered and s.is_commanding}
     steps = [abs(sent[k + 1] - sent[k]) for k in sent if k + 1 in sent]
     assert 0.1 < max(steps) / (LONG * 1e-3) < 1.001 * 0.2 * arm.robot.dq_max[6]
     assert any("A7: velocity limited" in line for line in rt.limited)
