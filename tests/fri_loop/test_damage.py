@@ -197,8 +197,10 @@ def test_a_loop_that_is_killed_is_named_in_the_trouble() -> None:
     with Client(0, realtime=False) as client:
         os.kill(int(client._header[at.PID]), signal.SIGKILL)
         until(lambda: not client.is_running)
-        assert client.trouble == "its process was killed by signal 9 (SIGKILL)"
-        with pytest.raises(ConnectionLost, match=r"FRI loop has ended: its process was killed by signal 9"):
+        assert client.trouble == "its process has ended, killed by signal 9 (SIGKILL)"
+        with pytest.raises(
+            ConnectionLost, match=r"FRI loop has ended: its process has ended, killed by signal 9"
+        ):
             client.command(q=IPO)
 
 

@@ -83,8 +83,9 @@ def numbers(value: npt.ArrayLike, name: str, wanted: str = "numbers") -> Array:
             given = np.asarray(value)
             if given.dtype.kind in "iuf":
                 with np.errstate(over="ignore"):  # of numbers longer than doubles: infinite then
-                    # + 0.0: -0.0 becomes 0.0, so that equal arrays hash alike
-                    return given.astype(np.float64) + 0.0
+                    result = given.astype(np.float64)
+                    result += 0.0  # -0.0 becomes 0.0, so that equal arrays hash alike
+                    return result
         except (TypeError, ValueError):
             pass
         except OverflowError:

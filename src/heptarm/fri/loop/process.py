@@ -200,7 +200,7 @@ class Worker:
         if code is None:
             return "it runs"
         if code < 0:
-            return f"its process was killed by signal {-code} ({signal.Signals(-code).name})"
+            return f"its process has ended, killed by signal {-code} ({signal.Signals(-code).name})"
         return f"its process has ended with status {code}"
 
     def kill(self) -> None:
