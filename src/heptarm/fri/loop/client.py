@@ -185,7 +185,11 @@ class Client(Reader):
         self._closed = False
         try:
             self._worker = process.Worker(block.path, sent)
-            self._wait_for_loop(timeout)
+            try:
+                self._wait_for_loop(timeout)
+            except BaseException:
+                self._worker.kill()
+                raise
         finally:
             block.unlink()
         self.port = int(self._header[at.PORT])
@@ -198,7 +202,7 @@ class Client(Reader):
                     f"the loop's process ended while it started: {self._worker.printed() or 'it printed nothing'}"
                 )
             if time.monotonic() > deadline:
-                self._worker.kill()
+                self._worker.kill()  # ends what it prints
                 printed = self._worker.printed()
                 raise ConnectFailed(
                     f"the loop's process did not start within {timeout:g} s"
