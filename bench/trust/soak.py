@@ -264,7 +264,10 @@ class Soak:
     def fault(self, arm: ha.Arm) -> None:
         """A fault at a random moment of a motion; the robot recovers."""
         name = self._random.choice(FAULTS)
-        handle = arm.start([ha.ptp(HOME + 0.3, speed=0.3), ha.ptp(HOME, speed=0.3)])
+        handle = arm.start([ha.ptp(HOME + 0.3, speed=0.1), ha.ptp(HOME, speed=0.1)])
+        arm.wait_until(
+            lambda state: float(np.abs(state.dq).max()) > 0.02
+        )  # some faults concern the running motion
         time.sleep(self._random.uniform(0.0, 0.8))
         self._cabinet.operate(name)
         try:
