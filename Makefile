@@ -49,7 +49,8 @@ check: $(STAMPS)/venv  ## the generated files agree with the schema
 	$(PY) schema/generate.py --check
 
 test: setup $(STAMPS)/browser lint check  ## everything; what takes long begins first
-	$(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(LONGEST)
+	$(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(LONGEST) -m "not alone"
+	$(PY) -m pytest $(LONGEST) -m alone
 	@$(MAKE) --no-print-directory test-ros
 
 # Each of them takes a processor or two: simulator, node, client.
@@ -59,7 +60,8 @@ test-ros: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## both ROS nodes; side by side w
 	@$(MAKE) --no-print-directory -j$(ROS_JOBS) $(if $(filter-out 1,$(ROS_JOBS)),--output-sync=target) test-ros2 test-ros1
 
 test-long: setup $(STAMPS)/browser  ## everything with LONG=1: soaks, long searches, all cases of conformance
-	LONG=1 $(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --timeout 3600 $(LONGEST)
+	LONG=1 $(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --timeout 3600 $(LONGEST) -m "not alone"
+	LONG=1 $(PY) -m pytest --timeout 3600 $(LONGEST) -m alone
 	@LONG=1 $(MAKE) --no-print-directory test-ros
 	@$(MAKE) --no-print-directory conformance
 

@@ -20,6 +20,7 @@ from tests.cabinet.fake import FakeCabinet
 from tests.cabinet.peer import Busy, Closed, Peer, ptp, run
 
 Make = Callable[..., FakeCabinet]
+pytestmark = pytest.mark.alone
 
 
 def stop(cabinet: FakeCabinet) -> None:

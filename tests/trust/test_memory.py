@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 
+import pytest
+
 import heptarm as ha
 from bench.measure.cabinet import Cabinet
 from bench.trust.soak import soak
 
 LONG = bool(os.environ.get("LONG"))
+pytestmark = pytest.mark.alone
 
 
 def test_calls_from_java_to_python_leave_nothing_behind() -> None:

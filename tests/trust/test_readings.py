@@ -9,6 +9,7 @@ import pytest
 from bench.trust.readings import compare
 
 LONG = bool(os.environ.get("LONG"))
+pytestmark = pytest.mark.alone
 
 
 @pytest.mark.parametrize(
