@@ -100,8 +100,8 @@ def test_something_else_arrives() -> None:
     finally:
         done.set()
         thread.join()
-    assert "none was an FRI message" in found["FRI messages"]["found"]
-    assert "choose another port" in found["FRI messages"]["remedy"]
+    assert "none is a message of FRI" in found["FRI messages"]["found"]
+    assert "another program sends to this port" in found["FRI messages"]["remedy"]
 
 
 def test_bench_measures_a_session_of_its_own(cabinet: RunningCabinet) -> None:

@@ -32,6 +32,7 @@ class Stage:
 
     def _start(self) -> subprocess.Popen[str]:
         command = [str(PYTHON), str(Path(__file__).with_name("faulty.py")), "--port", str(self.port)]
+        command += ["--drive-monitoring", "off"]  # the drives of an arm that does not follow would trip
         process = subprocess.Popen(
             [*command, *self._options],
             stdin=subprocess.PIPE,

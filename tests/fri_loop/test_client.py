@@ -136,8 +136,8 @@ def test_a_law_that_uses_what_belongs_to_this_process_is_refused() -> None:
     assert "not arms, locks or files" in error.value.hint
 
 
-def test_a_process_that_ends_while_it_starts_is_told_with_what_it_printed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+def test_a_law_whose_module_fails_in_the_new_process_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A law's module that this process can import, but the loop's cannot."""
     (tmp_path / "law_with_a_camera.py").write_text(
@@ -146,9 +146,8 @@ def test_a_process_that_ends_while_it_starts_is_told_with_what_it_printed(
     )
     monkeypatch.syspath_prepend(str(tmp_path))
     law = importlib.import_module("law_with_a_camera").law
-    with pytest.raises(ConnectFailed, match="ended while it started: .*RuntimeError: no camera here"):
+    with pytest.raises(ConnectFailed, match="RuntimeError: no camera here"):
         Client(0, law=law, realtime=False)
-    assert "no camera here" in capfd.readouterr().err, "and it is printed"
 
 
 def _until(client: Client, goal: np.ndarray) -> None:
@@ -281,7 +280,7 @@ def test_a_taken_port_and_bad_arguments_are_refused_in_words(client: Client) -> 
         Client(client.port, realtime=False)
     with pytest.raises(CommandRejected, match="got '1.9'"):
         Client(0, version="1.9")
-    with pytest.raises(CommandRejected, match="history must be 16 to 1048576 states, got 1"):
+    with pytest.raises(CommandRejected, match=r"history must be in \[16, 1048576\], got 1"):
         Client(0, history=1)
     with pytest.raises(ShapeError, match="q must have shape"):
         client.command(q=[1.0])

@@ -14,6 +14,7 @@ import pytest
 import heptarm as ha
 from heptarm import testing
 from heptarm.cli import check
+from heptarm.cli.options import NO_TARGET, CommandTarget
 from heptarm.testing import Outcome, Report, Risk, Verdict
 from heptarm.testing.runner import tidy
 from heptarm.testing.scenario import LINES
@@ -131,7 +132,7 @@ def test_the_command_names_runs_and_reports(
         "faults": False,
         "sim_speed": 4.0,
         "yes": False,
-        "target": None,
+        "target": NO_TARGET,
     }
     assert check.check("model", list_only=True, junit=None, as_json=True, **options) == 0
     told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
@@ -146,7 +147,7 @@ def test_the_command_names_runs_and_reports(
         def __exit__(self, *_: object) -> None:
             pass
 
-    monkeypatch.setattr(check, "connect", lambda *_, **__: Lent())
+    monkeypatch.setattr(CommandTarget, "connect", lambda *_, **__: Lent())
     junit = tmp_path / "report.xml"
     assert check.check("model.forward", list_only=False, junit=junit, as_json=True, **options) == 0
     *outcomes, last = [json.loads(line) for line in capsys.readouterr().out.splitlines()]

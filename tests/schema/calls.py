@@ -183,7 +183,7 @@ CALLS: dict[str, Call] = {
         _soft(
             lambda v: SineImpedance.spiral("xy", frequency=1.0, amplitude=1.0, total_time=1.0, stiffness=v)
         ),
-        "stiffness[0]",
+        "stiffness",
     ),
     "SpiralPattern.total_time": Call(
         _soft(lambda v: SineImpedance.spiral("xy", frequency=1.0, amplitude=1.0, total_time=v)), "total_time"

@@ -20,7 +20,7 @@ TCP = Pose.xyz_abc(0.02, 0.0, 0.15, 0.3, 0.0, 0.2)
 def serving(tcp: Pose | None = None, **terms: object) -> tuple[Plant, Ear, Pose]:
     plant, ear = ready(), Ear()
     tip = tcp or Pose.of((0.0, 0.0, 0.0))
-    wanted: dict[str, object] = {"straight": LIMITS, "tcp": numbers(tip), "listener": ear, **terms}
+    wanted: dict[str, object] = {"straight_limits": LIMITS, "tcp": numbers(tip), "listener": ear, **terms}
     plant.submit(Order(7, "straight", **wanted))  # type: ignore[arg-type]
     plant.step(2)
     return plant, ear, Pose.from_matrix(forward(plant.robot, np.array(READY))) @ tip

@@ -361,7 +361,7 @@ def _listening(settings: Look, port: int) -> Iterator[CheckResult]:
 
 def _nothing(client: Client, seconds: float) -> CheckResult:
     if client.stats.malformed:
-        found, _, remedy = strangers(client).rpartition(": ")
+        found, _, remedy = strangers(client).replace(": likely cause", "").rpartition(": ")
         return CheckResult("FRI messages", "bad", found, _VERSION if _names_version(found) else remedy)
     advice = silence("", client.port).partition("; ")[2]
     return CheckResult("FRI messages", "bad", f"nothing has arrived within {seconds:g} s", advice)

@@ -16,7 +16,7 @@ from heptarm.values.condition.condition import Condition
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion
 from heptarm.values.result import Result
-from heptarm.values.state import State
+from heptarm.values.state import GROUP_NAMES, State
 
 #: More numbers than this are reported by their least and largest.
 _MANY = 16
@@ -207,9 +207,14 @@ def record(
 
 
 def fresh(arm: Arm, *, after: float = 0.03) -> State:
-    """A state that is sampled later than now by so many cabinet seconds: everything before counts in it."""
-    now = arm.state.stamp
-    return arm.wait_until(lambda state: state.stamp > now + round(after * 1e9))
+    """A state with all groups sampled later than now by so many cabinet seconds: everything before counts in it."""
+    due = arm.state.stamp + round(after * 1e9)
+
+    def is_fresh(state: State) -> bool:
+        groups = (getattr(state.groups, name) for name in GROUP_NAMES)
+        return all(group.stamp > due for group in groups if group is not None)
+
+    return arm.wait_until(is_fresh)
 
 
 def watch(arm: Arm, seconds: float) -> tuple[State, ...]:

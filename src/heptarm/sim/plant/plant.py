@@ -18,7 +18,7 @@ from heptarm.sim.control.laws import MeasuredState, PositionLaw, Superposition
 from heptarm.sim.controller.interpolator import Interpolator
 from heptarm.sim.controller.safety import SafetyController, StopRequest
 from heptarm.sim.planning.command import TICK
-from heptarm.sim.plant.drive_monitor import DriveMonitor
+from heptarm.sim.plant.drive_monitor import LAG, DriveMonitor
 from heptarm.sim.plant.external_load import ExternalLoad
 from heptarm.sim.plant.io_image import IoImage
 from heptarm.sim.plant.payload import PayloadModel
@@ -66,8 +66,8 @@ def posture(robot: RobotModel, q: Sequence[float]) -> tuple[float, int]:
 #: After a stop on the path the brakes close when no axis is faster than this [rad/s], or after this many ticks.
 BRAKE_SPEED = 0.02
 BRAKE_TICKS = 400
-#: A brake that cannot hold its axis slips as far behind it [rad].
-BRAKE_SLIP = 0.05
+#: A brake that cannot hold its axis slips as far behind it [rad]; no drive trips at once when the brakes open.
+BRAKE_SLIP = 0.8 * LAG
 
 _REQUEST_FLAGS = {
     StopRequest.EMERGENCY_STOP: SafetyFlags.EMERGENCY_STOP,

@@ -26,7 +26,7 @@ from heptarm.values.mode.directions import (
     put,
     six,
 )
-from heptarm.values.mode.impedance import NO_FORCE, STRONGEST, UNLIMITED, CartesianImpedance
+from heptarm.values.mode.impedance import NO_FORCE, STIFFEST, STRONGEST, UNLIMITED, CartesianImpedance
 
 #: Highest frequency of an overlaid force [Hz].
 FASTEST = 15.0
@@ -313,7 +313,8 @@ def _with(
     under = _base(base)
     if stiffness is None:
         return under
-    stiffness = finite(stiffness, "stiffness")
+    most, unit = (STIFFEST[1], "Nm/rad") if any(index > 2 for index in directions) else (STIFFEST[0], "N/m")
+    stiffness = one(stiffness, "stiffness", 0.0, most, unit)
     changed = under.stiffness.tolist()
     for index in directions:
         changed[index] = stiffness
