@@ -83,6 +83,9 @@ def test_an_attacked_line_stops_the_arm(keyed: FakeCabinet, direction: str, atta
             motion = arm.start(ha.ptp([-2.5 if arm.state.q[0] > 0 else 2.5, 0, 0, 0, 0, 0, 0]))
             watcher.wait_for(wire.MotionStarted, lambda event: event.id == motion.id)
             watcher.ask(wire.Subscribe(groups=wire.Groups.MOTION, rate=200.0))
+            watcher.wait_for(
+                wire.State, lambda state: state.motion is not None and state.motion.motion == motion.id
+            )
             relay.attack(direction, ATTACKS[attack])  # type: ignore[arg-type]
             with pytest.raises(ha.ConnectionLost) as error:
                 motion.wait(timeout=30.0)
