@@ -63,7 +63,7 @@ def test_targets_are_followed_and_counted_and_the_stream_closes_at_rest(cabinet:
         for step in range(50):
             peer.send(target(servo, 0.01 * step))
             time.sleep(0.002)
-        reached(peer, 0.49)  # whoever closes drops a target that waits
+        reached(peer, 0.49)  # closing drops a target that waits
         assert isinstance(peer.ask(wire.ServoClose(servo=servo)), wire.Accepted)
         end = finish(peer, servo)
         assert (end.cause, end.q[6]) == (wire.Cause.CANCELLED, 0.49)

@@ -2,7 +2,7 @@
 
     .venv/bin/python tests/conformance/faulty.py [options of heptarm.sim.runtime.cabinet]
 
-follows, frozen, lags: how the arm does what its set-points say, whoever makes them. press, release: the emergency stop.
+follows, frozen, lags: how the arm follows its set-points, from any source. press, release: the emergency stop.
 Everything else is what the operator does, as in `heptarm sim`.
 It answers every line on standard output.
 """
