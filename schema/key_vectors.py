@@ -141,7 +141,8 @@ datagrams: UDP, with the number of the TCP port, at most {p["max_datagram"]} byt
    client datagrams" ‖ token ‖ 01)`. With a pre-shared key, S is the secret of which the keys of the session follow (step 4
    above, before the info is applied); without one it is the token. The tag is computed as above, with n = 0.
 4. The receiver ignores, and counts, a datagram that is damaged, that has a wrong tag, that is not newer (by `seq`) than every
-   accepted one of its stream, or that is older (by `time`) than the watchdog time of the session. A stream is: all servo targets;
+   accepted one of its stream, or that is too old (by `time`): for the cabinet, than the watchdog time of the client in control, 0.5 s
+   for others; for the client, than 1 s. A stream is: all servo targets;
    Stop and Cancel; each other message. The cabinet also ignores what does not come from the address of the session. An ignored
    datagram has no other effect; it never ends a session.
 5. Each side sends Ping as datagram a few times a second; the other one answers with Pong by datagram. While its pings are

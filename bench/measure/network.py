@@ -1,4 +1,4 @@
-"""A bad network between two namespaces of this machine: real TCP and UDP over packets that get lost, late and out of order.
+"""A bad network between two namespaces of this machine, with real TCP and UDP: packets get lost, late and out of order.
 
 Each namespace has a TUN device; a thread carries IP packets between the two devices and impairs them. It needs root and
 /dev/net/tun; nothing outside the two namespaces changes.

@@ -1,7 +1,7 @@
 """Datagrams of a link: targets, stops and pings go up, states come down; TCP remains beside them.
 
-Whether datagrams get through is measured, not assumed: pings go up all the time, and as long as their answers come, targets
-need no copy over TCP. Whatever the network does to a datagram, the link goes on.
+Whether datagrams get through is measured, not assumed: pings go up all the time, and as long as their answers come,
+targets need no copy over TCP. Whatever the network does to a datagram, the link goes on.
 """
 
 from __future__ import annotations

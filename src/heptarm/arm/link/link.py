@@ -475,6 +475,9 @@ class Link:
 
     def pack_target(self, kind: type[OneWay], numbers: Iterable[float], *, now: int) -> bytes:
         """Encode much as `send_target` does, without sending it."""
+        line = self._datagrams
+        if line is not None:
+            return line.pack(kind, numbers, number=0, now=now)
         return self._session.pack_numbers(kind, numbers, time=self.offset.to_cabinet(now))
 
     def ping(self) -> None:

@@ -68,8 +68,14 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
         try {
             datagrams.open(settings.bind, port);
         } catch (IOException e) {
-            log.warn("UDP port " + port + " cannot be opened (" + e.getMessage() + "): servo targets and states go over TCP");
+            log.warn(withoutUdp(port, e));
+        } catch (RuntimeException e) { // forbidden on this cabinet
+            log.warn(withoutUdp(port, e));
         }
+    }
+
+    private static String withoutUdp(int port, Exception why) {
+        return "UDP port " + port + " cannot be opened (" + why.getMessage() + "): servo targets and states go over TCP";
     }
 
     /** Stop motion, say goodbye to all clients, close the port, end all threads. */
