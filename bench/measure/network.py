@@ -54,7 +54,7 @@ class Impairment:
     cut: frozenset[Protocol] = frozenset()
 
 
-#: One packet in ten is lost, each way, and all are 15 to 25 ms late.
+#: One packet in ten is lost in each direction, and all are 15 to 25 ms late.
 BAD = Impairment(loss=0.1, delay=0.02, jitter=0.005)
 CUT = Impairment(cut=frozenset(("tcp", "udp")))
 

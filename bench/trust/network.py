@@ -126,7 +126,7 @@ def stream(network: BadNetwork, port: int, kind: str, seconds: float) -> Outcome
 
 @benchmark("bad_network")
 def bad_network() -> Iterator[Figure]:
-    """Servo streams at 200 Hz with 10 % loss each way and 20 ± 5 ms: by datagram, and over TCP alone."""
+    """Servo streams at 200 Hz with 10 % loss in each direction and 20 ± 5 ms: by datagram, and over TCP alone."""
     reason = why_not()
     if reason:
         yield Figure("bad_network_alive", nan, "count", disturbed=True, detail={"error": reason})

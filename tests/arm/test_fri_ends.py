@@ -140,7 +140,9 @@ def test_a_monitor_that_the_cabinet_ends(peer: Peer, quality: str, text: str, ki
         assert rt.next() is not None
         peer.tell(changed(9, States.IDLE, wire.FriQuality[quality], 0, text))
         assert not rt.wait(30.0)
-        peer.tell(changed(9, States.MONITORING_READY, wire.FriQuality.GOOD))  # late event: the session stays ended
+        peer.tell(
+            changed(9, States.MONITORING_READY, wire.FriQuality.GOOD)
+        )  # late event: the session stays ended
         assert rt.next() is None
 
 

@@ -77,9 +77,9 @@ class Line:
         self.throw(data)
         return data
 
-    def counts(self) -> wire.DatagramCounts:
-        answer = self.peer.ask(wire.GetDatagramCounts())
-        assert isinstance(answer, wire.DatagramCounts)
+    def counts(self) -> wire.DatagramStatistics:
+        answer = self.peer.ask(wire.GetDatagramStatistics())
+        assert isinstance(answer, wire.DatagramStatistics)
         return answer
 
     def counted(self, **least: int) -> None:

@@ -123,7 +123,9 @@ def case_triggers_write_outputs_and_notify(probe: Probe, stage: Stage) -> None:
     sent = probe.send("run_program", "RunProgram", motions=program)
     assert done(sent.end()).item == 2
     until(lambda: lit("MediaFlange.LEDRed"), "the output is not written")
-    fed = [one for feedback in sent.told for one in feedback.events]  # the last one may arrive after the result
+    fed = [
+        one for feedback in sent.told for one in feedback.events
+    ]  # the last one may arrive after the result
     assert fed[0].kind == "begun" and {feedback.item for feedback in sent.told} == {0, 1, 2}
     assert any(feedback.remaining > 0.0 for feedback in sent.told)
     number = fed[0].motion

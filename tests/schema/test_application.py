@@ -48,7 +48,9 @@ def picture(cabinet: PrivateCabinet) -> tuple[object, ...]:
     """The state that a refused request might have changed."""
     with ha.connect(f"sim://{cabinet.host}:{cabinet.port}", control=False, timeout=PATIENCE) as arm:
         arm.subscribe(groups=("joints", "motion", "safety", "mode", "io"))
-        state = arm.wait_until(lambda s: s.groups.io is not None and s.groups.mode is not None, timeout=PATIENCE)
+        state = arm.wait_until(
+            lambda s: s.groups.io is not None and s.groups.mode is not None, timeout=PATIENCE
+        )
         assert state.motion is not None and state.groups.mode is not None
         motion, control = state.motion, state.groups.mode
         told = (motion.id, motion.queued, motion.override, control.mode, control.tool, control.workpiece)

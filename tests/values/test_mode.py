@@ -43,9 +43,7 @@ def test_equal_hashed_and_pickled_by_value(make: Callable[[], Mode]) -> None:
     assert mode == make()
     assert hash(mode) == hash(make())
     assert pickle.loads(pickle.dumps(mode)) == mode
-    with pytest.raises(
-        (AttributeError, TypeError)
-    ):  # Python 3.10 raises TypeError where a slot is missing
+    with pytest.raises((AttributeError, TypeError)):  # Python 3.10 raises TypeError where a slot is missing
         setattr(mode, fields(mode)[0].name if fields(mode) else "stiffness", None)
 
 

@@ -3845,8 +3845,8 @@ class ProcessData:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GetDatagramCounts:
-    """Reads what the cabinet has counted of this session's datagrams; answered by DatagramCounts."""
+class GetDatagramStatistics:
+    """Reads what the cabinet has counted of this session's datagrams; answered by DatagramStatistics."""
 
     TYPE: ClassVar[int] = 57
     KIND: ClassVar[str] = "request"
@@ -3858,7 +3858,7 @@ class GetDatagramCounts:
         pass
 
     @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[GetDatagramCounts, int]:
+    def _read(cls, data: bytes, pos: int) -> tuple[GetDatagramStatistics, int]:
         return cls(), pos
 
     def _check(self, path: str) -> None:
@@ -3871,10 +3871,10 @@ class GetDatagramCounts:
         return b"".join(out)
 
     @classmethod
-    def decode(cls, data: bytes) -> GetDatagramCounts:
+    def decode(cls, data: bytes) -> GetDatagramStatistics:
         """Read one body, all of it."""
         value, pos = cls._read(data, 0)
-        codec.end(data, pos, "GetDatagramCounts")
+        codec.end(data, pos, "GetDatagramStatistics")
         return value
 
     def validate(self) -> None:
@@ -3882,11 +3882,11 @@ class GetDatagramCounts:
         self._check("")
 
 
-_DatagramCounts_0 = Struct(">IIIIIII")
+_DatagramStatistics_0 = Struct(">IIIIIII")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DatagramCounts:
+class DatagramStatistics:
     """The datagrams of this session since its last OpenDatagrams."""
 
     TYPE: ClassVar[int] = 58
@@ -3903,12 +3903,12 @@ class DatagramCounts:
     sent: int
 
     def _write(self, out: list[bytes]) -> None:
-        out.append(_DatagramCounts_0.pack(self.accepted, self.old, self.late, self.forged, self.damaged, self.strange, self.sent))
+        out.append(_DatagramStatistics_0.pack(self.accepted, self.old, self.late, self.forged, self.damaged, self.strange, self.sent))
 
     @classmethod
-    def _read(cls, data: bytes, pos: int) -> tuple[DatagramCounts, int]:
-        v = codec.unpack(_DatagramCounts_0, data, pos)
-        pos += _DatagramCounts_0.size
+    def _read(cls, data: bytes, pos: int) -> tuple[DatagramStatistics, int]:
+        v = codec.unpack(_DatagramStatistics_0, data, pos)
+        pos += _DatagramStatistics_0.size
         accepted = v[0]
         old = v[1]
         late = v[2]
@@ -3928,10 +3928,10 @@ class DatagramCounts:
         return b"".join(out)
 
     @classmethod
-    def decode(cls, data: bytes) -> DatagramCounts:
+    def decode(cls, data: bytes) -> DatagramStatistics:
         """Read one body, all of it."""
         value, pos = cls._read(data, 0)
-        codec.end(data, pos, "DatagramCounts")
+        codec.end(data, pos, "DatagramStatistics")
         return value
 
     def validate(self) -> None:
@@ -5207,7 +5207,7 @@ class State:
         self._check("")
 
 
-Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramCounts | DatagramCounts | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
+Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
 OneWay: TypeAlias = ServoJoints | ServoJointsVelocity | ServoPose
 
 #: Message classes by id.
@@ -5245,8 +5245,8 @@ MESSAGES: dict[int, type[Message]] = {
     54: GetProcessData,
     55: SetProcessData,
     56: ProcessData,
-    57: GetDatagramCounts,
-    58: DatagramCounts,
+    57: GetDatagramStatistics,
+    58: DatagramStatistics,
     64: ServoOpen,
     65: ServoJoints,
     66: ServoJointsVelocity,

@@ -35,9 +35,9 @@ from heptarm.wire.messages import (
     Accepted,
     Cancel,
     Challenge,
-    DatagramCounts,
+    DatagramStatistics,
     DatagramToken,
-    GetDatagramCounts,
+    GetDatagramStatistics,
     Goodbye,
     Message,
     OneWay,
@@ -321,12 +321,12 @@ class Link:
         """How the datagrams fare; None: they are not open."""
         return None if self._datagrams is None else self._datagrams.report
 
-    def datagram_counts(self, *, timeout: float) -> DatagramCounts:
+    def datagram_counts(self, *, timeout: float) -> DatagramStatistics:
         """What the cabinet has counted of this session's datagrams; raises as `request` does."""
-        answer = self.request(GetDatagramCounts(), timeout=timeout)
-        if not isinstance(answer, DatagramCounts):
+        answer = self.request(GetDatagramStatistics(), timeout=timeout)
+        if not isinstance(answer, DatagramStatistics):
             raise RemoteProtocolError(
-                f"the cabinet answered GetDatagramCounts with {type(answer).__name__}, not with DatagramCounts"
+                f"the cabinet answered GetDatagramStatistics with {type(answer).__name__}, not with DatagramStatistics"
             )
         return answer
 

@@ -111,10 +111,10 @@ public final class Messages {
                 message = ProcessData.read(in);
                 break;
             case 57:
-                message = GetDatagramCounts.read(in);
+                message = GetDatagramStatistics.read(in);
                 break;
             case 58:
-                message = DatagramCounts.read(in);
+                message = DatagramStatistics.read(in);
                 break;
             case 64:
                 message = ServoOpen.read(in);

@@ -14,7 +14,7 @@ import heptarm.core.key.FrameTag;
 import heptarm.core.key.KeyExchange;
 import heptarm.core.state.StateSampler;
 import heptarm.wire.Code;
-import heptarm.wire.DatagramCounts;
+import heptarm.wire.DatagramStatistics;
 import heptarm.wire.DatagramToken;
 import heptarm.wire.Goodbye;
 import heptarm.wire.Message;
@@ -305,9 +305,9 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     }
 
     /** What was counted of the datagrams; all 0 if they are not open. */
-    DatagramCounts datagramCounts() {
+    DatagramStatistics datagramCounts() {
         DatagramPeer peer = datagrams;
-        return peer == null ? new DatagramCounts(0, 0, 0, 0, 0, port.strange(), 0) : peer.counts();
+        return peer == null ? new DatagramStatistics(0, 0, 0, 0, 0, port.strange(), 0) : peer.counts();
     }
 
     /** Ping the client by datagram when it is time. */

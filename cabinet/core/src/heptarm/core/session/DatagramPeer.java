@@ -5,7 +5,7 @@ import java.net.InetAddress;
 import heptarm.core.Clock;
 import heptarm.core.key.FrameTag;
 import heptarm.wire.Cancel;
-import heptarm.wire.DatagramCounts;
+import heptarm.wire.DatagramStatistics;
 import heptarm.wire.Decoder;
 import heptarm.wire.Message;
 import heptarm.wire.Messages;
@@ -196,7 +196,7 @@ final class DatagramPeer {
         return port.send(packed, end + Protocol.TAG, address, from);
     }
 
-    synchronized DatagramCounts counts() {
-        return new DatagramCounts(accepted, old, late, forged, damaged, port.strange(), seq);
+    synchronized DatagramStatistics counts() {
+        return new DatagramStatistics(accepted, old, late, forged, damaged, port.strange(), seq);
     }
 }

@@ -5,7 +5,7 @@ import heptarm.core.Log;
 import heptarm.core.state.StateSampler;
 import heptarm.wire.Accepted;
 import heptarm.wire.Code;
-import heptarm.wire.GetDatagramCounts;
+import heptarm.wire.GetDatagramStatistics;
 import heptarm.wire.Message;
 import heptarm.wire.Messages;
 import heptarm.wire.OpenDatagrams;
@@ -130,7 +130,7 @@ final class RequestDispatcher {
             authority.release(client, client.name() + " released control");
         } else if (message instanceof OpenDatagrams) {
             return client.openDatagrams();
-        } else if (message instanceof GetDatagramCounts) {
+        } else if (message instanceof GetDatagramStatistics) {
             return client.datagramCounts();
         } else {
             return commands.answer(message);

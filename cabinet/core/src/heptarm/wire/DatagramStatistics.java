@@ -2,7 +2,7 @@
 package heptarm.wire;
 
 /** The datagrams of this session since its last OpenDatagrams. */
-public final class DatagramCounts extends Message {
+public final class DatagramStatistics extends Message {
     /** received and in order */
     public final long accepted;
     /** ignored: repeated, or overtaken by a newer one of the same stream */
@@ -18,7 +18,7 @@ public final class DatagramCounts extends Message {
     /** sent to this client */
     public final long sent;
 
-    public DatagramCounts(long accepted, long old, long late, long forged, long damaged, long strange, long sent) {
+    public DatagramStatistics(long accepted, long old, long late, long forged, long damaged, long strange, long sent) {
         this.accepted = accepted;
         this.old = old;
         this.late = late;
@@ -44,7 +44,7 @@ public final class DatagramCounts extends Message {
         out.putU32(sent);
     }
 
-    public static DatagramCounts read(Decoder in) throws WireException {
+    public static DatagramStatistics read(Decoder in) throws WireException {
         long accepted = in.getU32();
         long old = in.getU32();
         long late = in.getU32();
@@ -52,7 +52,7 @@ public final class DatagramCounts extends Message {
         long damaged = in.getU32();
         long strange = in.getU32();
         long sent = in.getU32();
-        return new DatagramCounts(accepted, old, late, forged, damaged, strange, sent);
+        return new DatagramStatistics(accepted, old, late, forged, damaged, strange, sent);
     }
 
     public void validate(String path) throws Violation {
