@@ -133,11 +133,13 @@ class BadNetwork:
         impairment: the present one.
         passed: packets that arrived.
         lost: packets that did not.
+        stall: longest time by which a packet was later than it had to be, because this machine was busy [s].
     """
 
     def __init__(self, impairment: Impairment, *, seed: int = 1) -> None:
         self.impairment = impairment
         self.passed = self.lost = 0
+        self.stall = 0.0
         self._random = random.Random(seed)
         self._sides = {side: _Namespace(side) for side in ADDRESSES}
         self._ends = os.pipe()
@@ -161,13 +163,14 @@ class BadNetwork:
             for device in ready:
                 with contextlib.suppress(BlockingIOError):
                     packet = os.read(device, _PACKET)
-                    due = self._due(packet)
-                    if due is not None:
+                    arrival = self._due(packet)
+                    if arrival is not None:
                         count += 1
-                        heapq.heappush(waiting, (due, count, other[device], packet))
+                        heapq.heappush(waiting, (arrival, count, other[device], packet))
             now = time.monotonic()
             while waiting and waiting[0][0] <= now:
-                _, _, device, packet = heapq.heappop(waiting)
+                due, _, device, packet = heapq.heappop(waiting)
+                self.stall = max(self.stall, now - due)
                 self._write(device, packet)
 
     def _due(self, packet: bytes) -> float | None:
