@@ -52,7 +52,7 @@ def _folder(item: pytest.Item) -> int:
 
 @dataclass(frozen=True)
 class RunningCabinet:
-    """A virtual cabinet that several tests share."""
+    """A virtual cabinet shared by several tests."""
 
     host: str
     port: int

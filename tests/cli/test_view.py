@@ -53,7 +53,7 @@ def _picture(browser: object) -> np.ndarray:
     return imread(io.BytesIO(browser.get_screenshot_as_png()), format="png")[..., :3]
 
 
-def _share(picture: np.ndarray, low: tuple[float, ...], high: tuple[float, ...]) -> float:
+def _fraction(picture: np.ndarray, low: tuple[float, ...], high: tuple[float, ...]) -> float:
     return float(((picture >= low) & (picture <= high)).all(axis=-1).mean())
 
 
@@ -81,7 +81,7 @@ def test_the_view_shows_the_arm_and_follows_it(browser: object, tmp_path: Path) 
         browser.get(ready["view"])
         first = _settled(browser)
         browser.save_screenshot(str(tmp_path / "view.png"))
-        assert _share(first, (0.55, 0.55, 0.55), (0.9, 0.9, 0.9)) > 0.005, "no silver links"
+        assert _fraction(first, (0.55, 0.55, 0.55), (0.9, 0.9, 0.9)) > 0.005, "no silver links"
         with ha.connect(ready["target"]) as arm:
             arm.move(ha.ptp(ha.deg(60, 50, 0, -60, 0, 60, 0)))
         second = _settled(browser)

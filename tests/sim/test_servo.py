@@ -122,7 +122,7 @@ def test_a_target_that_stays_ends_the_motion_after_its_timeout() -> None:
     assert ear.causes == ["started", "done"]
 
 
-def test_a_velocity_that_leads_out_of_the_limits_stops_the_arm() -> None:
+def test_a_velocity_that_goes_out_of_the_limits_stops_the_arm() -> None:
     plant, ear = serving(servo_timing=ServoTiming(speed_timeout=1.0))
     edge = HERE.copy()
     edge[6] = plant.robot.q_max[6] - 0.01
@@ -219,7 +219,7 @@ def test_a_motion_planned_behind_an_impedance_motion_starts_where_the_arm_is() -
 
 @pytest.mark.parametrize("fast", [False, True], ids=["path", "fast"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_whoever_cancels_a_motion_that_a_stop_halts_turns_nothing_back(kind: str, fast: bool) -> None:
+def test_a_client_that_cancels_a_motion_that_a_stop_halts_turns_nothing_back(kind: str, fast: bool) -> None:
     for lag in (*range(0, 16, 3), 17, 18, 19, 25, 60):
         plant, ear = serving(kind, joint_velocity=(0.2,) * 7, joint_acceleration=(0.2,) * 7)
         plant.shared.post(7, HERE + 0.5)
