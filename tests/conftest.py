@@ -19,7 +19,7 @@ from tests.long import LONG
 if TYPE_CHECKING:
     from heptarm import Arm
 
-pytest_plugins = ["tests.processes", "tests.hangs", "tests.retry"]
+pytest_plugins = ["tests.processes", "tests.hangs", "tests.retry", "tests.browser"]
 
 _LATE = ("slow", "browser")
 #: Folders with what takes long; training at the end of them, since it leaves little time to what runs beside it.
