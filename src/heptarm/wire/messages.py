@@ -23,6 +23,8 @@ PORT = 30001
 MAGIC = 0x4837
 NONCE = 32
 TAG = 16
+TOKEN = 32
+MAX_DATAGRAM = 1400
 MAX_BODY = 1048576
 HEADER = Struct(">HBBHIIIq")
 _MASK = Struct(">H")
@@ -2884,6 +2886,48 @@ class Rejected:
         self._check("")
 
 
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DatagramToken:
+    """Answer to OpenDatagrams."""
+
+    TYPE: ClassVar[int] = 18
+    KIND: ClassVar[str] = "answer"
+    SOURCE: ClassVar[str] = "cabinet"
+    ROLE: ClassVar[str] = "any"
+
+    token: bytes
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(codec.put_bytes(self.token))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[DatagramToken, int]:
+        token, pos = codec.read_bytes(data, pos)
+        return cls(token=token), pos
+
+    def _check(self, path: str) -> None:
+        codec.check_length(len(self.token), path + "token", 32, 32)
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> DatagramToken:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "DatagramToken")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
 _TakeControl_0 = Struct(">dB")
 
 
@@ -3286,6 +3330,46 @@ class SetOverride:
         """Read one body, all of it."""
         value, pos = cls._read(data, 0)
         codec.end(data, pos, "SetOverride")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OpenDatagrams:
+    """Opens datagrams beside the session, see [datagrams](#datagrams); answered by DatagramToken. A second request replaces the token."""
+
+    TYPE: ClassVar[int] = 41
+    KIND: ClassVar[str] = "request"
+    SOURCE: ClassVar[str] = "client"
+    ROLE: ClassVar[str] = "any"
+
+
+    def _write(self, out: list[bytes]) -> None:
+        pass
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[OpenDatagrams, int]:
+        return cls(), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> OpenDatagrams:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "OpenDatagrams")
         return value
 
     def validate(self) -> None:
@@ -3751,6 +3835,103 @@ class ProcessData:
         """Read one body, all of it."""
         value, pos = cls._read(data, 0)
         codec.end(data, pos, "ProcessData")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GetDatagramStatistics:
+    """Reads what the cabinet has counted of this session's datagrams; answered by DatagramStatistics."""
+
+    TYPE: ClassVar[int] = 57
+    KIND: ClassVar[str] = "request"
+    SOURCE: ClassVar[str] = "client"
+    ROLE: ClassVar[str] = "any"
+
+
+    def _write(self, out: list[bytes]) -> None:
+        pass
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[GetDatagramStatistics, int]:
+        return cls(), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> GetDatagramStatistics:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "GetDatagramStatistics")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
+_DatagramStatistics_0 = Struct(">IIIIIII")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DatagramStatistics:
+    """The datagrams of this session since its last OpenDatagrams."""
+
+    TYPE: ClassVar[int] = 58
+    KIND: ClassVar[str] = "answer"
+    SOURCE: ClassVar[str] = "cabinet"
+    ROLE: ClassVar[str] = "any"
+
+    accepted: int
+    old: int
+    late: int
+    forged: int
+    damaged: int
+    strange: int
+    sent: int
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_DatagramStatistics_0.pack(self.accepted, self.old, self.late, self.forged, self.damaged, self.strange, self.sent))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[DatagramStatistics, int]:
+        v = codec.unpack(_DatagramStatistics_0, data, pos)
+        pos += _DatagramStatistics_0.size
+        accepted = v[0]
+        old = v[1]
+        late = v[2]
+        forged = v[3]
+        damaged = v[4]
+        strange = v[5]
+        sent = v[6]
+        return cls(accepted=accepted, old=old, late=late, forged=forged, damaged=damaged, strange=strange, sent=sent), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> DatagramStatistics:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "DatagramStatistics")
         return value
 
     def validate(self) -> None:
@@ -5026,7 +5207,7 @@ class State:
         self._check("")
 
 
-Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
+Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
 OneWay: TypeAlias = ServoJoints | ServoJointsVelocity | ServoPose
 
 #: Message classes by id.
@@ -5043,6 +5224,7 @@ MESSAGES: dict[int, type[Message]] = {
     10: Halted,
     16: Accepted,
     17: Rejected,
+    18: DatagramToken,
     32: TakeControl,
     33: ReleaseControl,
     34: Subscribe,
@@ -5052,6 +5234,7 @@ MESSAGES: dict[int, type[Message]] = {
     38: Pause,
     39: Resume,
     40: SetOverride,
+    41: OpenDatagrams,
     42: Recover,
     48: DefineTool,
     49: AttachTool,
@@ -5062,6 +5245,8 @@ MESSAGES: dict[int, type[Message]] = {
     54: GetProcessData,
     55: SetProcessData,
     56: ProcessData,
+    57: GetDatagramStatistics,
+    58: DatagramStatistics,
     64: ServoOpen,
     65: ServoJoints,
     66: ServoJointsVelocity,
@@ -5085,3 +5270,5 @@ MESSAGES: dict[int, type[Message]] = {
     112: State,
 }
 ONE_WAY: tuple[type[OneWay], ...] = (ServoJoints, ServoJointsVelocity, ServoPose,)
+#: Messages that a datagram may contain.
+DATAGRAMS: tuple[type[Message], ...] = (Ping, Pong, Cancel, Stop, ServoJoints, ServoJointsVelocity, ServoPose, State,)
