@@ -355,7 +355,7 @@ class Plant:
     def _close_brakes(self) -> None:
         here = self._q.copy()
         self._braked = replace(self._sensed, before=here, now=here, after=here, is_overlaid=False)
-        self._brakes = PositionLaw.continuing(self._tau_cmd, self._braked)
+        self._brakes = PositionLaw.locked(self._tau_cmd, self._braked)
 
     def _write(self, order: int, progress: float, remaining: float) -> None:
         k, r = self.tick_count, self.shared
