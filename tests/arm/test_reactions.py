@@ -1,4 +1,4 @@
-"""Reactions to a break condition through the whole stack: the arm stays, relaxes or retreats, and forces are reported."""
+"""Reactions to a break condition through the whole stack: the arm stays, relaxes or retreats; forces are reported."""
 
 from __future__ import annotations
 
@@ -37,9 +37,7 @@ def arm(table: ha.Arm) -> ha.Arm:
 
 
 def press(arm: ha.Arm, then: Reaction | None, speed: float = 0.05, **more: Any) -> Result:
-    result = arm.move(
-        ha.lin_rel(z=-0.2, frame="base", speed_mps=speed), until=force > 20, then=then, **more
-    )
+    result = arm.move(ha.lin_rel(z=-0.2, frame="base", speed_mps=speed), until=force > 20, then=then, **more)
     assert result.cause is ha.Cause.CONDITION and result.stopped_by == (force > 20)
     return result
 

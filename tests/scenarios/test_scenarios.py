@@ -47,9 +47,7 @@ NOISY = [one.name for one in testing.scenarios() if LONG or one.risk is Risk.CON
 
 @pytest.fixture(scope="module")
 def noisy_arm() -> Iterator[ha.Arm]:
-    with ha.connect(
-        testing.stage(speed=SPEED, sensors=f"noisy:{SEED}"), watchdog=10.0, timeout=30.0
-    ) as arm:
+    with ha.connect(testing.stage(speed=SPEED, sensors=f"noisy:{SEED}"), watchdog=10.0, timeout=30.0) as arm:
         yield arm
 
 

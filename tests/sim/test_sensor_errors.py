@@ -67,7 +67,9 @@ def test_the_errors_are_of_the_stated_size() -> None:
     bias = np.abs(tau.mean(axis=0) - true_mean)
     assert (bias <= errors.OFFSET * IIWA.tau_max + errors.GAIN * np.abs(true_mean) + 0.05).all()
     assert bias.max() > 0.05
-    assert np.abs(external.mean(axis=0)) == pytest.approx(bias, abs=0.05), "what sensors show too much is no load"
+    assert np.abs(external.mean(axis=0)) == pytest.approx(bias, abs=0.05), (
+        "what sensors show too much is no load"
+    )
     steps = tau / errors.TORQUE_STEP
     assert steps == pytest.approx(np.round(steps), abs=1e-6)
     assert 0.5e-5 < q.std(axis=0).max() < 3e-5

@@ -50,8 +50,8 @@ def check(
 ) -> int:
     """Show what a robot can do, scenario by scenario, by measurement; exit code 1 if one fails.
 
-    Without a target, a simulator with a table, signals and tools is started, by default with ideal sensors. A real robot
-    moves at a tenth of its speed, and every scenario that moves it asks first.
+    Without a target, a simulator with a table, signals and tools is started, by default with ideal sensors. A real
+    robot moves at a tenth of its speed, and every scenario that moves it asks first.
     """
     chosen = testing.find(only)
     if noisy and target.or_else(None).text:

@@ -77,9 +77,9 @@ def guarded(
 ) -> Iterator[CollisionGuard]:
     """A block whose motions and servo motions end at a collision.
 
-    The cabinet monitors the torques, as a break condition of each motion; the arm brakes on its path and relaxes. A guard with a
-    margin is monitored by this program, in every pushed state, and stops the arm as hard as possible; it reacts later
-    by the delay of the network.
+    The cabinet monitors the torques, as a break condition of each motion; the arm brakes on its path and relaxes. A
+    guard with a margin is monitored by this program, in every pushed state, and stops the arm as hard as possible; it
+    reacts later by the delay of the network.
 
     Args:
         arm: in control.

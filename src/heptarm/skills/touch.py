@@ -49,8 +49,8 @@ def touch(
     """Move on a straight line until a contact.
 
     The cabinet monitors the force: a contact is a deviation from the baseline by more than the threshold along an axis
-    of the frame. The slower the arm, the shorter its stopping distance behind the contact. Then the arm relaxes, so that
-    it does not go on pushing by that distance; `Contact.result` has the largest force and the one at rest.
+    of the frame. The slower the arm, the shorter its stopping distance behind the contact. Then the arm relaxes, so
+    that it does not go on pushing by that distance; `Contact.result` has the largest force and the one at rest.
 
     Args:
         arm: in control.

@@ -46,8 +46,9 @@ def build(task: ReachTask) -> Any:
     spec.option.gravity = [0.0, 0.0, 0.0]
     return spec.compile()
 
-#: Position control while training: bandwidth [rad/s] and damping ratio of each joint. Without contacts the elastic joints
-#: of the virtual cabinet follow their set-points as closely.
+
+#: Position control while training: bandwidth [rad/s] and damping ratio of each joint. Without contacts the elastic
+#: joints of the virtual cabinet follow their set-points as closely.
 BANDWIDTH = 90.0
 DAMPING = 1.0
 

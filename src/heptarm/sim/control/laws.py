@@ -1,8 +1,9 @@
 """Control laws: from set-points and the measured state to torques.
 
-Position control is a computed-torque law whose feedback is as compliant as the joints of a robot: gear and torque sensor
-of each axis are a spring between the motor, which follows the set-point, and the link. Impedance laws make the arm more
-compliant: a spring and a damper to the set-point, in addition to the torques for gravity and the commanded motion.
+Position control is a computed-torque law whose feedback is as compliant as the joints of a robot: gear and torque
+sensor of each axis are a spring between the motor, which follows the set-point, and the link. Impedance laws make the
+arm more compliant: a spring and a damper to the set-point, in addition to the torques for gravity and the commanded
+motion.
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ import numpy as np
 from heptarm.sim.planning.command import TICK
 from heptarm.values.arrays import Array, frozen
 
-#: Stiffness of the axes in position control [Nm/rad]: the elasticity of the joint in series with the controller's. The
-#: order of 10 kNm/rad is that of DLR's publications on the LWR's joints; the values are assumed, in proportion to the
-#: gears. See docs/explanation/fidelity.md.
+#: Stiffness of the axes in position control [Nm/rad]: the elasticity of the joint in series with the controller's.
+#: The order of 10 kNm/rad is that of DLR's publications on the LWR's joints, the value of each axis is assumed: see
+#: docs/explanation/fidelity.md.
 STIFFNESS = frozen([15000.0, 15000.0, 10000.0, 10000.0, 7500.0, 5000.0, 5000.0])
-#: Damping of position control, in proportion to the inertia matrix [1/s] and to the stiffness [s] (Rayleigh). Every mode
-#: of the arm has a damping ratio of 0.6 to 1, and the law is stable at 1 ms in every posture.
+#: Damping of position control, in proportion to the inertia matrix [1/s] and to the stiffness [s] (Rayleigh): the modes
+#: of the arm have damping ratios of 0.6 to 1, and the law is stable at 1 ms in every posture.
 MASS_DAMPING = 90.0
 STIFFNESS_DAMPING = 0.004
 #: Time constant with which a preload fades when the brakes have opened [s].
@@ -94,8 +95,8 @@ class PositionLaw:
     """Position control with elastic joints.
 
     The motors follow the set-points; the measured positions are those of the links, which a load deflects from them by
-    its torque divided by `STIFFNESS`. Nothing compensates this deflection: the controller of an LBR knows the gravity of
-    the load data, but no external load.
+    its torque divided by `STIFFNESS`. Nothing compensates this deflection: the controller knows the gravity of the load
+    data, but no external load.
 
     Args:
         preload: torques beside those of the set-points, shape (7,) [Nm]; None: zero.

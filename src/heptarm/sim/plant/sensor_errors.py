@@ -17,15 +17,15 @@ import numpy as np
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 
-#: Accuracy of a torque sensor as a fraction of the axis' highest torque: half of the 2 % in KUKA's brochure is error of
-#: the gain, a quarter offset; a robot whose sensors were referenced lately is better than the worst one.
+#: Errors of gain and offset of a torque sensor as fractions of reading and highest torque: within the 2 % of KUKA's
+#: brochure, for a robot whose sensors were referenced lately.
 GAIN, OFFSET = 0.01, 0.005
 #: Standard deviation of a torque sensor's noise, as a fraction of the axis' highest torque, and its resolution [Nm].
 TORQUE_NOISE, TORQUE_STEP = 0.0004, 0.01
 #: Standard deviation and resolution of a measured position [rad].
 POSITION_NOISE, POSITION_STEP = 1e-5, 2.0 * np.pi / 2**19
-#: Friction that the controller does not compensate, as a fraction of the axis' highest torque, and the speed below which
-#: it decreases to zero [rad/s].
+#: Friction that the controller does not compensate, as a fraction of the axis' highest torque, and the speed below
+#: which it decreases to zero [rad/s].
 FRICTION, STICTION_SPEED = 0.003, 0.02
 
 

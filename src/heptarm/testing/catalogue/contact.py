@@ -66,7 +66,9 @@ def plane(arm: Arm) -> None:
     near(arm.wait_for_rest().q, HOME, 2e-3, "home", unit="rad")
 
 
-@scenario(line=8, rows="H7 H3", risk=Risk.CONTACT, space=0.3, needs=("conditions", "lin_rel", "joint_impedance"))
+@scenario(
+    line=8, rows="H7 H3", risk=Risk.CONTACT, space=0.3, needs=("conditions", "lin_rel", "joint_impedance")
+)
 def reactions(arm: Arm) -> None:
     """At a contact the cabinet lets the arm relax, or move back along its path; the result has the forces."""
     contact = force > 15
