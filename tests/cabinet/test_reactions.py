@@ -8,10 +8,13 @@ import pytest
 
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
+from tests.cabinet.conftest import Maker
 from tests.cabinet.fake import FakeCabinet
 from tests.cabinet.peer import Peer, run
 from tests.cabinet.test_conditions import CAUSE, PUSHED, controller, finish, started, turn
 
+#: Cabinet seconds per second where a request has to arrive during the reaction.
+SLOW = 0.15
 RETREAT = wire.Retreat(distance=0.1, speed=0.5)
 #: Fires at 0.3 rad of A7, where the fake's spring pushes with 3 N.
 CORE = wire.SignalOutside(signal="Cell.Level", low=1.0, high=2.0)
@@ -83,10 +86,8 @@ def test_what_is_queued_begins_after_the_reaction(cabinet: FakeCabinet) -> None:
     [(wire.Stop(), CAUSE.STOPPED), (wire.Cancel(id=0), CAUSE.CANCELLED)],
     ids=["stop", "cancel"],
 )
-def test_a_stop_ends_the_reaction(
-    cabinet: FakeCabinet, request_: wire.Stop | wire.Cancel, cause: wire.Cause
-) -> None:
-    with controller(cabinet.port) as peer:
+def test_a_stop_ends_the_reaction(make: Maker, request_: wire.Stop | wire.Cancel, cause: wire.Cause) -> None:
+    with controller(make(rate=SLOW).port) as peer:
         number = begun(peer, reacting(1.1, RETREAT))
         assert isinstance(peer.ask(request_), wire.Accepted)
         end = finish(peer, number)
@@ -95,8 +96,8 @@ def test_a_stop_ends_the_reaction(
         assert finish(peer, started(peer, turn(0.0))).cause is CAUSE.FINISHED
 
 
-def test_a_replacing_program_ends_the_reaction(cabinet: FakeCabinet) -> None:
-    with controller(cabinet.port) as peer:
+def test_a_replacing_program_ends_the_reaction(make: Maker) -> None:
+    with controller(make(rate=SLOW).port) as peer:
         number = begun(peer, reacting(1.1, RETREAT))
         answer = peer.ask(run(turn(0.5), when=wire.When.REPLACE))
         assert finish(peer, number).cause is CAUSE.REPLACED
