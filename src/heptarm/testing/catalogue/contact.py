@@ -69,7 +69,7 @@ def plane(arm: Arm) -> None:
 @scenario(
     line=8, rows="H7 H3", risk=Risk.CONTACT, space=0.3, needs=("conditions", "lin_rel", "joint_impedance")
 )
-def reactions(arm: Arm) -> None:
+def relaxing(arm: Arm) -> None:
     """At a contact the cabinet lets the arm relax, or move back along its path; the result has the forces."""
     contact = force > 15
     arm.move(lin_rel(z=-0.05, frame="base", speed_mps=0.1), until=contact)
