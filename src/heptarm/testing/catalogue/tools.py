@@ -89,7 +89,13 @@ def wrench(arm: Arm) -> None:
         watch(arm, 0.3)
         seen, tip, flange = baseline(arm), arm.wrench(), arm.wrench("flange")
         near(seen.force - rest.force, push, 0.5, "force", unit="N")
-        near(flange.torque - bare.torque, np.zeros(3), 0.6, "torque at the flange, where the push acts", unit="Nm")
+        near(
+            flange.torque - bare.torque,
+            np.zeros(3),
+            0.6,
+            "torque at the flange, where the push acts",
+            unit="Nm",
+        )
         lever = arm.pose("flange").xyz - arm.pose().xyz
         near(seen.torque - rest.torque, np.cross(lever, push), 0.3, "torque at the tip", unit="Nm")
         own = arm.wrench(axes="tool").force
