@@ -58,7 +58,7 @@ def test_it_stays_and_reports_its_forces(arm: ha.Arm) -> None:
 def test_it_relaxes(arm: ha.Arm) -> None:
     result = press(arm, "relax")
     assert result.peak_force > 20.0 and result.rest_force < 10.0
-    assert weight(arm) == pytest.approx(result.rest_force, abs=1.0)
+    assert weight(arm) == pytest.approx(result.rest_force, abs=3.0)
     state = arm.wait_for_rest()
     assert np.abs(state.q - state.q_cmd).max() < 1e-3, "it holds the position reached"
 

@@ -82,13 +82,13 @@ def test_positions_stay_accurate() -> None:
     assert np.abs(plant.snapshot.q - goal).max() < 5e-4  # friction by the stiffness of the joints
 
 
-def test_friction_holds_a_compliant_joint_back() -> None:
+def test_friction_slows_a_compliant_joint_down() -> None:
     goal = np.array(READY)
     ends = []
     for plant in (Plant("iiwa14", q=READY), noisy()):
         plant.submit(Order(1, "hold", duration=3.0, mode=JointImpedance(100.0)))
         plant.step(100)
         plant.apply_wrench((0.0, 6.0, 0.0), duration=0.2)
-        plant.step(600)
+        plant.step(1500)
         ends.append(float(np.abs(plant.snapshot.q - goal).max()))
     assert ends[1] > 5.0 * ends[0]
