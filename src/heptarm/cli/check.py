@@ -19,6 +19,7 @@ from heptarm.cli.options import (
     Yes,
 )
 from heptarm.cli.output import confirm, emit
+from heptarm.errors import CommandRejected
 from heptarm.testing import Outcome, Report, Scenario, Verdict
 
 #: Longest wait for an answer [s]: a machine that also simulates may be late.
@@ -38,6 +39,10 @@ def check(
     ] = False,
     faults: Annotated[bool, Parameter(negative="", help="On a robot, also those that cause faults.")] = False,
     sim_speed: Annotated[float, Parameter(help="Without a target: simulated seconds per second.")] = 2.0,
+    noisy: Annotated[
+        bool,
+        Parameter(negative="", help="Without a target: sensors with noise and offset, joints with friction."),
+    ] = False,
     junit: Annotated[Path | None, Parameter(help="Write a report for CI systems, JUnit XML.")] = None,
     yes: Yes = False,
     target: CommandTarget = NO_TARGET,
@@ -45,15 +50,21 @@ def check(
 ) -> int:
     """Show what a robot can do, scenario by scenario, by measurement; exit code 1 if one fails.
 
-    Without a target, a simulator with a table, signals and tools is started. A real robot moves at a tenth of its
-    speed, and every scenario that moves it asks first.
+    Without a target, a simulator with a table, signals and tools is started, by default with ideal sensors. A real
+    robot moves at a tenth of its speed, and every scenario that moves it asks first.
     """
     chosen = testing.find(only)
+    if noisy and target.or_else(None).text:
+        raise CommandRejected(
+            "--noisy is for the simulator that is started without a target",
+            parameter="noisy",
+            hint="leave out the target, or name a simulator with noisy sensors: sim://iiwa14?sensors=noisy",
+        )
     if list_only:
         _list(chosen, as_json)
         return 0
     console = Console()
-    with target.or_else(testing.stage(speed=sim_speed)).connect(
+    with target.or_else(testing.stage(speed=sim_speed, sensors="noisy" if noisy else "ideal")).connect(
         watchdog=CHECK.default, timeout=_TIMEOUT
     ) as arm:
         if not as_json:

@@ -62,6 +62,13 @@ def sim(
             "Default: the controller's load data."
         ),
     ] = "",
+    sensors: Annotated[
+        str,
+        Parameter(
+            help="'noisy' or 'noisy:SEED': sensors with noise, offset and resolution, joints with friction. "
+            "Default: ideal ones."
+        ),
+    ] = "ideal",
     project: Annotated[
         Path | None,
         Parameter(
@@ -224,6 +231,7 @@ def sim(
             speed=speed,
             faults=fault,
             payload=payload,
+            sensors=sensors,
             project=project,
             verbose=verbose,
             as_json=as_json,
@@ -266,6 +274,7 @@ def sim(
             network=fri_network,
             faults=fault,
             payload=payload,
+            sensors=sensors,
             speed=speed,
         )
         return fri_sim.run(options, verbose=verbose, as_json=as_json)
@@ -279,6 +288,7 @@ def sim(
         key_file=key_file,
         faults=fault,
         payload=payload,
+        sensors=sensors,
         project=project,
         verbose=verbose,
         as_json=as_json,
@@ -296,6 +306,7 @@ def _cabinet(
     key_file: Path | None,
     faults: tuple[str, ...],
     payload: str,
+    sensors: str,
     project: Path | None,
     verbose: bool,
     as_json: bool,
@@ -314,6 +325,7 @@ def _cabinet(
         speed=speed,
         fault=faults,
         payload=payload,
+        sensors=sensors,
         project=project,
         parent_pipe=True,
         verbose=verbose,
@@ -413,6 +425,7 @@ def _application(
     speed: float,
     faults: tuple[str, ...],
     payload: str,
+    sensors: str,
     project: Path | None,
     verbose: bool,
     as_json: bool,
@@ -459,6 +472,7 @@ def _application(
             answer=answers,
             fault=faults,
             payload=payload,
+            sensors=sensors,
             parent_pipe=True,
             verbose=verbose,
         )
