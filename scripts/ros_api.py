@@ -115,6 +115,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "release": OPERATOR,
         "set_signal": OPERATOR,
         "start": OPERATOR,
+        "where": OPERATOR,
     },
     "arm.fri(...)": {
         "active": ("~/fri/status",),
@@ -188,6 +189,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "lin_rel": ("~/move_pose", "~/run_program"),
         "ptp": ("~/move_joints", "~/move_pose", "~/command/joint", "~/command/pose", "~/run_program"),
         "ptp_home": ("~/run_program",),
+        "spiral": ("as SPLINE, with points computed by the client", "~/run_program"),
         "spl": ("~/move_spline", "~/run_program"),
         "spline": ("~/move_spline", "~/run_program"),
         "spline_joints": ("~/move_spline", "~/run_program"),
@@ -199,6 +201,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "JointImpedance": ("~/mode/joint_impedance",),
         "Position": ("~/mode/position",),
         "compliance": ("~/guide", "~/teach", "~/mode/cartesian_impedance"),
+        "pressing": ("~/mode/cartesian_impedance",),
         "SineImpedance": ("~/mode/sine_impedance", "~/mode/force_pattern"),
     },
     "heptarm.when": {

@@ -62,6 +62,13 @@ def sim(
             "Default: the controller's load data."
         ),
     ] = "",
+    scene: Annotated[
+        str,
+        Parameter(
+            help="NAME or FILE: what is around the arm and on its flange: table, peg-in-hole, bins, or a file in "
+            "MuJoCo's format (MJCF). Its bodies collide and can be grasped; the view shows them."
+        ),
+    ] = "",
     project: Annotated[
         Path | None,
         Parameter(
@@ -224,6 +231,7 @@ def sim(
             speed=speed,
             faults=fault,
             payload=payload,
+            scene=scene,
             project=project,
             verbose=verbose,
             as_json=as_json,
@@ -241,7 +249,12 @@ def sim(
     if fri is not None:
         from heptarm.cli import fri_sim
 
-        own = {"--view": view, "--key-file": key_file is not None, "--project": project is not None}
+        own = {
+            "--view": view,
+            "--key-file": key_file is not None,
+            "--project": project is not None,
+            "--scene": bool(scene),
+        }
         for name, present in own.items():
             if present:
                 raise CommandRejected(
@@ -279,6 +292,7 @@ def sim(
         key_file=key_file,
         faults=fault,
         payload=payload,
+        scene=scene,
         project=project,
         verbose=verbose,
         as_json=as_json,
@@ -296,6 +310,7 @@ def _cabinet(
     key_file: Path | None,
     faults: tuple[str, ...],
     payload: str,
+    scene: str,
     project: Path | None,
     verbose: bool,
     as_json: bool,
@@ -307,19 +322,24 @@ def _cabinet(
         CommandRejected: the key cannot be used.
     """
     key = find_key(key_file=key_file, host=host, port=port)
-    options = SimulatorOptions(
-        model=model,
-        host=host,
-        port=port,
-        speed=speed,
-        fault=faults,
-        payload=payload,
-        project=project,
-        parent_pipe=True,
-        verbose=verbose,
-    )
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ExitStack() as stack:
+        positions = None
+        if view and scene:
+            positions = Path(stack.enter_context(TemporaryDirectory(prefix="heptarm-"))) / "positions"
+        options = SimulatorOptions(
+            model=model,
+            host=host,
+            port=port,
+            speed=speed,
+            fault=faults,
+            payload=payload,
+            scene=scene,
+            project=project,
+            positions=positions,
+            parent_pipe=True,
+            verbose=verbose,
+        )
         cabinet = stack.enter_context(_child(_command(options), key))
         ready = _ready(cabinet, f"the virtual cabinet does not start on {host}:{port}")
         target = f"sim://{host}:{ready['port']}"
@@ -334,6 +354,7 @@ def _cabinet(
                         target,
                         "--port",
                         str(view_port),
+                        *([] if positions is None else ["--scene", scene, "--positions", str(positions)]),
                     ],
                     key,
                 )
@@ -413,6 +434,7 @@ def _application(
     speed: float,
     faults: tuple[str, ...],
     payload: str,
+    scene: str,
     project: Path | None,
     verbose: bool,
     as_json: bool,
@@ -459,6 +481,7 @@ def _application(
             answer=answers,
             fault=faults,
             payload=payload,
+            scene=scene,
             parent_pipe=True,
             verbose=verbose,
         )
@@ -540,7 +563,7 @@ def _answer(cabinet: subprocess.Popen[str], as_json: bool) -> str:
         elif as_json:
             print(line.strip(), flush=True)
         elif reply["operator"]:
-            print(reply["error"] or f"done: {reply['operator']}", flush=True)
+            print(reply["error"] or reply["shown"] or f"done: {reply['operator']}", flush=True)
     return failure
 
 
