@@ -10,7 +10,7 @@ import heptarm as ha
 TABLE = "sim://iiwa14?scene=table"
 GRIPPER = ha.Tool("two-finger", mass=1.0, com=(0, 0, 0.05), tcp=ha.Pose.at(0, 0, 0.16))
 FULL = 0.08  # speed at full deflection [m/s]
-#: Deflection of three axes, for how long [s], and whether the button is pressed: above the cube, down, grasp, up, aside.
+#: Deflection of three axes, for how long [s], and whether the button is pressed: over the cube, down, grasp, up, aside
 PERSON = [
     ((-1.0, 0.0, 0.0), 0.625, False),
     ((0.0, 0.0, -1.0), 1.0, False),

@@ -35,6 +35,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "cabinet": ("~/info", "/diagnostics"),
         "capabilities": ("~/capabilities",),
         "close": (LIFE,),
+        "collision_check": (WORDS + "a planner such as MoveIt checks paths before it sends them",),
         "collision_guard": ("~/collision_guard",),
         "connected": ("~/status",),
         "connection": ("no counterpart: it is for tools and tests",),

@@ -31,8 +31,8 @@ STEP = 0.02
 class CollisionModel:
     """The collision model of an arm, its tool and its scene; needs `pip install 'heptarm[sim]'`.
 
-    It reads joint positions and nothing else, so it serves a robot as well as a simulator. Bodies of the scene stay where
-    its file has them, unless you `place` or `hold` them.
+    It reads joint positions and nothing else, so it serves a robot as well as a simulator. Bodies of the scene stay
+    where its file has them, unless you `place` or `hold` them.
 
     A gripper counts as open, as wide as it gets.
 
@@ -253,7 +253,7 @@ class CollisionModel:
         return tuple(sorted(found, key=lambda one: one.distance))
 
     def _pair(self, first: int, second: int) -> tuple[str, str] | None:
-        """Names of two shapes' bodies, that of the arm first; None if neither is of the arm, its tool or what it holds."""
+        """Names of two shapes' bodies, that of the arm first; None if none is of the arm, its tool or what it holds."""
         bodies = int(self._model.geom_bodyid[first]), int(self._model.geom_bodyid[second])
         arm = [self._is_own[body] for body in bodies]
         held = [body in self._held for body in bodies]

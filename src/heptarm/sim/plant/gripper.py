@@ -72,7 +72,7 @@ def has_gripper(model: mujoco.MjModel) -> bool:
 
 
 def driven_joints(model: mujoco.MjModel) -> list[int]:
-    """Joints that the gripper of the scene drives, by itself or by a fixed tendon; the upper end of their range is open.
+    """Joints that the gripper of the scene drives, by itself or by a tendon; the upper end of their range is open.
 
     Raises:
         ValueError: its actuator drives something else.
