@@ -46,7 +46,7 @@ with ha.connect(target, watchdog=2.0) as arm, arm.tool(GRIPPER):
             arm.move(ha.lin_rel(z=0.1, frame="base", speed_mps=0.1))
             error = random.uniform(-0.003, 0.003, 2)  # what the program does not know
             arm.move(ha.lin(above(HOLE + error, TOP + 0.075), speed_mps=0.2))
-            done = insert(arm, "z", depth=0.03, force=10.0, search=ha.spiral(0.0045), distance=0.015)
+            done = insert(arm, "z", depth=0.03, force=10.0, search=ha.spiral(0.0055), distance=0.015)
             gripper.open()
         arm.move(ha.lin_rel(z=0.1, frame="base", speed_mps=0.1))
         peg = arm.operator.where("peg")

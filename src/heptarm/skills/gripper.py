@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 PATIENCE = 2.0
 #: Default of the time for which neither end switch may be on before the gripper counts as closed on something [s].
 SETTLE = 0.5
-#: The robot's clock decides; this bounds the wait where it stands still: a factor, and added to it [s].
+#: The robot's clock decides; this bounds the wait in case that clock has stopped: a factor, and added to it [s].
 _GENEROUS, _AND_MORE = 3.0, 15.0
 
 

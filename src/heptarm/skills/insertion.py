@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from heptarm.errors import InsertionFailed, MotionAborted, Timeout
 from heptarm.values.arrays import Array, instance, within
@@ -22,11 +24,14 @@ from heptarm.values.state import State
 if TYPE_CHECKING:
     from heptarm.arm.arm import Arm
     from heptarm.arm.motion.handle import MotionHandle
+    from heptarm.values.mode.impedance import CartesianImpedance
 
 #: Default of the search: for a hole within 3 mm.
 SEARCH = spiral(0.003)
 #: Stiffness across the direction while the hole is looked for, and while the part goes in [N/m].
 SEARCHING, CENTRING = 3000.0, 800.0
+#: Stiffness along the direction while the part goes in [N/m]; the force is limited.
+PUSHING = 2000.0
 #: A part that is so much deeper than the surface has found the hole [m].
 SUNK = 1.5e-3
 #: Speeds of the approach and of pushing in [m/s].
@@ -34,7 +39,7 @@ APPROACH, PUSH = 0.02, 0.02
 #: The depth counts as reached when so little is missing [m].
 _NEARLY = 5e-4
 #: The arm pushes this much beyond the depth, against the spring of the direction [m].
-_BEYOND = 4e-3
+_BEYOND = 2e-3
 _STRONGEST = 100.0
 
 
@@ -185,7 +190,7 @@ class _Insertion:
         step = max(0.0, missing(self.arm.wait_for_rest()) + _BEYOND) * self.axis
         handle = self.arm.start(
             lin_rel(*step.tolist(), frame=self.frame, speed_mps=PUSH),
-            mode=pressing(self.direction, self.force, frame=self.frame, stiffness=CENTRING),
+            mode=self._pushing(),
         )
         state = self._follow(handle, lambda seen: missing(seen) <= 0.0)
         if missing(state) > _NEARLY:
@@ -197,6 +202,13 @@ class _Insertion:
                 hint="raise the force, or check the orientation of the part and the depth of the hole",
             )
         return state
+
+    def _pushing(self) -> CartesianImpedance:
+        """Mode that moves the part to its depth, with the force as its limit, and is compliant across."""
+        springs = pressing(self.direction, 0.0, frame=self.frame, stiffness=CENTRING, along=PUSHING)
+        limits = np.full(6, np.nan)
+        limits[:3][self.axis != 0.0] = self.force
+        return replace(springs, max_force=limits)
 
     def _follow(self, handle: MotionHandle, is_enough: Callable[[State], bool]) -> State:
         """Wait until a state is enough or the motion ends; then let the arm rest, still compliant.
