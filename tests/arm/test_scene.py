@@ -95,11 +95,14 @@ def test_something_that_checks_nothing_is_refused(arm: ha.Arm) -> None:
 
 
 @pytest.mark.long
-def test_the_peg_is_in_the_hole_twenty_times_out_of_twenty() -> None:
+@pytest.mark.parametrize("seed", ["7", "8"])
+def test_the_peg_is_in_the_hole_twenty_times_out_of_twenty(seed: str) -> None:
+    """Ten times per process, which a slow machine finishes in time."""
+
     def run() -> subprocess.CompletedProcess[str]:
         program = PATIENT_AND_FASTER + "import runpy, sys\nrunpy.run_path(sys.argv[1], run_name='__main__')"
         return subprocess.run(
-            [sys.executable, "-c", program.replace("sys.argv[1]", repr(str(EXAMPLE))), "20", "7"],
+            [sys.executable, "-c", program.replace("sys.argv[1]", repr(str(EXAMPLE))), "10", seed],
             capture_output=True,
             text=True,
             timeout=280,
@@ -109,4 +112,4 @@ def test_the_peg_is_in_the_hole_twenty_times_out_of_twenty() -> None:
 
     done = retry(run, busy)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout.count("inserted") == 20
+    assert done.stdout.count("inserted") == 10

@@ -155,10 +155,11 @@ OWN = """
   <include file="two-finger-gripper.xml"/>
   <custom><text name="gripper"
     data="open=Cell.Open close=Cell.Close is_open=Cell.Opened is_closed=Cell.Closed"/></custom>
+  <keyframe><key name="home" qpos="0 0 0 0.6 0.5 1 0 0 0"/></keyframe>
   <option timestep="0.002" integrator="Euler" gravity="0 0 -1"/>
   <worldbody>
     <geom name="wall" type="box" size="0.01 0.5 0.5" pos="1 0 0.5"/>
-    <body name="link_1" pos="0.6 0 0.5"><freejoint/><geom type="sphere" size="0.03"/></body>
+    <body name="link_1" pos="0 0.6 0.5"><freejoint/><geom type="sphere" size="0.03"/></body>
   </worldbody>
 </mujoco>
 """
@@ -192,7 +193,7 @@ def test_a_scene_that_does_not_exist_is_refused(text: str, because: str) -> None
     "content",
     [
         "<mujoco>",
-        "<robot/>",
+        "<mjcf/>",
         "<mujoco><worldbody><body><freejoint/></body></worldbody></mujoco>",  # without a mass
     ],
 )

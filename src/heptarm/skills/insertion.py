@@ -14,6 +14,7 @@ from heptarm.values.condition.contact import axis_of
 from heptarm.values.condition.force import force as force_signal
 from heptarm.values.frames import TOOL, check_name
 from heptarm.values.mode.compliance import pressing
+from heptarm.values.mode.impedance import STIFFEST
 from heptarm.values.motion.line import lin_rel
 from heptarm.values.motion.search import Spiral, spiral
 from heptarm.values.motion.spline import spline
@@ -34,6 +35,8 @@ SEARCHING, CENTRING = 3000.0, 800.0
 PUSHING = 2000.0
 #: A part that is so much deeper than the surface has found the hole [m].
 SUNK = 1.5e-3
+#: A part that finds the hole falls by so much of the depth, until the spring along the direction balances the force.
+SINKING = 0.3
 #: Speeds of the approach and of pushing in [m/s].
 APPROACH, PUSH = 0.02, 0.02
 #: The depth counts as reached when so little is missing [m].
@@ -107,7 +110,7 @@ def insert(
         direction,
         axis,
         check_name(frame, "frame"),
-        depth=within(depth, "depth", 2.0 * SUNK, 0.5, unit="m"),
+        depth=within(depth, "depth", 2.0 * SUNK / SINKING, 0.5, unit="m"),
         force=within(force, "force", 0.0, _STRONGEST, above=True, unit="N"),
         distance=within(distance, "distance", 0.0, 0.5, above=True, unit="m"),
         timeout=within(timeout, "timeout", 0.0, 1e6, above=True, unit="s"),
@@ -170,7 +173,9 @@ class _Insertion:
         across = axes[:, self.axis == 0.0]
         places = origin.xyz + search.points @ across.T
         motion = spline([Pose.of(place, origin.quat) for place in places], speed_mps=search.speed_mps)
-        handle = self.arm.start(motion, mode=pressing(self.direction, self.force, frame=self.frame))
+        spring = min(self.force / (SINKING * self.depth), STIFFEST[0])  # ends the fall into the hole
+        mode = pressing(self.direction, self.force, frame=self.frame, stiffness=SEARCHING, along=spring)
+        handle = self.arm.start(motion, mode=mode)
         state = self._follow(handle, lambda seen: float((seen.pose.xyz - origin.xyz) @ along) > SUNK)
         deep = float((state.pose.xyz - origin.xyz) @ along)
         if deep <= SUNK:

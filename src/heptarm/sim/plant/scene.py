@@ -103,6 +103,8 @@ class Scene:
             ValueError: the file is not in MuJoCo's format.
         """
         world = self.read()
+        for one in (*world.texts, *world.keys):  # of the file as a whole, and of no meaning for the arm
+            world.delete(one)
         for name in _CONTACT_OPTIONS:
             setattr(arm.option, name, getattr(world.option, name))
         tool = _top_level(world, TOOL)
