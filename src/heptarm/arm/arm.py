@@ -21,6 +21,7 @@ from heptarm.arm.fri.session import Fri
 from heptarm.arm.link.connection import STATE_RATE, Connection
 from heptarm.arm.link.state_stream import GROUPS, States
 from heptarm.arm.motion import program
+from heptarm.arm.motion.foresight import Foresight
 from heptarm.arm.motion.handle import BreakRule, MotionHandle, check_timeout
 from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
@@ -32,6 +33,7 @@ from heptarm.skills import replay as replaying
 from heptarm.skills import teaching
 from heptarm.skills import touch as touching
 from heptarm.values.arrays import callback, instance, integer, within, word
+from heptarm.values.clearance import CollisionCheck
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.reaction import Reaction, check_reaction
 from heptarm.values.frames import BASE, TOOL, check_name
@@ -66,6 +68,7 @@ class Arm:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self._tooling = Tooling(connection)
+        self._foresight = Foresight(connection, self._tooling)
         self._io = Io(connection)
         self._pad = Pad(connection)
         self._speed = 1.0
@@ -333,6 +336,21 @@ class Arm:
     def speed(self, value: float) -> None:
         self._speed = within(value, "speed", 0.0, 1.0, above=True)
 
+    @property
+    def collision_check(self) -> CollisionCheck | None:
+        """Checks the path of each motion before it is sent, such as a `heptarm.CollisionModel`; None: nothing does.
+
+        `move` and `start` then refuse a path on which bodies would touch. Servo motions, FRI and hand guiding have no
+        path that could be checked. It is no safety function: it knows only its own model of the scene.
+        """
+        return self._foresight.check
+
+    @collision_check.setter
+    def collision_check(self, value: CollisionCheck | None) -> None:
+        if value is not None:
+            callback(getattr(value, "first_on", None), "collision_check")
+        self._foresight.check = value
+
     def move(
         self,
         motion: Motion | Sequence[Motion],
@@ -361,6 +379,7 @@ class Arm:
 
         Raises:
             CommandRejected: refused before anything moved; LimitError and others name the value and the range.
+            CollisionForeseen: `collision_check` found bodies that would touch.
             MotionAborted: ended early; carries cause, state and history.
             ConnectionLost: the connection was lost; the cabinet stops the arm.
             Timeout: not ended in time; the arm was stopped.
@@ -494,6 +513,7 @@ class Arm:
         ceiling, breaks = self._speed, self._breaks
         if speed is not None:
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
+        self._foresight.examine(motions, when)
         return program.send(
             self._connection,
             self._tooling,

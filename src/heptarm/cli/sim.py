@@ -69,6 +69,13 @@ def sim(
             "Default: ideal ones."
         ),
     ] = "ideal",
+    scene: Annotated[
+        str,
+        Parameter(
+            help="NAME or FILE: what is around the arm and on its flange: table, peg-in-hole, bins, or a file in "
+            "MuJoCo's format (MJCF). Its bodies collide and can be grasped; the view shows them."
+        ),
+    ] = "",
     project: Annotated[
         Path | None,
         Parameter(
@@ -232,6 +239,7 @@ def sim(
             faults=fault,
             payload=payload,
             sensors=sensors,
+            scene=scene,
             project=project,
             verbose=verbose,
             as_json=as_json,
@@ -249,7 +257,12 @@ def sim(
     if fri is not None:
         from heptarm.cli import fri_sim
 
-        own = {"--view": view, "--key-file": key_file is not None, "--project": project is not None}
+        own = {
+            "--view": view,
+            "--key-file": key_file is not None,
+            "--project": project is not None,
+            "--scene": bool(scene),
+        }
         for name, present in own.items():
             if present:
                 raise CommandRejected(
@@ -289,6 +302,7 @@ def sim(
         faults=fault,
         payload=payload,
         sensors=sensors,
+        scene=scene,
         project=project,
         verbose=verbose,
         as_json=as_json,
@@ -307,6 +321,7 @@ def _cabinet(
     faults: tuple[str, ...],
     payload: str,
     sensors: str,
+    scene: str,
     project: Path | None,
     verbose: bool,
     as_json: bool,
@@ -318,20 +333,25 @@ def _cabinet(
         CommandRejected: the key cannot be used.
     """
     key = find_key(key_file=key_file, host=host, port=port)
-    options = SimulatorOptions(
-        model=model,
-        host=host,
-        port=port,
-        speed=speed,
-        fault=faults,
-        payload=payload,
-        sensors=sensors,
-        project=project,
-        parent_pipe=True,
-        verbose=verbose,
-    )
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ExitStack() as stack:
+        positions = None
+        if view and scene:
+            positions = Path(stack.enter_context(TemporaryDirectory(prefix="heptarm-"))) / "positions"
+        options = SimulatorOptions(
+            model=model,
+            host=host,
+            port=port,
+            speed=speed,
+            fault=faults,
+            payload=payload,
+            sensors=sensors,
+            scene=scene,
+            project=project,
+            positions=positions,
+            parent_pipe=True,
+            verbose=verbose,
+        )
         cabinet = stack.enter_context(_child(_command(options), key))
         ready = _ready(cabinet, f"the virtual cabinet does not start on {host}:{port}")
         target = f"sim://{host}:{ready['port']}"
@@ -346,6 +366,7 @@ def _cabinet(
                         target,
                         "--port",
                         str(view_port),
+                        *([] if positions is None else ["--scene", scene, "--positions", str(positions)]),
                     ],
                     key,
                 )
@@ -426,6 +447,7 @@ def _application(
     faults: tuple[str, ...],
     payload: str,
     sensors: str,
+    scene: str,
     project: Path | None,
     verbose: bool,
     as_json: bool,
@@ -473,6 +495,7 @@ def _application(
             fault=faults,
             payload=payload,
             sensors=sensors,
+            scene=scene,
             parent_pipe=True,
             verbose=verbose,
         )
@@ -554,7 +577,7 @@ def _answer(cabinet: subprocess.Popen[str], as_json: bool) -> str:
         elif as_json:
             print(line.strip(), flush=True)
         elif reply["operator"]:
-            print(reply["error"] or f"done: {reply['operator']}", flush=True)
+            print(reply["error"] or reply["shown"] or f"done: {reply['operator']}", flush=True)
     return failure
 
 

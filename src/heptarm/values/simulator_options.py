@@ -68,6 +68,14 @@ class SimulatorOptions:
             "fixed box in the world [m]; may be repeated", metavar="X,Y,Z,LENGTH,WIDTH,HEIGHT", in_target=True
         ),
     )
+    scene: str = field(
+        default="",
+        metadata=_about(
+            "what is around the arm and on its flange: table, peg-in-hole, bins, or a file in MuJoCo's format",
+            metavar="NAME|FILE",
+            in_target=True,
+        ),
+    )
     payload: str = field(
         default="",
         metadata=_about(
@@ -115,6 +123,9 @@ class SimulatorOptions:
     )
     trace: Path | None = field(
         default=None, metadata=_about("file for the state of the plant after each tick (0.5 MB/s)")
+    )
+    positions: Path | None = field(
+        default=None, metadata=_about("file that always has the positions of arm and scene, for the view")
     )
     parent_pipe: bool = field(
         default=False,

@@ -61,8 +61,8 @@ class RunningMotion:
         "serial",
         "settling",
         "started",
-        "stop",
         "still",
+        "stop",
         "time",
         "watches",
     )

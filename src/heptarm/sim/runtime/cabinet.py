@@ -28,9 +28,10 @@ from heptarm.io.keys import find_key
 from heptarm.sim.fri.sessions import Sessions
 from heptarm.sim.plant.payload import parse_payload
 from heptarm.sim.plant.plant import Plant
+from heptarm.sim.plant.scene import Scene
 from heptarm.sim.plant.sensor_errors import parse_sensors, sensor_errors
-from heptarm.sim.plant.shared_state import Trace
-from heptarm.sim.plant.world import Box
+from heptarm.sim.plant.shared_state import PositionsFile, Trace
+from heptarm.sim.plant.world import Box, compiled
 from heptarm.sim.runtime import project
 from heptarm.sim.runtime.addresses import AddressMap
 from heptarm.sim.runtime.operator import SimulatedOperator, timed
@@ -47,6 +48,8 @@ REAL_TIME_PRIORITY = 10
 _PORT_PROPERTY = "heptarm.port.bound"
 _START_TIMEOUT = 20.0
 _HOUSEKEEPING = 0.1
+#: Ticks between two updates of the file of positions.
+_POSITIONS_EVERY = 30
 
 
 def arguments(argv: list[str] | None = None) -> SimulatorOptions:
@@ -107,6 +110,7 @@ class VirtualCabinet:
         self.plant = Plant(
             options.model,
             boxes=[Box.of(text) for text in options.box],
+            scene=Scene.of(options.scene) if options.scene else None,
             monitored=options.drive_monitoring == "on",
             errors=sensor_errors(robot(options.model), options.sensors),
         )
@@ -128,6 +132,9 @@ class VirtualCabinet:
             jpype.JClass("java.util.logging.LogManager").getLogManager().reset()
         self._java_memory = java_plant.java_memory
         self._trace = None if options.trace is None else Trace(self.plant.shared, options.trace)
+        self._positions = (
+            None if options.positions is None else PositionsFile(options.positions, len(self.plant.data.qpos))
+        )
         self._station = java_plant.open_station(self.plant, self.sessions)
         for name, value in data.items():
             self._station.setProcessData(name, java_plant.boxed(value))
@@ -161,6 +168,8 @@ class VirtualCabinet:
         self.plant.tick()
         if self._trace is not None:
             self._trace.append()
+        if self._positions is not None and self.plant.tick_count % _POSITIONS_EVERY == 0:
+            self._positions.write(self.plant.data.qpos)
 
     @property
     def is_foreign(self) -> bool:
@@ -236,14 +245,14 @@ def _read_standard_input(operator: SimulatedOperator, end: Callable[[], None]) -
 
 
 def _operate(operator: SimulatedOperator, words: str) -> None:
-    """Execute an operator action and report on standard output whether it was accepted."""
+    """Execute an operator action and report on standard output whether it was accepted, and what it shows."""
+    shown = error = ""
     try:
         if words:
-            operator.do(words)
-        error = ""
+            shown = operator.do(words)
     except ValueError as refused:
         error = str(refused)
-    print(json.dumps({"operator": words, "error": error}), flush=True)
+    print(json.dumps({"operator": words, "error": error, "shown": shown}), flush=True)
 
 
 def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
@@ -284,6 +293,8 @@ def main(argv: list[str] | None = None) -> int:
             timed(fault)
         for text in options.box:
             Box.of(text)
+        if options.scene:
+            compiled(options.model, (), Scene.of(options.scene))
         if options.payload:
             parse_payload(options.payload)
         if options.drive_monitoring not in ("on", "off"):
