@@ -14,7 +14,7 @@ speed = [
     for i in range(len(time) - 4)
 ]
 print(f"{len(time)} samples, one in {1000 * (time[-1] - time[0]) / (len(time) - 1):.0f} ms")
-print(f"starts {max(y) - y[0]:.0f} mm before the end of the line")
+print(f"starts {y[0] - y[-1]:.0f} mm after the start of the path")
 print(f"fastest {max(speed):.0f} mm/s")
 print(f"A7 turns by {max(table['jointPosition_A7']) - min(table['jointPosition_A7']):.1f} deg")
 with open(folder / "samples.csv", newline="") as file:
