@@ -30,6 +30,7 @@ public final class SharedState {
             MethodHandles.byteBufferViewVarHandle(long[].class, ByteOrder.nativeOrder());
 
     private final ByteBuffer memory;
+    private volatile Runnable onWrite = () -> { };
     private final ThreadLocal<View> views = ThreadLocal.withInitial(View::new);
 
     /** A copy of the state that a thread reads. */
@@ -66,6 +67,18 @@ public final class SharedState {
         return word(HeaderWords.START + HeaderWords.ANCHOR);
     }
 
+    /** The machine's time, see {@link System#nanoTime}, at which the plant computes the first tick at or after a simulation time. */
+    long wallTime(long nanos) {
+        double period = Seam.TICK_NS / rate();
+        long tick = nanos / Seam.TICK_NS + (nanos % Seam.TICK_NS == 0 ? 0 : 1);
+        return anchor() + tick * (long) period;
+    }
+
+    /** Calls a runnable whenever the override or an output has been written; it must not block. */
+    void onWrite(Runnable runnable) {
+        onWrite = runnable;
+    }
+
     double rate() {
         return Double.longBitsToDouble(word(HeaderWords.START + HeaderWords.RATE));
     }
@@ -77,6 +90,7 @@ public final class SharedState {
     /** Factor on every programmed speed. */
     public void setOverride(double value) {
         setWord(HeaderWords.START + HeaderWords.OVERRIDE, Double.doubleToRawLongBits(value));
+        onWrite.run();
     }
 
     /** Writes a servo target, which replaces the previous one at the plant's next tick. For straight lines q is a pose. */
@@ -148,6 +162,7 @@ public final class SharedState {
 
     public void setSignal(int place, double value) {
         setWord(ImageWords.START + place, Double.doubleToRawLongBits(value));
+        onWrite.run();
     }
 
     /** Copies the doubles of an array of a state, see {@link StateWords}. */
