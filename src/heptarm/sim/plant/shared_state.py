@@ -14,7 +14,6 @@ import numpy as np
 from heptarm.sim.seam import (
     MEMORY_WORDS,
     SLOTS,
-    TICK_NS,
     HeaderWords,
     ImageWords,
     StateWords,
@@ -73,27 +72,6 @@ class SharedState:
             return None
         copy = self.floats[slot].copy()
         return copy if self.ints[slot, StateWords.SEQ] == 2 * tick + 2 else None
-
-    def repeat(self, ticks: int) -> None:
-        """Publish the newest state again as that of each of the next ticks: those of a robot at rest.
-
-        Args:
-            ticks: how many, 1 to SLOTS - 1.
-        """
-        newest = int(self.header[HeaderWords.NEWEST])
-        state = self.ints[newest % SLOTS, StateWords.TIME + 1 :].copy()
-        while ticks > 0:
-            first = newest + 1
-            slot = first % SLOTS
-            count = min(ticks, SLOTS - slot)
-            words = self.ints[slot : slot + count]
-            sequence = 2 * np.arange(first, first + count) + 1
-            words[:, StateWords.SEQ] = sequence
-            words[:, StateWords.TIME] = (sequence >> 1) * TICK_NS
-            words[:, StateWords.TIME + 1 :] = state
-            words[:, StateWords.SEQ] = sequence + 1
-            newest, ticks = newest + count, ticks - count
-        self.header[HeaderWords.NEWEST] = newest
 
     def post(self, order: int, q: np.ndarray, dq: np.ndarray | None = None) -> None:
         """Write a servo target, as Java does; for programs that drive the plant without Java."""

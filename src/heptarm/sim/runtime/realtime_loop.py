@@ -61,14 +61,8 @@ class RestingPlant(Protocol):
     def begins(self) -> bool:
         """Whether it rests; asked after each tick."""
 
-    def sleep(self) -> bool:
-        """Sleep until a tick is needed; returns whether something may have changed."""
-
-    def skip(self, ticks: int) -> None:
-        """Let ticks pass."""
-
-    def wake_readers(self) -> None:
-        """Wake the threads whose tick has come."""
+    def pass_time(self) -> bool:
+        """Let time pass, publishing the ticks that become due; returns whether the rest is over."""
 
 
 @dataclass(slots=True)
@@ -210,22 +204,13 @@ class RealtimeLoop:
 
     def _pass_rest(self, rest: RestingPlant) -> None:
         """Let the time pass while the plant rests."""
-        header, period = self._shared.header, self._period
-        collected = time.monotonic_ns()
-        while not self._stop:
-            changed = rest.sleep()
-            now, newest = time.monotonic_ns(), int(header[HeaderWords.NEWEST])
-            due = (now - int(header[HeaderWords.ANCHOR])) // period - newest
-            if due > 2 * CATCH_UP:  # the machine was suspended
-                self._rebased += 1
-                header[HeaderWords.ANCHOR] = now - (newest + 1) * period
-                due = 1
-            if due > 0:
-                rest.skip(due)
-                self._rested += int(header[HeaderWords.NEWEST]) - newest
-            if changed:  # readers wait for the next tick, which shows the change
-                return
-            rest.wake_readers()
+        header, collected, over = self._shared.header, time.monotonic_ns(), False
+        while not (over or self._stop):
+            newest, anchor = int(header[HeaderWords.NEWEST]), int(header[HeaderWords.ANCHOR])
+            over = rest.pass_time()
+            self._rested += int(header[HeaderWords.NEWEST]) - newest
+            self._rebased += int(header[HeaderWords.ANCHOR]) != anchor
+            now = time.monotonic_ns()
             if now - collected > COLLECT_EVERY:
                 gc.collect()
                 collected = now

@@ -1,15 +1,13 @@
 """A robot at rest: its ticks repeat the last state instead of simulating it, and many of them pass at once.
 
-The robot rests when nothing runs or waits, no condition is observed, no FRI session is open, nothing in its world
-moves, and its published state has not changed for a tenth of a second. Then its next states are known. The realtime
-loop sleeps until somebody waits for a tick, publishes the ticks that have become due, and sleeps on. Whatever could
-change the state rouses it: calls of Java, written outputs and overrides, actions of the operator. After that the
-plant is simulated again, tick by tick, for half a second at least.
+The robot rests when nothing runs or waits, no condition is observed, no FRI session is open, nothing in its world moves
+and its published state has not changed for a tenth of a second. Then its next states are known: Java repeats the last
+one, tick by tick, as soon as somebody waits for it. Whatever could change the state rouses the plant: calls of Java,
+written outputs and overrides, actions of the operator. After that it is simulated again for half a second at least.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
@@ -20,8 +18,8 @@ from heptarm.sim.plant.plant import Plant
 from heptarm.sim.runtime.operator import SimulatedOperator
 from heptarm.sim.seam import SLOTS, TICK_NS, HeaderWords, StateWords
 
-#: Most ticks that pass at once; a reader's clock runs at most so far ahead of the newest state.
-LONGEST = 20
+#: Ticks that pass at most before the inputs are looked at again.
+LONGEST = 100
 #: Ticks that are simulated at least after something may have changed: an override needs 0.3 s to take effect.
 AWAKE = 500
 #: Ticks between two looks at whether the robot rests, and between the two states that are compared.
@@ -32,14 +30,14 @@ SAME_PLACE, SAME_LOAD = 1e-7, 2e-3
 STILL = 1e-5
 
 
-class Sleep(Protocol):
-    """Where the realtime loop sleeps: `heptarm.doubles.plant.TimerQueue`."""
+class Timers(Protocol):
+    """Passes the time of the ticks of a resting robot, and wakes their readers: `heptarm.doubles.plant.TimerQueue`."""
 
     def rest(self, latest: int) -> bool:
-        """Sleep until a reader's tick is due, at the latest until a plant time [ns]; returns whether it was roused."""
+        """Repeat the newest state tick by tick, at most until a plant time [ns]; returns whether it was roused."""
 
     def rouse(self) -> None:
-        """End the sleep, or the next one; from any thread."""
+        """End that, or the next one; from any thread."""
 
 
 class Rest:
@@ -49,11 +47,11 @@ class Rest:
         plant: the plant.
         sessions: its FRI sessions.
         operator: acts on it.
-        sleep: where to sleep.
+        timers: pass the time.
     """
 
-    def __init__(self, plant: Plant, sessions: Sessions, operator: SimulatedOperator, sleep: Sleep) -> None:
-        self._plant, self._sessions, self._operator, self._sleep = plant, sessions, operator, sleep
+    def __init__(self, plant: Plant, sessions: Sessions, operator: SimulatedOperator, timers: Timers) -> None:
+        self._plant, self._sessions, self._operator, self._timers = plant, sessions, operator, timers
         self._look = AWAKE
         self._inputs = _inputs(plant)
         tolerance = np.full(StateWords.SIZE, np.inf)
@@ -68,7 +66,7 @@ class Rest:
 
     def rouse(self) -> None:
         """Something may change: simulate the next ticks. Any thread."""
-        self._sleep.rouse()
+        self._timers.rouse()
 
     def begins(self) -> bool:
         """Whether the robot rests; asked after each tick."""
@@ -81,30 +79,18 @@ class Rest:
         self._inputs = _inputs(self._plant)
         return True
 
-    def sleep(self) -> bool:
-        """Sleep until a tick is needed; returns whether something may have changed."""
-        latest = min(self._plant.tick_count + LONGEST, self._operator.next_due)
-        changed = bool(self._sleep.rest(latest * TICK_NS))
-        if changed or not self._is_quiet() or _inputs(self._plant) != self._inputs:
-            self._look = self._plant.tick_count + AWAKE
+    def pass_time(self) -> bool:
+        """Let time pass; returns whether the rest is over."""
+        plant = self._plant
+        latest = min(plant.tick_count + LONGEST, self._operator.next_due)
+        changed = bool(self._timers.rest(latest * TICK_NS))
+        passed = int(plant.shared.header[HeaderWords.NEWEST]) - plant.tick_count
+        plant.tick_count += passed
+        plant.data.time += passed * TICK
+        if changed or not self._is_quiet() or _inputs(plant) != self._inputs:
+            self._look = plant.tick_count + AWAKE
             return True
         return False
-
-    def skip(self, ticks: int) -> None:
-        """Let ticks pass, at most up to the next action of the operator."""
-        plant = self._plant
-        ticks = min(ticks, self._operator.next_due - plant.tick_count)
-        if ticks > 0:
-            plant.shared.repeat(ticks)
-            plant.tick_count += ticks
-            plant.data.time += ticks * TICK
-
-    def wake_readers(self) -> None:
-        """Wake the threads of Java whose tick has come."""
-        wake: Callable[[int], None] | None = self._plant.on_wake
-        now = self._plant.time_ns
-        if wake is not None and now >= self._plant.shared.header[HeaderWords.WAKE]:
-            wake(now)
 
     def _is_quiet(self) -> bool:
         """Whether nothing is going on that the states do not show."""

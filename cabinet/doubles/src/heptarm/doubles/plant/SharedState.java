@@ -67,11 +67,49 @@ public final class SharedState {
         return word(HeaderWords.START + HeaderWords.ANCHOR);
     }
 
-    /** The machine's time, see {@link System#nanoTime}, at which the plant computes the first tick at or after a simulation time. */
-    long wallTime(long nanos) {
-        double period = Seam.TICK_NS / rate();
-        long tick = nanos / Seam.TICK_NS + (nanos % Seam.TICK_NS == 0 ? 0 : 1);
-        return anchor() + tick * (long) period;
+    /** Length of a tick by the machine's clock [ns]. */
+    private long period() {
+        return (long) (Seam.TICK_NS / rate());
+    }
+
+    /** The machine's time, see {@link System#nanoTime}, at which a tick is due. */
+    long wallTime(long tick) {
+        return anchor() + tick * period();
+    }
+
+    /**
+     * Publishes the newest state again as that of each tick that is due: the robot rests. Only on the plant's realtime thread.
+     *
+     * @param last tick after which none is published
+     * @param late a tick that cannot be due, unless the machine was suspended: then that time is given up
+     */
+    void repeat(long last, long late) {
+        long tick = newest();
+        long now = System.nanoTime();
+        long due = (now - anchor()) / period();
+        if (due > late) {
+            due = tick + 1;
+            setWord(HeaderWords.START + HeaderWords.ANCHOR, now - due * period());
+        }
+        int from = base(tick);
+        for (long next = tick + 1; next <= Math.min(due, last); next++) {
+            int to = base(next);
+            setWord(to + StateWords.SEQ, 2 * next + 1);
+            VarHandle.storeStoreFence();
+            for (int i = 0; i < StateWords.SIZE; i++) {
+                if (i != StateWords.SEQ && i != StateWords.TIME) {
+                    memory.putLong(WORD * (to + i), memory.getLong(WORD * (from + i)));
+                }
+            }
+            memory.putLong(WORD * (to + StateWords.TIME), next * Seam.TICK_NS);
+            setWord(to + StateWords.SEQ, 2 * next + 2);
+            setWord(HeaderWords.START + HeaderWords.NEWEST, next);
+        }
+    }
+
+    /** First word of the state of a tick. */
+    private static int base(long tick) {
+        return StateWords.START + (int) (tick % Seam.SLOTS) * StateWords.SIZE;
     }
 
     /** Calls a runnable whenever the override or an output has been written; it must not block. */
@@ -139,7 +177,7 @@ public final class SharedState {
     private void copy(View view, long wanted) {
         long tick = Math.min(wanted, newest());
         while (view.tick != tick) {
-            int base = StateWords.START + (int) (tick % Seam.SLOTS) * StateWords.SIZE;
+            int base = base(tick);
             if (word(base + StateWords.SEQ) == 2 * tick + 2) {
                 view.tick = -1;
                 for (int i = 0; i < StateWords.SIZE; i++) {

@@ -11,8 +11,8 @@ import heptarm.doubles.seam.Seam;
 /**
  * Threads that sleep in simulation time; the plant calls {@link #tick} only when at least one of them is due.
  *
- * <p>While the robot rests, the realtime loop of the plant sleeps here as well, until the first of them is due. Whoever changes
- * something that the plant must not miss wakes it by {@link #rouse}.
+ * <p>While the robot rests, the realtime loop of the plant waits here as well, see {@link #rest}. Whoever changes something that the
+ * plant must not miss ends that by {@link #rouse}.
  */
 public final class TimerQueue {
     private static final class Sleeper {
@@ -24,6 +24,9 @@ public final class TimerQueue {
             this.until = until;
         }
     }
+
+    /** A state is at most so many ticks old at rest: the clocks of the threads run ahead of it no further than that. */
+    private static final int STRIDE = 20;
 
     private final SharedState sharedState;
     private final List<Sleeper> sleepers = new ArrayList<>();
@@ -38,25 +41,39 @@ public final class TimerQueue {
     }
 
     /**
-     * The realtime loop sleeps until the first sleeper is due, at the latest until a simulation time.
+     * Lets the time pass while the robot rests: repeats its last state tick by tick, and wakes the sleepers. Called by the realtime
+     * loop; Python takes no part in it, so that a resting robot costs little.
      *
-     * @param latest [ns]
-     * @return whether it was roused; also if that was before it came here
+     * @param latest simulation time at which this ends [ns]
+     * @return whether it was roused, also if that was before it came here; then the next tick has to be simulated
      */
     public boolean rest(long latest) {
+        long last = latest / Seam.TICK_NS;
         resting = Thread.currentThread();
         try {
-            while (!roused.get()) {
-                long left = sharedState.wallTime(Math.min(latest, earliest)) - System.nanoTime();
-                if (left <= 0) {
-                    break;
+            while (sharedState.newest() < last) {
+                boolean changed = roused.get();
+                long next = Math.min(sharedState.newest() + STRIDE, Math.min(last, ticks(earliest)));
+                long left = sharedState.wallTime(next) - System.nanoTime();
+                if (left > 0 && !changed) {
+                    LockSupport.parkNanos(this, left);
+                    continue;
                 }
-                LockSupport.parkNanos(this, left);
+                sharedState.repeat(last, next + STRIDE);
+                if (changed) {
+                    break; // sleepers wait for the next tick, which shows the change
+                }
+                tick(sharedState.newest() * Seam.TICK_NS);
             }
         } finally {
             resting = null;
         }
         return roused.getAndSet(false);
+    }
+
+    /** The first tick at or after a simulation time. */
+    private static long ticks(long nanos) {
+        return nanos / Seam.TICK_NS + (nanos % Seam.TICK_NS == 0 ? 0 : 1);
     }
 
     /** Ends {@link #rest}, or the next one if the realtime loop does not rest: something has changed. Any thread. */
