@@ -54,6 +54,7 @@ def connect(
     groups: tuple[str, ...] = GROUPS,
     on_disconnect: Literal["stop", "finish"] = "stop",
     watchdog: float = CONNECTION.default,
+    black_box: bool = True,
 ) -> Arm:
     """Connect to an arm.
 
@@ -71,6 +72,8 @@ def connect(
         groups: groups that a state contains: "joints", "torques", "pose", "wrench", "motion", "safety", "mode".
         on_disconnect: what the cabinet does with accepted motions when this client is lost: "stop" or "finish" them.
         watchdog: silence after which the cabinet counts this client as lost, [0.1, 10] s.
+        black_box: write the last 30 s to a file after an abort, a safety stop or a lost connection; the error has its
+            path. The environment variable HEPTARM_BLACK_BOX chooses the folder, or is "off".
 
     Returns:
         The arm; use it in a `with` block, which leaves the arm at rest.
@@ -83,6 +86,7 @@ def connect(
     """
     word(on_disconnect, "on_disconnect", ("stop", "finish"))
     flag(control, "control")
+    flag(black_box, "black_box")
     for given, what in ((target, "target"), (name, "name"), (key, "key")):
         if given is not None:
             instance(given, str, what)
@@ -109,6 +113,7 @@ def connect(
         groups=groups,
         finishes=on_disconnect == "finish",
         watchdog=CONNECTION.time(finite(watchdog, "watchdog", unit="s")),
+        black_box=black_box,
     )
     private = PrivateCabinet.start(chosen, key=found) if chosen.is_private else None
     host, port = (chosen.host, chosen.port) if private is None else (private.host, private.port)
