@@ -1,8 +1,8 @@
 """The file of a recording: MCAP with protobuf and JSON messages, which Foxglove and rerun open without a plugin.
 
 Topics: /state and /fri (one message per pushed state and per FRI cycle), /tcp (the motion frame for a 3D view, at most
-30 per second), /log (what happened, as text), /journal (the same with all its data), /signals (IO and control mode, when
-they change). The log time of a message is its receipt, the publish time of a state the moment of its sampling.
+30 per second), /log (what happened, as text), /journal (the same with all its data), /signals (IO and control mode,
+when they change). The log time of a message is its receipt, the publish time of a state the moment of its sampling.
 """
 
 from __future__ import annotations
@@ -76,21 +76,24 @@ class RecordingFile:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("wb")
         except OSError as error:
-            raise CommandRejected(
-                f"{path} cannot be written: {error.strerror}",
-                parameter="path",
-                value=str(path),
-                hint="choose a folder in which this user may write",
-            ) from error
+            raise _unwritable(path, error) from error
         self._epoch = epoch
         self._pose_due = 0
         self._rest = b""
         self._last_signals = ""
+        self._cycles: int | None = None
         self._out: Any = writer.Writer(self._file, chunk_size=chunk)
+        try:
+            self._begin(facts)
+        except OSError as error:
+            self.abandon()
+            raise _unwritable(path, error) from error
+
+    def _begin(self, facts: Mapping[str, str]) -> None:
+        """Write the beginning, which a file that is cut off still has."""
         self._out.start(profile="", library="heptarm")
         self._out.add_metadata(BEGIN, dict(facts))
         self._states = self._add_rows("/state", STATE)
-        self._cycles: int | None = None
         self._pose = self._add("/tcp", *POSE_IN_FRAME)
         self._log = self._add("/log", *LOG)
         self._journal = self._add_json("/journal", "heptarm.JournalEntry", _JOURNAL_SCHEMA)
@@ -197,3 +200,12 @@ class RecordingFile:
             self._file.close()
         except OSError:
             pass  # the disk is full: what was buffered is lost
+
+
+def _unwritable(path: Path, error: OSError) -> CommandRejected:
+    return CommandRejected(
+        f"{path} cannot be written: {error.strerror}",
+        parameter="path",
+        value=str(path),
+        hint="choose a folder in which this user may write, on a disk that has space",
+    )

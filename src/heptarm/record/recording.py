@@ -17,7 +17,7 @@ from heptarm.record.journal import NOTE
 from heptarm.record.layout import FRI_CYCLE, STATE, RowLayout
 from heptarm.record.mcap_file import BEGIN, END
 from heptarm.record.samples import signals_of, to_frame
-from heptarm.values.arrays import Array, shown
+from heptarm.values.arrays import Array, finite, flag, instance, shown
 from heptarm.values.robot import ROBOTS, RobotModel
 
 if TYPE_CHECKING:
@@ -117,8 +117,8 @@ class Recording:
         if found is None:
             known = ", ".join(self.signals)
             raise CommandRejected(
-                f"signal must be one of {known}, got {shown(name)}",
-                parameter="signal",
+                f"name must be one of {known}, got {shown(name)}",
+                parameter="name",
                 value=name,
                 allowed=known,
             )
@@ -167,7 +167,7 @@ class Recording:
         Raises:
             CommandRejected: there is no note with that text.
         """
-        first, last = self._moment(begin), self._moment(end)
+        first, last = self._moment(begin, "begin"), self._moment(end, "end")
         masks = {prefix: _within(self.signals.get(f"{prefix}t"), first, last) for prefix in ("", FRI)}
         signals = {
             name: values[masks[FRI if name.startswith(FRI) else ""]] for name, values in self.signals.items()
@@ -179,10 +179,10 @@ class Recording:
             events=tuple(one for one in self.events if first <= one.t <= last),
         )
 
-    def _moment(self, when: float | str) -> float:
+    def _moment(self, when: float | str, name: str) -> float:
         """Time of a mark [s]."""
         if not isinstance(when, str):
-            return float(when)
+            return finite(when, name, unit="s")
         for one in self.notes:
             if one.text == when:
                 return one.t
@@ -190,7 +190,7 @@ class Recording:
             return -np.inf if when == "begin" else np.inf
         known = ", ".join(repr(one.text) for one in self.notes) or "none"
         raise CommandRejected(
-            f"there is no note {shown(when)}; there are {known}", parameter="when", value=when, allowed=known
+            f"there is no note {shown(when)}; there are {known}", parameter=name, value=when, allowed=known
         )
 
     def to_pandas(self, *, fri: bool = False) -> Any:
@@ -202,7 +202,7 @@ class Recording:
         Raises:
             MissingExtra: pandas is not installed.
         """
-        prefix = FRI if fri else ""
+        prefix = FRI if flag(fri, "fri") else ""
         chosen = {
             name.removeprefix(prefix): values
             for name, values in self.signals.items()
@@ -270,7 +270,7 @@ def load(path: str | Path) -> Recording:
         CommandRejected: the file cannot be read, or is no recording of heptarm.
         MissingExtra: the package mcap is not installed.
     """
-    where = Path(path)
+    where = Path(instance(path, (str, Path), "path"))
     content = _Content()
     try:
         with where.open("rb") as file:
