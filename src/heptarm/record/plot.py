@@ -228,7 +228,7 @@ def _draw_signal(
     t = recording[f"{FRI}t" if name.startswith(FRI) else "t"] - zero
     values = recording[name].astype(np.float64)
     values = values[:, None] if values.ndim == 1 else values
-    step = max(1, len(t) // _POINTS)
+    step = 1 if len(t) <= _POINTS else -(-2 * len(t) // _POINTS)
     limits = _limits(recording.robot, quantity)
     by_limit = short in ("dq", "tau") and limits is not None
     values = values / limits[1] if by_limit and limits is not None else values * quantity.factor
