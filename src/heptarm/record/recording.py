@@ -406,7 +406,9 @@ def _motions(
     events: Sequence[RecordedEvent], signals: Mapping[str, npt.NDArray[Any]]
 ) -> Iterator[RecordedMotion]:
     """Programs: of their events, and of the states where those of another client have none."""
-    texts, begins, ends = {}, {}, {}
+    texts: dict[int, str] = {}
+    begins: dict[int, float] = {}
+    ends: dict[int, RecordedEvent] = {}
     for one in events:
         if one.kind == "request" and one.name in ("Run", "ServoOpen", "FriOpen"):
             texts[one.id] = (
