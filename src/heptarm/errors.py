@@ -38,7 +38,11 @@ An error names what was refused, the value with its unit, the allowed range and 
 from __future__ import annotations
 
 import importlib
-from typing import Any
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+_Error = TypeVar("_Error", bound="HeptarmError")
 
 
 class HeptarmError(Exception):
@@ -70,10 +74,25 @@ class HeptarmError(Exception):
         self.value = value
         self.allowed = allowed
         self.hint = hint
+        self._black_box: Callable[[], Path | None] | None = None
 
     def __str__(self) -> str:
         """The text and, if there is one, the hint."""
         return f"{self.text} ({self.hint})" if self.hint else self.text
+
+    @property
+    def black_box(self) -> Path | None:
+        """Recording of the last 30 s before the error, for `heptarm.load`; None: none was written.
+
+        Errors that end a motion, safety stops and lost connections have one. Reading it waits until it is written,
+        half a second at most for what happens after the error.
+        """
+        return None if self._black_box is None else self._black_box()
+
+    def with_black_box(self: _Error, source: HeptarmError | Callable[[], Path | None] | None) -> _Error:
+        """The same error with the black box of another error, or with one that a function returns."""
+        self._black_box = source._black_box if isinstance(source, HeptarmError) else source
+        return self
 
 
 class ConnectFailed(HeptarmError, ConnectionError):
