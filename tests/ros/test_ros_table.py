@@ -58,6 +58,9 @@ def test_every_service_topic_and_action_of_ours_is_told_in_a_row(table) -> None:
     assert ours - told <= {
         "~/joint_trajectory",
         "~/query_state",
+        "~/controller_state",
+        "forward_position_controller/commands",
+        "forward_velocity_controller/commands",
         "/tf",
     }  # ROS' own, and what Python does not need
 
