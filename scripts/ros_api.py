@@ -10,7 +10,15 @@ LIFE = "the life cycle"
 STATES = ("~/state", "joint_states")
 MOTIONS = ("~/move_joints", "~/move_pose", "~/move_spline", "~/run_program")
 COMMANDS = ("~/command/joint", "~/command/pose", "~/command/lin")
-SERVOS = ("~/servo/joint", "~/servo/velocity", "~/servo/pose", "~/servo/lin")
+SERVOS = (
+    "~/servo/joint",
+    "~/servo/velocity",
+    "~/servo/pose",
+    "~/servo/lin",
+    "~/servo/twist",
+    "~/servo/twist_unstamped",
+    "~/servo/jog",
+)
 MODES = (
     "~/mode/position",
     "~/mode/joint_impedance",
@@ -64,7 +72,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "resume": ("~/resume",),
         "robot": ("~/info",),
         "servo": (*SERVOS, "~/follow_joint_trajectory"),
-        "set_override": ("~/set_override",),
+        "set_override": ("~/set_override", "~/speed_scaling"),
         "software": ("~/info",),
         "speed": ("parameter `speed`", "~/set_speed"),
         "start": (*MOTIONS, *COMMANDS),
