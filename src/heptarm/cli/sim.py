@@ -22,7 +22,7 @@ from heptarm.cli.options import (
     Model,
 )
 from heptarm.cli.output import emit, is_silent, lines
-from heptarm.errors import CommandRejected, ConnectFailed
+from heptarm.errors import CommandRejected, ConnectFailed, refuse_windows, require_extra
 from heptarm.io.keys import environment, find_key
 from heptarm.sim.runtime.operator import WORDS
 from heptarm.values.simulator_options import SimulatorOptions
@@ -490,6 +490,8 @@ def _application(
 
 
 def _command(options: SimulatorOptions) -> list[str]:
+    refuse_windows("the virtual cabinet")
+    require_extra("sim")
     return [sys.executable, "-m", "heptarm.sim.runtime.cabinet", *options.arguments()]
 
 

@@ -257,6 +257,7 @@ class Connection:
         in_control: this client took control and has not lost it; true also while the link is lost.
         controller: name of the client that controls the robot; empty: none.
         closed: set when the arm is closed.
+        left_at_rest: the arm was at rest when this client, in control, closed it.
         signals: signals of the cabinet.
     """
 
@@ -275,6 +276,7 @@ class Connection:
         self.in_control = False
         self.controller = ""
         self.closed = threading.Event()
+        self.left_at_rest = False
         self._dial = dial
         self._link: Link | None = None
         self._welcome: wire.Welcome | None = None

@@ -13,6 +13,7 @@ import gc
 import json
 import logging
 import os
+import re
 import signal
 import sys
 import threading
@@ -178,9 +179,10 @@ class VirtualCabinet:
             if not self.host.isAlive():
                 break
             time.sleep(0.002)
-        raise RuntimeError(
-            f"the cabinet application did not start: {self.host.failure() or 'no reason given'}"
-        )
+        failure = str(self.host.failure() or "no reason given")
+        if "Address already in use" in failure:
+            failure = f"port {self.options.port} is in use by another program"
+        raise RuntimeError(f"the cabinet application did not start: {without_classes(failure)}")
 
     def close(self) -> None:
         """Write the statistics for the last time, and what is left of the trace."""
@@ -200,7 +202,9 @@ class VirtualCabinet:
 
 
 def _promote() -> None:
-    """Set the priority of the application's threads; every client adds new ones."""
+    """Set the priority of the application's threads, on Linux; every client adds new ones."""
+    if sys.platform != "linux":
+        return
     for task in Path("/proc/self/task").iterdir():
         try:
             if (task / "comm").read_text().startswith(REAL_TIME_THREADS):
@@ -241,6 +245,11 @@ def _operate(operator: SimulatedOperator, words: str) -> None:
     except ValueError as refused:
         error = str(refused)
     print(json.dumps({"operator": words, "error": error}), flush=True)
+
+
+def without_classes(text: str) -> str:
+    """The text of a Java exception without the names of its classes."""
+    return re.sub(r"(?:\b[a-z]\w*\.)+[A-Z]\w*(?:Exception|Error)\b(?:: |$)", "", text).strip() or "no reason given"
 
 
 def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
