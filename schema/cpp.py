@@ -48,20 +48,20 @@ HEAD = """// heptarm: a client of the wire protocol in C++17, in one header.
 """
 #: Words that C++ keeps for itself, of those that a schema might use as names; they get a _ at their end.
 KEYWORDS = frozenset(
-    "and auto bool break case catch char class const continue default delete do double else enum explicit export extern "
-    "false float for friend goto if inline int long mutable namespace new not operator or private protected public "
-    "register return short signed sizeof static struct switch template this throw true try typename union unsigned "
-    "using virtual void volatile while xor".split()
+    ["and", "auto", "bool", "break", "case", "catch", "char", "class", "const", "continue", "default", "delete", "do", "double", "else", "enum", "explicit", "export", "extern", "false", "float", "for", "friend", "goto", "if", "inline", "int", "long", "mutable", "namespace", "new", "not", "operator", "or", "private", "protected", "public", "register", "return", "short", "signed", "sizeof", "static", "struct", "switch", "template", "this", "throw", "true", "try", "typename", "union", "unsigned", "using", "virtual", "void", "volatile", "while", "xor"]
 )
 PRIMITIVES = {"bool": "bool", "f64": "double"} | {
-    name: f"std::{'u' * (name[0] == 'u')}int{name[1:]}_t" for name in ("u8", "u16", "u32", "u64", "i32", "i64")
+    name: f"std::{'u' * (name[0] == 'u')}int{name[1:]}_t"
+    for name in ("u8", "u16", "u32", "u64", "i32", "i64")
 }
 
 
 def header(spec: Spec) -> str:
     """Text of heptarm.hpp."""
     parts = [HEAD, _part("codec"), "\n".join(_messages(spec)), _part("errors"), "\n".join(_errors(spec))]
-    return "\n".join(part.rstrip("\n") + "\n" for part in (*parts, _part("key"), _part("session"), _part("arm")))
+    return "\n".join(
+        part.rstrip("\n") + "\n" for part in (*parts, _part("key"), _part("session"), _part("arm"))
+    )
 
 
 def _part(name: str) -> str:
@@ -104,7 +104,13 @@ def _initial(spec: Spec, one: Field) -> str:
     if t.name == "bool":
         return f" = {str(bool(given)).lower()}"
     text = _number(float(given)) if t.name == "f64" else str(int(given))
-    return f" = filled<{t.size}>({text})" if t.kind == "array" and t.name == "f64" else "{}" if t.kind == "array" else f" = {text}"
+    return (
+        f" = filled<{t.size}>({text})"
+        if t.kind == "array" and t.name == "f64"
+        else "{}"
+        if t.kind == "array"
+        else f" = {text}"
+    )
 
 
 def _limits(one: Field) -> str:
@@ -124,11 +130,21 @@ def _note(one: Field) -> str:
 
 def _body(spec: Spec, fields: list[Field]) -> list[str]:
     """Members of a class and the function that visits them in their order."""
-    lines = [f"    {_type(spec, one.type)} {_name(one.name)}{_initial(spec, one)};{_note(one)}" for one in fields]
+    lines = [
+        f"    {_type(spec, one.type)} {_name(one.name)}{_initial(spec, one)};{_note(one)}" for one in fields
+    ]
     lines += ["" for _ in fields[:1]]
     args = "Self& self, Visit& visit" if fields else "Self&, Visit&"
     visits = [f'        visit(self.{_name(one.name)}, "{one.name}"{_limits(one)});' for one in fields]
-    return [*lines, "    template <class Self, class Visit>", f"    static void each({args}) {{", *visits, "    }", "};", ""]
+    return [
+        *lines,
+        "    template <class Self, class Visit>",
+        f"    static void each({args}) {{",
+        *visits,
+        "    }",
+        "};",
+        "",
+    ]
 
 
 def _messages(spec: Spec) -> list[str]:
@@ -153,9 +169,17 @@ def _messages(spec: Spec) -> list[str]:
     names = ", ".join(spec.messages)
     lines += ["/// Any message.", f"using Message = std::variant<{names}>;", ""]
     lines += ["/// The message with this id in a body. Throws DecodeError."]
-    lines += ["inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t size) {", "    switch (type) {"]
+    lines += [
+        "inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t size) {",
+        "    switch (type) {",
+    ]
     lines += [f"        case {name}::TYPE: return decode<{name}>(data, size);" for name in spec.messages]
-    lines += ['        default: throw DecodeError("unknown message id " + std::to_string(type));', "    }", "}", ""]
+    lines += [
+        '        default: throw DecodeError("unknown message id " + std::to_string(type));',
+        "    }",
+        "}",
+        "",
+    ]
     return [*lines, "}  // namespace wire", "}  // namespace heptarm", ""]
 
 
@@ -166,7 +190,10 @@ def _enum(enum: Enum) -> list[str]:
         note = f"  ///< {value['doc']}" if "doc" in value else ""
         lines.append(f"    {name} = {value['value']},{note}")
     lines += ["};", "", f"inline const char* name({enum.name} value) {{", "    switch (value) {"]
-    lines += [f'        case {enum.name}::{name}: return "{value["name"]}";' for name, value in zip(names, enum.values)]
+    lines += [
+        f'        case {enum.name}::{name}: return "{value["name"]}";'
+        for name, value in zip(names, enum.values)
+    ]
     lines += ["    }", '    return "";', "}", ""]
     return [*lines, f"inline bool is_known({enum.name} value) {{ return *name(value) != 0; }}", ""]
 
@@ -175,7 +202,9 @@ def _flags(enum: Enum) -> list[str]:
     lines = [f"/// {enum.doc}", f"struct {enum.name} {{"]
     for value in enum.values:
         note = f"  ///< {value['doc']}" if "doc" in value else ""
-        lines.append(f"    static constexpr {PRIMITIVES[enum.base]} {_name(value['name'])} = {1 << value['bit']};{note}")
+        lines.append(
+            f"    static constexpr {PRIMITIVES[enum.base]} {_name(value['name'])} = {1 << value['bit']};{note}"
+        )
     return [*lines, "};", ""]
 
 
@@ -205,7 +234,11 @@ def _message(spec: Spec, message: Message) -> list[str]:
         return [*lines, *_body(spec, message.fields)]
     mask = sum(1 << bit for _, bit, _ in message.groups)
     lines += [f"    std::optional<{kind}> {name};" for name, _, kind in message.groups]
-    lines += ["", "    template <class Self, class Visit>", "    static void each(Self& self, Visit& visit) {"]
+    lines += [
+        "",
+        "    template <class Self, class Visit>",
+        "    static void each(Self& self, Visit& visit) {",
+    ]
     present = " | ".join(f"(self.{name} ? {1 << bit} : 0)" for name, bit, _ in message.groups)
     lines += [
         f"        std::uint16_t mask = static_cast<std::uint16_t>({present});",
@@ -220,7 +253,9 @@ def _message(spec: Spec, message: Message) -> list[str]:
 
 
 def _errors(spec: Spec) -> list[str]:
-    kinds = sorted({error["class"] for error in spec.errors} | {"CommandRejected", "ConnectionLost", "MotionAborted"})
+    kinds = sorted(
+        {error["class"] for error in spec.errors} | {"CommandRejected", "ConnectionLost", "MotionAborted"}
+    )
     rejected = {"LimitError", "ShapeError", "ModeConflict", "NotInControl"}
     parents = dict.fromkeys(rejected, "CommandRejected") | {
         "VersionMismatch": "ConnectFailed",
@@ -229,15 +264,27 @@ def _errors(spec: Spec) -> list[str]:
     }
     lines = ["namespace heptarm {", ""]
     for kind in sorted(kinds, key=lambda kind: (kind in parents, kind)):
-        lines += [f"struct {kind} : {parents.get(kind, 'Error')} {{ using {parents.get(kind, 'Error')}::{parents.get(kind, 'Error')}; }};"]
+        lines += [
+            f"struct {kind} : {parents.get(kind, 'Error')} {{ using {parents.get(kind, 'Error')}::{parents.get(kind, 'Error')}; }};"
+        ]
     lines += ["", "/// Why something was refused or ended.", "enum class Code : std::uint16_t {"]
-    lines += [f"    {_name(error['name'])} = {error['code']},  ///< {error['title']}" for error in spec.errors]
+    lines += [
+        f"    {_name(error['name'])} = {error['code']},  ///< {error['title']}" for error in spec.errors
+    ]
     lines += ["};", "", "/// The C++ errors of the codes.", f"enum class Kind {{ {', '.join(kinds)} }};", ""]
     lines += ["/// A code in words, and the error that it becomes.", "struct Meaning {", "    Kind kind;"]
-    lines += ["    const char *title, *advice;", "};", "", "inline Meaning meaning_of(int code) {", "    switch (code) {"]
+    lines += [
+        "    const char *title, *advice;",
+        "};",
+        "",
+        "inline Meaning meaning_of(int code) {",
+        "    switch (code) {",
+    ]
     for error in spec.errors:
         title, advice = (error[name].replace('"', "'") for name in ("title", "advice"))
-        lines.append(f'        case {error["code"]}: return {{Kind::{error["class"]}, "{title}", "{advice}"}};')
+        lines.append(
+            f'        case {error["code"]}: return {{Kind::{error["class"]}, "{title}", "{advice}"}};'
+        )
     lines += ['        default: return {Kind::CommandRejected, "", ""};', "    }", "}", ""]
     lines += [
         "template <class Failure>",
@@ -253,5 +300,7 @@ def _errors(spec: Spec) -> list[str]:
         "                                    const wire::Rejected& refused) {",
         "    switch (kind) {",
     ]
-    lines += [f"        case Kind::{kind}: throw_refused<{kind}>(text, code, advice, refused);" for kind in kinds]
+    lines += [
+        f"        case Kind::{kind}: throw_refused<{kind}>(text, code, advice, refused);" for kind in kinds
+    ]
     return [*lines, "    }", "    throw Error(text, code, advice);", "}", "", "}  // namespace heptarm", ""]

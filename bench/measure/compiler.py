@@ -19,9 +19,7 @@ def compiled(source: Path, folder: Path) -> Path:
     is_cpp = source.suffix == ".cpp"
     compiler = shutil.which("g++" if is_cpp else "gcc") or shutil.which("c++" if is_cpp else "cc")
     if compiler is None:
-        raise RuntimeError(
-            f"no compiler to compile {source.name} with; install {'g++' if is_cpp else 'gcc'}"
-        )
+        raise RuntimeError(f"no compiler to compile {source.name} with; install {'g++' if is_cpp else 'gcc'}")
     more = ["-std=c++17", "-I", str(_CPP)] if is_cpp else []
     program = folder / source.stem
     subprocess.run([compiler, "-O2", *more, "-pthread", "-o", str(program), str(source), "-lm"], check=True)

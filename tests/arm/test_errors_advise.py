@@ -11,7 +11,15 @@ import pytest
 
 import heptarm as ha
 from heptarm.arm.translate.motions import items
-from heptarm.errors import CommandRejected, ConnectFailed, HeptarmError, LimitError, MissingExtra, missing_extra, require_extra
+from heptarm.errors import (
+    CommandRejected,
+    ConnectFailed,
+    HeptarmError,
+    LimitError,
+    MissingExtra,
+    missing_extra,
+    require_extra,
+)
 from heptarm.values.robot import robot
 from heptarm.wire.codes import MEANINGS, Code
 
@@ -41,8 +49,9 @@ def test_degrees_for_an_angle() -> None:
 
 
 def test_millimetres() -> None:
-    assert "offset.z must be in [-4, 4] m, got 50 m (units are metres: did you mean 50 mm, which is 0.05 m?)" in refused(
-        ha.lin_rel(z=50)
+    assert (
+        "offset.z must be in [-4, 4] m, got 50 m (units are metres: did you mean 50 mm, which is 0.05 m?)"
+        in refused(ha.lin_rel(z=50))
     )
     assert "target.x" in refused(ha.lin(ha.Pose.xyz_abc(500, 0, 400)))
     assert "did you mean 500 mm, which is 0.5 m?" in refused(ha.ptp(ha.Pose.xyz_abc(500, 0, 400)))
@@ -97,7 +106,9 @@ def test_a_missing_extra_is_one_sentence_with_the_command() -> None:
 
 def test_windows_is_told_what_does_not_work_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("heptarm.errors._PLATFORM", "win32")
-    with pytest.raises(CommandRejected, match=r"the virtual cabinet runs on Linux, this is Windows \(use WSL"):
+    with pytest.raises(
+        CommandRejected, match=r"the virtual cabinet runs on Linux, this is Windows \(use WSL"
+    ):
         ha.connect("sim://iiwa14")
     with pytest.raises(CommandRejected, match="FRI runs on Linux"):
         ha.fri.Client(0)

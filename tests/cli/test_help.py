@@ -49,14 +49,18 @@ def test_every_option_has_a_help_text_and_no_double(words: tuple[str, ...]) -> N
             continue
         if not (argument.parameter.help or "").strip():
             wrong.append(argument.name)
-        wrong += [name for name in argument.names if name.startswith(("--no-", "--empty-")) and name != "--no-key"]
+        wrong += [
+            name for name in argument.names if name.startswith(("--no-", "--empty-")) and name != "--no-key"
+        ]
     assert not wrong
 
 
 @pytest.mark.parametrize("words", [("move", "ptp"), ("state",), ("targets", "add"), ("servo",)], ids=" ".join)
 def test_help_shows_an_example(words: tuple[str, ...]) -> None:
     done = run(*words, "--help")
-    assert done.returncode == 0 and "For example" in done.stdout and f"heptarm {' '.join(words)} " in done.stdout
+    assert (
+        done.returncode == 0 and "For example" in done.stdout and f"heptarm {' '.join(words)} " in done.stdout
+    )
 
 
 @pytest.mark.parametrize(
@@ -121,7 +125,9 @@ def on_a_terminal(*words: str, interrupt: str = "") -> tuple[int, str]:
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 def test_a_long_motion_shows_progress_and_ctrl_c_says_that_the_arm_rests() -> None:
     words = ("move", "ptp", "160", "0", "0", "-90", "0", "60", "0", "--deg", "--speed", "0.1")
-    code, seen = on_a_terminal(*words, "--target", f"sim://iiwa14?speed={FASTER:g}", interrupt=r"\d+%, [\d.]+ s left")
+    code, seen = on_a_terminal(
+        *words, "--target", f"sim://iiwa14?speed={FASTER:g}", interrupt=r"\d+%, [\d.]+ s left"
+    )
     assert re.search(r"\d+%, [\d.]+ s left", seen), seen
     assert code == 130 and "heptarm: Ctrl-C: the arm was stopped and is at rest" in seen, seen
 

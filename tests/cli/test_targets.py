@@ -60,7 +60,7 @@ def test_a_wrong_entry_is_named(config: Path, text: str, words: str) -> None:
     (config / "targets.toml").write_text(text)
     with pytest.raises(CommandRejected) as refused:
         parse_target("lab1")
-    assert words in str(refused.value) and str(config) in str(refused.value) or "letter" in words
+    assert (words in str(refused.value) and str(config) in str(refused.value)) or "letter" in words
 
 
 def test_addresses_need_no_file_of_targets(config: Path) -> None:

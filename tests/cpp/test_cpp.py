@@ -25,7 +25,17 @@ from tests.simulators import FASTER
 
 ROOT = Path(__file__).resolve().parents[2]
 GOLDEN = ROOT / "schema" / "golden"
-FLAGS = ("-std=c++17", "-O1", "-Wall", "-Wextra", "-Wshadow", "-Werror", "-pthread", "-I", str(ROOT / "cpp" / "include"))
+FLAGS = (
+    "-std=c++17",
+    "-O1",
+    "-Wall",
+    "-Wextra",
+    "-Wshadow",
+    "-Werror",
+    "-pthread",
+    "-I",
+    str(ROOT / "cpp" / "include"),
+)
 KEY = "k7fh-9tqa-x2mn-p4cw-8r3e-vd6y-s5gj"
 
 
@@ -78,7 +88,9 @@ def test_judges_damaged_bytes_as_python_does(probe: Path) -> None:
         cases += [(one["type"], body[:-1]), (one["type"], body + b"\0")]
         for _ in range(10):
             changed = bytearray(body or b"\0")
-            changed[source.randrange(len(changed))] = source.choice((0, 1, 0x7F, 0x80, 0xC3, 0xED, 0xF8, 0xFF))
+            changed[source.randrange(len(changed))] = source.choice(
+                (0, 1, 0x7F, 0x80, 0xC3, 0xED, 0xF8, 0xFF)
+            )
             cases.append((one["type"], bytes(changed)))
     cases.append((999, b""))
     found = asked(probe, "recode", text="".join(f"{number} {body.hex()}\n" for number, body in cases))
@@ -92,7 +104,12 @@ def test_judges_damaged_bytes_as_python_does(probe: Path) -> None:
 
 def test_computes_the_vectors_of_the_key(probe: Path) -> None:
     vectors = json.loads((GOLDEN / "key.json").read_text())
-    given = (bytes.fromhex(vectors["key"]).decode(), vectors["hello"], vectors["challenge"], vectors["welcome"])
+    given = (
+        bytes.fromhex(vectors["key"]).decode(),
+        vectors["hello"],
+        vectors["challenge"],
+        vectors["welcome"],
+    )
     found = dict(line.split() for line in asked(probe, "key", *given, "1234567890"))
     assert set(found) == {"client_mac", "client_key", "cabinet_key", "proof", "stop_frame"}
     assert found == {name: vectors[name] for name in found}
@@ -122,7 +139,9 @@ def test_a_cabinet_with_a_key_takes_only_a_client_that_proves_it(probe: Path, tm
         address = f"127.0.0.1:{ready['port']}"
         check_moves(asked(probe, "move", address, KEY))
         (without,) = asked(probe, "connect", address)
-        assert without.startswith(f"connect ConnectFailed {Code.WRONG_KEY:d} the cabinet asks for a pre-shared key")
+        assert without.startswith(
+            f"connect ConnectFailed {Code.WRONG_KEY:d} the cabinet asks for a pre-shared key"
+        )
         (wrong,) = asked(probe, "connect", address, KEY[::-1])
         assert wrong.startswith(f"connect ConnectFailed {Code.WRONG_KEY:d} ")
 
@@ -164,10 +183,19 @@ def test_errors_have_the_text_of_the_cabinet(probe: Path, address: str) -> None:
     found = {line.split()[0]: line for line in lines}
     assert found["observer"].startswith(f"observer NotInControl {Code.NOT_IN_CONTROL:d} ")
     assert found["second"].startswith("second NotInControl ") and "probe" in found["second"]
-    assert found["limit"].startswith("limit LimitError ") and "A2" in found["limit"] and "[-120" in found["limit"]
+    assert (
+        found["limit"].startswith("limit LimitError ")
+        and "A2" in found["limit"]
+        and "[-120" in found["limit"]
+    )
     assert found["unset"].startswith("unset LimitError 1 items[0].motion.q[0] ")
-    assert found["speed"].startswith("speed LimitError 2 items[0].motion.dynamics.velocity[0] ") and "(0, 1]" in found["speed"]
-    assert found["unplanned"].split()[1] in ("CommandRejected", "LimitError", "MotionAborted"), found["unplanned"]
+    assert (
+        found["speed"].startswith("speed LimitError 2 items[0].motion.dynamics.velocity[0] ")
+        and "(0, 1]" in found["speed"]
+    )
+    assert found["unplanned"].split()[1] in ("CommandRejected", "LimitError", "MotionAborted"), found[
+        "unplanned"
+    ]
     assert "an not plan motion" in found["unplanned"] or "reach" in found["unplanned"]
     assert "(stopped)" in found["stopped"]
     assert found["starved"].startswith("starved Starved ")

@@ -4104,13 +4104,15 @@ public:
     /// The newest state after the one with this number: `sample = arm.next_state(sample.number)` waits for each new one.
     StateSample next_state(std::uint64_t after) const { return link_->state(after, link_->options().timeout); }
 
-    /// The first state that is received from now on and shows the arm at rest. Throws Timeout.
-    wire::State wait_for_rest(double seconds = 5.0) const {
-        const std::int64_t begin = now(), deadline = begin + static_cast<std::int64_t>(seconds * 1e9);
+    /// Waits until nothing runs, nothing waits and no axis turns in two consecutive states. Throws Timeout.
+    wire::State wait_for_rest(double seconds = 10.0) const {
+        const std::int64_t deadline = now() + static_cast<std::int64_t>(seconds * 1e9);
         StateSample sample = next_state(0);
-        while (!(sample.received > begin && is_at_rest(sample.state))) {
+        const std::int64_t first = sample.state.joints ? sample.state.joints->stamp : 0;
+        for (int count = 0; count < 2;) {
             if (now() > deadline) throw Timeout("the arm does not rest after " + wire::text_of(seconds) + " s");
             sample = next_state(sample.number);
+            count = is_at_rest(sample.state, first) ? count + 1 : 0;
         }
         return sample.state;
     }
@@ -4137,12 +4139,13 @@ public:
     void close() { link_->close(); }
 
 private:
-    static constexpr double AT_REST = 0.005;  // [rad/s]
+    static constexpr double AT_REST = 0.01;  // [rad/s]
 
-    static bool is_at_rest(const wire::State& state) {
-        if (!state.joints || !state.motion || state.motion->motion != 0) return false;
+    static bool is_at_rest(const wire::State& state, std::int64_t after) {
+        if (!state.joints || !state.motion || state.joints->stamp <= after) return false;
+        if (state.motion->motion != 0 || state.motion->queued != 0) return false;
         for (const double one : state.joints->dq)
-            if (!(std::fabs(one) < AT_REST)) return false;
+            if (std::fabs(one) >= AT_REST) return false;
         return true;
     }
 

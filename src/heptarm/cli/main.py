@@ -76,7 +76,9 @@ app.command(_add(_learn, LEARNING, listed=_words == ["rl"]))
 
 
 @_targets.default
-def _list_targets(*, as_json: Annotated[bool, Parameter(name="--json", help="Print one JSON object per line.")] = False) -> int:
+def _list_targets(
+    *, as_json: Annotated[bool, Parameter(name="--json", help="Print one JSON object per line.")] = False
+) -> int:
     """List, save and remove robots that have a name; without another word: list."""
     from heptarm.cli.targets import show
 

@@ -156,7 +156,10 @@ def servo(
         ):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
         direction, lag = np.eye(7)[index], 0.0
-        with progress(arm, seconds=seconds), arm.servo("joint", rate=rate, engine=engine, speed=speed, acceleration=1.0) as sv:
+        with (
+            progress(arm, seconds=seconds),
+            arm.servo("joint", rate=rate, engine=engine, speed=speed, acceleration=1.0) as sv,
+        ):
             while sv.tick() and sv.t < seconds:
                 fade = min(
                     1.0, sv.t, max(0.0, seconds - sv.t)

@@ -81,7 +81,9 @@ def add(
         read_key_file(key_file)
         place = str(key_file.expanduser().resolve())
     add_target(SavedTarget(name, address, place, tool, speed), replace=replace)
-    emit({"name": name, "file": str(targets_file())}) if as_json else print(f"{name} is {address} from now on")
+    emit({"name": name, "file": str(targets_file())}) if as_json else print(
+        f"{name} is {address} from now on"
+    )
     return 0
 
 

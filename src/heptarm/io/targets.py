@@ -169,7 +169,9 @@ def add_target(target: SavedTarget, *, replace: bool = False) -> None:
             )
         remove_target(target.name)
     lines = [f"[{target.name}]", f"address = {_text(target.address)}"]
-    lines += [f"{key} = {_text(getattr(target, key))}" for key in ("key_file", "tool") if getattr(target, key)]
+    lines += [
+        f"{key} = {_text(getattr(target, key))}" for key in ("key_file", "tool") if getattr(target, key)
+    ]
     if not math.isclose(target.speed, 1.0):
         lines.append(f"speed = {float(target.speed)!r}")
     before = _content().rstrip("\n")

@@ -249,7 +249,10 @@ def _operate(operator: SimulatedOperator, words: str) -> None:
 
 def without_classes(text: str) -> str:
     """The text of a Java exception without the names of its classes."""
-    return re.sub(r"(?:\b[a-z]\w*\.)+[A-Z]\w*(?:Exception|Error)\b(?:: |$)", "", text).strip() or "no reason given"
+    return (
+        re.sub(r"(?:\b[a-z]\w*\.)+[A-Z]\w*(?:Exception|Error)\b(?:: |$)", "", text).strip()
+        or "no reason given"
+    )
 
 
 def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
