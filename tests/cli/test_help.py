@@ -44,7 +44,7 @@ def test_the_table_has_every_command() -> None:
 @pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
 def test_every_option_has_a_help_text_and_no_double(words: tuple[str, ...]) -> None:
     wrong = []
-    for argument in COMMANDS[words].assemble_argument_collection():
+    for argument in COMMANDS[words].assemble_argument_collection(default_parameter=app.default_parameter):
         if not argument.show:
             continue
         if not (argument.parameter.help or "").strip():
@@ -53,6 +53,10 @@ def test_every_option_has_a_help_text_and_no_double(words: tuple[str, ...]) -> N
             name for name in argument.names if name.startswith(("--no-", "--empty-")) and name != "--no-key"
         ]
     assert not wrong
+
+
+def test_help_lists_no_double() -> None:
+    assert "--empty" not in run("sim", "--help").stdout
 
 
 @pytest.mark.parametrize("words", [("move", "ptp"), ("state",), ("targets", "add"), ("servo",)], ids=" ".join)

@@ -43,6 +43,7 @@ app = App(
     help="Control a KUKA LBR iiwa, with or without a robot on the desk.",
     version=__version__,
     default_parameter=Parameter(negative=()),  # no --no-… and --empty-… beside the options
+    suppress_keyboard_interrupt=False,  # `main` reports what became of the arm
 )
 
 
