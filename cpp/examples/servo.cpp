@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
         settings.velocity = 0.5;
         settings.acceleration = 1.0;
         Servo servo = arm.servo(settings);
-        const Joints start = arm.state().joints->q;
+        const Joints start = servo.start();
         while (servo.tick() && servo.t() < 3.0) {
             Joints q = start;
             q[6] += 0.3 * std::sin(2.0 * servo.t());

@@ -323,6 +323,12 @@ public:
         return newest_;
     }
 
+    /// Number of the states received so far.
+    std::uint64_t states() {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        return newest_.number;
+    }
+
     std::string controller() {
         const std::lock_guard<std::mutex> lock(mutex_);
         return controller_;
@@ -701,6 +707,7 @@ public:
             throw Timeout("the servo motion did not begin", 0, "check whether the robot is ready to move, or paused");
         }
         if (motion_->done()) motion_->wait();  // throws why
+        if (link_->options().rate > 0) begin_ = link_->state(link_->states(), link_->options().timeout).state.joints;
         start_ = due_ = now();
     }
 
@@ -712,6 +719,12 @@ public:
             if (motion_) close();
         } catch (const Error&) {  // close() yourself to see it
         }
+    }
+
+    /// The joint positions when the motion began [rad]: build targets on them, so that nothing jumps.
+    const Joints& start() const {
+        if (!begin_) throw Error("the joint positions are not known", 0, "subscribe to the joints: options.rate, options.groups");
+        return begin_->q;
     }
 
     /// Whether the arm follows the targets.
@@ -784,6 +797,7 @@ private:
     std::shared_ptr<Link> link_;
     ServoOptions options_;
     std::optional<Motion> motion_;
+    std::optional<wire::JointState> begin_;
     std::int64_t start_ = 0, due_ = 0;
 };
 
@@ -800,7 +814,7 @@ inline wire::Item ptp(const Joints& q, double speed = 0.2) {
 }
 
 /// Point to point to a pose of the motion frame in the base frame; it keeps the current arm angle.
-inline wire::Item ptp(const wire::Pose& target, double speed = 0.2) {
+inline wire::Item ptp_to(const wire::Pose& target, double speed = 0.2) {
     wire::PtpPose motion;
     motion.target = target;
     motion.dynamics.velocity = wire::filled<7>(speed);

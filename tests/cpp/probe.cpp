@@ -130,7 +130,7 @@ void serve(const std::string& address, double seconds) {
     options.velocity = 0.5;
     options.acceleration = 1;
     Servo servo = arm.servo(options);
-    const Joints start = arm.wait_for_rest(60).joints->q;
+    const Joints start = servo.start();
     long sent = 0;
     double widest = 0;
     while (servo.tick() && servo.t() < seconds) {

@@ -59,9 +59,17 @@ def address() -> Iterator[str]:
         yield f"127.0.0.1:{ready['port']}"
 
 
+def slow(done: subprocess.CompletedProcess[str]) -> str:
+    late = done.returncode != 0 and "did not open a session within" in done.stderr
+    return "the handshake came late" if late else ""
+
+
 def asked(probe: Path, *words: str, text: str = "") -> list[str]:
-    done = subprocess.run(
-        [str(probe), *words], input=text, capture_output=True, text=True, timeout=240, check=False
+    done = retry(
+        lambda: subprocess.run(
+            [str(probe), *words], input=text, capture_output=True, text=True, timeout=240, check=False
+        ),
+        slow,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.splitlines()
