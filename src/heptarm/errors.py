@@ -38,11 +38,16 @@ An error names what was refused, the value with its unit, the allowed range and 
 from __future__ import annotations
 
 import importlib
+import importlib.util
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
 _Error = TypeVar("_Error", bound="HeptarmError")
+
+#: The operating system.
+_PLATFORM = sys.platform
 
 
 class HeptarmError(Exception):
@@ -256,6 +261,55 @@ class Timeout(HeptarmError, TimeoutError):
 
 class MissingExtra(HeptarmError, ImportError):
     """An optional package is not installed."""
+
+
+#: Packages that each extra of heptarm brings, as they are imported.
+EXTRAS = {
+    "sim": ("mujoco", "ruckig", "jpype"),
+    "viz": ("viser", "matplotlib", "trimesh"),
+    "rl": ("torch", "gymnasium", "PIL"),
+    "record": ("mcap",),
+}
+
+
+def missing_extra(module: str) -> MissingExtra | None:
+    """The error of a package that cannot be imported, if an extra of heptarm brings it; None for any other package."""
+    root = module.partition(".")[0]
+    for extra, names in EXTRAS.items():
+        if root in names:
+            return MissingExtra(
+                f"this needs the package {root!r}, which is not installed",
+                parameter=root,
+                hint=f"pip install 'heptarm[{extra}]'",
+            )
+    return None
+
+
+def require_extra(extra: str) -> None:
+    """Check that all packages of an extra are installed, without importing them.
+
+    Raises:
+        MissingExtra: one is not; the hint is the command that installs it.
+    """
+    for name in EXTRAS[extra]:
+        error = missing_extra(name) if importlib.util.find_spec(name) is None else None
+        if error is not None:
+            raise error
+
+
+def refuse_windows(what: str) -> None:
+    """Check that something that was written for Linux and macOS does not run on Windows.
+
+    Raises:
+        CommandRejected: this is Windows.
+    """
+    if _PLATFORM == "win32":
+        raise CommandRejected(
+            f"{what} runs on Linux, this is Windows",
+            parameter="platform",
+            value=_PLATFORM,
+            hint="use WSL (wsl --install); a robot can be controlled from Windows, but not over FRI",
+        )
 
 
 def require(module: str, *, extra: str) -> Any:

@@ -105,7 +105,9 @@ def measure(client: Client, begin: float, here: Array, away: Array, delay: float
     )
 
 
-def follows(client: Client, rate: float, message: Callable[[int, Array, Array], None], delay: float = 0.0) -> None:
+def follows(
+    client: Client, rate: float, message: Callable[[int, Array, Array], None], delay: float = 0.0
+) -> None:
     """Stream a swing: the arm follows it without lag and without stops."""
     found: list[Followed] = []
     for _ in range(1 if client.timely else ATTEMPTS):
@@ -152,7 +154,9 @@ class Windows:
         for before, this, after in zip(held[:1] + held, held, held[1:]):
             other = (after[1] - this[1]) / (after[0] - this[0])
             one = (this[1] - before[1]) / (this[0] - before[0]) if this[0] > before[0] else other
-            dq = np.where(np.sign(one) != np.sign(other), 0.0, np.where(np.abs(one) < np.abs(other), one, other))
+            dq = np.where(
+                np.sign(one) != np.sign(other), 0.0, np.where(np.abs(one) < np.abs(other), one, other)
+            )
             points.append(point(this[0] - start, this[1], dq=() if self._bare else tuple(dq.tolist())))
         self._client.topic(TrajectoryGoal(self._client.joints, tuple(points), start))
 
@@ -309,7 +313,9 @@ def what_is_wrong_in_a_stream_is_left_out(client: Client) -> None:
             client.topic(goal(client, point(0.02, q)))
             client.sleep(0.02)
     stays(client, here)
-    client.topic(TrajectoryGoal(("elbow", *client.joints[1:]), (TrajectoryPoint(0.02, tuple(here.tolist())),)))
+    client.topic(
+        TrajectoryGoal(("elbow", *client.joints[1:]), (TrajectoryPoint(0.02, tuple(here.tolist())),))
+    )
     stays(client, here)
     _, last = streamed(client, seconds=0.4)
     arrives(client, last)

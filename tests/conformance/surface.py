@@ -440,7 +440,9 @@ def case_forward_controllers_are_followed(probe: Probe, stage: Stage) -> None:
     until(lambda: turn() or states[-1].position[6] < start + 0.1, "the velocities are not followed")
     until(lambda: all(abs(one.velocity[6]) < 1e-3 for one in states[-30:]), "silence does not end it")
     there = states[-1].position[6]
-    probe.tell("/surface/forward_position_controller/commands", "std_msgs/Float64MultiArray", data=[0.0] * 6)()
+    probe.tell(
+        "/surface/forward_position_controller/commands", "std_msgs/Float64MultiArray", data=[0.0] * 6
+    )()
     far = [*HOME[:6], there + 2.0]
     probe.tell("/surface/forward_position_controller/commands", "std_msgs/Float64MultiArray", data=far)()
     time.sleep(0.3)
@@ -468,7 +470,9 @@ def case_a_twist_moves_the_flange_and_silence_ends_it(probe: Probe, stage: Stage
             more["linear"] = twist.linear
         send = probe.tell(name, kind, **more)
         until(lambda: send() or (place() - begin) @ along > np.linalg.norm(move), "the flange does not move")
-        until(lambda: all(np.abs(one.velocity).max() < 1e-3 for one in states[-30:]), "silence does not end it")
+        until(
+            lambda: all(np.abs(one.velocity).max() < 1e-3 for one in states[-30:]), "silence does not end it"
+        )
         moved = place() - begin
         assert moved @ along < 2.0 * np.linalg.norm(move), "it does not stop"
         assert np.linalg.norm(moved - (moved @ along) * along) < 5e-3, "it leaves its line"
@@ -526,7 +530,9 @@ def case_the_state_of_the_controller_agrees_with_itself(probe: Probe, stage: Sta
     moving = 0
     for one in list(found)[count:]:
         wanted, actual = (getattr(one, name) for name in names)
-        np.testing.assert_allclose(one.error.positions, np.subtract(wanted.positions, actual.positions), atol=1e-9)
+        np.testing.assert_allclose(
+            one.error.positions, np.subtract(wanted.positions, actual.positions), atol=1e-9
+        )
         if abs(wanted.velocities[6]) > 1e-3:  # the trajectory is a straight line in time
             moving += 1
             seconds = probe.seconds(wanted.time_from_start)

@@ -145,6 +145,7 @@ class Arm:
             self.subscribe(groups=("joints", "motion", "safety"))
             self.stop()
             self._connection.wait_for(RestDetector(self._connection), REST_TIMEOUT)
+            self._connection.left_at_rest = True
             self.release_control()
         except HeptarmError as error:
             _log.warning("closing: %s", error)

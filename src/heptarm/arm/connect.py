@@ -20,6 +20,7 @@ from heptarm.errors import ShapeError
 from heptarm.io import tcp
 from heptarm.io.clock import RealClock
 from heptarm.io.keys import find_key
+from heptarm.io.targets import SavedTarget
 from heptarm.io.transport import Transport
 from heptarm.values.arrays import finite, flag, instance, within, word
 from heptarm.wire import messages as wire
@@ -61,7 +62,8 @@ def connect(
 
     Args:
         target: "ADDRESS[:PORT]" of a cabinet; "sim://iiwa14" or "sim://iiwa7?speed=5" for a private simulator that
-            ends with the arm; "sim://HOST:PORT" for a running one. None: the environment variable HEPTARM_TARGET.
+            ends with the arm; "sim://HOST:PORT" for a running one; the name of a saved target (`heptarm targets`), with
+            its key, tool and ceiling of the speed. None: the environment variable HEPTARM_TARGET.
         name: name of this client, shown to other clients, up to 64 bytes; None: user, host and process, and
             a number from the second client of a process on.
         key: pre-shared key of the cabinet; "": none. None: it is looked up in `key_file`, the environment variable
@@ -108,6 +110,8 @@ def connect(
             f"name must have printable characters only, got {name!a}", code=3, parameter="name", value=name
         )
     chosen = parse_target(target_from_env() if target is None else target)
+    if key is None and key_file is None:
+        key_file = chosen.key_file
     found = find_key(key=key, key_file=key_file, host=chosen.host, port=chosen.port)
     options = Options(
         name=name or _default_name(),
@@ -130,6 +134,8 @@ def connect(
         arm = Arm(Connection(dial, options, clock=RealClock(), cabinet=private))
         try:
             arm.open(control=control)
+            if chosen.saved is not None:
+                _set_up(arm, chosen.saved, control=control)
         except BaseException:
             arm.close()
             raise
@@ -139,3 +145,17 @@ def connect(
         raise
     _log.info("connected to %s (%s), %s", chosen, arm.robot.title, "in control" if control else "observing")
     return arm
+
+
+def _set_up(arm: Arm, saved: SavedTarget, *, control: bool) -> None:
+    """Give an arm the ceiling of the speed and the tool of its saved target.
+
+    Raises:
+        CommandRejected: the cabinet does not know the tool; the text lists those that it knows.
+    """
+    saved.mark_used()
+    arm.speed = saved.speed
+    newest = arm.connection.newest()
+    mode = None if newest is None else newest.groups.mode
+    if control and saved.tool and (mode is None or mode.tool != saved.tool):
+        arm.attach_tool(saved.tool)

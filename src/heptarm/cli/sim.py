@@ -23,7 +23,7 @@ from heptarm.cli.options import (
     Model,
 )
 from heptarm.cli.output import emit, is_silent, lines
-from heptarm.errors import CommandRejected, ConnectFailed
+from heptarm.errors import CommandRejected, ConnectFailed, refuse_windows, require_extra
 from heptarm.io.keys import environment, find_key
 from heptarm.sim.runtime.operator import WORDS
 from heptarm.values.simulator_options import RealTime, SimulatorOptions
@@ -456,7 +456,11 @@ def _cabinet(
                         target,
                         "--port",
                         str(view_port),
-                        *([] if positions is None else ["--scene", options.scene, "--positions", str(positions)]),
+                        *(
+                            []
+                            if positions is None
+                            else ["--scene", options.scene, "--positions", str(positions)]
+                        ),
                     ],
                     key,
                 )
@@ -619,6 +623,8 @@ def _application(
 
 
 def _command(options: SimulatorOptions) -> list[str]:
+    refuse_windows("the virtual cabinet")
+    require_extra("sim")
     return [sys.executable, "-m", "heptarm.sim.runtime.cabinet", *options.arguments()]
 
 

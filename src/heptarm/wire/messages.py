@@ -261,9 +261,9 @@ class Redundancy:
 
     RANGES: ClassVar[dict[str, tuple[float, float]]] = {"e1": (-1000.0, 1000.0)}
 
-    e1: float
-    status: int
-    turn: int
+    e1: float = nan
+    status: int = -1
+    turn: int = -1
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Redundancy_0.pack(self.e1, self.status, self.turn))
@@ -472,7 +472,7 @@ class PtpPose:
     """Point to point in joint space, to a pose of the motion frame."""
 
     target: Pose
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
     dynamics: JointDynamics = JointDynamics()
     blending: Blending = Blending()
 
@@ -504,7 +504,7 @@ class Lin:
     """Straight line of the motion frame."""
 
     target: Pose
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
     dynamics: CartesianDynamics = CartesianDynamics()
     joints: JointDynamics = JointDynamics()
     blending: Blending = Blending()
@@ -585,7 +585,7 @@ class Circ:
 
     via: Pose
     end: Pose
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
     dynamics: CartesianDynamics = CartesianDynamics()
     joints: JointDynamics = JointDynamics()
     blending: Blending = Blending()
@@ -2089,7 +2089,7 @@ class PoseState:
     quat: tuple[float, ...]
     xyz_cmd: tuple[float, ...]
     quat_cmd: tuple[float, ...]
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_PoseState_0.pack(self.stamp, *self.xyz, *self.quat, *self.xyz_cmd, *self.quat_cmd))

@@ -270,6 +270,7 @@ class Connection:
         in_control: this client took control and has not lost it; true also while the link is lost.
         controller: name of the client that controls the robot; empty: none.
         closed: set when the arm is closed.
+        left_at_rest: the arm was at rest when this client, in control, closed it.
         signals: signals of the cabinet.
         journal: what happened besides pushed states.
         black_box: writes the last 30 s to a file.
@@ -292,6 +293,7 @@ class Connection:
         self.in_control = False
         self.controller = ""
         self.closed = threading.Event()
+        self.left_at_rest = False
         self._dial = dial
         self._link: Link | None = None
         self._welcome: wire.Welcome | None = None
