@@ -384,7 +384,11 @@ class Arm:
     @collision_check.setter
     def collision_check(self, value: CollisionCheck | None) -> None:
         if value is not None:
-            callback(getattr(value, "first_on", None), "collision_check")
+            if not callable(getattr(value, "first_on", None)):
+                raise ShapeError(
+                    f"collision_check must have a method first_on, as ha.CollisionModel has, got {type(value).__name__}",
+                    parameter="collision_check",
+                )
         self._foresight.check = value
 
     def move(
