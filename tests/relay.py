@@ -48,11 +48,11 @@ class Relay:
                 return
             cabinet = socket.create_connection(("127.0.0.1", self.cabinet))
             self._sockets += [client, cabinet]
-            ways: list[tuple[Direction, socket.socket, socket.socket]] = [
+            paths: list[tuple[Direction, socket.socket, socket.socket]] = [
                 ("up", client, cabinet),
                 ("down", cabinet, client),
             ]
-            for direction, source, sink in ways:
+            for direction, source, sink in paths:
                 thread = threading.Thread(target=self._pass, args=(direction, source, sink), name="relay")
                 self._threads.append(thread)
                 thread.start()

@@ -24,8 +24,8 @@ def classes(folder: str = "java") -> str:
     """Class path of the cabinet's jars and the test's own classes, compiled where they have changed."""
     jars = [jar for jar in build.build() if folder != "java" or jar.name == "heptarm-core.jar"]
     sources = sorted((Path(__file__).parent / folder).rglob("*.java"))
-    octets = b"".join(path.read_bytes() for path in (*jars, *sources))
-    out = _OUT / hashlib.sha256(octets).hexdigest()[:16]
+    raw = b"".join(path.read_bytes() for path in (*jars, *sources))
+    out = _OUT / hashlib.sha256(raw).hexdigest()[:16]
     path = os.pathsep.join(str(jar) for jar in jars)
     if not out.exists():
         _OUT.mkdir(parents=True, exist_ok=True)

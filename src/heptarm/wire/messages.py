@@ -261,9 +261,9 @@ class Redundancy:
 
     RANGES: ClassVar[dict[str, tuple[float, float]]] = {"e1": (-1000.0, 1000.0)}
 
-    e1: float
-    status: int
-    turn: int
+    e1: float = nan
+    status: int = -1
+    turn: int = -1
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Redundancy_0.pack(self.e1, self.status, self.turn))
@@ -472,7 +472,7 @@ class PtpPose:
     """Point to point in joint space, to a pose of the motion frame."""
 
     target: Pose
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
     dynamics: JointDynamics = JointDynamics()
     blending: Blending = Blending()
 
@@ -504,7 +504,7 @@ class Lin:
     """Straight line of the motion frame."""
 
     target: Pose
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
     dynamics: CartesianDynamics = CartesianDynamics()
     joints: JointDynamics = JointDynamics()
     blending: Blending = Blending()
@@ -585,7 +585,7 @@ class Circ:
 
     via: Pose
     end: Pose
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
     dynamics: CartesianDynamics = CartesianDynamics()
     joints: JointDynamics = JointDynamics()
     blending: Blending = Blending()
@@ -1569,6 +1569,52 @@ class Condition:
             its_nodes._check(f"{path}nodes[{index}].")
 
 
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Relax:
+    """Is compliant for a moment, then holds the position that it has reached."""
+
+
+    def _write(self, out: list[bytes]) -> None:
+        pass
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Relax, int]:
+        return cls(), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+
+_Retreat_0 = Struct(">dd")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Retreat:
+    """Moves back along the joint positions that it has passed, then holds the position."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"distance": (0.0, 0.5), "speed": (0.0, 1.0)}
+
+    distance: float
+    speed: float = 0.1
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_Retreat_0.pack(self.distance, self.speed))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Retreat, int]:
+        v = codec.unpack(_Retreat_0, data, pos)
+        pos += _Retreat_0.size
+        distance = v[0]
+        speed = v[1]
+        return cls(distance=distance, speed=speed), pos
+
+    def _check(self, path: str) -> None:
+        codec.check(self.distance, path + "distance", 0.0, 0.5, True, False)
+        codec.check(self.speed, path + "speed", 0.0, 1.0, True, False)
+
+
 _SetSignal_0 = Struct(">d")
 
 
@@ -1739,17 +1785,39 @@ def _read_Mode(data: bytes, pos: int) -> tuple[Mode, int]:
     raise DecodeError(f"Mode has tag {tag}; legal are [1, 2, 3, 4, 5, 6]")
 
 
+Reaction: TypeAlias = Relax | Retreat
+_Reaction_TAGS = {
+    Relax: 1,
+    Retreat: 2,
+}
+
+
+def _write_Reaction(value: Reaction, out: list[bytes]) -> None:
+    out.append(bytes((_Reaction_TAGS[type(value)],)))
+    value._write(out)
+
+
+def _read_Reaction(data: bytes, pos: int) -> tuple[Reaction, int]:
+    tag, pos = codec.read_tag(data, pos)
+    if tag == 1:
+        return Relax._read(data, pos)
+    if tag == 2:
+        return Retreat._read(data, pos)
+    raise DecodeError(f"Reaction has tag {tag}; legal are [1, 2]")
+
+
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Item:
-    """A motion of a program with its control mode, break condition and triggers."""
+    """A motion of a program with its control mode, break condition and reaction to it, and triggers."""
 
     motion: Motion
     frame: str = ""
     mode: Mode | None = None
     until: Condition = Condition()
     triggers: tuple[Trigger, ...] = ()
+    reaction: Reaction | None = None
 
     def _write(self, out: list[bytes]) -> None:
         _write_Motion(self.motion, out)
@@ -1763,6 +1831,11 @@ class Item:
         out.append(codec.put_count(len(self.triggers)))
         for one_triggers in self.triggers:
             one_triggers._write(out)
+        if self.reaction is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            _write_Reaction(self.reaction, out)
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[Item, int]:
@@ -1779,7 +1852,11 @@ class Item:
             one_triggers, pos = Trigger._read(data, pos)
             triggers_list.append(one_triggers)
         triggers = tuple(triggers_list)
-        return cls(motion=motion, frame=frame, mode=mode, until=until, triggers=triggers), pos
+        present, pos = codec.read_flag(data, pos)
+        reaction: Reaction | None = None
+        if present:
+            reaction, pos = _read_Reaction(data, pos)
+        return cls(motion=motion, frame=frame, mode=mode, until=until, triggers=triggers, reaction=reaction), pos
 
     def _check(self, path: str) -> None:
         self.motion._check(path + "motion.")
@@ -1790,6 +1867,8 @@ class Item:
         codec.check_length(len(self.triggers), path + "triggers", 0, 16)
         for index, its_triggers in enumerate(self.triggers):
             its_triggers._check(f"{path}triggers[{index}].")
+        if self.reaction is not None:
+            self.reaction._check(path + "reaction.")
 
 
 _RobotInfo_0 = Struct(">7d7d7d7d")
@@ -2010,7 +2089,7 @@ class PoseState:
     quat: tuple[float, ...]
     xyz_cmd: tuple[float, ...]
     quat_cmd: tuple[float, ...]
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_PoseState_0.pack(self.stamp, *self.xyz, *self.quat, *self.xyz_cmd, *self.quat_cmd))
@@ -4708,7 +4787,7 @@ class TriggerFired:
         self._check("")
 
 
-_MotionFinished_0 = Struct(">IHBidd7dH")
+_MotionFinished_0 = Struct(">IHBidd7dddH")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -4727,11 +4806,13 @@ class MotionFinished:
     residual: float
     duration: float
     q: tuple[float, ...]
+    peak_force: float = nan
+    rest_force: float = nan
     code: int
     text: str = ""
 
     def _write(self, out: list[bytes]) -> None:
-        out.append(_MotionFinished_0.pack(self.id, self.item, self.cause, self.fired, self.residual, self.duration, *self.q, self.code))
+        out.append(_MotionFinished_0.pack(self.id, self.item, self.cause, self.fired, self.residual, self.duration, *self.q, self.peak_force, self.rest_force, self.code))
         out.append(codec.put_str(self.text))
 
     @classmethod
@@ -4745,14 +4826,18 @@ class MotionFinished:
         residual = v[4]
         duration = v[5]
         q = v[6:13]
-        code = v[13]
+        peak_force = v[13]
+        rest_force = v[14]
+        code = v[15]
         text, pos = codec.read_str(data, pos)
-        return cls(id=id, item=item, cause=cause, fired=fired, residual=residual, duration=duration, q=q, code=code, text=text), pos
+        return cls(id=id, item=item, cause=cause, fired=fired, residual=residual, duration=duration, q=q, peak_force=peak_force, rest_force=rest_force, code=code, text=text), pos
 
     def _check(self, path: str) -> None:
         codec.check(self.residual, path + "residual", -inf, inf, False, True)
         codec.check(self.duration, path + "duration", -inf, inf, False, False)
         codec.check_array(self.q, path + "q", -inf, inf, False, False)
+        codec.check(self.peak_force, path + "peak_force", -inf, inf, False, True)
+        codec.check(self.rest_force, path + "rest_force", -inf, inf, False, True)
 
     def encode(self) -> bytes:
         """The body."""
@@ -5272,3 +5357,51 @@ MESSAGES: dict[int, type[Message]] = {
 ONE_WAY: tuple[type[OneWay], ...] = (ServoJoints, ServoJointsVelocity, ServoPose,)
 #: Messages that a datagram may contain.
 DATAGRAMS: tuple[type[Message], ...] = (Ping, Pong, Cancel, Stop, ServoJoints, ServoJointsVelocity, ServoPose, State,)
+
+#: The first groups of a state's body, those of fixed size: name, bit of the mask, and its fields in order, each
+#: with its name, its type in numpy's notation and its number of entries. The mask, two bytes, is before them.
+STATE_LAYOUT: tuple[tuple[str, int, tuple[tuple[str, str, int], ...]], ...] = (
+    ("joints", 1, (
+        ("stamp", ">i8", 1),
+        ("q", ">f8", 7),
+        ("q_cmd", ">f8", 7),
+        ("dq", ">f8", 7),
+    )),
+    ("torques", 2, (
+        ("stamp", ">i8", 1),
+        ("tau", ">f8", 7),
+        ("tau_ext", ">f8", 7),
+        ("tau_cmd", ">f8", 7),
+    )),
+    ("pose", 4, (
+        ("stamp", ">i8", 1),
+        ("xyz", ">f8", 3),
+        ("quat", ">f8", 4),
+        ("xyz_cmd", ">f8", 3),
+        ("quat_cmd", ">f8", 4),
+        ("e1", ">f8", 1),
+        ("status", ">i4", 1),
+        ("turn", ">i4", 1),
+    )),
+    ("wrench", 8, (
+        ("stamp", ">i8", 1),
+        ("force", ">f8", 3),
+        ("torque", ">f8", 3),
+        ("force_inaccuracy", ">f8", 3),
+        ("torque_inaccuracy", ">f8", 3),
+    )),
+    ("motion", 16, (
+        ("stamp", ">i8", 1),
+        ("motion", ">u4", 1),
+        ("item", ">u2", 1),
+        ("queued", ">u2", 1),
+        ("progress", ">f8", 1),
+        ("remaining", ">f8", 1),
+        ("override", ">f8", 1),
+    )),
+    ("safety", 32, (
+        ("stamp", ">i8", 1),
+        ("bits", ">u2", 1),
+        ("mode", ">u1", 1),
+    )),
+)
