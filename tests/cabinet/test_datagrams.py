@@ -424,7 +424,7 @@ def test_loss_reordering_and_repetition_end_nothing(arm: Parts) -> None:
     assert one.connection.datagrams.ignored > 0  # type: ignore[union-attr]
 
 
-def test_whoever_changes_datagrams_in_the_middle_changes_nothing(arm: Parts) -> None:
+def test_datagrams_that_are_changed_in_transit_change_nothing(arm: Parts) -> None:
     one, _, datagrams, _ = arm
     with one.servo(rate=100, watchdog=1.0) as servo:
         for direction in ("up", "down"):
