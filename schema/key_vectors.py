@@ -135,8 +135,8 @@ datagrams: UDP, with the number of the TCP port, at most {p["max_datagram"]} byt
 1. The client sends OpenDatagrams in its session; the answer is a random token of {p["token"]} bytes. A cabinet without a UDP port
    refuses.
 2. A datagram is the number of the session (u32, of Welcome), then one frame with the flag 1 and a tag. `seq` counts the
-   datagrams of one direction and token, from 0, and never wraps; `time` is in both directions the cabinet's clock, as the
-   client estimates it.
+   datagrams of one direction and token, from 0, and never wraps; `time` is in both directions of the cabinet's
+   clock, which the client estimates from its pings.
 3. Each direction has a key: `HMAC(S, "heptarm client to cabinet datagrams" ‖ token ‖ 01)` or `HMAC(S, "heptarm cabinet to
    client datagrams" ‖ token ‖ 01)`. With a pre-shared key, S is the secret of which the keys of the session follow (step 4
    above, before the info is applied); without one it is the token. The tag is computed as above, with n = 0.
