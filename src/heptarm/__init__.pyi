@@ -144,6 +144,9 @@ from .values.condition.collision import (
 from .values.condition.contact import (
     Contact as Contact,
 )
+from .values.condition.reaction import (
+    Retreat as Retreat,
+)
 from .values.condition.trigger import (
     Trigger as Trigger,
 )

@@ -35,6 +35,7 @@ from heptarm.skills import touch as touching
 from heptarm.values.arrays import callback, instance, integer, within, word
 from heptarm.values.clearance import CollisionCheck
 from heptarm.values.condition.condition import Condition, check_condition
+from heptarm.values.condition.reaction import Reaction, check_reaction
 from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.mode.mode import MODES, Mode, check_mode
 from heptarm.values.motion.motion import Motion
@@ -357,6 +358,7 @@ class Arm:
         mode: Mode | None = None,
         speed: float | None = None,
         until: Condition | None = None,
+        then: Reaction | None = None,
         timeout: float | None = None,
     ) -> Result:
         """Carry out a motion, or several as one batch, and wait until it has ended.
@@ -366,7 +368,9 @@ class Arm:
             mode: control mode of all of them; None: that of `using`, otherwise position.
             speed: ceiling for this call, (0, 1]; the lower one of this and `arm.speed` applies.
             until: break condition, as in `until=force > 10`: the motion ends when it holds, and the motions after it
-                do not begin. See heptarm.when; the result names the part that fired, and where.
+                do not begin. See heptarm.when; the result names the part that fired, where, and the forces.
+            then: what the arm does when `until` has ended the motion: "stay" where it has braked, "relax", or
+                `Retreat(distance)`; done by the cabinet. None: "stay", or that of the enclosing block.
             timeout: longest wait [s]; None: three times the longest plausible duration plus 15 s.
 
         Returns:
@@ -394,7 +398,7 @@ class Arm:
                 hint="give a timeout, a hold with a duration, or use arm.start()",
             )
         with self._connection.stopping_on_interrupt():
-            handle = self._send(motions, mode=mode, speed=speed, until=until, when="queue")
+            handle = self._send(motions, mode=mode, speed=speed, until=until, then=then, when="queue")
             try:
                 result = handle.wait(timeout=timeout)
             except Timeout:
@@ -409,6 +413,7 @@ class Arm:
         mode: Mode | None = None,
         speed: float | None = None,
         until: Condition | None = None,
+        then: Reaction | None = None,
         when: Literal["queue", "replace", "reject"] = "queue",
     ) -> MotionHandle:
         """Begin a motion, or several as one batch, and return at once.
@@ -418,6 +423,7 @@ class Arm:
             mode: control mode of all of them; None: that of `using`, otherwise position.
             speed: ceiling for this call, (0, 1].
             until: break condition; see `move`.
+            then: reaction to it; see `move`.
             when: while another motion runs: "queue" behind it, "replace" it, or "reject" this one.
 
         Raises:
@@ -425,7 +431,9 @@ class Arm:
             ConnectionLost: the connection has ended.
         """
         with self._connection.stopping_on_interrupt():
-            return self._send(program.listed(motion), mode=mode, speed=speed, until=until, when=when)
+            return self._send(
+                program.listed(motion), mode=mode, speed=speed, until=until, then=then, when=when
+            )
 
     @contextlib.contextmanager
     def using(self, mode: Mode) -> Iterator[None]:
@@ -443,7 +451,11 @@ class Arm:
 
     @contextlib.contextmanager
     def breaking_on(
-        self, condition: Condition, *, error: Callable[[Result], HeptarmError] | None = None
+        self,
+        condition: Condition,
+        *,
+        error: Callable[[Result], HeptarmError] | None = None,
+        then: Reaction = "stay",
     ) -> Iterator[None]:
         """A block whose motions and servo motions also end when a condition holds.
 
@@ -451,13 +463,14 @@ class Arm:
             condition: break condition, in addition to `until` of each motion; see heptarm.when.
             error: called with the result of a motion that it ended; returns the error that `move` and `wait` raise.
                 Called from the link's thread, so it must not block. None: the motion ends with a result.
+            then: reaction of motions in the block that name none; see `move`. Servo motions have none.
 
         Raises:
-            ShapeError: not a condition.
+            ShapeError: not a condition, or not a reaction.
         """
         if error is not None:
             callback(error, "error")
-        rule = BreakRule(check_condition(condition, "condition"), error)
+        rule = BreakRule(check_condition(condition, "condition"), error, check_reaction(then))
         self._breaks = (*self._breaks, rule)
         try:
             yield
@@ -472,6 +485,21 @@ class Arm:
             until = rule.condition if until is None else until | rule.condition
         return until
 
+    def _then(
+        self, then: Reaction | None, until: Condition | None, breaks: tuple[BreakRule, ...]
+    ) -> Reaction:
+        """The reaction of a motion: its own, or that of the innermost block."""
+        if then is None:
+            return breaks[-1].then if breaks else "stay"
+        if until is None and not breaks:
+            raise ShapeError(
+                "then is the reaction to a break condition, but the motion has none",
+                parameter="then",
+                value=then,
+                hint="give until, for example until=force > 10",
+            )
+        return check_reaction(then)
+
     def _send(
         self,
         motions: tuple[Motion, ...],
@@ -479,6 +507,7 @@ class Arm:
         mode: Mode | None,
         speed: float | None,
         until: Condition | None,
+        then: Reaction | None,
         when: str,
     ) -> MotionHandle:
         ceiling, breaks = self._speed, self._breaks
@@ -493,6 +522,7 @@ class Arm:
             mode=self._mode if mode is None else mode,
             until=self._until(until, breaks),
             when=when,
+            then=self._then(then, until, breaks),
             breaks=breaks,
         )
 

@@ -62,6 +62,13 @@ def sim(
             "Default: the controller's load data."
         ),
     ] = "",
+    sensors: Annotated[
+        str,
+        Parameter(
+            help="'noisy' or 'noisy:SEED': sensors with noise, offset and resolution, joints with friction. "
+            "Default: ideal ones."
+        ),
+    ] = "ideal",
     scene: Annotated[
         str,
         Parameter(
@@ -231,6 +238,7 @@ def sim(
             speed=speed,
             faults=fault,
             payload=payload,
+            sensors=sensors,
             scene=scene,
             project=project,
             verbose=verbose,
@@ -279,6 +287,7 @@ def sim(
             network=fri_network,
             faults=fault,
             payload=payload,
+            sensors=sensors,
             speed=speed,
         )
         return fri_sim.run(options, verbose=verbose, as_json=as_json)
@@ -292,6 +301,7 @@ def sim(
         key_file=key_file,
         faults=fault,
         payload=payload,
+        sensors=sensors,
         scene=scene,
         project=project,
         verbose=verbose,
@@ -310,6 +320,7 @@ def _cabinet(
     key_file: Path | None,
     faults: tuple[str, ...],
     payload: str,
+    sensors: str,
     scene: str,
     project: Path | None,
     verbose: bool,
@@ -334,6 +345,7 @@ def _cabinet(
             speed=speed,
             fault=faults,
             payload=payload,
+            sensors=sensors,
             scene=scene,
             project=project,
             positions=positions,
@@ -434,6 +446,7 @@ def _application(
     speed: float,
     faults: tuple[str, ...],
     payload: str,
+    sensors: str,
     scene: str,
     project: Path | None,
     verbose: bool,
@@ -481,6 +494,7 @@ def _application(
             answer=answers,
             fault=faults,
             payload=payload,
+            sensors=sensors,
             scene=scene,
             parent_pipe=True,
             verbose=verbose,

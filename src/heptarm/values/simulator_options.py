@@ -101,6 +101,14 @@ class SimulatorOptions:
             '"off": drives never trip, whatever speed, torque or position', metavar="on|off", in_target=True
         ),
     )
+    sensors: str = field(
+        default="ideal",
+        metadata=_about(
+            '"noisy": sensors with noise, offset and resolution, and joints with friction, the same for a seed',
+            metavar="ideal|noisy[:SEED]",
+            in_target=True,
+        ),
+    )
     fault: tuple[str, ...] = field(
         default=(),
         metadata=_about(

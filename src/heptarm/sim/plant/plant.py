@@ -24,6 +24,7 @@ from heptarm.sim.plant.gripper import SimulatedGripper, has_gripper
 from heptarm.sim.plant.io_image import IoImage
 from heptarm.sim.plant.payload import PayloadModel
 from heptarm.sim.plant.scene import Scene, find_body, is_mounted
+from heptarm.sim.plant.sensor_errors import SensorErrors
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.plant.world import Box, compiled
 from heptarm.sim.seam import SLOTS, TICK_NS, HeaderWords, SafetyFlags, StateWords
@@ -132,6 +133,7 @@ class Plant:
         boxes: fixed boxes around it.
         scene: what else is around it and on its flange; None: nothing.
         monitored: whether drives trip; see `heptarm.sim.plant.drive_monitor`.
+        errors: of the sensors, and friction of the joints; None: ideal ones.
 
     Attributes:
         submit: plans a command and queues it; see `heptarm.sim.controller.queue.MotionQueue.submit`.
@@ -145,8 +147,10 @@ class Plant:
         boxes: Sequence[Box] = (),
         scene: Scene | None = None,
         monitored: bool = True,
+        errors: SensorErrors | None = None,
     ) -> None:
         self.robot: RobotModel = robot(model)
+        self._errors = errors
         self.model = compiled(model, boxes, scene)
         self.data = mujoco.MjData(self.model)
         self.data.qpos[:7] = q
@@ -194,6 +198,7 @@ class Plant:
         self._limit, self._least = self.robot.tau_max, -self.robot.tau_max
         self._mass = np.zeros((self.model.nv, self.model.nv))
         mujoco.mj_fullM(self.model, d, self._mass)
+        self._measured = self._q  # positions that the sensors show
         self._tau = np.zeros(7)
         self._tau_cmd = np.zeros(7)
 
@@ -324,12 +329,20 @@ class Plant:
             self._control.superpose(torque, interpolator.action)
         np.minimum(torque, self._limit, out=torque)
         np.maximum(torque, self._least, out=torque)
+        self._tau_cmd = torque if self._brakes is None else np.zeros(7)
+        if self._errors is not None:
+            torque = torque - self._errors.friction(self._dq)
         self._ctrl[:] = torque
         mujoco.mj_step2(m, d)
-        self._tau_cmd = torque if self._brakes is None else np.zeros(7)
         # the torque sensors are on the link side of the gear: they do not measure rotor inertia and gear friction
         self._tau = torque - self._armature * self._acc + self._passive
-        self._load.measure(sensed.mass @ self._acc + sensed.bias - self._passive - torque)
+        inertial = sensed.mass @ self._acc + sensed.bias - self._passive - torque
+        if self._errors is None:
+            self._load.measure(inertial)
+        else:
+            reading = self._errors.read(self._q, self._tau)
+            self._measured, self._tau = reading.q, reading.tau
+            self._load.measure(inertial, error=reading.tau_error)
         if self._monitor is not None and not self._tripped:
             self._supervise(self._monitor)
         self.tick_count += 1
@@ -375,7 +388,7 @@ class Plant:
     def _close_brakes(self) -> None:
         here = self._q.copy()
         self._braked = replace(self._sensed, before=here, now=here, after=here, is_overlaid=False)
-        self._brakes = PositionLaw.continuing(self._tau_cmd, self._braked)
+        self._brakes = PositionLaw.locked(self._tau_cmd, self._braked)
 
     def _write(self, order: int, progress: float, remaining: float) -> None:
         k, r = self.tick_count, self.shared
@@ -383,7 +396,7 @@ class Plant:
         words, reals = r.ints[slot], r.floats[slot]
         words[StateWords.SEQ] = 2 * k + 1
         words[StateWords.TIME] = k * TICK_NS
-        q = self._q
+        q = self._measured
         reals[StateWords.Q] = q
         reals[StateWords.Q_CMD] = self.interpolator.command.after
         reals[StateWords.DQ] = self._dq
@@ -437,7 +450,7 @@ class Plant:
         slot = self.shared.floats[self.tick_count % SLOTS]
         return Snapshot(
             self.tick_count * TICK,
-            self._q.copy(),
+            self._measured.copy(),
             self.interpolator.command.after.copy(),
             self._dq.copy(),
             self._tau.copy(),

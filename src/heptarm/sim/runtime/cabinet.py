@@ -29,12 +29,14 @@ from heptarm.sim.fri.sessions import Sessions
 from heptarm.sim.plant.payload import parse_payload
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.plant.scene import Scene
+from heptarm.sim.plant.sensor_errors import parse_sensors, sensor_errors
 from heptarm.sim.plant.shared_state import PositionsFile, Trace
 from heptarm.sim.plant.world import Box, compiled
 from heptarm.sim.runtime import project
 from heptarm.sim.runtime.addresses import AddressMap
 from heptarm.sim.runtime.operator import SimulatedOperator, timed
 from heptarm.sim.runtime.realtime_loop import ANSWER_GAP, RealtimeLoop, batch_scheduled
+from heptarm.values.robot import robot
 from heptarm.values.simulator_options import SimulatorOptions, flag
 
 log = logging.getLogger("heptarm.sim")
@@ -110,6 +112,7 @@ class VirtualCabinet:
             boxes=[Box.of(text) for text in options.box],
             scene=Scene.of(options.scene) if options.scene else None,
             monitored=options.drive_monitoring == "on",
+            errors=sensor_errors(robot(options.model), options.sensors),
         )
         self.sessions = Sessions(
             self.plant,
@@ -296,6 +299,7 @@ def main(argv: list[str] | None = None) -> int:
             parse_payload(options.payload)
         if options.drive_monitoring not in ("on", "off"):
             raise ValueError(f"drive_monitoring must be on or off, got {options.drive_monitoring!r}")
+        parse_sensors(options.sensors)
         if options.project is not None:
             project.read_project(options.project)
     except (ValueError, OSError) as error:  # a CommandRejected is a ValueError
