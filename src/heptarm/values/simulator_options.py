@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import Field, dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
+
+#: When a virtual cabinet asks for real-time priority: while an FRI client has to answer each tick, always, never.
+RealTime: TypeAlias = Literal["fri", "on", "off"]
 
 
 def _about(
@@ -114,6 +117,14 @@ class SimulatorOptions:
         metadata=_about(
             "fault at a simulated time, such as emergency_stop@5; may be repeated",
             metavar="NAME@SECONDS",
+            in_target=True,
+        ),
+    )
+    real_time: str = field(
+        default="fri",
+        metadata=_about(
+            'real-time priority: "fri": while an FRI session is open; "on": always; "off": never',
+            metavar="fri|on|off",
             in_target=True,
         ),
     )

@@ -228,6 +228,15 @@ class Interpolator:
         """Whether the set-points rest."""
         return self.command.rests
 
+    @property
+    def is_quiet(self) -> bool:
+        """Whether nothing runs, nothing waits for the next tick, and no condition is observed."""
+        return (
+            self.run is None
+            and self.queue.is_quiet
+            and not (self._aborts or self._changes or self.condition_monitor.is_busy)
+        )
+
     def _rest(self) -> Array:
         return self.command.after.copy()
 

@@ -16,6 +16,7 @@ from itertools import count
 from typing import TYPE_CHECKING
 
 from heptarm.sim.controller.safety import StopRequest
+from heptarm.sim.plant.shared_state import NEVER
 from heptarm.sim.seam import OperationMode
 
 if TYPE_CHECKING:
@@ -187,6 +188,8 @@ class SimulatedOperator:
         self.press: Callable[[str, int], bool] = lambda bar, slot: False
         #: Presses a button of the open dialog; returns whether there is one.
         self.answer: Callable[[int], bool] = lambda button: False
+        #: Called after each action, in its thread.
+        self.on_action: Callable[[], None] = lambda: None
 
     def schedule(self, text: str) -> None:
         """Schedule an action at a plant time: "NAME@SECONDS".
@@ -196,6 +199,11 @@ class SimulatedOperator:
         """
         words, seconds = timed(text)
         heapq.heappush(self._due, (round(seconds * 1000), next(self._numbers), words))
+
+    @property
+    def next_due(self) -> int:
+        """Tick before which the next scheduled action is executed; `NEVER` if there is none."""
+        return self._due[0][0] if self._due else NEVER
 
     def tick(self) -> None:
         """Execute the actions that are due; called before each tick of the plant."""
@@ -217,7 +225,9 @@ class SimulatedOperator:
             ValueError: there is no such action, or its values are illegal; nothing has changed.
         """
         name, values = understood(words)
-        return self._verbs[name](*values) or ""
+        shown = self._verbs[name](*values) or ""
+        self.on_action()
+        return shown
 
     def _requesting(self, request: StopRequest) -> Callable[[], None]:
         return lambda: self._plant.safety.request_stop(request)
