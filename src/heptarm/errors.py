@@ -14,11 +14,13 @@
     │   ├── LimitError                      outside a range
     │   │   └── Unreachable                 no joint position reaches the pose
     │   ├── ModeConflict                    conflicts with what is running
+    │   ├── CollisionForeseen               `arm.collision_check` found bodies that would touch
     │   └── NotInControl                    this client does not control the robot
     ├── MotionError                         a motion did not end as commanded; has its result
     │   ├── MotionAborted                   it was stopped early
     │   │   └── CollisionDetected           by a collision guard; `collision` has joint and torque
     │   ├── NoContact                       no contact was found
+    │   ├── InsertionFailed                 a part did not go into its hole
     │   └── ArrivalError                    it ended short of its target
     ├── StreamError
     │   ├── Starved                         no target within the watchdog time
@@ -36,11 +38,16 @@ An error names what was refused, the value with its unit, the allowed range and 
 from __future__ import annotations
 
 import importlib
+import importlib.util
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
 _Error = TypeVar("_Error", bound="HeptarmError")
+
+#: The operating system.
+_PLATFORM = sys.platform
 
 
 class HeptarmError(Exception):
@@ -137,6 +144,20 @@ class ModeConflict(CommandRejected):
     """The request conflicts with what is running."""
 
 
+class CollisionForeseen(CommandRejected):
+    """The collision check of the arm found that bodies would touch on the path; nothing was sent.
+
+    Attributes:
+        touch: the bodies, and where on the path.
+        motion: index of the motion in the program.
+    """
+
+    def __init__(self, text: str, *, touch: Any = None, motion: int = 0, **details: Any) -> None:
+        super().__init__(text, **details)
+        self.touch = touch
+        self.motion = motion
+
+
 class NotInControl(CommandRejected):
     """This client does not control the robot."""
 
@@ -185,6 +206,18 @@ class NoContact(MotionError):
     """A motion until contact ended without contact."""
 
 
+class InsertionFailed(MotionError):
+    """A part did not go into its hole.
+
+    Attributes:
+        depth: how deep it is behind the surface that it touched [m].
+    """
+
+    def __init__(self, text: str, *, depth: float = 0.0, **details: Any) -> None:
+        super().__init__(text, **details)
+        self.depth = depth
+
+
 class ArrivalError(MotionError):
     """The motion ended short of its target."""
 
@@ -228,6 +261,55 @@ class Timeout(HeptarmError, TimeoutError):
 
 class MissingExtra(HeptarmError, ImportError):
     """An optional package is not installed."""
+
+
+#: Packages that each extra of heptarm brings, as they are imported.
+EXTRAS = {
+    "sim": ("mujoco", "ruckig", "jpype"),
+    "viz": ("viser", "matplotlib", "trimesh"),
+    "rl": ("torch", "gymnasium", "PIL"),
+    "record": ("mcap",),
+}
+
+
+def missing_extra(module: str) -> MissingExtra | None:
+    """The error of a package that cannot be imported, if an extra of heptarm brings it; None for any other package."""
+    root = module.partition(".")[0]
+    for extra, names in EXTRAS.items():
+        if root in names:
+            return MissingExtra(
+                f"this needs the package {root!r}, which is not installed",
+                parameter=root,
+                hint=f"pip install 'heptarm[{extra}]'",
+            )
+    return None
+
+
+def require_extra(extra: str) -> None:
+    """Check that all packages of an extra are installed, without importing them.
+
+    Raises:
+        MissingExtra: one is not; the hint is the command that installs it.
+    """
+    for name in EXTRAS[extra]:
+        error = missing_extra(name) if importlib.util.find_spec(name) is None else None
+        if error is not None:
+            raise error
+
+
+def refuse_windows(what: str) -> None:
+    """Check that something that was written for Linux and macOS does not run on Windows.
+
+    Raises:
+        CommandRejected: this is Windows.
+    """
+    if _PLATFORM == "win32":
+        raise CommandRejected(
+            f"{what} runs on Linux, this is Windows",
+            parameter="platform",
+            value=_PLATFORM,
+            hint="use WSL (wsl --install); a robot can be controlled from Windows, but not over FRI",
+        )
 
 
 def require(module: str, *, extra: str) -> Any:

@@ -27,6 +27,9 @@ from heptarm.values.text import fixed
 
 #: Whose axes an offset of a pose may refer to.
 _FRAMES = ("base", "tool")
+#: Largest angle; more is degrees [rad].
+_TURN = 2.0 * math.pi + 1e-9
+
 #: Largest arm angle that is accepted [rad].
 _LARGEST = 1000.0
 
@@ -141,8 +144,14 @@ class Pose(Value):
     def xyz_abc(
         cls, x: float = 0.0, y: float = 0.0, z: float = 0.0, a: float = 0.0, b: float = 0.0, c: float = 0.0
     ) -> Pose:
-        """KUKA's notation in SI: translation [m], then R = Rz(a) Ry(b) Rx(c) [rad]."""
-        angles = [finite(value, name, unit="rad") for name, value in (("a", a), ("b", b), ("c", c))]
+        """KUKA's notation in SI: translation [m], then R = Rz(a) Ry(b) Rx(c) [rad], each at most one turn.
+
+        Raises:
+            LimitError: a number is not finite, or an angle is more than a turn, as degrees are.
+        """
+        angles = [
+            within(value, name, -_TURN, _TURN, unit="rad") for name, value in (("a", a), ("b", b), ("c", c))
+        ]
         (sa, ca), (sb, cb), (sc, cc) = ((math.sin(t / 2), math.cos(t / 2)) for t in angles)
         quat = (
             sc * cb * ca - cc * sb * sa,

@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from heptarm import __version__
+from heptarm.arm.link.datagrams import DatagramReport
 from heptarm.arm.link.halt import BUSY, PAUSE, halt
 from heptarm.arm.link.link import Link
 from heptarm.arm.link.local_simulator import PrivateCabinet
@@ -65,6 +66,7 @@ class Options:
         groups: groups of the state that are pushed.
         finishes: after a lost connection accepted motions finish instead of stopping.
         watchdog: silence after which the cabinet counts this client as lost [s].
+        datagrams: send servo targets and receive states by UDP as far as it gets through.
         black_box: the last 30 s are written to a file after an error.
     """
 
@@ -75,6 +77,7 @@ class Options:
     groups: tuple[str, ...] = GROUPS
     finishes: bool = False
     watchdog: float = CONNECTION.default
+    datagrams: bool = False
     black_box: bool = True
 
 
@@ -267,6 +270,7 @@ class Connection:
         in_control: this client took control and has not lost it; true also while the link is lost.
         controller: name of the client that controls the robot; empty: none.
         closed: set when the arm is closed.
+        left_at_rest: the arm was at rest when this client, in control, closed it.
         signals: signals of the cabinet.
         journal: what happened besides pushed states.
         black_box: writes the last 30 s to a file.
@@ -289,6 +293,7 @@ class Connection:
         self.in_control = False
         self.controller = ""
         self.closed = threading.Event()
+        self.left_at_rest = False
         self._dial = dial
         self._link: Link | None = None
         self._welcome: wire.Welcome | None = None
@@ -341,6 +346,11 @@ class Connection:
         return self._link is not None and self._link.error is None
 
     @property
+    def datagrams(self) -> DatagramReport | None:
+        """How the datagrams beside the link fare; None: it has none."""
+        return self.link.datagrams
+
+    @property
     def real_time_factor(self) -> float:
         """Seconds of the cabinet's clock per second of this computer's."""
         return max(self.link.offset.rate, 0.001)
@@ -366,6 +376,10 @@ class Connection:
         try:
             self._robot = read_robot(self._welcome.robot)
             self.signals = read_signals(self._welcome.signals)
+            if self.options.datagrams:
+                missing = link.open_datagrams(timeout=self.options.timeout)
+                if missing:
+                    _log.warning("no datagrams, everything goes over TCP: %s", missing)
             self.subscribe(self.options.rate, self.options.groups)
         except BaseException:
             link.close()
