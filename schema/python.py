@@ -311,6 +311,8 @@ def messages(spec: Spec) -> str:
         f"MAGIC = {p['magic']:#06x}",
         f"NONCE = {p['nonce']}",
         f"TAG = {p['tag']}",
+        f"TOKEN = {p['token']}",
+        f"MAX_DATAGRAM = {p['max_datagram']}",
     ]
     layout = "".join(PRIMITIVES[one["type"]] for one in spec.header)
     lines += [f"MAX_BODY = {p['max_body']}", f'HEADER = Struct(">{layout}")', '_MASK = Struct(">H")', ""]
@@ -377,7 +379,10 @@ def messages(spec: Spec) -> str:
     lines += [f"OneWay: TypeAlias = {' | '.join(one_way)}", ""]
     lines += ["#: Message classes by id.", "MESSAGES: dict[int, type[Message]] = {"]
     lines += [f"    {message.id}: {name}," for name, message in spec.messages.items()] + ["}"]
-    lines += [f"ONE_WAY: tuple[type[OneWay], ...] = ({', '.join(one_way)},)", ""]
+    lines += [f"ONE_WAY: tuple[type[OneWay], ...] = ({', '.join(one_way)},)"]
+    datagrams = [name for name, message in spec.messages.items() if message.datagram]
+    lines += ["#: Messages that a datagram may contain."]
+    lines += [f"DATAGRAMS: tuple[type[Message], ...] = ({', '.join(datagrams)},)", ""]
     return "\n".join(lines)
 
 

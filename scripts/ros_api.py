@@ -35,6 +35,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "cabinet": ("~/info", "/diagnostics"),
         "capabilities": ("~/capabilities",),
         "close": (LIFE,),
+        "collision_check": (WORDS + "a planner such as MoveIt checks paths before it sends them",),
         "collision_guard": ("~/collision_guard",),
         "connected": ("~/status",),
         "connection": ("no counterpart: it is for tools and tests",),
@@ -115,6 +116,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "release": OPERATOR,
         "set_signal": OPERATOR,
         "start": OPERATOR,
+        "where": OPERATOR,
     },
     "arm.fri(...)": {
         "active": ("~/fri/status",),
@@ -188,6 +190,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "lin_rel": ("~/move_pose", "~/run_program"),
         "ptp": ("~/move_joints", "~/move_pose", "~/command/joint", "~/command/pose", "~/run_program"),
         "ptp_home": ("~/run_program",),
+        "spiral": ("as SPLINE, with points computed by the client", "~/run_program"),
         "spl": ("~/move_spline", "~/run_program"),
         "spline": ("~/move_spline", "~/run_program"),
         "spline_joints": ("~/move_spline", "~/run_program"),
@@ -199,6 +202,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "JointImpedance": ("~/mode/joint_impedance",),
         "Position": ("~/mode/position",),
         "compliance": ("~/guide", "~/teach", "~/mode/cartesian_impedance"),
+        "pressing": ("~/mode/cartesian_impedance",),
         "SineImpedance": ("~/mode/sine_impedance", "~/mode/force_pattern"),
     },
     "heptarm.when": {

@@ -1,4 +1,4 @@
-"""Every public function with every bad value: the enumeration that tests of values and of the arm share.
+"""Every public function with every bad value: the enumeration for tests of values and of the arm.
 
 A call that works is derived from the annotations of a function; then one argument at a time is replaced by something
 that it cannot mean. A new public function is covered by itself. `VECTORS`, `ARGUMENTS` and `ACCEPTED` have only what

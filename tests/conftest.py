@@ -19,7 +19,7 @@ from tests.long import LONG
 if TYPE_CHECKING:
     from heptarm import Arm
 
-pytest_plugins = ["tests.processes", "tests.hangs", "tests.retry"]
+pytest_plugins = ["tests.processes", "tests.hangs", "tests.retry", "tests.browser"]
 
 _LATE = ("slow", "browser")
 #: Folders with what takes long; training at the end of them, since it leaves little time to what runs beside it.
@@ -52,7 +52,7 @@ def _folder(item: pytest.Item) -> int:
 
 @dataclass(frozen=True)
 class RunningCabinet:
-    """A virtual cabinet that several tests share."""
+    """A virtual cabinet shared by several tests."""
 
     host: str
     port: int

@@ -14,11 +14,13 @@
     │   ├── LimitError                      outside a range
     │   │   └── Unreachable                 no joint position reaches the pose
     │   ├── ModeConflict                    conflicts with what is running
+    │   ├── CollisionForeseen               `arm.collision_check` found bodies that would touch
     │   └── NotInControl                    this client does not control the robot
     ├── MotionError                         a motion did not end as commanded; has its result
     │   ├── MotionAborted                   it was stopped early
     │   │   └── CollisionDetected           by a collision guard; `collision` has joint and torque
     │   ├── NoContact                       no contact was found
+    │   ├── InsertionFailed                 a part did not go into its hole
     │   └── ArrivalError                    it ended short of its target
     ├── StreamError
     │   ├── Starved                         no target within the watchdog time
@@ -118,6 +120,20 @@ class ModeConflict(CommandRejected):
     """The request conflicts with what is running."""
 
 
+class CollisionForeseen(CommandRejected):
+    """The collision check of the arm found that bodies would touch on the path; nothing was sent.
+
+    Attributes:
+        touch: the bodies, and where on the path.
+        motion: index of the motion in the program.
+    """
+
+    def __init__(self, text: str, *, touch: Any = None, motion: int = 0, **details: Any) -> None:
+        super().__init__(text, **details)
+        self.touch = touch
+        self.motion = motion
+
+
 class NotInControl(CommandRejected):
     """This client does not control the robot."""
 
@@ -164,6 +180,18 @@ class CollisionDetected(MotionAborted):
 
 class NoContact(MotionError):
     """A motion until contact ended without contact."""
+
+
+class InsertionFailed(MotionError):
+    """A part did not go into its hole.
+
+    Attributes:
+        depth: how deep it is behind the surface that it touched [m].
+    """
+
+    def __init__(self, text: str, *, depth: float = 0.0, **details: Any) -> None:
+        super().__init__(text, **details)
+        self.depth = depth
 
 
 class ArrivalError(MotionError):

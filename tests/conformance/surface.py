@@ -17,7 +17,9 @@ from heptarm.model.kinematics import forward
 from heptarm.values.robot import robot
 from tests.conformance.stage import Stage
 
-WORLD = "MediaFlange.UserButton&lt;bool MediaFlange.LEDBlue&gt;bool MediaFlange.LEDRed&gt;bool Cell.Offset&gt;i16"
+WORLD = (
+    "MediaFlange.UserButton&lt;bool MediaFlange.LEDBlue&gt;bool MediaFlange.LEDRed&gt;bool Cell.Offset&gt;i16"
+)
 PROJECT = f"""<persistence><processDataContainer>
 <processData dataType="java.lang.String" id="heptarm.io" value="{WORLD}"/>
 <processData dataType="java.lang.Integer" id="cell.count" value="3"/>
@@ -35,7 +37,7 @@ class Sent(Protocol):
     """A goal that was sent."""
 
     @property
-    def told(self) -> list[Any]:
+    def reported(self) -> list[Any]:
         """Its feedback so far."""
         ...
 
@@ -125,9 +127,9 @@ def home(probe: Probe) -> None:
 
 def case_signals_are_listed_written_and_published(probe: Probe, stage: Stage) -> None:
     seen = probe.listen("signals", "heptarm_msgs/Signals", latched=True)
-    told = done(probe.call("signals", "GetSignals"))
-    assert list(told.names) == [word.partition("&")[0] for word in WORLD.split()]
-    assert list(told.outputs) == [False, True, True, True] and told.kinds[3] == "integer"
+    reported = done(probe.call("signals", "GetSignals"))
+    assert list(reported.names) == [word.partition("&")[0] for word in WORLD.split()]
+    assert list(reported.outputs) == [False, True, True, True] and reported.kinds[3] == "integer"
     done(probe.call("set_signals", "SetSignals", names=["offset", "LEDRed"], values=[-30.0, 1.0]))
     until(lambda: seen and dict(zip(seen[-1].names, seen[-1].values))["Cell.Offset"] == -30.0, "no signal")
     done(probe.call("set_led", "SetText", value="blue"))
@@ -162,17 +164,25 @@ def case_a_condition_ends_a_motion(probe: Probe, stage: Stage) -> None:
     home(probe)
     states = probe.listen("state", "heptarm_msgs/RobotState")
     until(lambda: states, "no states")
-    ended = probe.send("move_joints", "MoveJoints", joint_names=["A1"], position=[2.0], until="io.user_button")
+    ended = probe.send(
+        "move_joints", "MoveJoints", joint_names=["A1"], position=[2.0], until="io.user_button"
+    )
     until(lambda: states[-1].position[0] > 0.05, "the arm does not set out")
     stage.do("set UserButton true")
     result = done(ended.end())
     assert "UserButton" in result.stopped_by or "user_button" in result.stopped_by, result.stopped_by
     assert states[-1].position[0] < 1.9
     stage.do("set UserButton false")
-    result = done(act(probe, "move_joints", "MoveJoints", position=HOME, until="~io.user_button | (force > 900)"))
+    result = done(
+        act(probe, "move_joints", "MoveJoints", position=HOME, until="~io.user_button | (force > 900)")
+    )
     assert "user_button" in result.stopped_by.casefold().replace("userbutton", "user_button")
     bad = "__import__('os').system('true')"
-    refused(act(probe, "move_joints", "MoveJoints", position=HOME, until=bad), "must be a condition", "force.along")
+    refused(
+        act(probe, "move_joints", "MoveJoints", position=HOME, until=bad),
+        "must be a condition",
+        "force.along",
+    )
     refused(act(probe, "move_joints", "MoveJoints", position=HOME, until="force > 9999"), "9999")
     home(probe)
 
@@ -278,7 +288,14 @@ def case_modes_with_all_their_parameters(probe: Probe, stage: Stage) -> None:
         "frame": "base",
     }
     done(probe.call("mode/sine_impedance", "SetSineImpedance", **sine))
-    done(act(probe, "run_program", "RunProgram", motions=[probe.make("heptarm_msgs/Motion", kind=6, duration=0.6)]))
+    done(
+        act(
+            probe,
+            "run_program",
+            "RunProgram",
+            motions=[probe.make("heptarm_msgs/Motion", kind=6, duration=0.6)],
+        )
+    )
     for pattern in (
         {"pattern": "force", "force": [0.0, 0.0, 5.0, 0.0, 0.0, 0.0], "total_time": [1.0]},
         {"pattern": "sine", "direction": "z", "frequency": 2.0, "amplitude": 5.0},
@@ -287,7 +304,10 @@ def case_modes_with_all_their_parameters(probe: Probe, stage: Stage) -> None:
     ):
         done(probe.call("mode/force_pattern", "SetForcePattern", **pattern))
     refused(probe.call("mode/force_pattern", "SetForcePattern", pattern="star"), "star", "lissajous")
-    refused(probe.call("mode/force_pattern", "SetForcePattern", pattern="force", force=[1.0]), "must have 6 numbers")
+    refused(
+        probe.call("mode/force_pattern", "SetForcePattern", pattern="force", force=[1.0]),
+        "must have 6 numbers",
+    )
     refused(probe.call("mode/sine_impedance", "SetSineImpedance", **{**sine, "nullspace": six}), "nullspace")
     done(probe.call("mode/position", "std_srvs/Trigger"))
 
@@ -345,7 +365,9 @@ def case_an_fri_session_is_opened_commanded_and_closed(probe: Probe, stage: Stag
         if status and status[-1].kind:
             return True
         answer = probe.call("fri/open", "OpenFri", kind=kind, period_ms=10, **settings)
-        return answer.success and bool(until(lambda: status and (status[-1].kind or status[-1].text), "no status"))
+        return answer.success and bool(
+            until(lambda: status and (status[-1].kind or status[-1].text), "no status")
+        )
 
     def watched() -> bool:
         return stands("monitor", io=["LEDRed"]) and status[-1].received > 10
@@ -395,4 +417,3 @@ def case_the_desired_state_of_a_trajectory(probe: Probe, stage: Stage) -> None:
 CASES = {
     name.removeprefix("case_"): case for name, case in list(globals().items()) if name.startswith("case_")
 }
-

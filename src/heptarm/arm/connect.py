@@ -54,6 +54,7 @@ def connect(
     groups: tuple[str, ...] = GROUPS,
     on_disconnect: Literal["stop", "finish"] = "stop",
     watchdog: float = CONNECTION.default,
+    datagrams: bool = False,
 ) -> Arm:
     """Connect to an arm.
 
@@ -71,6 +72,8 @@ def connect(
         groups: groups that a state contains: "joints", "torques", "pose", "wrench", "motion", "safety", "mode".
         on_disconnect: what the cabinet does with accepted motions when this client is lost: "stop" or "finish" them.
         watchdog: silence after which the cabinet counts this client as lost, [0.1, 10] s.
+        datagrams: send servo targets and receive states by UDP beside the TCP connection, for networks that lose
+            packets; what does not get through by UDP goes over TCP. `arm.connection.datagrams` reports how it fares.
 
     Returns:
         The arm; use it in a `with` block, which leaves the arm at rest.
@@ -83,6 +86,7 @@ def connect(
     """
     word(on_disconnect, "on_disconnect", ("stop", "finish"))
     flag(control, "control")
+    flag(datagrams, "datagrams")
     for given, what in ((target, "target"), (name, "name"), (key, "key")):
         if given is not None:
             instance(given, str, what)
@@ -109,6 +113,7 @@ def connect(
         groups=groups,
         finishes=on_disconnect == "finish",
         watchdog=CONNECTION.time(finite(watchdog, "watchdog", unit="s")),
+        datagrams=datagrams,
     )
     private = PrivateCabinet.start(chosen, key=found) if chosen.is_private else None
     host, port = (chosen.host, chosen.port) if private is None else (private.host, private.port)

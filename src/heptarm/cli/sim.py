@@ -76,6 +76,20 @@ def sim(
             "Default: the controller's load data."
         ),
     ] = "",
+    sensors: Annotated[
+        str,
+        Parameter(
+            help="'noisy' or 'noisy:SEED': sensors with noise, offset and resolution, joints with friction. "
+            "Default: ideal ones."
+        ),
+    ] = "ideal",
+    scene: Annotated[
+        str,
+        Parameter(
+            help="NAME or FILE: what is around the arm and on its flange: table, peg-in-hole, bins, or a file in "
+            "MuJoCo's format (MJCF). Its bodies collide and can be grasped; the view shows them."
+        ),
+    ] = "",
     project: Annotated[
         Path | None,
         Parameter(
@@ -240,6 +254,8 @@ def sim(
             real_time=real_time,
             faults=fault,
             payload=payload,
+            sensors=sensors,
+            scene=scene,
             project=project,
             verbose=verbose,
             as_json=as_json,
@@ -261,6 +277,7 @@ def sim(
             "--view": view,
             "--key-file": key_file is not None,
             "--project": project is not None,
+            "--scene": bool(scene),
             "--count": count != 1,
             "--real-time": real_time != "fri",
         }
@@ -288,6 +305,7 @@ def sim(
             network=fri_network,
             faults=fault,
             payload=payload,
+            sensors=sensors,
             speed=speed,
         )
         return fri_sim.run(options, verbose=verbose, as_json=as_json)
@@ -300,6 +318,8 @@ def sim(
         real_time=real_time,
         fault=fault,
         payload=payload,
+        sensors=sensors,
+        scene=scene,
         project=project,
         parent_pipe=True,
         verbose=verbose,
@@ -418,6 +438,10 @@ def _cabinet(
     key = find_key(key_file=key_file, host=host, port=port)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ExitStack() as stack:
+        positions = None
+        if view and options.scene:
+            positions = Path(stack.enter_context(TemporaryDirectory(prefix="heptarm-"))) / "positions"
+            options = replace(options, positions=positions)
         cabinet = stack.enter_context(_child(_command(options), key))
         ready = _ready(cabinet, f"the virtual cabinet does not start on {host}:{port}")
         target = f"sim://{host}:{ready['port']}"
@@ -432,6 +456,7 @@ def _cabinet(
                         target,
                         "--port",
                         str(view_port),
+                        *([] if positions is None else ["--scene", options.scene, "--positions", str(positions)]),
                     ],
                     key,
                 )
@@ -512,6 +537,8 @@ def _application(
     real_time: RealTime,
     faults: tuple[str, ...],
     payload: str,
+    sensors: str,
+    scene: str,
     project: Path | None,
     verbose: bool,
     as_json: bool,
@@ -559,6 +586,8 @@ def _application(
             answer=answers,
             fault=faults,
             payload=payload,
+            sensors=sensors,
+            scene=scene,
             parent_pipe=True,
             verbose=verbose,
         )
@@ -653,7 +682,7 @@ def _answer(cabinet: subprocess.Popen[str], as_json: bool, *, number: int = 0) -
         elif as_json:
             print(json.dumps(reply | {"cabinet": number}) if number else line.strip(), flush=True)
         elif reply["operator"]:
-            text = reply["error"] or f"done: {reply['operator']}"
+            text = reply["error"] or reply["shown"] or f"done: {reply['operator']}"
             print(f"{number}: {text}" if number else text, flush=True)
     return failure
 

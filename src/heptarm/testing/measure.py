@@ -217,6 +217,38 @@ def fresh(arm: Arm, *, after: float = 0.03) -> State:
     return arm.wait_until(is_fresh)
 
 
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """What the torque sensors show while nobody touches the arm: their offsets, and what the load data lack.
+
+    Attributes:
+        force: external force at the motion frame, base axes, shape (3,) [N].
+        torque: external torque there, shape (3,) [Nm].
+        tau: torques of the joints, shape (7,) [Nm].
+        tau_ext: external torques of the joints, shape (7,) [Nm].
+    """
+
+    force: Array
+    torque: Array
+    tau: Array
+    tau_ext: Array
+
+
+def baseline(arm: Arm) -> Baseline:
+    """The mean of a tenth of a second in which nothing changes."""
+    states = watch(arm, 0.1)
+
+    def mean(values: Sequence[Array]) -> Array:
+        return np.asarray(np.mean(values, axis=0), dtype=np.float64)
+
+    return Baseline(
+        mean([state.wrench.force for state in states]),
+        mean([state.wrench.torque for state in states]),
+        mean([state.tau for state in states]),
+        mean([state.tau_ext for state in states]),
+    )
+
+
 def watch(arm: Arm, seconds: float) -> tuple[State, ...]:
     """States of so many cabinet seconds."""
     first = arm.state.stamp

@@ -39,6 +39,9 @@ class Result(Value):
         stopped_by: the part of the break condition that fired: of parts combined by | the one that held; None if none
             fired.
         fired_at: the robot when it fired, before it braked.
+        peak_force: largest external force at the motion frame since it fired, while the arm braked and reacted [N]; NaN
+            if no condition ended a motion of `move` or `start`. On a cabinet it is read every few milliseconds.
+        rest_force: external force at the end, after the reaction [N]; NaN likewise.
         item: index of the motion of the program that ran last.
         code: number in the protocol's table of codes; 0: none.
         text: explanation by the cabinet.
@@ -50,6 +53,8 @@ class Result(Value):
     duration: float = 0.0
     stopped_by: Condition | None = None
     fired_at: State | None = None
+    peak_force: float = nan
+    rest_force: float = nan
     item: int = 0
     code: int = 0
     text: str = ""

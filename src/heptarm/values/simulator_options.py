@@ -71,6 +71,14 @@ class SimulatorOptions:
             "fixed box in the world [m]; may be repeated", metavar="X,Y,Z,LENGTH,WIDTH,HEIGHT", in_target=True
         ),
     )
+    scene: str = field(
+        default="",
+        metadata=_about(
+            "what is around the arm and on its flange: table, peg-in-hole, bins, or a file in MuJoCo's format",
+            metavar="NAME|FILE",
+            in_target=True,
+        ),
+    )
     payload: str = field(
         default="",
         metadata=_about(
@@ -96,6 +104,14 @@ class SimulatorOptions:
             '"off": drives never trip, whatever speed, torque or position', metavar="on|off", in_target=True
         ),
     )
+    sensors: str = field(
+        default="ideal",
+        metadata=_about(
+            '"noisy": sensors with noise, offset and resolution, and joints with friction, the same for a seed',
+            metavar="ideal|noisy[:SEED]",
+            in_target=True,
+        ),
+    )
     fault: tuple[str, ...] = field(
         default=(),
         metadata=_about(
@@ -118,6 +134,9 @@ class SimulatorOptions:
     )
     trace: Path | None = field(
         default=None, metadata=_about("file for the state of the plant after each tick (0.5 MB/s)")
+    )
+    positions: Path | None = field(
+        default=None, metadata=_about("file that always has the positions of arm and scene, for the view")
     )
     parent_pipe: bool = field(
         default=False,

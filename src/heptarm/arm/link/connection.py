@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 
 from heptarm import __version__
+from heptarm.arm.link.datagrams import DatagramReport
 from heptarm.arm.link.halt import BUSY, PAUSE, halt
 from heptarm.arm.link.link import Link
 from heptarm.arm.link.local_simulator import PrivateCabinet
@@ -61,6 +62,7 @@ class Options:
         groups: groups of the state that are pushed.
         finishes: after a lost connection accepted motions finish instead of stopping.
         watchdog: silence after which the cabinet counts this client as lost [s].
+        datagrams: send servo targets and receive states by UDP as far as it gets through.
     """
 
     name: str = "heptarm"
@@ -70,6 +72,7 @@ class Options:
     groups: tuple[str, ...] = GROUPS
     finishes: bool = False
     watchdog: float = CONNECTION.default
+    datagrams: bool = False
 
 
 #: FRI sessions whose last change is kept.
@@ -326,6 +329,11 @@ class Connection:
         return self._link is not None and self._link.error is None
 
     @property
+    def datagrams(self) -> DatagramReport | None:
+        """How the datagrams beside the link fare; None: it has none."""
+        return self.link.datagrams
+
+    @property
     def real_time_factor(self) -> float:
         """Seconds of the cabinet's clock per second of this computer's."""
         return max(self.link.offset.rate, 0.001)
@@ -351,6 +359,10 @@ class Connection:
         try:
             self._robot = read_robot(self._welcome.robot)
             self.signals = read_signals(self._welcome.signals)
+            if self.options.datagrams:
+                missing = link.open_datagrams(timeout=self.options.timeout)
+                if missing:
+                    _log.warning("no datagrams, everything goes over TCP: %s", missing)
             self.subscribe(self.options.rate, self.options.groups)
         except BaseException:
             link.close()

@@ -34,6 +34,7 @@ from heptarm.errors import (
 from heptarm.values.arrays import callback as check_callback
 from heptarm.values.arrays import scalar, within
 from heptarm.values.condition.condition import Condition, condition_nodes
+from heptarm.values.condition.reaction import Reaction
 from heptarm.values.condition.trigger import Trigger
 from heptarm.values.result import Cause, MotionEvent, Result
 from heptarm.wire import messages as wire
@@ -100,10 +101,12 @@ class BreakRule:
     Attributes:
         condition: ends the motion when it holds.
         error: makes the error of a motion that it ended; None: the motion ends with a result.
+        then: reaction of motions that name none.
     """
 
     condition: Condition
     error: Callable[[Result], HeptarmError] | None
+    then: Reaction = "stay"
 
     def ended(self, result: Result) -> bool:
         """Whether this condition ended a motion."""

@@ -29,13 +29,16 @@ from heptarm.io.keys import find_key
 from heptarm.sim.fri.sessions import Sessions
 from heptarm.sim.plant.payload import parse_payload
 from heptarm.sim.plant.plant import Plant
-from heptarm.sim.plant.shared_state import Trace
-from heptarm.sim.plant.world import Box
+from heptarm.sim.plant.scene import Scene
+from heptarm.sim.plant.sensor_errors import parse_sensors, sensor_errors
+from heptarm.sim.plant.shared_state import PositionsFile, Trace
+from heptarm.sim.plant.world import Box, compiled
 from heptarm.sim.runtime import project
 from heptarm.sim.runtime.addresses import AddressMap
 from heptarm.sim.runtime.operator import SimulatedOperator, timed
 from heptarm.sim.runtime.realtime_loop import ANSWER_GAP, RealtimeLoop, batch_scheduled
 from heptarm.sim.runtime.rest import Rest
+from heptarm.values.robot import robot
 from heptarm.values.simulator_options import RealTime, SimulatorOptions, flag
 
 log = logging.getLogger("heptarm.sim")
@@ -47,6 +50,8 @@ REAL_TIME_PRIORITY = 10
 _PORT_PROPERTY = "heptarm.port.bound"
 _START_TIMEOUT = 20.0
 _HOUSEKEEPING = 0.1
+#: Ticks between two updates of the file of positions.
+_POSITIONS_EVERY = 30
 
 
 def arguments(argv: list[str] | None = None) -> SimulatorOptions:
@@ -107,7 +112,9 @@ class VirtualCabinet:
         self.plant = Plant(
             options.model,
             boxes=[Box.of(text) for text in options.box],
+            scene=Scene.of(options.scene) if options.scene else None,
             monitored=options.drive_monitoring == "on",
+            errors=sensor_errors(robot(options.model), options.sensors),
         )
         self.sessions = Sessions(
             self.plant,
@@ -126,6 +133,9 @@ class VirtualCabinet:
             jpype.JClass("java.util.logging.LogManager").getLogManager().reset()
         self._java_memory = java_plant.java_memory
         self._trace = None if options.trace is None else Trace(self.plant.shared, options.trace)
+        self._positions = (
+            None if options.positions is None else PositionsFile(options.positions, len(self.plant.data.qpos))
+        )
         self._station = java_plant.open_station(self.plant, self.sessions)
         rest = Rest(self.plant, self.sessions, self.operator, self._station.timers)
         self.loop = RealtimeLoop(
@@ -167,6 +177,8 @@ class VirtualCabinet:
         self.plant.tick()
         if self._trace is not None:
             self._trace.append()
+        if self._positions is not None and self.plant.tick_count % _POSITIONS_EVERY == 0:
+            self._positions.write(self.plant.data.qpos)
 
     @property
     def is_foreign(self) -> bool:
@@ -269,14 +281,14 @@ def _read_standard_input(operator: SimulatedOperator, end: Callable[[], None]) -
 
 
 def _operate(operator: SimulatedOperator, words: str) -> None:
-    """Execute an operator action and report on standard output whether it was accepted."""
+    """Execute an operator action and report on standard output whether it was accepted, and what it shows."""
+    shown = error = ""
     try:
         if words:
-            operator.do(words)
-        error = ""
+            shown = operator.do(words)
     except ValueError as refused:
         error = str(refused)
-    print(json.dumps({"operator": words, "error": error}), flush=True)
+    print(json.dumps({"operator": words, "error": error, "shown": shown}), flush=True)
 
 
 def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
@@ -317,10 +329,13 @@ def main(argv: list[str] | None = None) -> int:
             timed(fault)
         for text in options.box:
             Box.of(text)
+        if options.scene:
+            compiled(options.model, (), Scene.of(options.scene))
         if options.payload:
             parse_payload(options.payload)
         if options.drive_monitoring not in ("on", "off"):
             raise ValueError(f"drive_monitoring must be on or off, got {options.drive_monitoring!r}")
+        parse_sensors(options.sensors)
         real_time_of(options)
         if options.project is not None:
             project.read_project(options.project)
