@@ -18,6 +18,7 @@ import sys
 
 from bench.contact import force  # noqa: F401  every import registers its benchmarks
 from bench.fri import codec, faults, guard, hold, loop  # noqa: F401
+from bench.lab import record  # noqa: F401
 from bench.measure.figure import BENCHMARKS, Benchmark
 from bench.measure.store import Store
 from bench.motion import endpoints, inverse_kinematics, paths  # noqa: F401

@@ -123,6 +123,6 @@ def parts() -> dict[str, list[float]]:
 
 @benchmark("request_parts")
 def request_parts() -> Iterator[Figure]:
-    """Where the time of a request goes: encoding, sending, the way to Java and back, Java, decoding."""
+    """Where the time of a request goes: encoding, sending, the kernel, Java, decoding."""
     for name, values in parts().items():
         yield Figure(name, float(np.median(values)), "us")

@@ -114,6 +114,15 @@ from .errors import (
 from .errors import (
     VersionMismatch as VersionMismatch,
 )
+from .record.recorder import (
+    Recorder as Recorder,
+)
+from .record.recording import (
+    Recording as Recording,
+)
+from .record.recording import (
+    load as load,
+)
 from .sim.collision import (
     CollisionModel as CollisionModel,
 )

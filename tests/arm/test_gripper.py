@@ -69,7 +69,9 @@ def test_an_input_for_a_gripped_part_replaces_the_wait(arm: ha.Arm) -> None:
 def test_a_gripper_without_air_is_a_timeout(arm: ha.Arm, holds: str | None) -> None:
     gripper = ha.TwoSignalGripper(arm, **WIRED, holds=holds, timeout=0.4, settle=0.2)
     gripper.open()
-    with pytest.raises(ha.Timeout, match=r"did not close within 0\.4 s: the switch MediaFlange.InputX3Pin4 is off"):
+    with pytest.raises(
+        ha.Timeout, match=r"did not close within 0\.4 s: the switch MediaFlange.InputX3Pin4 is off"
+    ):
         gripper.close()
     switch(arm)
     with pytest.raises(ha.Timeout, match=r"did not open within 0\.4 s"):

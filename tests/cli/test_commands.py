@@ -114,7 +114,7 @@ def test_move_lin_and_lin_rel(target: str) -> None:
         "move", "ptp", "0", "30", "0", "-90", "0", "60", "0", "--deg", "--speed", "0.5", "--target", target
     )
     (down,) = objects(
-        "move", "lin_rel", "--z", "-0.05", "--frame", "base", "--speed", "0.5", "--target", target
+        "move", "lin-rel", "--z", "-0.05", "--frame", "base", "--speed", "0.5", "--target", target
     )
     x, y, z = down["xyz"]
     pose = [f"{v:.6f}" for v in (x, y + 0.05, z)]
@@ -140,8 +140,8 @@ def test_dry_run_moves_nothing(target: str) -> None:
             ("A2", "150.00", "[-120, 120] deg"),
         ),
         (("move", "ptp", "0", "nan", "0", "-1", "0", "1", "0"), ("nan",)),
-        (("move", "lin_rel", "--x", "3"), ("Can not plan motion",)),
-        (("move", "lin_rel", "--x", "0.01", "--speed", "1.5"), ("speed", "(0, 1]")),
+        (("move", "lin-rel", "--x", "3"), ("Can not plan motion",)),
+        (("move", "lin-rel", "--x", "0.01", "--speed", "1.5"), ("speed", "(0, 1]")),
     ],
 )
 def test_refusals_are_one_sentence_and_exit_code_1(

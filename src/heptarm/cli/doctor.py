@@ -16,6 +16,7 @@ import numpy as np
 from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from heptarm import __version__, _resources
 from heptarm.arm.arm import Arm
@@ -34,7 +35,7 @@ from heptarm.cli.options import (
     Json,
 )
 from heptarm.cli.output import emit
-from heptarm.errors import CommandRejected, ConnectFailed, HeptarmError, Timeout
+from heptarm.errors import EXTRAS, CommandRejected, ConnectFailed, HeptarmError, Timeout
 from heptarm.fri.loop.client import Client
 from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
 from heptarm.fri.session.session import Event, Kind
@@ -103,6 +104,12 @@ def doctor(
 
     With --fri also check FRI: a session of the target, or with --listen the messages of another application on
     the cabinet.
+
+    For example:
+
+        heptarm doctor
+
+        heptarm doctor --fri --target lab1
     """
     target = target.or_else(None)
     listens = listen or target.text is None
@@ -133,7 +140,8 @@ def _table(verdicts: list[CheckResult]) -> Table:
     for name in ("", "what", "found", "what to do"):
         table.add_column(name, overflow="fold")
     for verdict in verdicts:
-        table.add_row(style[verdict.how], verdict.what, verdict.found, verdict.remedy)
+        # found and remedy are no markup: Rich would swallow the extra in 'heptarm[viz]'
+        table.add_row(style[verdict.how], verdict.what, Text(verdict.found), Text(verdict.remedy))
     return table
 
 
@@ -143,11 +151,10 @@ def _python() -> CheckResult:
 
 
 def _extras() -> CheckResult:
-    needed = {"sim": ("mujoco", "ruckig", "jpype"), "viz": ("viser", "matplotlib")}
     missing = [
         extra
-        for extra, modules in needed.items()
-        if any(importlib.util.find_spec(m) is None for m in modules)
+        for extra in ("sim", "viz")
+        if any(importlib.util.find_spec(name) is None for name in EXTRAS[extra])
     ]
     if missing:
         return CheckResult(

@@ -261,9 +261,9 @@ class Redundancy:
 
     RANGES: ClassVar[dict[str, tuple[float, float]]] = {"e1": (-1000.0, 1000.0)}
 
-    e1: float
-    status: int
-    turn: int
+    e1: float = nan
+    status: int = -1
+    turn: int = -1
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Redundancy_0.pack(self.e1, self.status, self.turn))
@@ -472,7 +472,7 @@ class PtpPose:
     """Point to point in joint space, to a pose of the motion frame."""
 
     target: Pose
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
     dynamics: JointDynamics = JointDynamics()
     blending: Blending = Blending()
 
@@ -504,7 +504,7 @@ class Lin:
     """Straight line of the motion frame."""
 
     target: Pose
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
     dynamics: CartesianDynamics = CartesianDynamics()
     joints: JointDynamics = JointDynamics()
     blending: Blending = Blending()
@@ -585,7 +585,7 @@ class Circ:
 
     via: Pose
     end: Pose
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
     dynamics: CartesianDynamics = CartesianDynamics()
     joints: JointDynamics = JointDynamics()
     blending: Blending = Blending()
@@ -2089,7 +2089,7 @@ class PoseState:
     quat: tuple[float, ...]
     xyz_cmd: tuple[float, ...]
     quat_cmd: tuple[float, ...]
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_PoseState_0.pack(self.stamp, *self.xyz, *self.quat, *self.xyz_cmd, *self.quat_cmd))
@@ -5357,3 +5357,51 @@ MESSAGES: dict[int, type[Message]] = {
 ONE_WAY: tuple[type[OneWay], ...] = (ServoJoints, ServoJointsVelocity, ServoPose,)
 #: Messages that a datagram may contain.
 DATAGRAMS: tuple[type[Message], ...] = (Ping, Pong, Cancel, Stop, ServoJoints, ServoJointsVelocity, ServoPose, State,)
+
+#: The first groups of a state's body, those of fixed size: name, bit of the mask, and its fields in order, each
+#: with its name, its type in numpy's notation and its number of entries. The mask, two bytes, is before them.
+STATE_LAYOUT: tuple[tuple[str, int, tuple[tuple[str, str, int], ...]], ...] = (
+    ("joints", 1, (
+        ("stamp", ">i8", 1),
+        ("q", ">f8", 7),
+        ("q_cmd", ">f8", 7),
+        ("dq", ">f8", 7),
+    )),
+    ("torques", 2, (
+        ("stamp", ">i8", 1),
+        ("tau", ">f8", 7),
+        ("tau_ext", ">f8", 7),
+        ("tau_cmd", ">f8", 7),
+    )),
+    ("pose", 4, (
+        ("stamp", ">i8", 1),
+        ("xyz", ">f8", 3),
+        ("quat", ">f8", 4),
+        ("xyz_cmd", ">f8", 3),
+        ("quat_cmd", ">f8", 4),
+        ("e1", ">f8", 1),
+        ("status", ">i4", 1),
+        ("turn", ">i4", 1),
+    )),
+    ("wrench", 8, (
+        ("stamp", ">i8", 1),
+        ("force", ">f8", 3),
+        ("torque", ">f8", 3),
+        ("force_inaccuracy", ">f8", 3),
+        ("torque_inaccuracy", ">f8", 3),
+    )),
+    ("motion", 16, (
+        ("stamp", ">i8", 1),
+        ("motion", ">u4", 1),
+        ("item", ">u2", 1),
+        ("queued", ">u2", 1),
+        ("progress", ">f8", 1),
+        ("remaining", ">f8", 1),
+        ("override", ">f8", 1),
+    )),
+    ("safety", 32, (
+        ("stamp", ">i8", 1),
+        ("bits", ">u2", 1),
+        ("mode", ">u1", 1),
+    )),
+)

@@ -203,6 +203,7 @@ class Link:
         on_event: called with each event, in the order received; must not block.
         on_state: called with (body, our clock at its receipt [ns]) of each pushed state; must not block.
         on_lost: called once, from the link thread, with the error that ended the link; not after `close`.
+        on_answer: called with each request and its answer, by the thread that has sent it; must not block.
 
     Attributes:
         offset: estimate of the cabinet's clock.
@@ -218,6 +219,7 @@ class Link:
         on_event: Callable[[Message], None],
         on_state: Callable[[bytes, int], None],
         on_lost: Callable[[HeptarmError], None],
+        on_answer: Callable[[Message, Message], None] | None = None,
     ) -> None:
         self.offset = ClockOffset()
         self.peer = transport.peer
@@ -228,6 +230,7 @@ class Link:
         self._on_event = on_event
         self._on_state = on_state
         self._on_lost = on_lost
+        self._on_answer = on_answer
         self._view = memoryview(bytearray(_BUFFER))
         self._sending = threading.Lock()
         self._reading = threading.Lock()  # held by the one thread that reads the socket
@@ -426,6 +429,8 @@ class Link:
                 f"the cabinet did not answer {type(message).__name__} within {timeout:g} s",
                 hint="check the network and the load of both machines, or use connect(..., timeout=...)",
             )
+        if self._on_answer is not None:
+            self._on_answer(message, answer)
         if isinstance(answer, Rejected):
             raise rejection(answer)
         return answer

@@ -19,7 +19,7 @@ import weakref
 from collections import deque
 
 from heptarm.arm.link.target import Target
-from heptarm.errors import ConnectFailed, ConnectionLost
+from heptarm.errors import ConnectFailed, ConnectionLost, refuse_windows, require_extra
 from heptarm.io.keys import environment
 from heptarm.values.simulator_options import flag
 
@@ -85,7 +85,11 @@ class PrivateCabinet:
 
         Raises:
             ConnectFailed: it does not start; the text has its last output.
+            MissingExtra: the packages of the simulator are not installed.
+            CommandRejected: this is Windows.
         """
+        refuse_windows("the virtual cabinet")
+        require_extra("sim")
         command = [
             sys.executable,
             "-m",
@@ -124,15 +128,21 @@ class PrivateCabinet:
         ]
         for reader in readers:
             reader.start()
+        is_slow = False
         try:
             port = ready.get(timeout=timeout)
         except queue.Empty:
-            port = None
+            port, is_slow = None, True
         except BaseException:
             _end(process, readers)
             raise
         if port is None:
             _end(process, readers)
+            if is_slow:
+                raise ConnectFailed(
+                    f"the virtual cabinet did not start within {timeout:g} s",
+                    hint="check the load and the free memory of this machine",
+                )
             raise ConnectFailed(
                 f"the virtual cabinet did not start: {' | '.join(output) or 'no output'}",
                 hint="run `python -m heptarm.sim.runtime.cabinet`; it needs pip install 'heptarm[sim]'",

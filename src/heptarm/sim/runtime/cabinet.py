@@ -14,6 +14,7 @@ import gc
 import json
 import logging
 import os
+import re
 import signal
 import sys
 import threading
@@ -199,9 +200,10 @@ class VirtualCabinet:
             if not self.host.isAlive():
                 break
             time.sleep(0.002)
-        raise RuntimeError(
-            f"the cabinet application did not start: {self.host.failure() or 'no reason given'}"
-        )
+        failure = str(self.host.failure() or "no reason given")
+        if "Address already in use" in failure:
+            failure = f"port {self.options.port} is in use by another program"
+        raise RuntimeError(f"the cabinet application did not start: {without_classes(failure)}")
 
     def close(self) -> None:
         """Write the statistics for the last time, and what is left of the trace."""
@@ -241,7 +243,7 @@ class _Priorities:
 
     def update(self) -> None:
         """Promote new threads, every client adds some; or demote those that were promoted."""
-        if self._loop.is_real_time:
+        if sys.platform == "linux" and self._loop.is_real_time:
             for task in Path("/proc/self/task").iterdir():
                 with contextlib.suppress(OSError):  # it has ended, or is refused, which the statistics report
                     if (task / "comm").read_text().startswith(REAL_TIME_THREADS):
@@ -289,6 +291,14 @@ def _operate(operator: SimulatedOperator, words: str) -> None:
     except ValueError as refused:
         error = str(refused)
     print(json.dumps({"operator": words, "error": error, "shown": shown}), flush=True)
+
+
+def without_classes(text: str) -> str:
+    """The text of a Java exception without the names of its classes."""
+    return (
+        re.sub(r"(?:\b[a-z]\w*\.)+[A-Z]\w*(?:Exception|Error)\b(?:: |$)", "", text).strip()
+        or "no reason given"
+    )
 
 
 def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:

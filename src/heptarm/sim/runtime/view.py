@@ -128,7 +128,11 @@ def main(argv: list[str] | None = None) -> int:
     from heptarm.arm.connect import connect
     from heptarm.errors import HeptarmError
 
-    viser = require("viser", extra="viz")
+    try:
+        viser = require("viser", extra="viz")
+    except HeptarmError as error:  # the parent prints it
+        print(json.dumps({"ready": False, "error": str(error), "host": True}), flush=True)
+        return 1
     signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with connect(options.target, control=False, name="view", state_rate=_RATE) as arm:
