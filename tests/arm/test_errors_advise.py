@@ -123,7 +123,7 @@ def test_a_missing_extra_is_one_sentence_with_the_command() -> None:
     require_extra("sim")
 
 
-def test_windows_is_told_what_does_not_work_there(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_windows_gets_one_sentence_for_what_does_not_work_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("heptarm.errors._PLATFORM", "win32")
     with pytest.raises(
         CommandRejected, match=r"the virtual cabinet runs on Linux, this is Windows \(use WSL"
