@@ -17,9 +17,14 @@ from tests.interrupts import ctrl_c_interrupts
 
 
 class Cabinet:
-    """Starts `python -m heptarm.sim.runtime.cabinet` on a free port."""
+    """Starts `python -m heptarm.sim.runtime.cabinet` on a free port.
 
-    def __init__(self, *options: str) -> None:
+    Args:
+        options: of its command line.
+        real_time: when it asks for real-time priority; latencies are measured with it.
+    """
+
+    def __init__(self, *options: str, real_time: str = "on") -> None:
         self._folder = tempfile.TemporaryDirectory()
         self._stats = Path(self._folder.name) / "stats.json"
         began = time.monotonic()
@@ -31,6 +36,8 @@ class Cabinet:
             "0",
             "--stats",
             str(self._stats),
+            "--real-time",
+            real_time,
         ]
         with ctrl_c_interrupts():  # also where the benchmarks run in the background
             self.process = subprocess.Popen(

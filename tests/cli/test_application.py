@@ -110,7 +110,7 @@ def test_applications_are_found_and_one_has_to_be_chosen(lab: Path) -> None:
 
 @needs_javac
 def test_a_whole_project_runs_with_its_tools_frames_signals_and_background_task() -> None:
-    done = sim(ROOT / "examples" / "sunrise", "--app-data", "cell.parts=1")
+    done = sim(ROOT / "examples" / "sunrise" / "cell", "--app-data", "cell.parts=1")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "1 parts are placed, the gripper closed 1 times" in done.stderr
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from heptarm.ros.trajectory.goal import (
 from heptarm.ros.trajectory.runner import GoalFeedback
 from heptarm.values.condition.collision import Collision
 from heptarm.values.motion.ptp import ptp
-from heptarm.values.result import MotionEvent
+from heptarm.values.result import Cause, MotionEvent
 from heptarm.values.state import State
 from tests.conftest import RunningCabinet
 
@@ -186,6 +187,30 @@ def _commanded(driver: Driver, recorder: Recorder) -> None:
             time.sleep(0.1)
     recorder.until(lambda: bool(recorder.ends))
     assert recorder.ends[-1].outcome is GoalOutcome.SUCCEEDED, recorder.ends
+
+
+@pytest.mark.parametrize("execution", ["servo"], indirect=True)
+def test_a_malformed_goal_leaves_a_command_alone(driver: Driver) -> None:
+    handle = driver.start(ptp(HOME + 0.2))
+    bad = goal(driver)
+    for wrong in (replace(bad, points=()), replace(bad, joints=("elbow", *bad.joints[1:]))):
+        with pytest.raises(GoalRefused):
+            driver.accept(wrong)
+    assert handle.wait().cause is Cause.FINISHED
+    assert np.abs(driver.arm.state.q - HOME - 0.2).max() < 0.01
+
+
+@pytest.mark.parametrize("execution", ["servo"], indirect=True)
+def test_a_twist_moves_and_silence_ends_it(driver: Driver) -> None:
+    begin = driver.arm.state.pose.xyz
+    deadline = time.monotonic() + PATIENCE
+    while driver.arm.state.pose.xyz[1] < begin[1] + 0.03 and time.monotonic() < deadline:
+        driver.follow_twist(np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0]))
+        time.sleep(0.02)
+    driver.arm.wait_for_rest(timeout=PATIENCE)
+    moved = driver.arm.state.pose.xyz - begin
+    assert 0.03 <= moved[1] < 0.15
+    assert np.abs(moved[[0, 2]]).max() < 5e-3
 
 
 def test_an_unknown_execution_is_refused_by_name() -> None:

@@ -60,6 +60,9 @@ def test_every_service_topic_and_action_of_ours_is_reported_in_a_row(table) -> N
     assert ours - reported <= {
         "~/joint_trajectory",
         "~/query_state",
+        "~/controller_state",
+        "forward_position_controller/commands",
+        "forward_velocity_controller/commands",
         "/tf",
     }  # ROS' own, and what Python does not need
 

@@ -239,6 +239,7 @@ class Client:
 
     preempted = (GoalOutcome.PREEMPTED,)
     timely = False
+    empty_stops = True
 
     def __init__(self, stage: Stage | None, name: str = "/heptarm", prefix: str = "") -> None:
         self.stage, self.name = stage, name
@@ -290,6 +291,17 @@ class Client:
             return SentGoal(False, ErrorCode(result.error_code), handle)
         self._reported[id(handle)] = reported
         return SentGoal(True, handle=handle)
+
+    def send_all(self, goals: list[TrajectoryGoal]) -> list[SentGoal]:
+        """Send goals without waiting between them; wait until each is accepted or rejected."""
+        handles = [self._action.send_goal(action_goal(goal)) for goal in goals]
+        pending = (GoalStatus.PENDING, GoalStatus.LOST)
+        until(
+            lambda: all(one.get_goal_status() not in pending for one in handles),
+            "the goals are neither accepted nor rejected",
+        )
+        rejected = [one.get_goal_status() == GoalStatus.REJECTED for one in handles]
+        return [SentGoal(not refused, handle=one) for one, refused in zip(handles, rejected)]
 
     def cancel(self, sent: SentGoal) -> bool:
         handle: Any = sent.handle

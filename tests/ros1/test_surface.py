@@ -67,6 +67,9 @@ class Client:
             "trajectory_msgs/JointTrajectoryPoint", positions=positions, time_from_start=duration
         )
 
+    def seconds(self, duration: Any) -> float:
+        return float(duration.to_sec())
+
     def query(self) -> Any:
         try:
             return self.call("query_state", "control_msgs/QueryTrajectoryState")

@@ -46,6 +46,8 @@ DEFAULTS: dict[str, object] = {
     "max_deceleration_on_cancel": 2.0,
     "allow_nonzero_velocity_at_trajectory_end": False,
     "allow_partial_joints_goal": False,
+    "allow_integration_in_goal_trajectories": False,
+    "cmd_timeout": 0.0,
     "constraints__goal_time": PATIENT["constraints__goal_time"],
     "constraints__stopped_velocity_tolerance": 0.02,
     "constraints__A7__trajectory": 0.0,
@@ -295,6 +297,11 @@ def _value(value: object) -> ParameterValue:
     return ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
 
 
+def parameter(name: str, value: object) -> Parameter:
+    """A parameter to set."""
+    return Parameter(name=name, value=_value(value))
+
+
 def fresh(ros: Ros, found: list[Any]) -> Any:
     """A copy of the newest of a topic's messages with headers, measured from now on."""
     now = ros.node.get_clock().now().nanoseconds * 1e-9
@@ -307,6 +314,7 @@ class Client:
 
     preempted = (GoalOutcome.ABORTED,)
     timely = False
+    empty_stops = False
 
     def __init__(
         self,
@@ -362,6 +370,12 @@ class Client:
         self._reported[id(handle)] = reported
         return SentGoal(True, handle=(handle, handle.get_result_async()))
 
+    def send_all(self, goals: list[TrajectoryGoal]) -> list[SentGoal]:
+        """Send goals without waiting between them; wait until each is accepted or rejected."""
+        futures = [self._action.send_goal_async(action_goal(goal)) for goal in goals]
+        handles = [self.ros.wait(future, "a goal is neither accepted nor rejected") for future in futures]
+        return [SentGoal(handle.accepted, handle=handle) for handle in handles]
+
     def cancel(self, sent: SentGoal) -> bool:
         handle, _ = sent.handle  # type: ignore[misc]
         answer = self.ros.wait(handle.cancel_goal_async(), "cancelling is not answered")
@@ -401,9 +415,7 @@ class Client:
     def set(self, **values: object) -> bool:
         self._changed |= values.keys()
         request = SetParameters.Request(
-            parameters=[
-                Parameter(name=name.replace("__", "."), value=_value(value)) for name, value in values.items()
-            ]
+            parameters=[parameter(name.replace("__", "."), value) for name, value in values.items()]
         )
         answer = self.ros.call(SetParameters, f"{self.name}/set_parameters", request)
         return all(one.successful for one in answer.results)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import signal
 from collections.abc import Callable, Iterator
@@ -12,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from heptarm_msgs.msg import RobotState, Status
 from lifecycle_msgs.msg import Transition
-from rcl_interfaces.srv import DescribeParameters, ListParameters
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParametersAtomically
 from rclpy.qos import ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
@@ -20,9 +21,10 @@ from std_srvs.srv import Trigger
 
 import heptarm as ha
 from heptarm.ros.node import parameters
-from tests.conformance.case import TOUCH, long, rests, step, succeeds, under_way
+from tests.conformance.case import TOUCH, arrives, goal, long, point, rests, step, succeeds, under_way
 from tests.conformance.stage import Stage
-from tests.ros2.peer import Client, NodeProcess, Ros, fresh, until
+from tests.conformance.streams import streamed
+from tests.ros2.peer import Client, NodeProcess, Ros, fresh, parameter, until
 
 Start = Callable[..., NodeProcess]
 
@@ -107,6 +109,62 @@ def test_every_parameter_is_described(client: Client, ros: Ros) -> None:
 def test_parameters_that_count_later_are_refused_while_connected(client: Client) -> None:
     assert not client.set(prefix="left_")
     assert not client.set(state_rate=1e9)
+
+
+def test_parameters_that_are_set_together_apply_together_or_not_at_all(client: Client, ros: Ros) -> None:
+    def atomically(**values: float) -> bool:
+        given = [parameter(name, value) for name, value in values.items()]
+        request = SetParametersAtomically.Request(parameters=given)
+        kind, name = SetParametersAtomically, "/heptarm/set_parameters_atomically"
+        return bool(ros.call(kind, name, request).result.successful)
+
+    def start_tolerance() -> float:
+        request = GetParameters.Request(names=["start_tolerance"])
+        return float(ros.call(GetParameters, "/heptarm/get_parameters", request).values[0].double_value)
+
+    assert not atomically(start_tolerance=0.2, max_deceleration_on_cancel=99.0)
+    assert start_tolerance() == 0.05
+    assert not atomically(start_tolerance=0.2, state_rate=50.0), "one of them cannot change now"
+    assert start_tolerance() == 0.05
+    try:
+        assert atomically(start_tolerance=0.2, max_deceleration_on_cancel=3.0)
+        assert start_tolerance() == 0.2
+    finally:
+        assert atomically(start_tolerance=0.05, max_deceleration_on_cancel=2.0)
+
+
+def test_quality_of_service_may_be_overridden(ros: Ros, spare: Stage, nodes: Start) -> None:
+    override = {"qos_overrides./quality/joint_states.publisher.reliability": "best_effort"}
+    nodes(spare.target, space="/quality", **override)
+    client = Client(ros, spare, "/quality/heptarm")
+    reliable = ReliabilityPolicy.RELIABLE
+
+    def kinds(topic: str) -> set[ReliabilityPolicy]:
+        return {p.qos_profile.reliability for p in ros.node.get_publishers_info_by_topic(topic)}
+
+    for _ in range(2):  # also after the node was configured again
+        until(lambda: client.status and client.status[-1].active, "the node is not active")
+        until(lambda: kinds("/quality/joint_states") == {ReliabilityPolicy.BEST_EFFORT}, "no override")
+        assert kinds("/quality/heptarm/pose") == {reliable}
+        for step_of_life in ("DEACTIVATE", "CLEANUP", "CONFIGURE", "ACTIVATE"):
+            assert client.change(getattr(Transition, f"TRANSITION_{step_of_life}"))
+
+
+def test_a_node_without_a_simulator_reports_how_to_start_one(nodes: Start) -> None:
+    if importlib.util.find_spec("mujoco") is not None:
+        pytest.skip("this Python has a simulator")
+    nodes("sim://iiwa14", space="/alone").waits_for("heptarm sim --port 30001")
+
+
+def test_streams_and_replaced_trajectories_leave_no_warnings(client: Client, node: NodeProcess) -> None:
+    begin = len(node.said)
+    here, last = streamed(client, rate=100.0)
+    arrives(client, last)
+    client.topic(goal(client, point(5.0, here)))
+    client.sleep(0.3)
+    client.topic(goal(client, point(1.0, here)))
+    arrives(client, here)
+    assert "WARN" not in node.said[begin:], node.said[begin:]
 
 
 # ----------------------------------------------------------------------------------------- states

@@ -71,6 +71,9 @@ class Client:
             "trajectory_msgs/JointTrajectoryPoint", positions=positions, time_from_start=to_duration(seconds)
         )
 
+    def seconds(self, duration: Any) -> float:
+        return float(duration.sec + duration.nanosec * 1e-9)
+
     def query(self) -> Any:
         answer = self.call("query_state", "control_msgs/QueryTrajectoryState")
         return answer if answer.success else None

@@ -1440,6 +1440,25 @@ struct Condition {
     }
 };
 
+/// Is compliant for a moment, then holds the position that it has reached.
+struct Relax {
+    template <class Self, class Visit>
+    static void each(Self&, Visit&) {
+    }
+};
+
+/// Moves back along the joint positions that it has passed, then holds the position.
+struct Retreat {
+    double distance = unset;  ///< of the motion frame; at most to the start of the motion [m]
+    double speed = 0.1;  ///< fraction of each axis' maximum
+
+    template <class Self, class Visit>
+    static void each(Self& self, Visit& visit) {
+        visit(self.distance, "distance", {0.0, 0.5, true});
+        visit(self.speed, "speed", {0.0, 1.0, true});
+    }
+};
+
 /// Sets an output.
 struct SetSignal {
     std::string signal;
@@ -1495,13 +1514,21 @@ struct Tags<Mode> {
     static constexpr std::uint8_t values[] = {1, 2, 3, 4, 5, 6};
 };
 
-/// A motion of a program with its control mode, break condition and triggers.
+/// What the arm does when a break condition has ended a motion and it has braked.
+using Reaction = std::variant<Relax, Retreat>;
+template <>
+struct Tags<Reaction> {
+    static constexpr std::uint8_t values[] = {1, 2};
+};
+
+/// A motion of a program with its control mode, break condition and reaction to it, and triggers.
 struct Item {
     Motion motion;
     std::string frame;  ///< the motion frame; "": the attached tool's, without a tool the flange
     std::optional<Mode> mode;  ///< absent: the session's mode
     Condition until;  ///< break condition
     std::vector<Trigger> triggers;
+    std::optional<Reaction> reaction;  ///< when the break condition has ended it; absent: stays where it has braked
 
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
@@ -1510,6 +1537,7 @@ struct Item {
         visit(self.mode, "mode");
         visit(self.until, "until");
         visit(self.triggers, "triggers", {-infinite, infinite, false, false, false, 0, 16});
+        visit(self.reaction, "reaction");
     }
 };
 
@@ -1926,6 +1954,18 @@ struct Rejected {
     }
 };
 
+/// Answer to OpenDatagrams.
+struct DatagramToken {
+    static constexpr std::uint16_t TYPE = 18;
+    static constexpr const char* NAME = "DatagramToken";
+    Bytes token;  ///< random; the keys of the datagrams follow from it, see [datagrams](#datagrams)
+
+    template <class Self, class Visit>
+    static void each(Self& self, Visit& visit) {
+        visit(self.token, "token", {-infinite, infinite, false, false, false, 32, 32});
+    }
+};
+
 /// Requests control. A controller that is silent for the watchdog time loses control and the arm stops.
 struct TakeControl {
     static constexpr std::uint16_t TYPE = 32;
@@ -2028,6 +2068,15 @@ struct SetOverride {
     template <class Self, class Visit>
     static void each(Self& self, Visit& visit) {
         visit(self.value, "value", {0.0, 1.0});
+    }
+};
+
+/// Opens datagrams beside the session, see [datagrams](#datagrams); answered by DatagramToken. A second request replaces the token.
+struct OpenDatagrams {
+    static constexpr std::uint16_t TYPE = 41;
+    static constexpr const char* NAME = "OpenDatagrams";
+    template <class Self, class Visit>
+    static void each(Self&, Visit&) {
     }
 };
 
@@ -2161,6 +2210,39 @@ struct ProcessData {
     static void each(Self& self, Visit& visit) {
         visit(self.name, "name");
         visit(self.value, "value");
+    }
+};
+
+/// Reads what the cabinet has counted of this session's datagrams; answered by DatagramStatistics.
+struct GetDatagramStatistics {
+    static constexpr std::uint16_t TYPE = 57;
+    static constexpr const char* NAME = "GetDatagramStatistics";
+    template <class Self, class Visit>
+    static void each(Self&, Visit&) {
+    }
+};
+
+/// The datagrams of this session since its last OpenDatagrams.
+struct DatagramStatistics {
+    static constexpr std::uint16_t TYPE = 58;
+    static constexpr const char* NAME = "DatagramStatistics";
+    std::uint32_t accepted = 0;  ///< received and in order
+    std::uint32_t old = 0;  ///< ignored: repeated, or overtaken by a newer one of the same stream
+    std::uint32_t late = 0;  ///< ignored: older than the watchdog time of the session
+    std::uint32_t forged = 0;  ///< ignored: the tag is wrong
+    std::uint32_t damaged = 0;  ///< ignored: no frame, or a message that no datagram may contain
+    std::uint32_t strange = 0;  ///< ignored by the cabinet, of all sessions: of no session, or from another address than its session
+    std::uint32_t sent = 0;  ///< sent to this client
+
+    template <class Self, class Visit>
+    static void each(Self& self, Visit& visit) {
+        visit(self.accepted, "accepted");
+        visit(self.old, "old");
+        visit(self.late, "late");
+        visit(self.forged, "forged");
+        visit(self.damaged, "damaged");
+        visit(self.strange, "strange");
+        visit(self.sent, "sent");
     }
 };
 
@@ -2421,6 +2503,8 @@ struct MotionFinished {
     double residual = unset;  ///< largest joint distance between measured and commanded position at the end; NaN if it never moved [rad]
     double duration = unset;  ///< cabinet time since its start [s]
     std::array<double, 7> q = filled<7>(unset);  ///< measured at the end [rad]
+    double peak_force = unset;  ///< largest external force at the motion frame since a break condition fired; NaN if none did, also in the next field [N]
+    double rest_force = unset;  ///< external force at the end, after the reaction [N]
     std::uint16_t code = 0;  ///< 0: none
     std::string text;
 
@@ -2433,6 +2517,8 @@ struct MotionFinished {
         visit(self.residual, "residual", {-infinite, infinite, false, true});
         visit(self.duration, "duration");
         visit(self.q, "q");
+        visit(self.peak_force, "peak_force", {-infinite, infinite, false, true});
+        visit(self.rest_force, "rest_force", {-infinite, infinite, false, true});
         visit(self.code, "code");
         visit(self.text, "text");
     }
@@ -2594,7 +2680,7 @@ struct State {
 };
 
 /// Any message.
-using Message = std::variant<Hello, Challenge, Proof, Welcome, Refusal, Ping, Pong, Goodbye, Halt, Halted, Accepted, Rejected, TakeControl, ReleaseControl, Subscribe, Run, Cancel, Stop, Pause, Resume, SetOverride, Recover, DefineTool, AttachTool, AttachLoad, SetSignals, ShowMessage, SetKey, GetProcessData, SetProcessData, ProcessData, ServoOpen, ServoJoints, ServoJointsVelocity, ServoPose, ServoSettings, ServoClose, ServoStatus, FriOpen, FriClose, FriChanged, MotionStarted, ItemReached, TriggerFired, MotionFinished, ControlChanged, SafetyChanged, KeyPressed, Notice, ConditionFired, SegmentReached, State>;
+using Message = std::variant<Hello, Challenge, Proof, Welcome, Refusal, Ping, Pong, Goodbye, Halt, Halted, Accepted, Rejected, DatagramToken, TakeControl, ReleaseControl, Subscribe, Run, Cancel, Stop, Pause, Resume, SetOverride, OpenDatagrams, Recover, DefineTool, AttachTool, AttachLoad, SetSignals, ShowMessage, SetKey, GetProcessData, SetProcessData, ProcessData, GetDatagramStatistics, DatagramStatistics, ServoOpen, ServoJoints, ServoJointsVelocity, ServoPose, ServoSettings, ServoClose, ServoStatus, FriOpen, FriClose, FriChanged, MotionStarted, ItemReached, TriggerFired, MotionFinished, ControlChanged, SafetyChanged, KeyPressed, Notice, ConditionFired, SegmentReached, State>;
 
 /// The message with this id in a body. Throws DecodeError.
 inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t size) {
@@ -2611,6 +2697,7 @@ inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t 
         case Halted::TYPE: return decode<Halted>(data, size);
         case Accepted::TYPE: return decode<Accepted>(data, size);
         case Rejected::TYPE: return decode<Rejected>(data, size);
+        case DatagramToken::TYPE: return decode<DatagramToken>(data, size);
         case TakeControl::TYPE: return decode<TakeControl>(data, size);
         case ReleaseControl::TYPE: return decode<ReleaseControl>(data, size);
         case Subscribe::TYPE: return decode<Subscribe>(data, size);
@@ -2620,6 +2707,7 @@ inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t 
         case Pause::TYPE: return decode<Pause>(data, size);
         case Resume::TYPE: return decode<Resume>(data, size);
         case SetOverride::TYPE: return decode<SetOverride>(data, size);
+        case OpenDatagrams::TYPE: return decode<OpenDatagrams>(data, size);
         case Recover::TYPE: return decode<Recover>(data, size);
         case DefineTool::TYPE: return decode<DefineTool>(data, size);
         case AttachTool::TYPE: return decode<AttachTool>(data, size);
@@ -2630,6 +2718,8 @@ inline Message decode(std::uint16_t type, const std::uint8_t* data, std::size_t 
         case GetProcessData::TYPE: return decode<GetProcessData>(data, size);
         case SetProcessData::TYPE: return decode<SetProcessData>(data, size);
         case ProcessData::TYPE: return decode<ProcessData>(data, size);
+        case GetDatagramStatistics::TYPE: return decode<GetDatagramStatistics>(data, size);
+        case DatagramStatistics::TYPE: return decode<DatagramStatistics>(data, size);
         case ServoOpen::TYPE: return decode<ServoOpen>(data, size);
         case ServoJoints::TYPE: return decode<ServoJoints>(data, size);
         case ServoJointsVelocity::TYPE: return decode<ServoJointsVelocity>(data, size);

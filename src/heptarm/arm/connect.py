@@ -55,6 +55,8 @@ def connect(
     groups: tuple[str, ...] = GROUPS,
     on_disconnect: Literal["stop", "finish"] = "stop",
     watchdog: float = CONNECTION.default,
+    datagrams: bool = False,
+    black_box: bool = True,
 ) -> Arm:
     """Connect to an arm.
 
@@ -73,6 +75,10 @@ def connect(
         groups: groups that a state contains: "joints", "torques", "pose", "wrench", "motion", "safety", "mode".
         on_disconnect: what the cabinet does with accepted motions when this client is lost: "stop" or "finish" them.
         watchdog: silence after which the cabinet counts this client as lost, [0.1, 10] s.
+        datagrams: send servo targets and receive states by UDP beside the TCP connection, for networks that lose
+            packets; what does not get through by UDP goes over TCP. `arm.connection.datagrams` reports how it fares.
+        black_box: write the last 30 s to a file after an abort, a safety stop or a lost connection; the error has its
+            path. The environment variable HEPTARM_BLACK_BOX chooses the folder, or is "off".
 
     Returns:
         The arm; use it in a `with` block, which leaves the arm at rest.
@@ -85,6 +91,8 @@ def connect(
     """
     word(on_disconnect, "on_disconnect", ("stop", "finish"))
     flag(control, "control")
+    flag(datagrams, "datagrams")
+    flag(black_box, "black_box")
     for given, what in ((target, "target"), (name, "name"), (key, "key")):
         if given is not None:
             instance(given, str, what)
@@ -113,6 +121,8 @@ def connect(
         groups=groups,
         finishes=on_disconnect == "finish",
         watchdog=CONNECTION.time(finite(watchdog, "watchdog", unit="s")),
+        datagrams=datagrams,
+        black_box=black_box,
     )
     private = PrivateCabinet.start(chosen, key=found) if chosen.is_private else None
     host, port = (chosen.host, chosen.port) if private is None else (private.host, private.port)

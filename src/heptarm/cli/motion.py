@@ -109,7 +109,7 @@ def _move(motion: Motion, options: MoveOptions) -> int:
         items((motion,), arm.robot, options.speed)
         title, percent = arm.robot.title, f"{options.speed:.0%}"
         if options.dry_run:
-            text = f"{motion} at {percent} speed is within the limits of the {title}; nothing was moved"
+            text = f"{motion!r} at {percent} speed is within the limits of the {title}; nothing was moved"
             emit({"ok": True, "text": text}) if options.as_json else print(text)
             return 0
         if not (arm.is_virtual or options.yes or confirm(f"Move the real {title} at {percent} speed?")):

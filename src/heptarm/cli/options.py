@@ -46,6 +46,7 @@ class CommandTarget:
     Attributes:
         text: as in `heptarm.connect`; None: not given.
         key_file: file with the key; None: the key is looked up elsewhere.
+        datagrams: send servo targets and receive states by UDP as far as it gets through.
     """
 
     text: Annotated[
@@ -58,6 +59,14 @@ class CommandTarget:
         ),
     ] = None
     key_file: KeyFile = None
+    datagrams: Annotated[
+        bool,
+        Parameter(
+            negative="",
+            group=COMMON,
+            help="Servo targets and states go by UDP beside the TCP connection: for networks that lose packets.",
+        ),
+    ] = False
 
     def or_else(self, default: str | None) -> CommandTarget:
         """Complete it: as given, else HEPTARM_TARGET, else this default."""
@@ -81,6 +90,7 @@ class CommandTarget:
         arm = connect(
             self.text,
             key_file=self.key_file,
+            datagrams=self.datagrams,
             control=control,
             state_rate=STATE_RATE if state_rate is None else state_rate,
             watchdog=CONNECTION.default if watchdog is None else watchdog,

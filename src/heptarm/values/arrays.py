@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import LimitError, ShapeError
+from heptarm.values.text import as_html
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -36,6 +37,10 @@ class Value:
 
     def __hash__(self) -> int:
         return hash(self._key())
+
+    def _repr_html_(self) -> str:
+        """The text of `str` for a notebook."""
+        return as_html(str(self))
 
     def _key(self) -> tuple[object, ...]:
         return tuple(_key(getattr(self, name)) for name, f in self.__dataclass_fields__.items() if f.compare)

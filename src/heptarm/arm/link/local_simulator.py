@@ -47,7 +47,7 @@ class PrivateCabinet:
         process: subprocess.Popen[str],
         port: int,
         readers: list[threading.Thread],
-        replies: queue.SimpleQueue[str],
+        replies: queue.SimpleQueue[tuple[str, str]],
     ) -> None:
         self._replies = replies
         self._command_lock = threading.Lock()
@@ -116,7 +116,7 @@ class PrivateCabinet:
         )
         output: deque[str] = deque(maxlen=20)
         ready: queue.SimpleQueue[int | None] = queue.SimpleQueue()
-        replies: queue.SimpleQueue[str] = queue.SimpleQueue()
+        replies: queue.SimpleQueue[tuple[str, str]] = queue.SimpleQueue()
         readers = [
             threading.Thread(
                 target=_read_output,
@@ -154,8 +154,8 @@ class PrivateCabinet:
         """Whether the process runs."""
         return self._process.poll() is None
 
-    def operate(self, words: str) -> str:
-        """Carry out an operator command and return the error text, "" if it succeeded.
+    def operate(self, words: str) -> tuple[str, str]:
+        """Carry out an operator command; returns the error text, "" if it succeeded, and what it shows.
 
         Raises:
             ConnectionLost: the process has ended, or does not answer.
@@ -198,7 +198,7 @@ if hasattr(os, "register_at_fork"):  # not on Windows, where no process forks
 def _read_output(
     process: subprocess.Popen[str],
     ready: queue.SimpleQueue[int | None],
-    replies: queue.SimpleQueue[str],
+    replies: queue.SimpleQueue[tuple[str, str]],
     output: deque[str],
 ) -> None:
     """Read the READY line, then the replies to operator commands."""
@@ -207,7 +207,7 @@ def _read_output(
         try:
             message = json.loads(line)
             if "operator" in message:
-                replies.put(str(message["error"]))
+                replies.put((str(message["error"]), str(message["shown"])))
             elif message["ready"]:
                 ready.put(int(message["port"]))
             else:

@@ -35,6 +35,7 @@ def items(
     *,
     mode: wire.Mode | None = None,
     until: wire.Condition | None = None,
+    reaction: wire.Reaction | None = None,
 ) -> tuple[wire.Item, ...]:
     """The items of a program.
 
@@ -44,12 +45,16 @@ def items(
         speed: no joint is faster than this fraction of its maximum, (0, 1].
         mode: control mode of all of them; None: position.
         until: break condition of all of them.
+        reaction: to that condition; None: stay.
 
     Raises:
         LimitError: a target is outside the robot's limits; the text names motion, joint, value and range.
     """
     return tuple(
-        _item(motion, index if len(motions) > 1 else None, robot, speed, mode, until or wire.Condition())
+        replace(
+            _item(motion, index if len(motions) > 1 else None, robot, speed, mode, until or wire.Condition()),
+            reaction=reaction,
+        )
         for index, motion in enumerate(motions)
     )
 

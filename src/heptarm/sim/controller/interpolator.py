@@ -61,6 +61,7 @@ class RunningMotion:
         "serial",
         "settling",
         "started",
+        "still",
         "stop",
         "time",
         "watches",
@@ -79,6 +80,7 @@ class RunningMotion:
         self.cancelled = False
         self.ended = False
         self.settling = 0
+        self.still = 0
         self.started = False
         self.follower: Follower | None = None
         self.stop: AxisStop | None = None
@@ -125,7 +127,8 @@ class RunningMotion:
 #: A motion is done when every measured joint is within this distance of its command [rad] and this slow [rad/s] ...
 SETTLED = 5e-5
 SETTLED_SPEED = 1e-3
-#: ... or after this many ticks.
+#: ... or has been this slow for this many ticks, since a load deflects it; or at the latest after this many ticks.
+STILL_TICKS = 60
 SETTLE_TICKS = 500
 
 #: Highest speed of the tool frame in T1 [m/s], slightly below the standard's 250 mm/s.
@@ -224,6 +227,15 @@ class Interpolator:
     def rests(self) -> bool:
         """Whether the set-points rest."""
         return self.command.rests
+
+    @property
+    def is_quiet(self) -> bool:
+        """Whether nothing runs, nothing waits for the next tick, and no condition is observed."""
+        return (
+            self.run is None
+            and self.queue.is_quiet
+            and not (self._aborts or self._changes or self.condition_monitor.is_busy)
+        )
 
     def _rest(self) -> Array:
         return self.command.after.copy()
@@ -395,8 +407,12 @@ class Interpolator:
         if self._control.stays and not run.cancelled and not run.failure:
             return 1.0, 0.0
         run.settling += 1
-        at_rest = not self._control.is_stiff or float(np.abs(self._q - self.command.after).max()) <= SETTLED
-        at_rest = at_rest and float(np.abs(self._dq).max()) <= SETTLED_SPEED
+        run.still = run.still + 1 if float(np.abs(self._dq).max()) <= SETTLED_SPEED else 0
+        at_rest = run.still > 0 and (
+            not self._control.is_stiff
+            or run.still > STILL_TICKS
+            or float(np.abs(self._q - self.command.after).max()) <= SETTLED
+        )
         if at_rest or run.settling >= SETTLE_TICKS:
             cause = "condition" if run.broken else "cancelled" if run.cancelled else "done"
             self.run = None
