@@ -66,7 +66,7 @@ def test_each_line_has_a_scenario_and_each_scenario_a_title() -> None:
 
 
 class Real:
-    """An arm that says it is a real one."""
+    """An arm that reports it is a real one."""
 
     is_virtual = False
 
@@ -115,7 +115,7 @@ def test_a_robot_is_asked_for_and_slow(arm: ha.Arm) -> None:
     assert nobody.outcomes[0].verdict is Verdict.LEFT_OUT and not nobody.ok
 
 
-def test_what_fails_is_told_with_what_was_measured(arm: ha.Arm) -> None:
+def test_what_fails_is_reported_with_what_was_measured(arm: ha.Arm) -> None:
     def show(_: ha.Arm) -> None:
         from heptarm.testing.measure import near
 
@@ -155,8 +155,8 @@ def test_the_command_names_runs_and_reports(
         "target": NO_TARGET,
     }
     assert check.check("model", list_only=True, junit=None, as_json=True, **options) == 0
-    told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert told[0]["scenario"] == "model.forward" and told[0]["risk"] == "still"
+    reported = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert reported[0]["scenario"] == "model.forward" and reported[0]["risk"] == "still"
 
     class Lent:
         """The arm of these tests, which the command must not close."""

@@ -94,7 +94,9 @@ def test_a_contact_stays_near_its_threshold(speed: float, most: float) -> None:
     assert 20.0 < forces.max() < most
     rest = forces[-1]
     assert rest < most and np.abs(forces[-500:] - rest).max() < 1.0
-    assert forces[-200:].mean() == pytest.approx(forces[-800:-600].mean(), abs=0.3), "it must not grow at rest"
+    assert forces[-200:].mean() == pytest.approx(forces[-800:-600].mean(), abs=0.3), (
+        "it must not grow at rest"
+    )
     assert float(np.abs(plant.snapshot.dq).max()) < 1e-3
 
 

@@ -7,6 +7,7 @@ import contextlib
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal, overload
 
@@ -21,17 +22,20 @@ from heptarm.arm.fri.session import Fri
 from heptarm.arm.link.connection import STATE_RATE, Connection
 from heptarm.arm.link.state_stream import GROUPS, States
 from heptarm.arm.motion import program
-from heptarm.arm.motion.handle import BreakRule, MotionHandle, check_timeout
+from heptarm.arm.motion.foresight import Foresight
+from heptarm.arm.motion.handle import LONGEST_STREAM, STREAM_SIZE, BreakRule, MotionHandle, check_timeout
 from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
 from heptarm.arm.motion.servo import JointServo, PoseServo, ServoKeywords, ServoRequest, documented
 from heptarm.arm.translate.conditions import condition_message
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
+from heptarm.record.recorder import Recorder
 from heptarm.skills import collision_guard as guarding
 from heptarm.skills import replay as replaying
 from heptarm.skills import teaching
 from heptarm.skills import touch as touching
 from heptarm.values.arrays import callback, instance, integer, within, word
+from heptarm.values.clearance import CollisionCheck
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.reaction import Reaction, check_reaction
 from heptarm.values.frames import BASE, TOOL, check_name
@@ -51,7 +55,6 @@ _log = logging.getLogger("heptarm.arm")
 
 #: States that a stream of all states keeps for a slow loop.
 _STREAM_SIZE = 2000
-_LONGEST_STREAM = 1_000_000
 #: Longest wait, after an error, for the arm to rest so that its tool can be changed [s].
 _TOOL_PATIENCE = 5.0
 _STOPS = {kind.name.lower(): kind for kind in wire.StopKind}
@@ -66,6 +69,7 @@ class Arm:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self._tooling = Tooling(connection)
+        self._foresight = Foresight(connection, self._tooling)
         self._io = Io(connection)
         self._pad = Pad(connection)
         self._speed = 1.0
@@ -141,6 +145,7 @@ class Arm:
             self.subscribe(groups=("joints", "motion", "safety"))
             self.stop()
             self._connection.wait_for(RestDetector(self._connection), REST_TIMEOUT)
+            self._connection.left_at_rest = True
             self.release_control()
         except HeptarmError as error:
             _log.warning("closing: %s", error)
@@ -267,23 +272,57 @@ class Arm:
         return self._connection.history()
 
     def states(
-        self, *, rate: float | None = None, duration: float | None = None, size: int = _STREAM_SIZE
+        self,
+        *,
+        rate: float | None = None,
+        duration: float | None = None,
+        until: MotionHandle | None = None,
+        size: int | None = None,
     ) -> States:
         """Iterate over states, each at most once.
 
         Args:
             rate: at most this many per second [Hz], the newest each time; None: every pushed state, in order.
-            duration: end after this time [s]; None: never.
-            size: without a rate, number of states kept for a slow loop; `States.lost` counts those dropped.
+            duration: end after the states of this time [s]; None: never.
+            until: every state of this motion to its end, as `MotionHandle.states`; without a rate and a duration.
+            size: without a rate, number of states kept for a slow loop, 2000, and 100,000 of a motion;
+                `States.lost` counts those dropped.
 
         Raises:
             LimitError: a rate or duration that is not positive.
+            CommandRejected: `until` beside a rate or a duration.
         """
+        if until is not None:
+            instance(until, MotionHandle, "until")
+            if rate is not None or duration is not None:
+                raise CommandRejected(
+                    "until must be given without rate and duration: it returns every state of the motion",
+                    parameter="until",
+                    hint="leave them out, or skip states in the loop",
+                )
+            return until.states(size=STREAM_SIZE if size is None else size)
         return self._connection.stream(
             rate=None if rate is None else within(rate, "rate", 0.0, 1e4, above=True, unit="Hz"),
             duration=None if duration is None else within(duration, "duration", 0.0, 1e9, unit="s"),
-            size=integer(size, "size", 1, _LONGEST_STREAM),
+            size=integer(_STREAM_SIZE if size is None else size, "size", 1, LONGEST_STREAM),
         )
+
+    def record(self, path: str | Path, *, rate: float | None = None) -> Recorder:
+        """A recording of everything that happens while the `with` block runs; `heptarm.load` reads it.
+
+        Pushed states, FRI cycles at their own rate, requests, events and errors go to the file in a thread of its own.
+        The file is complete to its last half second even if this program is killed.
+
+        Args:
+            path: the file, MCAP; it is replaced.
+            rate: have at least so many states pushed per second meanwhile [Hz]; None: as many as are.
+
+        Raises:
+            LimitError: a rate outside its range.
+            CommandRejected: the file cannot be written (when the block begins).
+            MissingExtra: the package mcap is not installed (when the block begins).
+        """
+        return Recorder(self._connection, Path(instance(path, (str, Path), "path")), rate=rate)
 
     def wait_until(self, condition: Callable[[State], object], *, timeout: float = 30.0) -> State:
         """Wait until a condition holds for a pushed state; checked by this program, not by the cabinet.
@@ -333,6 +372,21 @@ class Arm:
     def speed(self, value: float) -> None:
         self._speed = within(value, "speed", 0.0, 1.0, above=True)
 
+    @property
+    def collision_check(self) -> CollisionCheck | None:
+        """Checks the path of each motion before it is sent, such as a `heptarm.CollisionModel`; None: nothing does.
+
+        `move` and `start` then refuse a path on which bodies would touch. Servo motions, FRI and hand guiding have no
+        path that could be checked. It is no safety function: it knows only its own model of the scene.
+        """
+        return self._foresight.check
+
+    @collision_check.setter
+    def collision_check(self, value: CollisionCheck | None) -> None:
+        if value is not None:
+            callback(getattr(value, "first_on", None), "collision_check")
+        self._foresight.check = value
+
     def move(
         self,
         motion: Motion | Sequence[Motion],
@@ -361,6 +415,7 @@ class Arm:
 
         Raises:
             CommandRejected: refused before anything moved; LimitError and others name the value and the range.
+            CollisionForeseen: `collision_check` found bodies that would touch.
             MotionAborted: ended early; carries cause, state and history.
             ConnectionLost: the connection was lost; the cabinet stops the arm.
             Timeout: not ended in time; the arm was stopped.
@@ -494,6 +549,7 @@ class Arm:
         ceiling, breaks = self._speed, self._breaks
         if speed is not None:
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
+        self._foresight.examine(motions, when)
         return program.send(
             self._connection,
             self._tooling,

@@ -109,7 +109,7 @@ def _text(value: npt.ArrayLike) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class MotionStates:
     """The states pushed during a motion, in their order; in each one joints and pose were sampled again.
 
     Attributes:
@@ -188,7 +188,7 @@ def record(
     mode: Mode | None = None,
     until: Condition | None = None,
     speed: float | None = None,
-) -> Recording:
+) -> MotionStates:
     """Carry out a motion, or several, and keep all states meanwhile. Raises as `Arm.move` does."""
     before = arm.state.stamp
     pushed = arm.states()  # from before the beginning: a slow machine would miss the first of them
@@ -203,7 +203,7 @@ def record(
         if state.stamp >= end if end is not None else state.stamp - before > handle.limit * 1e9:
             break
     pushed.close()
-    return Recording(handle.wait(), tuple(states))
+    return MotionStates(handle.wait(), tuple(states))
 
 
 def fresh(arm: Arm, *, after: float = 0.03) -> State:

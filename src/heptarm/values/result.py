@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from math import nan
+from math import isnan, nan
 
 from heptarm.values.arrays import Value
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.trigger import Notify, Trigger
 from heptarm.values.state import State
+from heptarm.values.text import degrees, lines
 
 
 class Cause(Enum):
@@ -58,6 +59,26 @@ class Result(Value):
     item: int = 0
     code: int = 0
     text: str = ""
+
+    def __str__(self) -> str:
+        """A few lines: why it ended, how long it took, where the arm is."""
+        fired = "" if self.stopped_by is None else str(self.stopped_by)
+        cause = (
+            self.cause.value
+            + (f": {self.text}" if self.text else "")
+            + (f" (code {self.code})" if self.code else "")
+        )
+        rows = {
+            "cause": cause,
+            "stopped by": fired,
+            "duration": f"{self.duration:.3f} s",
+            "residual": "" if isnan(self.residual) else f"{degrees(self.residual, 4)}",
+        }
+        if self.state is not None and self.state.joints is not None:
+            rows["joints"] = degrees(self.state.q)
+        if self.state is not None and self.state.groups.pose is not None:
+            rows["pose"] = str(self.state.pose)
+        return lines("Result", rows)
 
     @property
     def arrived(self) -> bool:

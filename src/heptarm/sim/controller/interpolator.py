@@ -16,7 +16,14 @@ from heptarm.sim.controller.condition_monitor import ConditionMonitor, LoadEstim
 from heptarm.sim.controller.hand_guiding import GuidedMotion
 from heptarm.sim.controller.queue import Cancellation, MotionQueue
 from heptarm.sim.controller.safety import SafetyController
-from heptarm.sim.controller.servo import Follower, SmartFollower, follower
+from heptarm.sim.controller.servo import (
+    AxisStop,
+    DirectFollower,
+    Follower,
+    SmartFollower,
+    StraightFollower,
+    follower,
+)
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.controller.speed_override import SpeedOverride
 from heptarm.sim.planning.command import TICK, Order
@@ -55,6 +62,7 @@ class RunningMotion:
         "settling",
         "started",
         "still",
+        "stop",
         "time",
         "watches",
     )
@@ -75,6 +83,7 @@ class RunningMotion:
         self.still = 0
         self.started = False
         self.follower: Follower | None = None
+        self.stop: AxisStop | None = None
         self.guided: GuidedMotion | None = None
         self.broken = False
 
@@ -104,7 +113,7 @@ class RunningMotion:
             speed: its velocity, shape (7,) [rad/s].
             hardest: acceleration [rad/s²] and jerk [rad/s³] of the fastest axis.
         """
-        self.braking, self.follower, self.guided = True, None, None
+        self.braking, self.follower, self.stop, self.guided = True, None, None, None
         full = float(np.abs(speed).max())
         self.ended = full < 1e-9
         if self.ended:
@@ -219,6 +228,15 @@ class Interpolator:
         """Whether the set-points rest."""
         return self.command.rests
 
+    @property
+    def is_quiet(self) -> bool:
+        """Whether nothing runs, nothing waits for the next tick, and no condition is observed."""
+        return (
+            self.run is None
+            and self.queue.is_quiet
+            and not (self._aborts or self._changes or self.condition_monitor.is_busy)
+        )
+
     def _rest(self) -> Array:
         return self.command.after.copy()
 
@@ -238,7 +256,7 @@ class Interpolator:
         if run is not None:
             run.failure = run.failure or text
             run.braking = run.ended = True
-            run.path = run.follower = run.guided = None
+            run.path = run.follower = run.stop = run.guided = None
 
     def advance(self) -> tuple[float, float]:
         """Shift the set-points and compute the next one; returns progress and remaining time."""
@@ -320,9 +338,11 @@ class Interpolator:
     def _follow(self, run: RunningMotion) -> tuple[float, float]:
         planned = run.plan
         if run.cancelled and not (run.ended or run.braking or self.is_overlaid):
-            if self._speed_override.rests:
+            if self._speed_override.rests and run.stop is None:
                 run.ended = True
-            elif not self._safety.latched:  # the stop ended before the motion was at rest
+            elif (
+                not self._safety.latched and run.stop is None
+            ):  # the stop ended before the motion was at rest
                 self._brake_on_path(run)
         if run.ended:
             return self._settle(run)
@@ -423,7 +443,7 @@ class Interpolator:
             return
         run.cancelled = True
         # a stop in force brings a motion to rest sooner, but it does not act on hand guiding
-        if run.guided is not None or not self._safety.latched:
+        if run.guided is not None or (not self._safety.latched and run.stop is None):
             self._brake_on_path(run)
 
     def _brake_on_path(self, run: RunningMotion) -> None:
@@ -479,6 +499,8 @@ class Interpolator:
         order = run.plan.order
         if target is not None and target.order == order.id and not run.cancelled:
             follower.aim(target.q, target.dq)
+        if not isinstance(follower, StraightFollower) and self._stops_axes(run, follower):
+            return nan, follower.remaining
         try:
             there = follower.advance(TICK if run.braking else TICK * self._speed_override.factor)
         except Unreachable as error:
@@ -491,6 +513,20 @@ class Interpolator:
         else:
             self._set(run, there)
         return nan, follower.remaining
+
+    def _stops_axes(self, run: RunningMotion, follower: SmartFollower | DirectFollower) -> bool:
+        """Whether a safety stop brakes the axes of a servo motion; moves the set-point if it does."""
+        if run.stop is None:
+            if run.braking or not self._safety.latched:
+                return False
+            run.stop = AxisStop(self._robot, self.command.after, self.command.speed, jerk=FAST_JERK)
+            self._speed_override.rest()
+        elif run.stop.is_over and (run.cancelled or not self._safety.latched):
+            run.stop, run.ended = None, run.cancelled
+            follower.restart(self.command.after)
+            return run.ended
+        self._set(run, run.stop.advance())
+        return True
 
     def _stop_at_limit(self, run: RunningMotion, text: str) -> None:
         """A limit of the control mode is exceeded: switch to position control and brake from the measured velocity."""

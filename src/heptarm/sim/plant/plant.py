@@ -20,8 +20,10 @@ from heptarm.sim.controller.safety import SafetyController, StopRequest
 from heptarm.sim.planning.command import TICK
 from heptarm.sim.plant.drive_monitor import LAG, DriveMonitor
 from heptarm.sim.plant.external_load import ExternalLoad
+from heptarm.sim.plant.gripper import SimulatedGripper, has_gripper
 from heptarm.sim.plant.io_image import IoImage
 from heptarm.sim.plant.payload import PayloadModel
+from heptarm.sim.plant.scene import Scene, find_body, is_mounted
 from heptarm.sim.plant.sensor_errors import SensorErrors
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.plant.world import Box, compiled
@@ -129,6 +131,7 @@ class Plant:
         model: "iiwa7", "iiwa14", "med7" or "med14".
         q: joint positions at the start, shape (7,) [rad].
         boxes: fixed boxes around it.
+        scene: what else is around it and on its flange; None: nothing.
         monitored: whether drives trip; see `heptarm.sim.plant.drive_monitor`.
         errors: of the sensors, and friction of the joints; None: ideal ones.
 
@@ -142,12 +145,13 @@ class Plant:
         *,
         q: tuple[float, ...] = HOME,
         boxes: Sequence[Box] = (),
+        scene: Scene | None = None,
         monitored: bool = True,
         errors: SensorErrors | None = None,
     ) -> None:
         self.robot: RobotModel = robot(model)
         self._errors = errors
-        self.model = compiled(model, boxes)
+        self.model = compiled(model, boxes, scene)
         self.data = mujoco.MjData(self.model)
         self.data.qpos[:7] = q
         mujoco.mj_forward(self.model, self.data)
@@ -156,12 +160,16 @@ class Plant:
         self.on_wake: Callable[[int], None] | None = None
         self._views()
         self._load = ExternalLoad(self.model, self.data)
-        self._payload = PayloadModel(self.model, self.data, self._mass)
+        bare = compiled(model) if is_mounted(self.model) else None
+        self._payload = PayloadModel(self.model, self.data, self._mass, bare)
         self._payloads: deque[tuple[Callable[[Body], None], Body]] = (
             deque()
         )  # to take effect in the next tick
         self._control = ActiveLaw(self.robot, self.model, self.data)
         self.signals = IoImage(self.shared.signals)
+        self._gripper: SimulatedGripper | None = None
+        if scene is not None and has_gripper(self.model):
+            self._gripper = SimulatedGripper(self.model, self.data, self.signals, scene.wiring)
         self._sensed = MeasuredState(
             self._q, self._dq, self._mass[:7, :7], self._bias, self._passive, self._q, self._q, self._q
         )
@@ -178,6 +186,7 @@ class Plant:
         )
         self.condition_monitor = self.interpolator.condition_monitor
         self.submit = self.interpolator.queue.submit
+        self._take_loads()
         self._write(0, 0.0, nan)
 
     def _views(self) -> None:
@@ -281,6 +290,15 @@ class Plant:
         """Set-point of the next tick without an overlay, shape (7,) [rad]; of a hold: its start."""
         return self.interpolator.interpolated
 
+    def body_pose(self, name: str) -> Array:
+        """Pose of a body of the scene in the base: x y z [m] and quaternion x y z w, shape (7,).
+
+        Raises:
+            ValueError: the scene has no such body.
+        """
+        index = find_body(self.model, name)
+        return np.concatenate([self.data.xpos[index], np.roll(self.data.xquat[index], -1)])
+
     def overlay(self, action: Superposition | None) -> None:
         """Overlay the running hold in the next tick; None after an overlay: brake, and end the hold."""
         self.interpolator.action = action
@@ -296,6 +314,8 @@ class Plant:
         if self._payloads:
             self._take_loads()
         progress, remaining = self._advance()
+        if self._gripper is not None:
+            self._gripper.tick()
         mujoco.mj_step1(m, d)
         self._load.apply(self.tick_count * TICK)
         mujoco.mj_fullM(m, d, self._mass)

@@ -236,7 +236,9 @@ def validation(arm: Arm) -> None:
         holds("load" in error.text, error.text)
     arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
     arm.wait_until(lambda s: np.abs(s.tau_ext - rest).max() < 1.0, timeout=20.0)
-    settled(arm)  # after the release the arm oscillates: it is slow at every turning point, and rests only later
+    settled(
+        arm
+    )  # after the release the arm oscillates: it is slow at every turning point, and rests only later
     with arm.servo("joint", mode=JointImpedance(500.0), watchdog=2.0) as servo:
         servo.tick()
         servo.set(servo.start.q)

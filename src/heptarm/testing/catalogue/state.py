@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 
 from heptarm import model
@@ -86,6 +88,25 @@ def stream(arm: Arm) -> None:
     handle.wait()
     rested = arm.wait_for_rest().motion
     holds(rested is not None and not rested.active, "and that nothing runs any more")
+
+
+@scenario(line=9, rows="G15 E16", space=0.1, needs=("ptp",))
+def every(arm: Arm) -> None:
+    """A loop that is slower than the states, and begins late, has every state of a motion to its end."""
+    handle = arm.start(ptp(HOME + deg(0, 0, 0, 0, 0, 0, 15), speed=0.2))
+    live = arm.states(until=handle).to_numpy()
+    late = handle.states()
+    slow = []
+    for state in late:
+        slow.append(state.q)
+        time.sleep(0.004)
+    result = handle.wait()
+    holds(len(slow) == len(live["q"]) > 10, f"{len(slow)} states, as many as were received")
+    near(np.array(slow), live["q"], 0.0, "the same states", unit="rad")
+    holds(late.lost == 0, "none was dropped")
+    holds((live["motion"][:-1] == handle.id).all(), "none is of another motion")
+    spans = live["stamp"][live["motion"] == handle.id]
+    near((spans[-1] - spans[0]) * 1e-9, result.duration, 0.2, "they reach from begin to end", unit="s")
 
 
 @scenario(line=9, rows="D26 G19", space=0.05, needs=("hold",))
