@@ -26,7 +26,9 @@ from tests.conformance.case import (
 from tests.conformance.client import Client, ReceivedFeedback
 
 
-def consistent(told: list[ReceivedFeedback], wanted: TrajectoryGoal, here: Array, joints: tuple[str, ...]) -> None:
+def consistent(
+    told: list[ReceivedFeedback], wanted: TrajectoryGoal, here: Array, joints: tuple[str, ...]
+) -> None:
     """All numbers of a message belong to one instant of a trajectory of positions only."""
     times = np.array([0.0, *(one.time for one in wanted.points)])
     order = [wanted.joints.index(joint) for joint in joints]
@@ -68,7 +70,8 @@ def feedback_of_permuted_joints_belongs_to_one_instant(client: Client) -> None:
     path = swing(client)
     order = [6, 2, 0, 1, 5, 3, 4]
     points = tuple(
-        TrajectoryPoint(time, tuple((here + size * path)[order].tolist())) for time, size in ((0.4, 0.5), (0.9, 1.0))
+        TrajectoryPoint(time, tuple((here + size * path)[order].tolist()))
+        for time, size in ((0.4, 0.5), (0.9, 1.0))
     )
     wanted = TrajectoryGoal(tuple(client.joints[i] for i in order), points)
     consistent(client.feedback(succeeds(client, wanted)), wanted, here, client.joints)

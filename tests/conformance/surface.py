@@ -17,7 +17,9 @@ from heptarm.model.kinematics import forward
 from heptarm.values.robot import robot
 from tests.conformance.stage import Stage
 
-WORLD = "MediaFlange.UserButton&lt;bool MediaFlange.LEDBlue&gt;bool MediaFlange.LEDRed&gt;bool Cell.Offset&gt;i16"
+WORLD = (
+    "MediaFlange.UserButton&lt;bool MediaFlange.LEDBlue&gt;bool MediaFlange.LEDRed&gt;bool Cell.Offset&gt;i16"
+)
 PROJECT = f"""<persistence><processDataContainer>
 <processData dataType="java.lang.String" id="heptarm.io" value="{WORLD}"/>
 <processData dataType="java.lang.Integer" id="cell.count" value="3"/>
@@ -166,17 +168,25 @@ def case_a_condition_ends_a_motion(probe: Probe, stage: Stage) -> None:
     home(probe)
     states = probe.listen("state", "heptarm_msgs/RobotState")
     until(lambda: states, "no states")
-    ended = probe.send("move_joints", "MoveJoints", joint_names=["A1"], position=[2.0], until="io.user_button")
+    ended = probe.send(
+        "move_joints", "MoveJoints", joint_names=["A1"], position=[2.0], until="io.user_button"
+    )
     until(lambda: states[-1].position[0] > 0.05, "the arm does not set out")
     stage.do("set UserButton true")
     result = done(ended.end())
     assert "UserButton" in result.stopped_by or "user_button" in result.stopped_by, result.stopped_by
     assert states[-1].position[0] < 1.9
     stage.do("set UserButton false")
-    result = done(act(probe, "move_joints", "MoveJoints", position=HOME, until="~io.user_button | (force > 900)"))
+    result = done(
+        act(probe, "move_joints", "MoveJoints", position=HOME, until="~io.user_button | (force > 900)")
+    )
     assert "user_button" in result.stopped_by.casefold().replace("userbutton", "user_button")
     bad = "__import__('os').system('true')"
-    refused(act(probe, "move_joints", "MoveJoints", position=HOME, until=bad), "must be a condition", "force.along")
+    refused(
+        act(probe, "move_joints", "MoveJoints", position=HOME, until=bad),
+        "must be a condition",
+        "force.along",
+    )
     refused(act(probe, "move_joints", "MoveJoints", position=HOME, until="force > 9999"), "9999")
     home(probe)
 
@@ -282,7 +292,14 @@ def case_modes_with_all_their_parameters(probe: Probe, stage: Stage) -> None:
         "frame": "base",
     }
     done(probe.call("mode/sine_impedance", "SetSineImpedance", **sine))
-    done(act(probe, "run_program", "RunProgram", motions=[probe.make("heptarm_msgs/Motion", kind=6, duration=0.6)]))
+    done(
+        act(
+            probe,
+            "run_program",
+            "RunProgram",
+            motions=[probe.make("heptarm_msgs/Motion", kind=6, duration=0.6)],
+        )
+    )
     for pattern in (
         {"pattern": "force", "force": [0.0, 0.0, 5.0, 0.0, 0.0, 0.0], "total_time": [1.0]},
         {"pattern": "sine", "direction": "z", "frequency": 2.0, "amplitude": 5.0},
@@ -291,7 +308,10 @@ def case_modes_with_all_their_parameters(probe: Probe, stage: Stage) -> None:
     ):
         done(probe.call("mode/force_pattern", "SetForcePattern", **pattern))
     refused(probe.call("mode/force_pattern", "SetForcePattern", pattern="star"), "star", "lissajous")
-    refused(probe.call("mode/force_pattern", "SetForcePattern", pattern="force", force=[1.0]), "must have 6 numbers")
+    refused(
+        probe.call("mode/force_pattern", "SetForcePattern", pattern="force", force=[1.0]),
+        "must have 6 numbers",
+    )
     refused(probe.call("mode/sine_impedance", "SetSineImpedance", **{**sine, "nullspace": six}), "nullspace")
     done(probe.call("mode/position", "std_srvs/Trigger"))
 
@@ -349,7 +369,9 @@ def case_an_fri_session_is_opened_commanded_and_closed(probe: Probe, stage: Stag
         if status and status[-1].kind:
             return True
         answer = probe.call("fri/open", "OpenFri", kind=kind, period_ms=10, **settings)
-        return answer.success and bool(until(lambda: status and (status[-1].kind or status[-1].text), "no status"))
+        return answer.success and bool(
+            until(lambda: status and (status[-1].kind or status[-1].text), "no status")
+        )
 
     def watched() -> bool:
         return stands("monitor", io=["LEDRed"]) and status[-1].received > 10
@@ -418,7 +440,9 @@ def case_forward_controllers_are_followed(probe: Probe, stage: Stage) -> None:
     until(lambda: turn() or states[-1].position[6] < start + 0.1, "the velocities are not followed")
     until(lambda: all(abs(one.velocity[6]) < 1e-3 for one in states[-30:]), "silence does not end it")
     there = states[-1].position[6]
-    probe.tell("/surface/forward_position_controller/commands", "std_msgs/Float64MultiArray", data=[0.0] * 6)()
+    probe.tell(
+        "/surface/forward_position_controller/commands", "std_msgs/Float64MultiArray", data=[0.0] * 6
+    )()
     far = [*HOME[:6], there + 2.0]
     probe.tell("/surface/forward_position_controller/commands", "std_msgs/Float64MultiArray", data=far)()
     time.sleep(0.3)
@@ -446,7 +470,9 @@ def case_a_twist_moves_the_flange_and_silence_ends_it(probe: Probe, stage: Stage
             more["linear"] = twist.linear
         send = probe.tell(name, kind, **more)
         until(lambda: send() or (place() - begin) @ along > np.linalg.norm(move), "the flange does not move")
-        until(lambda: all(np.abs(one.velocity).max() < 1e-3 for one in states[-30:]), "silence does not end it")
+        until(
+            lambda: all(np.abs(one.velocity).max() < 1e-3 for one in states[-30:]), "silence does not end it"
+        )
         moved = place() - begin
         assert moved @ along < 2.0 * np.linalg.norm(move), "it does not stop"
         assert np.linalg.norm(moved - (moved @ along) * along) < 5e-3, "it leaves its line"
@@ -504,7 +530,9 @@ def case_the_state_of_the_controller_agrees_with_itself(probe: Probe, stage: Sta
     moving = 0
     for one in list(found)[count:]:
         wanted, actual = (getattr(one, name) for name in names)
-        np.testing.assert_allclose(one.error.positions, np.subtract(wanted.positions, actual.positions), atol=1e-9)
+        np.testing.assert_allclose(
+            one.error.positions, np.subtract(wanted.positions, actual.positions), atol=1e-9
+        )
         if abs(wanted.velocities[6]) > 1e-3:  # the trajectory is a straight line in time
             moving += 1
             seconds = probe.seconds(wanted.time_from_start)
@@ -525,4 +553,3 @@ def case_the_state_of_the_controller_agrees_with_itself(probe: Probe, stage: Sta
 CASES = {
     name.removeprefix("case_"): case for name, case in list(globals().items()) if name.startswith("case_")
 }
-

@@ -168,7 +168,9 @@ def simulated(ros: None, spare: Stage) -> Iterator[list[float]]:
 
     thread = threading.Thread(target=run)
     thread.start()
-    rospy.set_param("/use_sim_time", True)  # nodes ask for it when they start; this process has started before
+    rospy.set_param(
+        "/use_sim_time", True
+    )  # nodes ask for it when they start; this process has started before
     node = NodeProcess(spare.target, ns="/jump")
     try:
         states = collect("/jump/joint_states", JointState)

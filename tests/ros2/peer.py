@@ -414,9 +414,7 @@ class Client:
     def set(self, **values: object) -> bool:
         self._changed |= values.keys()
         request = SetParameters.Request(
-            parameters=[
-                parameter(name.replace("__", "."), value) for name, value in values.items()
-            ]
+            parameters=[parameter(name.replace("__", "."), value) for name, value in values.items()]
         )
         answer = self.ros.call(SetParameters, f"{self.name}/set_parameters", request)
         return all(one.successful for one in answer.results)

@@ -122,9 +122,7 @@ def test_jumps_of_the_clock(ros: Ros, spare: Stage, nodes: Start, simulated: lis
         goal.trajectory.joint_names = list(states[-1].name)
         there = list(states[-1].position)
         there[6] += -0.1 if there[6] > 0 else 0.1
-        goal.trajectory.points.append(
-            JointTrajectoryPoint(positions=there, time_from_start=to_duration(1.0))
-        )
+        goal.trajectory.points.append(JointTrajectoryPoint(positions=there, time_from_start=to_duration(1.0)))
         handle = None
         while handle is None or not handle.accepted:  # the node may not be active yet
             handle = ros.wait(action.send_goal_async(goal), "no answer")

@@ -143,7 +143,9 @@ class TrajectoryAction:
         if result.code is ErrorCode.SUCCESSFUL:
             log.info(f"goal {result.number} {result.outcome.value}: {result.text}")
         elif future is None and result.outcome is GoalOutcome.PREEMPTED:
-            log.debug(f"trajectory {result.number} of the topic: {result.text}")  # as clients of a topic intend
+            log.debug(
+                f"trajectory {result.number} of the topic: {result.text}"
+            )  # as clients of a topic intend
         else:
             log.warning(f"goal {result.number} {result.outcome.value} ({result.code.name}): {result.text}")
         if future is not None:
