@@ -25,7 +25,7 @@ _AT_REST = "a spline of the cabinet ends at rest, so such a goal is refused"
 UNFIT: dict[str, dict[str, str]] = {
     "spline": {
         "the_deceleration_is_a_parameter": _OWN_BRAKES,
-        "cancelling_brakes_as_the_parameter_says": _OWN_BRAKES,
+        "cancelling_brakes_as_the_parameter_reports": _OWN_BRAKES,
         "points_streamed_at_50_hz_are_followed": _PLANNED,
         "points_streamed_at_100_hz_are_followed": _PLANNED,
         "points_streamed_at_250_hz_are_followed": _PLANNED,
@@ -160,4 +160,4 @@ def rests(client: Client) -> Array:
 
 def aborted(ended: ReceivedResult, code: ErrorCode) -> None:
     assert ended.outcome is GoalOutcome.ABORTED and ended.code is code, ended
-    assert ended.text, "the client is told why"
+    assert ended.text, "the client receives the reason"

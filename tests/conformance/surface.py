@@ -37,7 +37,7 @@ class Sent(Protocol):
     """A goal that was sent."""
 
     @property
-    def told(self) -> list[Any]:
+    def reported(self) -> list[Any]:
         """Its feedback so far."""
         ...
 
@@ -131,9 +131,9 @@ def home(probe: Probe) -> None:
 
 def case_signals_are_listed_written_and_published(probe: Probe, stage: Stage) -> None:
     seen = probe.listen("signals", "heptarm_msgs/Signals", latched=True)
-    told = done(probe.call("signals", "GetSignals"))
-    assert list(told.names) == [word.partition("&")[0] for word in WORLD.split()]
-    assert list(told.outputs) == [False, True, True, True] and told.kinds[3] == "integer"
+    reported = done(probe.call("signals", "GetSignals"))
+    assert list(reported.names) == [word.partition("&")[0] for word in WORLD.split()]
+    assert list(reported.outputs) == [False, True, True, True] and reported.kinds[3] == "integer"
     done(probe.call("set_signals", "SetSignals", names=["offset", "LEDRed"], values=[-30.0, 1.0]))
     until(lambda: seen and dict(zip(seen[-1].names, seen[-1].values))["Cell.Offset"] == -30.0, "no signal")
     done(probe.call("set_led", "SetText", value="blue"))

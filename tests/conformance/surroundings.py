@@ -76,8 +76,8 @@ def _scaled(client: Client, factor: float) -> None:
         sent = client.send(wanted)
         ended = client.result(sent)
         assert ended.outcome is GoalOutcome.SUCCEEDED, ended
-        told = client.feedback(sent)
-        late = [one for one in told if one.elapsed > 0.3]
+        reported = client.feedback(sent)
+        late = [one for one in reported if one.elapsed > 0.3]
         for one in late:
             late = one.time - factor * one.elapsed
             # a spline of the cabinet takes less time than a trajectory that is slower than it need be

@@ -39,7 +39,7 @@ class Bare:
         self._slept = 0.0  # less than a period: it has not passed yet
         self._late: deque[KinematicState] = deque()
         self._ends: dict[int, GoalResult] = {}
-        self._told: dict[int, list[GoalFeedback]] = {}
+        self._reported: dict[int, list[GoalFeedback]] = {}
         self._track: list[tuple[float, Array]] = []
 
     def now(self) -> float:
@@ -93,7 +93,7 @@ class Bare:
                 one.elapsed,
                 one.index,
             )
-            for one in self._told.get(sent.handle, [])
+            for one in self._reported.get(sent.handle, [])
         ]
 
     def behave(self, how: str) -> None:
@@ -131,7 +131,7 @@ class Bare:
         step = self._runner.advance(self._time, self._measured())
         self._collect(step.results)
         if step.feedback is not None:
-            self._told.setdefault(step.feedback.number, []).append(step.feedback)
+            self._reported.setdefault(step.feedback.number, []).append(step.feedback)
         if step.command is None or self._how == "frozen":
             self._dq = np.zeros(7)
             return

@@ -106,9 +106,9 @@ def recorder(driver: Driver) -> Recorder:
 def goal(driver: Driver, away: np.ndarray = AWAY, duration: float = 2.0) -> TrajectoryGoal:
     """A goal to a position, on a curve."""
     now = driver.arm.state.q_cmd
-    shares = 0.5 * (1 - np.cos(np.pi * np.linspace(0, 1, 11)[1:]))
+    fractions = 0.5 * (1 - np.cos(np.pi * np.linspace(0, 1, 11)[1:]))
     times = np.linspace(0, duration, 11)[1:]
-    points = [TrajectoryPoint(float(t), tuple(now + s * away)) for t, s in zip(times, shares, strict=True)]
+    points = [TrajectoryPoint(float(t), tuple(now + s * away)) for t, s in zip(times, fractions, strict=True)]
     return TrajectoryGoal(joints=driver.configuration.joints, points=tuple(points))
 
 
@@ -232,7 +232,9 @@ def test_a_spline_goes_through_the_points_as_fast_as_the_trajectory(cabinet: Run
         assert recorder.ends[-1].outcome is GoalOutcome.SUCCEEDED, recorder.ends
         took = (recorder.moved[-1] - recorder.moved[0]) * 1e-9
         assert 0.6 * 4.0 < took < 1.25 * 4.0
-        off = max(float(np.abs(told.desired.q - told.actual.q).max()) for told in recorder.feedback)
+        off = max(
+            float(np.abs(received.desired.q - received.actual.q).max()) for received in recorder.feedback
+        )
         assert off < 0.02  # the cabinet chooses the curve between the points
     finally:
         driver.close()

@@ -328,7 +328,7 @@ class Client:
         self.states = ros.collect(JointState, f"{name.rpartition('/')[0]}/joint_states")
         self.status = ros.collect(Status, f"{name}/status", latched=True)
         self._topic = ros.node.create_publisher(JointTrajectory, f"{name}/joint_trajectory", 1)
-        self._told: dict[int, list[ReceivedFeedback]] = {}
+        self._reported: dict[int, list[ReceivedFeedback]] = {}
         self._changed: set[str] = set()
         self._how, self._override = "follows", 1.0
 
@@ -359,14 +359,15 @@ class Client:
         return [(time, np.array(message.position)) for time, message in found if time >= begin]
 
     def send(self, goal: TrajectoryGoal) -> SentGoal:
-        told: list[ReceivedFeedback] = []
+        reported: list[ReceivedFeedback] = []
         future = self._action.send_goal_async(
-            action_goal(goal), feedback_callback=lambda message: told.append(self._telling(message.feedback))
+            action_goal(goal),
+            feedback_callback=lambda message: reported.append(self._telling(message.feedback)),
         )
         handle = self.ros.wait(future, "the goal is neither accepted nor rejected")
         if not handle.accepted:
             return SentGoal(False)
-        self._told[id(handle)] = told
+        self._reported[id(handle)] = reported
         return SentGoal(True, handle=(handle, handle.get_result_async()))
 
     def send_all(self, goals: list[TrajectoryGoal]) -> list[SentGoal]:
@@ -389,7 +390,7 @@ class Client:
 
     def feedback(self, sent: SentGoal) -> list[ReceivedFeedback]:
         handle, _ = sent.handle  # type: ignore[misc]
-        return list(self._told[id(handle)])
+        return list(self._reported[id(handle)])
 
     def restore(self) -> None:
         """Undo what a case has changed."""

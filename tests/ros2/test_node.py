@@ -73,7 +73,7 @@ def test_it_waits_for_a_cabinet_and_starts_by_itself(ros: Ros, spare: Stage, nod
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_told_to_end_in_mid_air_it_leaves_the_arm_at_rest(
+def test_asked_to_end_in_mid_air_it_leaves_the_arm_at_rest(
     ros: Ros, spare: Stage, nodes: Start, number: int
 ) -> None:
     node = nodes(spare.target, name="short", space="/alone")
@@ -97,8 +97,8 @@ def test_every_parameter_is_described(client: Client, ros: Ros) -> None:
     ours = [*parameters.PARAMETERS, *parameters.joint_parameters([f"A{i}" for i in range(1, 8)])]
     assert {one.name for one in ours} <= set(names)
     request = DescribeParameters.Request(names=[one.name for one in ours])
-    told = ros.call(DescribeParameters, "/heptarm/describe_parameters", request).descriptors
-    for one, descriptor in zip(ours, told):
+    reported = ros.call(DescribeParameters, "/heptarm/describe_parameters", request).descriptors
+    for one, descriptor in zip(ours, reported):
         assert descriptor.description == one.text
         if isinstance(one.default, float):
             assert descriptor.floating_point_range[0].to_value == one.high
@@ -185,7 +185,7 @@ def test_joint_states_are_complete_ordered_and_stamped_by_this_machine(client: C
     assert before <= stamps[-1] <= client.now()
 
 
-def test_states_are_reliable_as_moveit_wants_them(client: Client, ros: Ros) -> None:
+def test_states_are_reliable_as_moveit_needs_them(client: Client, ros: Ros) -> None:
     publishers = ros.node.get_publishers_info_by_topic("/joint_states")
     assert publishers and all(p.qos_profile.reliability is ReliabilityPolicy.RELIABLE for p in publishers)
 
@@ -250,10 +250,10 @@ def test_a_joint_command_moves_and_a_stop_stops(client: Client, ros: Ros) -> Non
 
 def test_pose_and_line_commands(client: Client, ros: Ros) -> None:
     poses = ros.collect(PoseStamped, "/heptarm/pose")
-    for name, way in (("lin", 0.03), ("pose", -0.03)):
+    for name, travel in (("lin", 0.03), ("pose", -0.03)):
         rests(client)
         goal = fresh(ros, poses)
-        z = goal.pose.position.z = goal.pose.position.z + way
+        z = goal.pose.position.z = goal.pose.position.z + travel
         publish(client, PoseStamped, f"/heptarm/command/{name}", goal)
         until(lambda: abs(poses[-1].pose.position.z - z) < 2e-3, f"{name} gets there")  # noqa: B023
     rests(client)

@@ -89,14 +89,14 @@ def test_an_arm_expands_with_the_limits_of_its_data_sheet(model: str) -> None:
         (robot.dq_max, "velocity"),
         (robot.tau_max, "effort"),
     ):
-        told = [float(joint.find("limit").get(name)) for joint in joints]  # type: ignore[union-attr,arg-type]
-        np.testing.assert_allclose(told, values, rtol=1e-7)
+        reported = [float(joint.find("limit").get(name)) for joint in joints]  # type: ignore[union-attr,arg-type]
+        np.testing.assert_allclose(reported, values, rtol=1e-7)
     mass = sum(float(m.get("value")) for m in arm.iter("mass"))  # type: ignore[arg-type]
     assert 20.0 < mass < 35.0
 
 
 @pytest.mark.parametrize("model", ROBOTS)
-def test_its_flange_is_where_heptarm_says(model: str) -> None:
+def test_its_flange_is_where_heptarm_reports(model: str) -> None:
     arm = expand(URDF / "heptarm.urdf.xacro", model=model)
     rng = np.random.default_rng(7)
     for _ in range(5):
@@ -156,7 +156,7 @@ def test_the_numbers_are_written_by_their_script() -> None:
 
 
 @pytest.mark.parametrize("name", PACKAGES)
-def test_a_package_says_what_it_is_and_installs_what_it_has(name: str) -> None:
+def test_a_package_reports_what_it_is_and_installs_what_it_has(name: str) -> None:
     folder = ROS2 / name
     manifest = ET.parse(folder / "package.xml").getroot()
     assert manifest.findtext("name") == name and manifest.findtext("license") == "Apache-2.0"
@@ -180,7 +180,7 @@ def test_all_interfaces_are_built() -> None:
 
 def test_upstreams_interfaces_are_upstreams() -> None:
     """The hashes of control_msgs, by which two machines find out whether they mean the same."""
-    share = Path(sys.prefix) / "share" / "control_msgs"
+    folder = Path(sys.prefix) / "share" / "control_msgs"
     for name, begin in (
         ("action/FollowJointTrajectory", "ff29901b2693f5d"),
         ("msg/JointTolerance", "c254f9cece0f3b7"),
@@ -188,7 +188,7 @@ def test_upstreams_interfaces_are_upstreams() -> None:
         ("msg/JointTrajectoryControllerState", "51d8dd89cc624cb"),
         ("srv/QueryTrajectoryState", "4a0935dffef18bc"),
     ):
-        hashes = yaml.safe_load((share / f"{name}.json").read_text())["type_hashes"]
+        hashes = yaml.safe_load((folder / f"{name}.json").read_text())["type_hashes"]
         assert hashes[0]["hash_string"] == hashes[0]["hash_string"].replace("RIHS01_", "RIHS01_")
         assert hashes[0]["hash_string"].startswith(f"RIHS01_{begin}"), name
 

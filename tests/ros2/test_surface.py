@@ -22,9 +22,9 @@ class Sent:
     """A goal of ROS 2."""
 
     def __init__(self, ros: Ros, client: ActionClient, goal: Any) -> None:
-        self.told: list[Any] = []
+        self.reported: list[Any] = []
         self._ros = ros
-        sent = client.send_goal_async(goal, feedback_callback=lambda one: self.told.append(one.feedback))
+        sent = client.send_goal_async(goal, feedback_callback=lambda one: self.reported.append(one.feedback))
         self._handle = ros.wait(sent, "no answer")
         assert self._handle.accepted
         self._result = self._handle.get_result_async()

@@ -19,6 +19,7 @@ from heptarm.cli.options import (
     Yes,
 )
 from heptarm.cli.output import confirm, emit
+from heptarm.errors import CommandRejected
 from heptarm.testing import Outcome, Report, Scenario, Verdict
 
 #: Longest wait for an answer [s]: a machine that also simulates may be late.
@@ -37,38 +38,74 @@ def check(
         bool, Parameter(negative="", help="On a robot, also those that touch something.")
     ] = False,
     faults: Annotated[bool, Parameter(negative="", help="On a robot, also those that cause faults.")] = False,
-    sim_speed: Annotated[float, Parameter(help="Without a target: simulated seconds per second.")] = 2.0,
+    sim_speed: Annotated[
+        float | None,
+        Parameter(help="Without a target: simulated seconds per second. Default: 2, with --commission 1."),
+    ] = None,
+    noisy: Annotated[
+        bool,
+        Parameter(negative="", help="Without a target: sensors with noise and offset, joints with friction."),
+    ] = False,
     junit: Annotated[Path | None, Parameter(help="Write a report for CI systems, JUnit XML.")] = None,
+    commission: Annotated[
+        bool,
+        Parameter(
+            negative="",
+            help="Compare a robot in T1 with what the simulator assumes, step by step; NAMES are steps or groups.",
+        ),
+    ] = False,
+    report: Annotated[
+        Path | None,
+        Parameter(
+            help="With --commission: write this file with .md and .json. Default: commissioning-ROBOT-DATE."
+        ),
+    ] = None,
     yes: Yes = False,
     target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
     """Show what a robot can do, scenario by scenario, by measurement; exit code 1 if one fails.
 
-    Without a target, a simulator with a table, signals and tools is started. A real robot moves at a tenth of its
-    speed, and every scenario that moves it asks first.
+    Without a target, a simulator with a table, signals and tools is started, by default with ideal sensors. A real
+    robot moves at a tenth of its speed, and every scenario that moves it asks first.
     """
+    if commission:
+        from heptarm.cli import commissioning
+
+        where = target.or_else(testing.stage(speed=1.0 if sim_speed is None else sim_speed))
+        return commissioning.run(only, where, file=report, list_only=list_only, yes=yes, as_json=as_json)
+    if report is not None:
+        raise CommandRejected(
+            "--report needs --commission", parameter="report", hint="use --junit for a report on scenarios"
+        )
     chosen = testing.find(only)
+    if noisy and target.or_else(None).text:
+        raise CommandRejected(
+            "--noisy is for the simulator that is started without a target",
+            parameter="noisy",
+            hint="leave out the target, or name a simulator with noisy sensors: sim://iiwa14?sensors=noisy",
+        )
     if list_only:
         _list(chosen, as_json)
         return 0
     console = Console()
-    with target.or_else(testing.stage(speed=sim_speed)).connect(
-        watchdog=CHECK.default, timeout=_TIMEOUT
-    ) as arm:
+    stage = testing.stage(
+        speed=2.0 if sim_speed is None else sim_speed, sensors="noisy" if noisy else "ideal"
+    )
+    with target.or_else(stage).connect(watchdog=CHECK.default, timeout=_TIMEOUT) as arm:
         if not as_json:
             console.print(
                 f"{len(chosen)} scenarios on {arm.robot.title}{' (virtual)' if arm.is_virtual else ''}"
             )
 
-        def ended(outcome: Outcome) -> None:
+        def ended(one: Outcome) -> None:
             if as_json:
-                emit(outcome.data)
+                emit(one.data)
             else:
-                style = _STYLES[outcome.verdict]
-                console.print(f"[{style}]{outcome.verdict.value:8}[/] {outcome.scenario.name}")
+                style = _STYLES[one.verdict]
+                console.print(f"[{style}]{one.verdict.value:8}[/] {one.scenario.name}")
 
-        report = testing.run(
+        outcome = testing.run(
             arm,
             only=only,
             contact=contact,
@@ -77,13 +114,13 @@ def check(
             on_end=ended,
         )
     if junit is not None:
-        junit.write_text(report.junit(), encoding="utf-8")
+        junit.write_text(outcome.junit(), encoding="utf-8")
     if as_json:
-        emit({"ok": report.ok, "summary": report.summary})
+        emit({"ok": outcome.ok, "summary": outcome.summary})
     else:
-        console.print(_table(report))
-        console.print(report.summary)
-    return 0 if report.ok else 1
+        console.print(_table(outcome))
+        console.print(outcome.summary)
+    return 0 if outcome.ok else 1
 
 
 def _list(chosen: tuple[Scenario, ...], as_json: bool) -> None:

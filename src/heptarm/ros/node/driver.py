@@ -36,6 +36,7 @@ from heptarm.ros.trajectory.trajectory import TrajectorySample
 from heptarm.values.arrays import Array
 from heptarm.values.condition.collision import Collision
 from heptarm.values.condition.condition import Condition
+from heptarm.values.condition.reaction import Reaction
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose
@@ -313,6 +314,7 @@ class Driver:
         mode: Mode | None = None,
         speed: float | None = None,
         until: Condition | None = None,
+        then: Reaction | None = None,
         when: Literal["queue", "replace", "reject"] = "replace",
     ) -> MotionHandle:
         """Start a motion, or several as one program.
@@ -322,6 +324,7 @@ class Driver:
             mode: control mode; None: the one that the services have set.
             speed: speed limit for this one, (0, 1]; None: that of the parameter `speed`.
             until: condition that ends it; None: that of `guard`.
+            then: reaction to it; None: stay.
             when: while another motion runs: "replace" it, "queue" behind it, or "reject" this one.
 
         Raises:
@@ -335,7 +338,9 @@ class Driver:
         self._check_no_task()
         limit = self.configuration.values["speed"] if speed is None else speed
         condition = self.guard if until is None else until
-        handle = self._handle = self._arm.start(motion, mode=mode, speed=limit, until=condition, when=when)
+        handle = self._handle = self._arm.start(
+            motion, mode=mode, speed=limit, until=condition, then=then, when=when
+        )
         handle.add_event_callback(lambda event: self._listener.on_event(handle.id, event))
         return handle
 

@@ -147,7 +147,8 @@ def _modern(text: str, own: frozenset[str] = frozenset()) -> str:
         if match[1].startswith("com.kuka."):
             known = own | _sunrise_names()
             if match[2] == "*":
-                unused = not any(name.startswith(f"{match[1]}.") for name in known)
+                # of a package, or of a class: `import static ...BasicMotions.*`
+                unused = match[1] not in known and not any(name.startswith(f"{match[1]}.") for name in known)
             else:
                 named = f"{match[1]}.{match[2]}" in known or match[1] in known  # a member of a class
                 unused = not named and re.search(rf"\b{match[2]}\b", code) is None

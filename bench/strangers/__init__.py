@@ -1,0 +1,1 @@
+"""Sunrise applications of other people: compiled, started, and driven by their clients."""

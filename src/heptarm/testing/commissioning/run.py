@@ -1,0 +1,184 @@
+"""The commissioning run: one assumption at a time, in T1, slowly, and only after the person beside the robot agrees."""
+
+from __future__ import annotations
+
+import datetime
+import fnmatch
+import importlib
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from heptarm.arm.arm import Arm
+from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, NotReady
+from heptarm.testing.commissioning.person import PATIENCE, PROVES, Action, Person
+from heptarm.testing.commissioning.report import Agreement, CommissioningReport, StepOutcome
+from heptarm.testing.commissioning.step import STEPS, CommissioningStep
+from heptarm.testing.measure import Unfit
+from heptarm.testing.stage import HOME, REAL_SPEED, has_operator
+from heptarm.values.motion.ptp import ptp
+from heptarm.values.state import OperationMode
+
+#: Modules of this package with steps, in the order in which they run: what does not move comes first.
+GROUPS = ("sunrise", "sensors", "dynamics", "drives", "safety", "fri")
+#: At home the joints are within this [rad].
+_AT_HOME = 1e-3
+#: Longest approach to the home position [s].
+_APPROACH = 120.0
+
+
+def steps() -> tuple[CommissioningStep, ...]:
+    """All steps, group by group."""
+    for group in GROUPS:
+        importlib.import_module(f"heptarm.testing.commissioning.{group}")
+    return tuple(sorted(STEPS.values(), key=lambda one: GROUPS.index(one.group)))
+
+
+def find_steps(patterns: Sequence[str] = ()) -> tuple[CommissioningStep, ...]:
+    """Steps by name, group, or pattern such as "fri.*"; without any: all.
+
+    Raises:
+        CommandRejected: a pattern that fits none.
+    """
+    every = steps()
+    for pattern in patterns:
+        if not any(_fits(one, pattern) for one in every):
+            raise CommandRejected(
+                f"no step {pattern!r} in the commissioning run",
+                parameter="only",
+                value=pattern,
+                allowed=", ".join(GROUPS),
+                hint="name a group, a step, or a pattern such as fri.*",
+            )
+    return tuple(one for one in every if not patterns or any(_fits(one, pattern) for pattern in patterns))
+
+
+def _fits(one: CommissioningStep, pattern: str) -> bool:
+    return one.group == pattern or fnmatch.fnmatchcase(one.name, pattern)
+
+
+def commission(
+    arm: Arm,
+    person: Person,
+    *,
+    only: Sequence[str] = (),
+    on_begin: Callable[[CommissioningStep], None] | None = None,
+    on_end: Callable[[CommissioningReport], None] | None = None,
+) -> CommissioningReport:
+    """Measure, step by step, whether the robot does what the virtual cabinet assumes.
+
+    A simulator that this program has started is put into T1 first, and into AUT afterwards.
+
+    Args:
+        arm: in control of the robot, in T1.
+        person: beside the robot.
+        only: names, groups or patterns of names; none: all.
+        on_begin: called before each step.
+        on_end: called after each step with the report so far, so that an interrupted run keeps what it measured.
+
+    Raises:
+        CommandRejected: a pattern that fits no step.
+        ModeConflict: the robot is not in T1.
+    """
+    chosen = find_steps(only)
+    outcomes: list[StepOutcome] = []
+    before = arm.speed
+
+    def report() -> CommissioningReport:
+        date = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
+        return CommissioningReport(
+            arm.robot.title, arm.cabinet, arm.software, date, arm.is_virtual, tuple(outcomes)
+        )
+
+    if has_operator(arm):
+        arm.operator.choose("t1")
+        arm.wait_until(lambda s: s.safety.mode is OperationMode.T1, timeout=20.0)
+    try:
+        check_mode(arm)
+        for one in chosen:
+            if on_begin is not None:
+                on_begin(one)
+            outcomes.append(_try(one, arm, person))
+            if on_end is not None:
+                on_end(report())
+    finally:
+        arm.speed = before
+        if has_operator(arm):
+            for words in ("clear", "release", "aut"):
+                arm.operator.do(words)
+    return report()
+
+
+def check_mode(arm: Arm) -> None:
+    """Check that the robot is in T1.
+
+    Raises:
+        ModeConflict: it is not.
+    """
+    mode = arm.state.safety.mode
+    if mode is not OperationMode.T1:
+        raise ModeConflict(
+            f"operation mode must be T1 for the commissioning run, got {mode.value}",
+            parameter="mode",
+            value=mode.value,
+            allowed="T1",
+            hint="turn the key switch of the smartPAD to T1; at the terminal of `heptarm sim`, type t1 and enable",
+        )
+
+
+def _try(one: CommissioningStep, arm: Arm, person: Person) -> StepOutcome:
+    lacks = [name for name in one.needs if name not in arm.capabilities]
+    if lacks:
+        return StepOutcome(one, Agreement.SKIPPED, text=f"this cabinet lacks {', '.join(lacks)}")
+    if one.movement is not None:
+        check_mode(arm)  # its error ends the run: nobody turns the key switch by accident
+    try:
+        if one.movement is not None:
+            if not person.agrees(announcement(one, arm)):
+                return StepOutcome(one, Agreement.SKIPPED, text="not wanted")
+            prepare(arm, person)
+            arm.speed = one.movement.ceiling
+        comparisons = one.measure(arm, person)
+    except Unfit as error:
+        text = f"{PROVES} ({error.text})" if arm.is_virtual else error.text
+        return StepOutcome(one, Agreement.SKIPPED, text=text)
+    except NotReady as error:
+        return StepOutcome(one, Agreement.SKIPPED, text=f"the robot is not ready: {error}")
+    except HeptarmError as error:
+        return StepOutcome(one, Agreement.DIFFERS, text=f"{type(error).__name__}: {error}")
+    agrees = all(comparison.agrees for comparison in comparisons)
+    return StepOutcome(one, Agreement.AGREES if agrees else Agreement.DIFFERS, comparisons)
+
+
+def announcement(one: CommissioningStep, arm: Arm) -> str:
+    """What is about to move, how far, how fast; empty movement: nothing moves."""
+    assert one.movement is not None
+    away = float(np.degrees(np.abs(arm.state.q - HOME).max()))
+    approach = ""
+    if away > np.degrees(_AT_HOME):
+        approach = (
+            f"First all axes go to 0 30 0 -90 0 60 0 deg, up to {away:.0f} deg away, at {REAL_SPEED:.0%} of their "
+            "speed. "
+        )
+    moves = one.movement
+    return f"{one.name}: {one.question} {approach}{moves.what} moves {moves.far}, {moves.fast}. Go on?"
+
+
+def prepare(arm: Arm, person: Person) -> None:
+    """Bring the arm to rest at its home position, ready to move.
+
+    Raises:
+        NotReady: it does not get ready.
+        Unfit: nobody can hold the enabling switch.
+    """
+    arm.stop()
+    arm.wait_for_rest(timeout=20.0)
+    arm.speed = REAL_SPEED
+    if not arm.state.safety.ready_to_move:
+        person.does(Action.HOLD)
+        recovery = arm.recover(timeout=PATIENCE)
+        if not recovery.done:
+            raise NotReady(f"the robot does not get ready: {'; '.join(recovery.remaining)}")
+    if np.abs(arm.state.q - HOME).max() > _AT_HOME:
+        arm.move(ptp(HOME), timeout=_APPROACH)
+    arm.wait_for_rest(timeout=20.0)
