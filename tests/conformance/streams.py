@@ -294,7 +294,8 @@ def a_stream_turns_back(client: Client) -> None:
     paced(client, rate, count, send)
     arrives(client, here)
     far = max(float((q - here) @ away / (away @ away)) for _, q in client.track(begin))
-    assert far < 1.15, f"it overshoots: {far:.2f}"
+    # messages that come late are continued by the velocity of the stream
+    assert far < (1.15 if client.timely else 1.6), f"it overshoots: {far:.2f}"
     assert far > 0.5, f"it has not turned: {far:.2f}"
 
 
