@@ -10,7 +10,7 @@ import heptarm as ha
 TABLE = "sim://iiwa14?scene=table"
 GRIPPER = ha.Tool("two-finger", mass=1.0, com=(0, 0, 0.05), tcp=ha.Pose.at(0, 0, 0.16))
 FULL = 0.08  # speed at full deflection [m/s]
-LEAD = 0.03  # the target is at most so far ahead of the arm [m]
+AHEAD = 0.03  # the target is at most so far ahead of the arm [m]
 #: Deflection of three axes, whether the button is pressed, and what the person waits for: place of the tip, seconds.
 PERSON: list[tuple[str, tuple[float, float, float], bool, Callable[[np.ndarray, float], bool]]] = [
     ("over the cube", (-0.5, 0.0, 0.0), False, lambda tip, seconds: tip[0] < 0.553),
@@ -42,7 +42,7 @@ with ha.connect(os.environ.get("HEPTARM_TARGET_WITH_SCENE", TABLE), watchdog=2.0
             while sv.tick() is not None and not is_enough(state.pose.xyz, (state.stamp - began) * 1e-9):
                 state = arm.state
                 place = place + FULL * sv.period * np.array(axes)
-                place = np.clip(place, state.pose.xyz - LEAD, state.pose.xyz + LEAD)
+                place = np.clip(place, state.pose.xyz - AHEAD, state.pose.xyz + AHEAD)
                 sv.set(ha.Pose.of(place, sv.start.pose.quat))
             print(f"{what}: {arm.state.pose.xyz.round(3)}")
     print(f"{sv.stats.sent} targets, {sv.stats.late_ticks} late")
