@@ -1,7 +1,7 @@
-"""Teleoperate: a joystick moves the arm and grasps a cube. Here a list plays the person at the joystick."""
+"""Teleoperate: a joystick moves the arm and grasps a cube. A list plays the person who watches and holds the stick."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable
 
 import numpy as np
 
@@ -10,22 +10,15 @@ import heptarm as ha
 TABLE = "sim://iiwa14?scene=table"
 GRIPPER = ha.Tool("two-finger", mass=1.0, com=(0, 0, 0.05), tcp=ha.Pose.at(0, 0, 0.16))
 FULL = 0.08  # speed at full deflection [m/s]
-#: Deflection of three axes, for how long [s], and whether the button is pressed: over the cube, down, grasp, up, aside
-PERSON = [
-    ((-1.0, 0.0, 0.0), 0.625, False),
-    ((0.0, 0.0, -1.0), 1.0, False),
-    ((0.0, 0.0, 0.0), 1.2, True),
-    ((0.0, 0.0, 1.0), 1.0, True),
-    ((0.0, 1.0, 0.0), 1.0, True),
+AHEAD = 0.03  # the target is at most so far ahead of the arm [m]
+#: Deflection of three axes, whether the button is pressed, and what the person waits for: place of the tip, seconds.
+PERSON: list[tuple[str, tuple[float, float, float], bool, Callable[[np.ndarray, float], bool]]] = [
+    ("over the cube", (-0.5, 0.0, 0.0), False, lambda tip, seconds: tip[0] < 0.553),
+    ("down", (0.0, 0.0, -0.4), False, lambda tip, seconds: tip[2] < 0.230),
+    ("grasp", (0.0, 0.0, 0.0), True, lambda tip, seconds: seconds > 0.8),
+    ("up", (0.0, 0.0, 1.0), True, lambda tip, seconds: tip[2] > 0.31),
+    ("aside", (0.0, 1.0, 0.0), True, lambda tip, seconds: tip[1] > 0.1),
 ]
-
-
-def joystick(period: float) -> Iterator[tuple[np.ndarray, bool]]:
-    """What a driver reads each period: deflections of the axes, -1 to 1, and the button."""
-    for axes, duration, button in PERSON:
-        for _ in range(round(duration / period)):
-            yield np.array(axes), button
-
 
 with ha.connect(os.environ.get("HEPTARM_TARGET_WITH_SCENE", TABLE), watchdog=2.0) as arm, arm.tool(GRIPPER):
     gripper = ha.TwoSignalGripper(
@@ -40,17 +33,20 @@ with ha.connect(os.environ.get("HEPTARM_TARGET_WITH_SCENE", TABLE), watchdog=2.0
     arm.move(ha.lin(ha.Pose.of((0.6, 0.0, 0.305), arm.pose().quat), speed_mps=0.2))
     before = arm.operator.where("cube")
     with arm.servo("lin", rate=50, speed_mps=0.15, acceleration_mps2=1.0, watchdog=1.0) as sv:
-        place, closed = sv.start.pose.xyz, False
-        for axes, button in joystick(sv.period):
-            if sv.tick() is None:
-                break
-            place = place + FULL * sv.period * axes
-            sv.set(ha.Pose.of(place, sv.start.pose.quat))
-            if button != closed:  # the signals only: the stream must not pause
-                arm.io.set({"OutputX3Pin1": not button, "OutputX3Pin2": button})
-                closed = button
+        for what, axes, button, is_enough in PERSON:
+            arm.io.set(
+                {"OutputX3Pin1": not button, "OutputX3Pin2": button}
+            )  # the signals only, without waiting
+            began, state = arm.state.stamp, arm.state
+            place = state.pose.xyz
+            while sv.tick() is not None and not is_enough(state.pose.xyz, (state.stamp - began) * 1e-9):
+                state = arm.state
+                place = place + FULL * sv.period * np.array(axes)
+                place = np.clip(place, state.pose.xyz - AHEAD, state.pose.xyz + AHEAD)
+                sv.set(ha.Pose.of(place, sv.start.pose.quat))
+            print(f"{what}: {arm.state.pose.xyz.round(3)}")
     print(f"{sv.stats.sent} targets, {sv.stats.late_ticks} late")
     after = arm.operator.where("cube")
     print(f"the cube: from {before.xyz.round(3)} to {after.xyz.round(3)}")
-    assert gripper.holds_something and after.xyz[2] > before.xyz[2] + 0.06
+    assert gripper.holds_something and after.xyz[2] > before.xyz[2] + 0.06 and after.xyz[1] > 0.07
     gripper.open()

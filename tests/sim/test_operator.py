@@ -21,6 +21,7 @@ def test_every_word_of_the_help_is_understood(words: str) -> None:
             "override": ["0.5"],
             "push": ["1", "2", "3"],
             "set": ["Cell.Door", "true"],
+            "where": ["peg"],
             "press": ["0"],
             "answer": ["1"],
         }.get(name, [])

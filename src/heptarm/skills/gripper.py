@@ -93,7 +93,10 @@ class TwoSignalGripper:
 
     @property
     def holds_something(self) -> bool:
-        """Whether it was closed on something: it is commanded to close, and neither end switch is on."""
+        """Whether it was closed on something: it is commanded to close, and neither end switch is on.
+
+        Without an input of its own this is also so while it closes, until `close` returns.
+        """
         return self._holding(self._arm.io.values_now)
 
     def open(self) -> None:
