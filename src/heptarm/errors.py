@@ -278,7 +278,7 @@ EXTRAS = {
     "sim": ("mujoco", "ruckig", "jpype"),
     "viz": ("viser", "matplotlib", "trimesh"),
     "rl": ("torch", "gymnasium", "PIL"),
-    "record": ("mcap",),
+    "record": ("mcap", "pandas", "pyarrow"),
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import pty
 import re
@@ -15,8 +16,11 @@ from collections.abc import Iterator
 import pytest
 from cyclopts import App
 
+from heptarm.arm.link.local_simulator import PrivateCabinet
+from heptarm.arm.link.target import parse_target
 from heptarm.cli.main import app
 from heptarm.cli.progress import timed
+from heptarm.errors import ConnectFailed
 from tests.cli.running import HEPTARM, run
 from tests.interrupts import ctrl_c_interrupts
 from tests.simulators import FASTER
@@ -138,3 +142,24 @@ def test_a_long_motion_shows_progress_and_ctrl_c_reports_that_the_arm_rests() ->
 
 def test_progress_of_a_known_time() -> None:
     assert timed(1.0, 4.0) == " 25%, 3.0 s left" and timed(5.0, 4.0) == "100%, 0.0 s left"
+
+
+def test_a_view_without_viser_is_one_sentence() -> None:
+    program = (
+        "import sys\nsys.modules['viser'] = None\n"
+        "from heptarm.sim.runtime.view import main\nsys.exit(main(['--target', 'sim://localhost:1']))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=False
+    )
+    first = json.loads(done.stdout)
+    assert done.returncode == 1 and done.stderr == ""
+    assert (
+        first["error"]
+        == "this needs the package 'viser', which is not installed (pip install 'heptarm[viz]')"
+    )
+
+
+def test_a_simulator_that_starts_too_slowly_is_one_sentence() -> None:
+    with pytest.raises(ConnectFailed, match=r"did not start within 0\.001 s \(check the load"):
+        PrivateCabinet.start(parse_target("sim://iiwa14"), timeout=0.001)
