@@ -1,4 +1,4 @@
-"""Streams: what belongs to one, and what becomes of points that cannot be followed."""
+"""Streams: what belongs to one, and points that cannot be followed."""
 
 from __future__ import annotations
 
