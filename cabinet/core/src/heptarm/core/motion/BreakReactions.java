@@ -35,7 +35,7 @@ import heptarm.wire.Trigger;
  */
 final class BreakReactions {
     private static final int JOINTS = 7;
-    /** Stiffness [Nm/rad], damping ratio and duration [s] of relaxing: soft beside position control, but an unknown load of 1 kg moves the hand by millimetres only. */
+    /** Stiffness [Nm/rad], damping ratio and duration [s] of relaxing: compliant beside position control, but an unknown load of 1 kg moves the hand by millimetres only. */
     private static final double STIFFNESS = 1000.0;
     private static final double DAMPING = 1.0;
     private static final double DURATION = 0.2;
@@ -52,9 +52,9 @@ final class BreakReactions {
         this.log = log;
     }
 
-    /** A record of an item that a break condition may end. */
-    ContactLog record(Item item) {
-        return new ContactLog(sensors, clock, log, item.reaction instanceof Retreat ? (Retreat) item.reaction : null);
+    /** A record of an item, or of items that run as one batch, that a break condition may end. */
+    ContactLog record(int first, Item item) {
+        return new ContactLog(sensors, clock, log, first, item.reaction instanceof Retreat ? (Retreat) item.reaction : null);
     }
 
     /** Reacts if the condition of an item has ended the program; returns when the arm rests. */
