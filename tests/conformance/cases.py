@@ -9,7 +9,21 @@ import importlib
 
 from tests.conformance.case import CASES, UNFIT
 
-__all__ = ["CASES", "UNFIT"]
+__all__ = ["CASES", "UNFIT", "part"]
+
+#: Cases that every node runs: what no other test of the nodes covers.
+_EVERYWHERE = (
+    "points_streamed_at_100_hz_are_followed",
+    "windows_of_moveit_servo_are_followed",
+    "an_end_that_moves_succeeds_with_the_default_tolerances",
+    "an_empty_trajectory_on_the_topic_does_as_upstreams_controller",
+)
 
 for _topic in ("refusals", "arrivals", "interruptions", "deviations", "surroundings", "instants", "streams"):
     importlib.import_module(f"tests.conformance.{_topic}")
+
+
+def part(number: int) -> list[str]:
+    """The cases that a node runs where not all of them have to: every third one, from this number on."""
+    names = list(CASES)
+    return [name for index, name in enumerate(names) if index % 3 == number or name in _EVERYWHERE]

@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from heptarm.ros.interface.action import MAX_GOALS
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, TrajectoryGoal
 from tests.conformance.case import REST, TOUCH, goal, last, point, rests, step, succeeds, swing
 from tests.conformance.client import Client, SentGoal
@@ -17,8 +18,8 @@ from tests.conformance.refusals import REFUSALS
 WARM_UP = 60
 #: Largest growth of the memory by malformed goals [bytes], and per goal: less than one goal takes in Python.
 GROWTH, GROWTH_EACH = 12e6, 500.0
-#: Threads that a node may have more than before.
-THREADS = 4
+#: Threads that a node may have more than before: executors make theirs when they need them, and keep them.
+THREADS = MAX_GOALS + 8
 
 
 class StressedClient(Client, Protocol):

@@ -1,7 +1,7 @@
 """Cases of conformance against the node: messages, actionlib, driver, cabinet, plant.
 
-Here those that the node of ROS 2 leaves out, as all of them run against the runner alone; `make conformance` runs all,
-with each path of execution.
+Here every third case; another third runs against the node of ROS 2, and all of them against the runner alone.
+`make conformance` runs all of them, with each path of execution.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ import os
 
 import pytest
 
-from tests.conformance.cases import CASES, UNFIT
+from tests.conformance.cases import CASES, UNFIT, part
 from tests.ros1.peer import Client
 
 TRAVEL = os.environ.get("EXECUTION", "servo")
 #: The messages of ROS 1 have no field for these.
 UNKNOWN = ("rejects_several_degrees_of_freedom",)
-NAMES = list(CASES) if os.environ.get("CONFORMANCE") == "all" else list(CASES)[1::2]
+NAMES = list(CASES) if os.environ.get("CONFORMANCE") == "all" else part(1)
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in UNKNOWN])

@@ -151,7 +151,10 @@ class Ros:
         rclpy shows a client to the executor before it is complete, so the executor's thread has to create it.
         """
         if name not in self._actions:
-            made = self._executor.create_task(ActionClient, self.node, kind, name)
+            many = QoSProfile(depth=100)  # by default more than ten answers at once are lost
+            made = self._executor.create_task(
+                ActionClient, self.node, kind, name, goal_service_qos_profile=many
+            )
             self._actions[name] = self.wait(made, f"no client of {name} can be made")
             until(self._actions[name].server_is_ready, f"there is no action {name}")
             self._meet(name)

@@ -134,7 +134,7 @@ def test_parameters_that_are_set_together_apply_together_or_not_at_all(client: C
 
 
 def test_quality_of_service_may_be_overridden(ros: Ros, spare: Stage, nodes: Start) -> None:
-    override = {"qos_overrides./quality/joint_states.publisher.reliability": "best_effort"}
+    override = {"qos_overrides./quality/heptarm/wrench.publisher.reliability": "best_effort"}
     nodes(spare.target, space="/quality", **override)
     client = Client(ros, spare, "/quality/heptarm")
     reliable = ReliabilityPolicy.RELIABLE
@@ -144,8 +144,8 @@ def test_quality_of_service_may_be_overridden(ros: Ros, spare: Stage, nodes: Sta
 
     for _ in range(2):  # also after the node was configured again
         until(lambda: client.status and client.status[-1].active, "the node is not active")
-        until(lambda: kinds("/quality/joint_states") == {ReliabilityPolicy.BEST_EFFORT}, "no override")
-        assert kinds("/quality/heptarm/pose") == {reliable}
+        until(lambda: kinds("/quality/heptarm/wrench") == {ReliabilityPolicy.BEST_EFFORT}, "no override")
+        assert kinds("/quality/joint_states") == {reliable}
         for step_of_life in ("DEACTIVATE", "CLEANUP", "CONFIGURE", "ACTIVATE"):
             assert client.change(getattr(Transition, f"TRANSITION_{step_of_life}"))
 

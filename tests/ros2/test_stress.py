@@ -17,7 +17,7 @@ from trajectory_msgs.msg import JointTrajectoryPoint
 import heptarm as ha
 from tests.conformance.case import long, rests, step, succeeds, under_way
 from tests.conformance.stage import Stage
-from tests.conformance.stress import preempted_often, refused_in_flight, status
+from tests.conformance.stress import THREADS, preempted_often, refused_in_flight, status
 from tests.ros2.peer import PATIENT, Client, NodeProcess, Ros, stamp, to_duration, to_time, until
 
 Start = Callable[..., NodeProcess]
@@ -26,7 +26,7 @@ Start = Callable[..., NodeProcess]
 def test_fifty_preemptions_in_five_seconds(client: Client, node: NodeProcess) -> None:
     threads = status(node.process.pid, "Threads")
     preempted_often(client)
-    assert status(node.process.pid, "Threads") <= threads + 4
+    assert status(node.process.pid, "Threads") <= threads + THREADS
 
 
 @pytest.mark.parametrize(

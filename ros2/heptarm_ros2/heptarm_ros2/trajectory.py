@@ -11,6 +11,7 @@ from control_msgs.action import FollowJointTrajectory
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.qos import QoSProfile
 from rclpy.task import Future
 
 from heptarm.ros.interface import messages
@@ -21,6 +22,9 @@ from heptarm.ros.trajectory.runner import GoalFeedback
 
 #: How long the server may take to mark a cancelled goal as canceling [s], and how often that is checked [s].
 _CANCELING_TIMEOUT, _CANCELING_PERIOD = 5.0, 0.002
+
+#: The default of services keeps ten requests; a burst of more goals would be lost without an answer.
+_MANY = QoSProfile(depth=100)
 
 
 class TrajectoryAction:
@@ -51,6 +55,9 @@ class TrajectoryAction:
                 goal_callback=self._on_goal,
                 handle_accepted_callback=self._on_accepted,
                 cancel_callback=self._on_cancel,
+                goal_service_qos_profile=_MANY,
+                result_service_qos_profile=_MANY,
+                cancel_service_qos_profile=_MANY,
             )
             for name in names
         ]
