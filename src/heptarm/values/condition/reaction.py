@@ -45,7 +45,7 @@ def check_reaction(value: object, parameter: str = "then") -> Reaction:
         ShapeError: see above.
     """
     if isinstance(value, Retreat) or value == "stay" or value == "relax":
-        return value  # type: ignore[return-value]
+        return value
     raise ShapeError(
         f"{parameter} must be 'stay', 'relax' or a Retreat, got {shown(value)}",
         parameter=parameter,
