@@ -310,7 +310,7 @@ def sim(
         )
         return fri_sim.run(options, verbose=verbose, as_json=as_json)
     _check_count(count, port, has_view=view)
-    options = SimulatorOptions(
+    cabinet = SimulatorOptions(
         model=model,
         host=host,
         port=port,
@@ -325,8 +325,8 @@ def sim(
         verbose=verbose,
     )
     if count > 1:
-        return _fleet(options, count, key_file=key_file, as_json=as_json)
-    return _cabinet(options, view=view, view_port=view_port, key_file=key_file, as_json=as_json)
+        return _fleet(cabinet, count, key_file=key_file, as_json=as_json)
+    return _cabinet(cabinet, view=view, view_port=view_port, key_file=key_file, as_json=as_json)
 
 
 def _check_count(count: int, port: int, *, has_view: bool) -> None:
@@ -388,7 +388,8 @@ def _fleet(options: SimulatorOptions, count: int, *, key_file: Path | None, as_j
             ended.wait()
         except KeyboardInterrupt:
             return 0
-    return max(abs(cabinet.returncode) for cabinet in cabinets)
+    codes: list[int] = [abs(cabinet.returncode) for cabinet in cabinets]
+    return max(codes)
 
 
 def _close_all(cabinets: list[subprocess.Popen[str]]) -> None:

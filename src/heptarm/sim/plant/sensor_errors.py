@@ -54,7 +54,7 @@ def sensor_errors(robot: RobotModel, text: str) -> SensorErrors | None:
 
 
 @dataclass(slots=True)
-class Reading:
+class SensorReading:
     """What the sensors show in a tick, arrays of shape (7,).
 
     Attributes:
@@ -89,7 +89,7 @@ class SensorErrors:
         result: Array = self._friction * np.tanh(dq * (1.0 / STICTION_SPEED))
         return result
 
-    def read(self, q: Array, tau: Array) -> Reading:
+    def read(self, q: Array, tau: Array) -> SensorReading:
         """What the sensors show; called once per tick.
 
         Args:
@@ -100,4 +100,4 @@ class SensorErrors:
         shown_q = np.round((q + noise[:7]) / POSITION_STEP) * POSITION_STEP
         shown = tau + self._gain * tau + self._offset + noise[7:]
         shown = np.round(shown / TORQUE_STEP) * TORQUE_STEP
-        return Reading(shown_q, shown, shown - tau)
+        return SensorReading(shown_q, shown, shown - tau)
