@@ -26,7 +26,7 @@ TORQUE_NOISE, TORQUE_STEP = 0.0004, 0.01
 POSITION_NOISE, POSITION_STEP = 1e-5, 2.0 * np.pi / 2**19
 #: Friction that the controller does not compensate, as a fraction of the axis' highest torque, and the speed below
 #: which it decreases to zero [rad/s].
-FRICTION, STICTION_SPEED = 0.003, 0.02
+FRICTION, STICTION_SPEED = 0.0015, 0.02
 
 
 def parse_sensors(text: str) -> int | None:
