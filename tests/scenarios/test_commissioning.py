@@ -132,10 +132,10 @@ class Answering:
         self.asked.append(question)
         return self.willing
 
-    def does(self, action: commissioning.Action) -> None:
+    def does(self, action: commissioning.PersonAction) -> None:
         raise AssertionError(action)
 
-    def finds(self, action: commissioning.Action) -> bool:
+    def finds(self, action: commissioning.PersonAction) -> bool:
         return False
 
     def reads(self, question: str) -> str:
@@ -208,7 +208,7 @@ def test_the_command_line_writes_both_files(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
     found = json.loads(base.with_suffix(".json").read_text())
     assert [one["verdict"] for one in found["steps"]] == ["agrees", "skipped"]
-    assert "| dynamics.braking | A7 moves on after a stop by |" in base.read_text()
+    assert "| dynamics.braking | A7 moves on after the brake began by |" in base.read_text()
     assert "1 agrees, 0 differs, 1 skipped" in done.stdout
     done = run("check", "--commission", "--list")
     assert all(name in done.stdout for name in ("fri.handshake", "safety.t1_speed"))
