@@ -1,16 +1,30 @@
 # Every target does the set-up it needs. Stamps under build/ keep repeats fast.
 PY := .venv/bin/python
 STAMPS := build/stamps
+.DEFAULT_GOAL := setup
 
-.PHONY: setup cabinet demo test test-ros test-ros2 test-ros1 test-long conformance lint check bench soak figures lock docs wheel clean help
+.PHONY: setup cabinet demo test test-ros test-ros2 test-ros1 test-pythons test-long conformance lint check bench soak figures lock docs \
+	wheel clean help
 
-setup: $(STAMPS)/venv cabinet  ## virtual environment, package, compiled cabinet
+##@ To try it
 
-$(STAMPS)/venv: pyproject.toml scripts/setup.sh $(wildcard scripts/lock/all.txt scripts/lock/torch.txt)
+demo: cabinet  ## motions on the virtual cabinet, a table and a plot; installs only what that needs
+	.venv/bin/heptarm demo
+
+# Only the packages of the demo; those of the tests come on top of them.
+$(STAMPS)/demo: pyproject.toml scripts/setup.sh $(wildcard scripts/lock/demo.txt)
+	scripts/setup.sh demo
+	@mkdir -p $(STAMPS) && touch $@
+
+##@ To build
+
+setup: $(STAMPS)/venv cabinet  ## everything for developers: virtual environment, package, tools, compiled cabinet
+
+$(STAMPS)/venv: $(STAMPS)/demo $(wildcard scripts/lock/all.txt scripts/lock/torch.txt)
 	scripts/setup.sh all
 	@mkdir -p $(STAMPS) && touch $@
 
-$(STAMPS)/jdk: scripts/setup_jdk.py cabinet/toolchain.py $(STAMPS)/venv
+$(STAMPS)/jdk: scripts/setup_jdk.py cabinet/toolchain.py $(STAMPS)/demo
 	$(PY) scripts/setup_jdk.py
 	@mkdir -p $(STAMPS) && touch $@
 
@@ -37,8 +51,7 @@ $(STAMPS)/ros1: scripts/setup_ros1.sh scripts/ros1_interfaces.py $(wildcard scri
 cabinet: $(STAMPS)/jdk  ## compile the cabinet application and its doubles
 	@$(PY) cabinet/build.py
 
-demo: setup  ## motions on the virtual cabinet, a table and a plot
-	.venv/bin/heptarm demo
+##@ To test
 
 lint: $(STAMPS)/venv  ## ruff, mypy, import contract
 	.venv/bin/ruff check .
@@ -64,6 +77,10 @@ test-long: setup $(STAMPS)/browser  ## everything with LONG=1: soaks, long searc
 	LONG=1 $(PY) -m pytest --timeout 3600 $(LONGEST) -m alone
 	@LONG=1 $(MAKE) --no-print-directory test-ros
 	@$(MAKE) --no-print-directory conformance
+	@$(MAKE) --no-print-directory test-pythons
+
+test-pythons: cabinet  ## the package with each Python of this machine, 3.10 to 3.13; PYTHONS="3.10 3.12" selects
+	scripts/test_pythons.sh $(PYTHONS)
 
 test-ros2: setup $(STAMPS)/ros2  ## the ROS 2 node with real rclpy, where there are wheels of it
 	@if [ -x build/ros2/bin/python ]; then build/ros2/bin/python -m pytest $(LONGEST) tests/ros2; \
@@ -78,6 +95,8 @@ conformance: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## every case of conformance a
 	if [ -x build/$$ros/bin/python ]; then echo "$$ros, $$execution:"; \
 	CONFORMANCE=all EXECUTION=$$execution build/$$ros/bin/python -m pytest -q tests/$$ros/test_conformance.py || exit 1; fi; done; done
 
+##@ To measure
+
 bench: setup  ## figures as JSON lines; GROUP=fri or ONLY=name selects, LIST=1 lists them, STORE=1 stores the run
 	@$(PY) -m bench $(if $(GROUP),--group $(GROUP)) $(if $(ONLY),--only $(ONLY)) $(if $(LIST),--list) $(if $(STORE),--store)
 
@@ -89,7 +108,9 @@ soak: setup  ## everything at once on a virtual cabinet for MINUTES=3: what grow
 figures: $(STAMPS)/venv  ## docs/explanation/figures.md, from the newest stored run
 	$(PY) scripts/figures_page.py
 
-lock: $(STAMPS)/venv  ## versions and checksums of all packages, in scripts/lock
+##@ To document and release
+
+lock: $(STAMPS)/demo  ## versions and checksums of all packages, in scripts/lock
 	$(PY) scripts/lock.py
 
 docs: $(STAMPS)/venv  ## the site, in docs/_build/html
@@ -103,4 +124,5 @@ clean:  ## everything that make made, but for the virtual environment
 	rm -rf build dist docs/_build src/heptarm/sim/jars .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
 
 help:  ## this list
-	@sed -n 's/^\([a-z0-9-]*\):.*## \(.*\)/\1|\2/p' $(MAKEFILE_LIST) | sort | awk -F'|' '{printf "  make %-12s %s\n", $$1, $$2}'
+	@awk -F ':.*## ' '/^##@ / {printf "%s%s\n", (n++ ? "\n" : ""), substr($$0, 5)} /^[a-z0-9-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' \
+		$(MAKEFILE_LIST)

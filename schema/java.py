@@ -230,7 +230,12 @@ def _union(spec: Spec, union: Union) -> str:
     for one in _common(spec, union).values():
         missing = {"str": '""', "struct": "null"}.get(one.type.kind, "Double.NaN")
         lines += [f"    /** The field of this name; {missing} where there is none. */"]
-        lines += [f"    public {java_type(one.type)} {one.name}() {{", f"        return {missing};", "    }", ""]
+        lines += [
+            f"    public {java_type(one.type)} {one.name}() {{",
+            f"        return {missing};",
+            "    }",
+            "",
+        ]
     lines += ["    public abstract int tag();", "", "    public abstract void write(Encoder out);", ""]
     lines += ["    public abstract void validate(String path) throws Violation;", ""]
     lines += [
@@ -394,6 +399,7 @@ def _messages(spec: Spec) -> str:
         ),
         ("isRequest", "Whether the message is answered.", lambda m: m.kind == "request"),
         ("fromClient", "Whether a client may send the message.", lambda m: m.source in ("client", "both")),
+        ("byDatagram", "Whether a datagram may contain the message.", lambda m: m.datagram),
     ):
         chosen = [message for message in spec.messages.values() if keep(message)]
         lines += [
@@ -416,7 +422,7 @@ def _messages(spec: Spec) -> str:
 def _protocol(spec: Spec) -> str:
     p = spec.protocol
     lines = [BANNER, "/** Constants of the protocol. */", "public final class Protocol {"]
-    for name in ("major", "minor", "port", "magic", "max_body", "nonce", "tag"):
+    for name in ("major", "minor", "port", "magic", "max_body", "nonce", "tag", "token", "max_datagram"):
         lines += [f"    public static final int {name.upper()} = {p[name]};"]
     return "\n".join(
         [*lines, "    public static final int HEADER = 26;", "", "    private Protocol() {", "    }", "}", ""]

@@ -14,6 +14,9 @@ KEY = b"a key of a lab, 32 bytes or more"
 CLIENT_NONCE = bytes(range(32))
 CABINET_NONCE = bytes(range(0x80, 0xA0))
 TIME = 1_234_567_890
+TOKEN = bytes(range(0x40, 0x60))
+SESSION = 5
+_UP, _DOWN = b"heptarm client to cabinet", b"heptarm cabinet to client"
 
 
 def _bytes(value: bytes) -> bytes:
@@ -39,6 +42,13 @@ def _sealed(spec: Spec, key: bytes, number: int, content: bytes, seq: int, reque
     return frame + _mac(key, struct.pack(">I", 0) + frame)[: p["tag"]]
 
 
+def _datagram(
+    spec: Spec, secret: bytes, label: bytes, number: int, content: bytes, seq: int, request: int
+) -> bytes:
+    key = _mac(secret, label + b" datagrams" + TOKEN + b"\x01")
+    return struct.pack(">I", SESSION) + _sealed(spec, key, number, content, seq, request)
+
+
 def vectors(spec: Spec) -> dict[str, Any]:
     """The bytes of a handshake with a key, of the keys of the session and of one frame in each direction."""
     p, ids = spec.protocol, {name: one.id for name, one in spec.messages.items()}
@@ -51,8 +61,10 @@ def vectors(spec: Spec) -> dict[str, Any]:
     all_four = both + _part(ids["Proof"], proof) + _part(ids["Welcome"], bare)
     cabinet_mac = _mac(KEY, b"heptarm cabinet\0" + all_four)
     secret = _mac(CLIENT_NONCE + CABINET_NONCE, KEY)
-    client_key = _mac(secret, b"heptarm client to cabinet\x01")
-    cabinet_key = _mac(secret, b"heptarm cabinet to client\x01")
+    client_key = _mac(secret, _UP + b"\x01")
+    cabinet_key = _mac(secret, _DOWN + b"\x01")
+    target = struct.pack(">Id7d", 9, 0.2, *(0.1 * axis for axis in range(7)))
+    pong = struct.pack(">qq", TIME - 1000, TIME)
     stop, accepted = bytes([0]), struct.pack(">I", 0)
     return {
         name: value.hex()
@@ -68,6 +80,11 @@ def vectors(spec: Spec) -> dict[str, Any]:
             "cabinet_key": cabinet_key,
             "stop_frame": _sealed(spec, client_key, ids["Stop"], stop, 2, 1),
             "accepted_frame": _sealed(spec, cabinet_key, ids["Accepted"], accepted, 2, 1),
+            "token": TOKEN,
+            "target_datagram": _datagram(spec, secret, _UP, ids["ServoJoints"], target, 3, 17),
+            "pong_datagram": _datagram(spec, secret, _DOWN, ids["Pong"], pong, 4, 0),
+            "target_datagram_without_key": _datagram(spec, TOKEN, _UP, ids["ServoJoints"], target, 3, 17),
+            "pong_datagram_without_key": _datagram(spec, TOKEN, _DOWN, ids["Pong"], pong, 4, 0),
         }.items()
     }
 
@@ -102,4 +119,38 @@ One handshake with its first two frames, as hexadecimal bytes; an implementation
 | | bytes |
 |---|---|""".splitlines()
     lines += [f"| {name} | `{value}` |" for name, value in vectors(spec).items() if name != "welcome"]
-    return [*lines, ""]
+    return [*lines, "", *_datagrams(spec), ""]
+
+
+def _datagrams(spec: Spec) -> list[str]:
+    """The section of the protocol page about datagrams."""
+    p = spec.protocol
+    names = ", ".join(f"[{one.name}](#{one.name.lower()})" for one in spec.messages.values() if one.datagram)
+    return f"""## Datagrams
+
+TCP delivers everything in order, so one lost packet delays all that follow by its retransmission: on a network that loses
+packets, for longer than a servo motion waits for a target. Beside the session, which stays on TCP, a client may therefore open
+datagrams: UDP, with the number of the TCP port, at most {p["max_datagram"]} bytes each. They may contain {names}; all else stays on TCP.
+
+1. The client sends OpenDatagrams in its session; the answer is a random token of {p["token"]} bytes. A cabinet without a UDP port
+   refuses.
+2. A datagram is the number of the session (u32, of Welcome), then one frame with the flag 1 and a tag. `seq` counts the
+   datagrams of one direction and token, from 0, and never wraps; `time` is in both directions the cabinet's clock, as the
+   client estimates it.
+3. Each direction has a key: `HMAC(S, "heptarm client to cabinet datagrams" ‖ token ‖ 01)` or `HMAC(S, "heptarm cabinet to
+   client datagrams" ‖ token ‖ 01)`. With a pre-shared key, S is the secret of which the keys of the session follow (step 4
+   above, before the info is applied); without one it is the token. The tag is computed as above, with n = 0.
+4. The receiver ignores, and counts, a datagram that is damaged, that has a wrong tag, that is not newer (by `seq`) than every
+   accepted one of its stream, or that is too old (by `time`): for the cabinet, than the watchdog time of the client in control, 0.5 s
+   for others; for the client, than 1 s. A stream is: all servo targets;
+   Stop and Cancel; each other message. The cabinet also ignores what does not come from the address of the session. An ignored
+   datagram has no other effect; it never ends a session.
+5. Each side sends Ping as datagram a few times a second; the other one answers with Pong by datagram. While its pings are
+   answered, the cabinet sends states as datagrams (those that fit into one), otherwise over TCP. The client sends each
+   target as datagram, and over TCP as well unless an answer came recently, so that it falls back without waiting.
+6. A target that may come twice has a number (`request`) that rises with each target of the session. The cabinet follows a target
+   only if its number is 0 or higher than that of every target before.
+7. Stop and Cancel always go over TCP, with their answer. A client may also send them as datagrams, repeatedly, with the same
+   `request`. The cabinet executes such a datagram unless that request, or a later one, has already come; it does not answer it.
+8. An accepted datagram is a sign of life of its sender as of its `time`. A session in which TCP is silent for 10 s ends nevertheless.
+""".splitlines()

@@ -311,6 +311,8 @@ def messages(spec: Spec) -> str:
         f"MAGIC = {p['magic']:#06x}",
         f"NONCE = {p['nonce']}",
         f"TAG = {p['tag']}",
+        f"TOKEN = {p['token']}",
+        f"MAX_DATAGRAM = {p['max_datagram']}",
     ]
     layout = "".join(PRIMITIVES[one["type"]] for one in spec.header)
     lines += [f"MAX_BODY = {p['max_body']}", f'HEADER = Struct(">{layout}")', '_MASK = Struct(">H")', ""]
@@ -377,8 +379,53 @@ def messages(spec: Spec) -> str:
     lines += [f"OneWay: TypeAlias = {' | '.join(one_way)}", ""]
     lines += ["#: Message classes by id.", "MESSAGES: dict[int, type[Message]] = {"]
     lines += [f"    {message.id}: {name}," for name, message in spec.messages.items()] + ["}"]
-    lines += [f"ONE_WAY: tuple[type[OneWay], ...] = ({', '.join(one_way)},)", ""]
-    return "\n".join(lines)
+    lines += [f"ONE_WAY: tuple[type[OneWay], ...] = ({', '.join(one_way)},)"]
+    datagrams = [name for name, message in spec.messages.items() if message.datagram]
+    lines += ["#: Messages that a datagram may contain."]
+    lines += [f"DATAGRAMS: tuple[type[Message], ...] = ({', '.join(datagrams)},)", ""]
+    return "\n".join(lines + _state_layout(spec))
+
+
+def _state_layout(spec: Spec) -> list[str]:
+    """The groups of a state that have a fixed size, field by field, for those who read many bodies at once."""
+    lines = [
+        "#: The first groups of a state's body, those of fixed size: name, bit of the mask, and its fields in order, each",
+        "#: with its name, its type in numpy's notation and its number of entries. The mask, two bytes, is before them.",
+        "STATE_LAYOUT: tuple[tuple[str, int, tuple[tuple[str, str, int], ...]], ...] = (",
+    ]
+    (message,) = (one for one in spec.messages.values() if one.groups)
+    for name, number, kind in message.groups:
+        entries = _flat(spec, spec.structs[kind].fields)
+        if entries is None:
+            break
+        lines += [f'    ("{name}", {1 << number}, (']
+        lines += [f'        ("{field}", "{code}", {size}),' for field, code, size in entries]
+        lines += ["    )),"]
+    return [*lines, ")", ""]
+
+
+def _flat(spec: Spec, chosen: list[Field]) -> list[tuple[str, str, int]] | None:
+    """Name, numpy type and number of entries of each field, structs resolved; None: not all have a fixed size."""
+    found: list[tuple[str, str, int]] = []
+    for one in chosen:
+        t = one.type
+        if t.kind == "struct":
+            inner = _flat(spec, spec.structs[t.name].fields)
+            if inner is None:
+                return None
+            found += inner
+        elif t.kind in ("prim", "array"):
+            found.append((one.name, _numpy(t.name), t.size if t.kind == "array" else 1))
+        elif t.kind in ("enum", "flags"):
+            found.append((one.name, _numpy(spec.enums[t.name].base), 1))
+        else:
+            return None
+    return found
+
+
+def _numpy(primitive: str) -> str:
+    """Numpy's notation of a primitive type, such as ">f8" for f64."""
+    return ">u1" if primitive == "bool" else f">{primitive[0]}{int(primitive[1:]) // 8}"
 
 
 def union(spec: Spec, name: str) -> list[str]:

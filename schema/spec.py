@@ -105,6 +105,7 @@ class Message:
     doc: str
     fields: list[Field]
     groups: list[tuple[str, int, str]] = field(default_factory=list)
+    datagram: bool = False
 
 
 @dataclass(frozen=True)
@@ -233,6 +234,7 @@ def load(folder: Path = HERE) -> Spec:
             entry["doc"],
             [parse_field(f, kinds) for f in entry.get("fields", [])],
             groups,
+            entry.get("datagram", False),
         )
     session = {n: State(n, e["doc"], e["next"]) for n, e in raw.get("session", {}).items()}
     spec = Spec(raw["protocol"], raw["header"]["fields"], enums, structs, unions, messages, errors, session)

@@ -1,7 +1,7 @@
-"""Draw the data-flow diagrams of the documentation as SVG: one column per process, one box per step.
+"""Draw the diagrams of the documentation as SVG: data flows, one column per process, one box per step; and the network.
 
-`diagrams.py` writes docs/_static/flow-*.svg; `diagrams.py --check` fails if one of them is out of date, or if a box
-names a file that does not exist.
+`diagrams.py` writes docs/_static/flow-*.svg and network.svg; `diagrams.py --check` fails if one of them is out of date,
+or if a box names a file that does not exist.
 """
 
 from __future__ import annotations
@@ -155,6 +155,82 @@ def svg(lanes: tuple[str, ...], steps: tuple[Step, ...]) -> str:
     return "\n".join([*out, "</svg>", ""])
 
 
+class Device(NamedTuple):
+    """A box of the network's drawing.
+
+    Attributes:
+        x, y, width, height: its place and size [px].
+        name: what it is.
+        lines: further text.
+        colour: index into COLOURS; -1: white.
+    """
+
+    x: float
+    y: float
+    width: float
+    height: float
+    name: str
+    lines: tuple[str, ...] = ()
+    colour: int = -1
+
+
+class Cable(NamedTuple):
+    """A connection between two points, with text above and below its middle."""
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+    above: str
+    below: str = ""
+
+
+NETWORK: tuple[Device, ...] = (
+    Device(16, 16, 190, 268, "Workstation", ("Python, ROS",), 0),
+    Device(46, 92, 130, 52, "network card", ("172.31.1.150",)),
+    Device(46, 206, 130, 52, "second card", ("192.170.10.1",)),
+    Device(470, 16, 354, 268, "Cabinet: one PC, two systems", (), 1),
+    Device(484, 92, 120, 52, "X66 (KLI)", ("172.31.1.147",)),
+    Device(484, 206, 120, 52, "KONI", ("192.170.10.2",)),
+    Device(640, 72, 170, 84, "Windows", ("Java applications", "heptarm, TCP 30001"), 2),
+    Device(640, 190, 170, 84, "Real-time system", ("motion kernel, 1 ms", "FRI, UDP 30200"), 3),
+    Device(856, 16, 130, 268, "LBR iiwa", ("7 joints,", "7 torque sensors"), 0),
+)
+CABLES: tuple[Cable, ...] = (
+    Cable((176, 118), (484, 118), "session: commands, states (TCP)", "FRI too, if it is set up for X66"),
+    Cable((176, 232), (484, 232), "FRI only (UDP), optional"),
+    Cable((604, 118), (640, 118), ""),
+    Cable((604, 232), (640, 232), ""),
+    Cable((604, 132), (640, 204), ""),
+    Cable((725, 156), (725, 190), ""),
+    Cable((810, 232), (856, 232), ""),
+)
+
+
+def network() -> str:
+    """Draw the network between workstation and cabinet."""
+    width, height = 1002, 300
+    out = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}" '
+        f'font-family="system-ui, sans-serif">',
+        f'<rect width="{width}" height="{height}" fill="#ffffff"/>',
+    ]
+    for one in NETWORK:
+        fill = COLOURS[one.colour] if one.colour >= 0 else "#ffffff"
+        out.append(
+            f'<rect x="{one.x}" y="{one.y}" width="{one.width}" height="{one.height}" rx="5" fill="{fill}" '
+            f'stroke="{EDGE}"/>'
+        )
+        middle = one.x + one.width / 2
+        out.append(_text(middle, one.y + 21, one.name, size=13, weight=600))
+        for number, line in enumerate(one.lines):
+            out.append(_text(middle, one.y + 40 + 17 * number, line, size=11, colour=MUTED))
+    for cable in CABLES:
+        (x, y), (to_x, to_y) = cable.start, cable.end
+        out.append(f'<path d="M{x} {y} L{to_x} {to_y}" stroke="{EDGE}" stroke-width="2" fill="none"/>')
+        out.append(_text((x + to_x) / 2, (y + to_y) / 2 - 8, cable.above, size=11))
+        out.append(_text((x + to_x) / 2, (y + to_y) / 2 + 18, cable.below, size=10, colour=MUTED))
+    return "\n".join([*out, "</svg>", ""])
+
+
 def _corner(number: int, step: Step) -> tuple[float, float]:
     return MARGIN + LANE * step.lane + (LANE - BOX) / 2, MARGIN + HEAD + STEP * number
 
@@ -186,17 +262,20 @@ def _text(
 
 def main(arguments: list[str]) -> int:
     """Write the diagrams, or check them."""
-    stale = []
+    drawings = {"network.svg": network()}
     for name, (lanes, steps) in DIAGRAMS.items():
         missing = [step.file for step in steps if not (ROOT / step.file).is_file()]
         if missing:
             print(f"flow-{name}.svg names files that do not exist: {', '.join(missing)}", file=sys.stderr)
             return 1
-        drawing, path = svg(lanes, steps), OUT / f"flow-{name}.svg"
+        drawings[f"flow-{name}.svg"] = svg(lanes, steps)
+    stale = []
+    for name, drawing in drawings.items():
+        path = OUT / name
         if "--check" not in arguments:
             path.write_text(drawing, encoding="utf-8")
         elif not path.is_file() or path.read_text(encoding="utf-8") != drawing:
-            stale.append(path.name)
+            stale.append(name)
     if stale:
         print(f"out of date: {', '.join(stale)}; run scripts/diagrams.py", file=sys.stderr)
     return 1 if stale else 0

@@ -118,7 +118,12 @@ def page() -> str:
     every = scenarios()
     lines = [HEAD]
     for letter, title in groups.items():
-        lines += [f"## {title}", "", "| | feature | known from | heptarm | shown by |", "|---|---|---|---|---|"]
+        lines += [
+            f"## {title}",
+            "",
+            "| | feature | known from | heptarm | shown by |",
+            "|---|---|---|---|---|",
+        ]
         for row in rows:
             if row.id[0] == letter and not row.left_out:
                 peers = ", ".join(row.peers)

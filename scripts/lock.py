@@ -18,6 +18,15 @@ LOCK = ROOT / "scripts" / "lock"
 UV = "uv==0.13.9"
 #: Name of a lock file and what it is made of.
 INPUTS = {
+    # the same versions as in "all", on top of which the tools of the developers come
+    "demo": (
+        "pyproject.toml",
+        "--extra",
+        "sim",
+        "scripts/lock/demo.in",
+        "--constraint",
+        "scripts/lock/all.txt",
+    ),
     "all": ("pyproject.toml", "--extra", "all", "scripts/lock/all.in"),
     "ros2": ("scripts/ros2_requirements.txt",),
     "ros1": ("scripts/lock/ros1.in",),

@@ -10,7 +10,15 @@ LIFE = "the life cycle"
 STATES = ("~/state", "joint_states")
 MOTIONS = ("~/move_joints", "~/move_pose", "~/move_spline", "~/run_program")
 COMMANDS = ("~/command/joint", "~/command/pose", "~/command/lin")
-SERVOS = ("~/servo/joint", "~/servo/velocity", "~/servo/pose", "~/servo/lin")
+SERVOS = (
+    "~/servo/joint",
+    "~/servo/velocity",
+    "~/servo/pose",
+    "~/servo/lin",
+    "~/servo/twist",
+    "~/servo/twist_unstamped",
+    "~/servo/jog",
+)
 MODES = (
     "~/mode/position",
     "~/mode/joint_impedance",
@@ -30,11 +38,13 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "attached": ("~/attach_workpiece", "~/detach_workpiece"),
         "groups": (WORDS + "the nodes subscribe to what their topics need",),
         "history": (WORDS + "a rosbag keeps the states",),
+        "record": (WORDS + "a rosbag records the topics; `heptarm record` runs beside the node",),
         "state_rate": ("parameter `state_rate`",),
         "breaking_on": ("~/collision_guard", "fields `until` of goals"),
         "cabinet": ("~/info", "/diagnostics"),
         "capabilities": ("~/capabilities",),
         "close": (LIFE,),
+        "collision_check": (WORDS + "a planner such as MoveIt checks paths before it sends them",),
         "collision_guard": ("~/collision_guard",),
         "connected": ("~/status",),
         "connection": ("no counterpart: it is for tools and tests",),
@@ -62,7 +72,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "resume": ("~/resume",),
         "robot": ("~/info",),
         "servo": (*SERVOS, "~/follow_joint_trajectory"),
-        "set_override": ("~/set_override",),
+        "set_override": ("~/set_override", "~/speed_scaling"),
         "software": ("~/info",),
         "speed": ("parameter `speed`", "~/set_speed"),
         "start": (*MOTIONS, *COMMANDS),
@@ -115,6 +125,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "release": OPERATOR,
         "set_signal": OPERATOR,
         "start": OPERATOR,
+        "where": OPERATOR,
     },
     "arm.fri(...)": {
         "active": ("~/fri/status",),
@@ -173,6 +184,9 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "result": ("the action's result",),
         "segment": ("the feedback of", "~/move_spline", "~/run_program", "~/events"),
         "started": ("the action's status",),
+        "states": ("~/state", "joint_states"),
+        "first_sample": (WORDS + "internal",),
+        "last_sample": (WORDS + "internal",),
         "wait": ("the action's result",),
         "wait_started": ("the action's feedback",),
     },
@@ -186,8 +200,10 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "hold": ("~/run_program",),
         "lin": ("~/move_pose", "~/command/lin", "~/run_program"),
         "lin_rel": ("~/move_pose", "~/run_program"),
+        "load": (WORDS + "it reads a file",),
         "ptp": ("~/move_joints", "~/move_pose", "~/command/joint", "~/command/pose", "~/run_program"),
         "ptp_home": ("~/run_program",),
+        "spiral": ("as SPLINE, with points computed by the client", "~/run_program"),
         "spl": ("~/move_spline", "~/run_program"),
         "spline": ("~/move_spline", "~/run_program"),
         "spline_joints": ("~/move_spline", "~/run_program"),
@@ -199,6 +215,7 @@ API: dict[str, dict[str, tuple[str, ...]]] = {
         "JointImpedance": ("~/mode/joint_impedance",),
         "Position": ("~/mode/position",),
         "compliance": ("~/guide", "~/teach", "~/mode/cartesian_impedance"),
+        "pressing": ("~/mode/cartesian_impedance",),
         "SineImpedance": ("~/mode/sine_impedance", "~/mode/force_pattern"),
     },
     "heptarm.when": {

@@ -1,5 +1,6 @@
 #!/bin/sh
-# Makes .venv with heptarm (editable) and its tools. Usage: scripts/setup.sh [extras], for example "sim,viz" or "all".
+# Makes .venv with heptarm (editable). Usage: scripts/setup.sh demo (what the demo needs), all (with all tools, the default), or
+# extras, for example "sim,viz".
 set -eu
 cd "$(dirname "$0")/.."
 extras=${1:-all}
@@ -59,19 +60,21 @@ torch() { # A version for which there is a build without CUDA here; any newer on
 }
 
 # Old versions of pip can search for a long time for a set of versions that fit.
-pip install -q -U "pip>=24"
-if [ "$extras" = all ]; then
-    if ! locked torch --no-index; then
+"$venv/bin/python" -c 'import sys, pip; sys.exit(int(pip.__version__.split(".")[0]) < 24)' || pip install -q -U "pip>=24"
+packages=".[$extras]"
+case $extras in
+all | demo)
+    if [ "$extras" = all ] && ! locked torch --no-index; then
         echo "the locked build of torch is not on this machine; another build is installed, without a checksum" >&2
         torch || true
     fi
-    if locked all; then
+    if locked "$extras"; then
         pip install -q --no-deps --no-build-isolation -e . && pip check && exit 0
     fi
     echo "the locked versions are not all to be had here, or do not suffice; the newest are installed, without checksums" >&2
-else
-    case ",$extras," in
-    *,all,* | *,dev,* | *,rl,*) torch || true ;;
-    esac
-fi
-pip install -q -e ".[$extras]"
+    if [ "$extras" = demo ]; then packages=".[sim] matplotlib"; fi
+    ;;
+*,rl,* | rl | rl,* | *,rl | dev | dev,* | *,dev | *,dev,*) torch || true ;;
+esac
+# shellcheck disable=SC2086
+pip install -q -e $packages

@@ -1,4 +1,4 @@
-"""Every public function with every bad value: the enumeration that tests of values and of the arm share.
+"""Every public function with every bad value: the enumeration for tests of values and of the arm.
 
 A call that works is derived from the annotations of a function; then one argument at a time is replaced by something
 that it cannot mean. A new public function is covered by itself. `VECTORS`, `ARGUMENTS` and `ACCEPTED` have only what
@@ -16,6 +16,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -74,6 +75,7 @@ VECTORS = {
     "quat": 4,
     "centre": 3,
     "plane": 3,
+    "rotvec": 3,
     "direction": 3,
     "point": 3,
     "com": 3,
@@ -90,6 +92,9 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "Trajectory": {"q": np.zeros((3, 7))},
     "Trajectory.of": {"q": np.zeros((3, 7))},
     "Trajectory.load": {"path": "no such file"},
+    "load": {"path": "no such file"},
+    "Recording.__getitem__": {"name": "q"},
+    "Arm.record": {"path": "no folder of mine/run.mcap"},
     "Limits": {"q_max": np.full(7, 1.0)},
     "Tool.frame": {"name": "tip"},
     "circ": {"via": OTHER},
@@ -100,6 +105,11 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "Arm.touch": {"distance": 0.01, "force": 5.0},
     "Arm.touch_twice": {"distance": 0.01, "force": 5.0},
     "connect": {"target": "127.0.0.1:9"},
+    "CollisionModel": {"robot": "iiwa14"},
+    "CollisionModel.first_on": {"path": (HOME, HOME)},
+    **{f"CollisionModel.{verb}": {"body": "cube"} for verb in ("place", "hold", "release")},
+    "spiral": {"radius": 0.003},
+    "Spiral": {"radius": 0.003},
     "CollisionGuard.named": {"part": heptarm.CollisionGuard.of(20.0).parts[0], "state": None},
     **{
         f"{band}.{side}": {"low": 0.5, "high": 1.5}
@@ -107,6 +117,10 @@ ARGUMENTS: dict[str, dict[str, object]] = {
         for side in ("inside", "outside")
     },
 }
+#: A recording of three states.
+RECORDING = heptarm.Recording(
+    Path("run.mcap"), {"robot": "iiwa14"}, {"t": np.arange(3.0), "q": np.zeros((3, 7))}, (), (), True
+)
 #: Functions that only heptarm itself calls.
 INTERNAL = ("Output.on", "Params", "Params.replace", "Stats.of")
 _OPEN = "NaN keeps the default"
@@ -154,14 +168,19 @@ OPERATORS: dict[str, Callable[[Any, Any], object]] = {
 REPORTS = (
     *(
         "Arm",
+        "Clearance",
         "Collision",
         "Contact",
         "Fri",
+        "Gripper",
+        "Insertion",
         "JointServo",
         "MotionEvent",
         "MotionHandle",
         "Outcome",
         "PoseServo",
+        "Recording",
+        "TouchOnPath",
     ),
     *("Recovery", "Replay", "Report", "Result", "Scenario", "ServoStats", "State", "States", "Stats"),
 )

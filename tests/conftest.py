@@ -7,6 +7,9 @@ worker is left alone with something long at the end.
 
 from __future__ import annotations
 
+import os
+import shutil
+import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -19,7 +22,7 @@ from tests.long import LONG
 if TYPE_CHECKING:
     from heptarm import Arm
 
-pytest_plugins = ["tests.processes", "tests.hangs", "tests.retry"]
+pytest_plugins = ["tests.processes", "tests.hangs", "tests.retry", "tests.browser"]
 
 _LATE = ("slow", "browser")
 #: Folders with what takes long; training at the end of them, since it leaves little time to what runs beside it.
@@ -28,6 +31,13 @@ _LONG_FIRST = ("docs", "arm", "examples", "cli", "scenarios", "doubles", "ros", 
 # no timing assertions, above all on a busy machine
 settings.register_profile("heptarm", deadline=None)
 settings.load_profile("heptarm")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Black boxes of the tests, and of the programs that they start, go to a folder that is deleted at the end."""
+    folder = tempfile.mkdtemp(prefix="heptarm-black-box-")
+    os.environ["HEPTARM_BLACK_BOX"] = folder
+    config.add_cleanup(lambda: shutil.rmtree(folder, ignore_errors=True))
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -52,7 +62,7 @@ def _folder(item: pytest.Item) -> int:
 
 @dataclass(frozen=True)
 class RunningCabinet:
-    """A virtual cabinet that several tests share."""
+    """A virtual cabinet shared by several tests."""
 
     host: str
     port: int

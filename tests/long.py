@@ -11,5 +11,5 @@ LONG = os.environ.get("LONG", "") not in ("", "0")
 
 
 def longer(usual: T, long: T) -> T:
-    """A number, or whatever says how thorough a test is: the usual one, or that of the long run."""
+    """A number, or whatever states how thorough a test is: the usual one, or that of the long run."""
     return long if LONG else usual

@@ -1,7 +1,7 @@
 """Retries where this machine was too busy: a pytest plugin, and the one helper for all tests.
 
 FRI answers that come late and servo targets that do not come are faults that heptarm has to report, and on a machine
-that is busy with something else it is right to. Such a test says nothing about heptarm; it runs again. Each such case
+that is busy with something else it is right to. Such a test shows nothing about heptarm; it runs again. Each such case
 names its cause and is counted over the whole run with all its workers. More than a few mean that this machine is not
 what the tests take it for: then nothing is tried again any more, and the run fails. A check that fails is never tried
 again.

@@ -64,7 +64,7 @@ def test_require() -> None:
         require("heptarm_no_such_module", extra="sim")
 
 
-def test_require_tells_broken_from_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_require_reports_broken_from_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "heptarm_broken_module.py").write_text("import heptarm_not_there_either")
     monkeypatch.syspath_prepend(str(tmp_path))
     with pytest.raises(MissingExtra, match="cannot be imported .No module named 'heptarm_not_there_either'"):

@@ -13,30 +13,39 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+from tests.interrupts import ctrl_c_interrupts
+
 
 class Cabinet:
-    """Starts `python -m heptarm.sim.runtime.cabinet` on a free port."""
+    """Starts `python -m heptarm.sim.runtime.cabinet` on a free port.
 
-    def __init__(self, *options: str) -> None:
+    Args:
+        options: of its command line.
+        real_time: when it asks for real-time priority; latencies are measured with it.
+    """
+
+    def __init__(self, *options: str, real_time: str = "on") -> None:
         self._folder = tempfile.TemporaryDirectory()
         self._stats = Path(self._folder.name) / "stats.json"
         began = time.monotonic()
-        self.process = subprocess.Popen(
-            [
-                sys.executable,
-                "-m",
-                "heptarm.sim.runtime.cabinet",
-                "--port",
-                "0",
-                "--stats",
-                str(self._stats),
-                "--parent-pipe",
-                *options,
-            ],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
+        command = [
+            sys.executable,
+            "-m",
+            "heptarm.sim.runtime.cabinet",
+            "--port",
+            "0",
+            "--stats",
+            str(self._stats),
+            "--real-time",
+            real_time,
+        ]
+        with ctrl_c_interrupts():  # also where the benchmarks run in the background
+            self.process = subprocess.Popen(
+                [*command, "--parent-pipe", *options],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                text=True,
+            )
         assert self.process.stdout is not None
         ready = json.loads(self.process.stdout.readline() or '{"ready": false}')
         if not ready["ready"]:

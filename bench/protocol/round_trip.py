@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import subprocess
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,6 +12,7 @@ from pathlib import Path
 import heptarm as ha
 from bench.measure.blocks import Placement, by_turns, pin
 from bench.measure.cabinet import Cabinet
+from bench.measure.compiler import compiled
 from bench.measure.figure import Figure, benchmark
 from heptarm.wire import messages
 
@@ -20,6 +22,8 @@ REQUESTS, PAUSED, PAUSE = 4000, 200, 0.005
 KEY, KEY_LIMIT = "k7fh-9tqa-x2mn-p4cw-8r3e-vd6y-s5gj", 1.5
 #: Of the ratio; on one core nothing is waited for, and the work of the API itself weighs more.
 LIMITS = {"one_core": 2.5, "two_cores": 2.0}
+#: Limit of the ratio of the C++ client to the Python API.
+CPP_LIMIT = 1.2
 
 
 @benchmark("round_trip")
@@ -104,3 +108,39 @@ def round_trip_with_key() -> Iterator[Figure]:
             place,
         ):
             yield found.figure("round_trip_key", 50, "us", limit=KEY_LIMIT, scale=1e6)
+
+
+@benchmark("round_trip_cpp")
+def round_trip_cpp() -> Iterator[Figure]:
+    """Round trip of a request by the C++ client, beside the Python API."""
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        Cabinet() as cabinet,
+        Cabinet() as other,
+        ha.connect(other.target) as arm,
+        subprocess.Popen(
+            [str(compiled(Path(__file__).with_suffix(".cpp"), Path(folder))), f"127.0.0.1:{cabinet.port}"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        ) as program,
+    ):
+        assert program.stdin is not None and program.stdout is not None
+        if program.stdout.readline() != "ready\n":
+            raise RuntimeError("the C++ client did not connect")
+
+        def place(placement: Placement) -> None:
+            pin(cabinet.process.pid, placement.far)
+            pin(other.process.pid, placement.far)
+            pin(program.pid, placement.near)
+
+        def from_cpp() -> list[float]:
+            assert program.stdin is not None and program.stdout is not None
+            program.stdin.write(f"{REQUESTS}\n")
+            program.stdin.flush()
+            return [int(word) * 1e-9 for word in program.stdout.readline().split()]
+
+        for found in by_turns(from_cpp, lambda: _times(lambda: arm.set_override(1.0), REQUESTS, 0.0), place):
+            yield found.figure("round_trip_cpp", 50, "us", limit=CPP_LIMIT, scale=1e6)
+            yield found.figure("round_trip_cpp_p99", 99, "us", scale=1e6)
+        program.stdin.close()

@@ -1,4 +1,4 @@
-"""The nodes with rclpy and a roscore: accuracy of trajectories, regularity of joint states."""
+"""The nodes with rclpy and a roscore: accuracy of trajectories, lag of streams, regularity of joint states."""
 
 from __future__ import annotations
 
@@ -72,6 +72,19 @@ def _trajectory(ros: str) -> Iterator[Figure]:
             yield Figure(f"{name}_at_its_time", found["at_its_time"] * 1e3, "mrad")
 
 
+def _stream(ros: str) -> Iterator[Figure]:
+    if not _is_there(ros):
+        return
+    with Cabinet() as cabinet, Noise() as noise:
+        found = _peer(ros, "stream", cabinet.target)
+    for rate, values in found.items():
+        name = f"{ros}_stream_{rate}hz"
+        yield Figure(
+            f"{name}_lag", values["lag"] * 1e3, "ms", limit=40.0, disturbed=noise.is_noisy, detail=values
+        )
+        yield Figure(f"{name}_speed", values["speed"] * 100, "%", limit=5.0, disturbed=noise.is_noisy)
+
+
 def _states(ros: str) -> Iterator[Figure]:
     if not _is_there(ros):
         return
@@ -99,6 +112,18 @@ def ros2_trajectory() -> Iterator[Figure]:
 def ros1_trajectory() -> Iterator[Figure]:
     """FollowJointTrajectory over ROS 1, 100 points in 10 s: distance from each point, and from its time."""
     yield from _trajectory("ros1")
+
+
+@benchmark("ros2_stream")
+def ros2_stream() -> Iterator[Figure]:
+    """Single points on the trajectory topic of ROS 2, 0.3 rad in 4 s: lag, and error of the speed over its peak."""
+    yield from _stream("ros2")
+
+
+@benchmark("ros1_stream")
+def ros1_stream() -> Iterator[Figure]:
+    """Single points on the trajectory topic of ROS 1, 0.3 rad in 4 s: lag, and error of the speed over its peak."""
+    yield from _stream("ros1")
 
 
 @benchmark("ros2_states")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,9 @@ import numpy.typing as npt
 from bench.measure.blocks import BLOCKS, pin, placed, placements
 from bench.measure.noise import Noise
 from heptarm.ros.trajectory.goal import GoalOutcome, TrajectoryGoal, TrajectoryPoint
+from tests.conformance.case import arrives, rests
 from tests.conformance.client import Client
+from tests.conformance.streams import DURATION, measure, paced, single, swing
 
 Floats = npt.NDArray[np.float64]
 
@@ -120,6 +123,22 @@ def follow(client: Client, watch: Watch, execution: str) -> dict[str, Any]:
         "states": len(times),
         "longest_gap": float(gaps.max()),
     }
+
+
+def stream(client: Client, rate: float) -> dict[str, float]:
+    """Stream a swing of A7 by single points, and measure how the arm follows.
+
+    Args:
+        client: of the trajectory topic.
+        rate: of messages [Hz].
+    """
+    here = rests(client)
+    away = swing(client)
+    begin = client.now()
+    send = single(client, rate)
+    paced(client, rate, round(DURATION * rate), lambda k: send(k, here, away))
+    arrives(client, here + away)
+    return asdict(measure(client, begin, here, away, 0.0))
 
 
 def compare(states: Watch, bare: Watch, processes: Sequence[int]) -> dict[str, Any]:

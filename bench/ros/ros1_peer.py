@@ -1,6 +1,7 @@
 """The part of the ROS 1 figures that needs rospy; `bench.ros.nodes` starts it. Prints one JSON object.
 
 build/ros1/bin/python -m bench.ros.ros1_peer trajectory_servo|trajectory_fri TARGET
+build/ros1/bin/python -m bench.ros.ros1_peer stream TARGET
 build/ros1/bin/python -m bench.ros.ros1_peer states TARGET CABINET-PROCESS
 """
 
@@ -15,7 +16,7 @@ from typing import Any
 import rospy
 from sensor_msgs.msg import JointState
 
-from bench.ros.peer import RATE, Watch, compare, follow
+from bench.ros.peer import RATE, Watch, compare, follow, stream
 from tests.ros1.peer import Client, Core, NodeProcess, until
 
 
@@ -38,6 +39,16 @@ def trajectory(target: str, execution: str) -> dict[str, Any]:
     client = Client(None)
     client.ready()
     found = follow(client, watched("/joint_states"), execution)
+    _end(node)
+    return found
+
+
+def streams(target: str) -> dict[str, Any]:
+    """Measure how the arm follows streams of several rates."""
+    node = NodeProcess(target, state_rate=RATE)
+    client = Client(None)
+    client.ready()
+    found = {f"{rate:g}": stream(client, rate) for rate in (50.0, 100.0, 250.0)}
     _end(node)
     return found
 
@@ -79,6 +90,8 @@ if __name__ == "__main__":
         with Core("bench"):
             if what == "trajectory":
                 measured = trajectory(sys.argv[2], execution)
+            elif what == "stream":
+                measured = streams(sys.argv[2])
             else:
                 measured = states(sys.argv[2], int(sys.argv[3]))
         print(json.dumps(measured))

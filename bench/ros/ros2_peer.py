@@ -1,6 +1,7 @@
 """The part of the ROS 2 figures that needs rclpy; `bench.ros.nodes` starts it. Prints one JSON object.
 
 build/ros2/bin/python -m bench.ros.ros2_peer trajectory_servo|trajectory_fri TARGET
+build/ros2/bin/python -m bench.ros.ros2_peer stream TARGET
 build/ros2/bin/python -m bench.ros.ros2_peer states TARGET CABINET-PROCESS
 """
 
@@ -16,7 +17,7 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
-from bench.ros.peer import RATE, Watch, compare, follow
+from bench.ros.peer import RATE, Watch, compare, follow, stream
 from tests.ros2.peer import Client, NodeProcess, Ros, stamp, until
 
 
@@ -34,6 +35,18 @@ def trajectory(target: str, execution: str) -> dict[str, Any]:
     client = Client(ros, None)
     client.ready()
     found = follow(client, watched(ros, "/joint_states"), execution)
+    node.finish()
+    ros.close()
+    return found
+
+
+def streams(target: str) -> dict[str, Any]:
+    """Measure how the arm follows streams of several rates."""
+    ros = Ros("bench")
+    node = NodeProcess(target, state_rate=RATE)
+    client = Client(ros, None)
+    client.ready()
+    found = {f"{rate:g}": stream(client, rate) for rate in (50.0, 100.0, 250.0)}
     node.finish()
     ros.close()
     return found
@@ -76,6 +89,8 @@ if __name__ == "__main__":
     what, _, execution = sys.argv[1].partition("_")
     if what == "publish":
         publish()
+    elif what == "stream":
+        print(json.dumps(streams(sys.argv[2])))
     elif what == "trajectory":
         print(json.dumps(trajectory(sys.argv[2], execution)))
     else:

@@ -68,7 +68,7 @@ def paced(
             loop.stop()
         prepare()
 
-    loop = RealtimeLoop(shared, tick)
+    loop = RealtimeLoop(shared, tick, real_time="on")
     loop.run()
     return costs
 

@@ -226,7 +226,7 @@ class Soak:
                     arm.move(motion)
                 except ha.HeptarmError:
                     continue
-                raise AssertionError(f"{motion} was carried out")
+                raise AssertionError(f"{motion!r} was carried out")
 
     def servo(self, arm: ha.Arm) -> None:
         """A stream of joint positions."""

@@ -34,6 +34,9 @@ from .errors import (
     CollisionDetected as CollisionDetected,
 )
 from .errors import (
+    CollisionForeseen as CollisionForeseen,
+)
+from .errors import (
     CommandRejected as CommandRejected,
 )
 from .errors import (
@@ -44,6 +47,9 @@ from .errors import (
 )
 from .errors import (
     HeptarmError as HeptarmError,
+)
+from .errors import (
+    InsertionFailed as InsertionFailed,
 )
 from .errors import (
     LimitError as LimitError,
@@ -108,8 +114,35 @@ from .errors import (
 from .errors import (
     VersionMismatch as VersionMismatch,
 )
+from .record.recorder import (
+    Recorder as Recorder,
+)
+from .record.recording import (
+    Recording as Recording,
+)
+from .record.recording import (
+    load as load,
+)
+from .sim.collision import (
+    CollisionModel as CollisionModel,
+)
+from .skills.gripper import (
+    Gripper as Gripper,
+)
+from .skills.gripper import (
+    TwoSignalGripper as TwoSignalGripper,
+)
+from .skills.insertion import (
+    Insertion as Insertion,
+)
 from .skills.replay import (
     Replay as Replay,
+)
+from .values.clearance import (
+    Clearance as Clearance,
+)
+from .values.clearance import (
+    TouchOnPath as TouchOnPath,
 )
 from .values.condition.collision import (
     Collision as Collision,
@@ -119,6 +152,9 @@ from .values.condition.collision import (
 )
 from .values.condition.contact import (
     Contact as Contact,
+)
+from .values.condition.reaction import (
+    Retreat as Retreat,
 )
 from .values.condition.trigger import (
     Trigger as Trigger,
@@ -149,6 +185,12 @@ from .values.motion.ptp import (
 )
 from .values.motion.ptp import (
     ptp_home as ptp_home,
+)
+from .values.motion.search import (
+    Spiral as Spiral,
+)
+from .values.motion.search import (
+    spiral as spiral,
 )
 from .values.motion.spline import (
     ellipse as ellipse,

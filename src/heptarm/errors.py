@@ -14,11 +14,13 @@
     │   ├── LimitError                      outside a range
     │   │   └── Unreachable                 no joint position reaches the pose
     │   ├── ModeConflict                    conflicts with what is running
+    │   ├── CollisionForeseen               `arm.collision_check` found bodies that would touch
     │   └── NotInControl                    this client does not control the robot
     ├── MotionError                         a motion did not end as commanded; has its result
     │   ├── MotionAborted                   it was stopped early
     │   │   └── CollisionDetected           by a collision guard; `collision` has joint and torque
     │   ├── NoContact                       no contact was found
+    │   ├── InsertionFailed                 a part did not go into its hole
     │   └── ArrivalError                    it ended short of its target
     ├── StreamError
     │   ├── Starved                         no target within the watchdog time
@@ -36,7 +38,17 @@ An error names what was refused, the value with its unit, the allowed range and 
 from __future__ import annotations
 
 import importlib
-from typing import Any
+import importlib.util
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+_Error = TypeVar("_Error", bound="HeptarmError")
+
+#: The operating system.
+_PLATFORM = sys.platform
 
 
 class HeptarmError(Exception):
@@ -68,10 +80,25 @@ class HeptarmError(Exception):
         self.value = value
         self.allowed = allowed
         self.hint = hint
+        self._black_box: Callable[[], Path | None] | None = None
 
     def __str__(self) -> str:
         """The text and, if there is one, the hint."""
         return f"{self.text} ({self.hint})" if self.hint else self.text
+
+    @property
+    def black_box(self) -> Path | None:
+        """Recording of the last 30 s before the error, for `heptarm.load`; None: none was written.
+
+        Errors that end a motion, safety stops and lost connections have one. Reading it waits until it is written,
+        half a second at most for what happens after the error.
+        """
+        return None if self._black_box is None else self._black_box()
+
+    def with_black_box(self: _Error, source: HeptarmError | Callable[[], Path | None] | None) -> _Error:
+        """The same error with the black box of another error, or with one that a function returns."""
+        self._black_box = source._black_box if isinstance(source, HeptarmError) else source
+        return self
 
 
 class ConnectFailed(HeptarmError, ConnectionError):
@@ -116,6 +143,20 @@ class Unreachable(LimitError):
 
 class ModeConflict(CommandRejected):
     """The request conflicts with what is running."""
+
+
+class CollisionForeseen(CommandRejected):
+    """The collision check of the arm found that bodies would touch on the path; nothing was sent.
+
+    Attributes:
+        touch: the bodies, and where on the path.
+        motion: index of the motion in the program.
+    """
+
+    def __init__(self, text: str, *, touch: Any = None, motion: int = 0, **details: Any) -> None:
+        super().__init__(text, **details)
+        self.touch = touch
+        self.motion = motion
 
 
 class NotInControl(CommandRejected):
@@ -166,6 +207,18 @@ class NoContact(MotionError):
     """A motion until contact ended without contact."""
 
 
+class InsertionFailed(MotionError):
+    """A part did not go into its hole.
+
+    Attributes:
+        depth: how deep it is behind the surface that it touched [m].
+    """
+
+    def __init__(self, text: str, *, depth: float = 0.0, **details: Any) -> None:
+        super().__init__(text, **details)
+        self.depth = depth
+
+
 class ArrivalError(MotionError):
     """The motion ended short of its target."""
 
@@ -209,6 +262,64 @@ class Timeout(HeptarmError, TimeoutError):
 
 class MissingExtra(HeptarmError, ImportError):
     """An optional package is not installed."""
+
+
+#: A class of an exception of Java, and the colon behind it.
+_JAVA = re.compile(r"(?:\b[a-z]\w*\.)+[A-Z]\w*(?:Exception|Error)\b(?:: ?|(?=[\s.,;)]|$))")
+
+
+def without_java(text: str) -> str:
+    """A text without the names of Java's exceptions, which say nothing to people; empty if nothing is left."""
+    return _JAVA.sub("", text).strip()
+
+
+#: Packages that each extra of heptarm brings, as they are imported.
+EXTRAS = {
+    "sim": ("mujoco", "ruckig", "jpype"),
+    "viz": ("viser", "matplotlib", "trimesh"),
+    "rl": ("torch", "gymnasium", "PIL"),
+    "record": ("mcap",),
+}
+
+
+def missing_extra(module: str) -> MissingExtra | None:
+    """The error of a package that cannot be imported, if an extra of heptarm brings it; None for any other package."""
+    root = module.partition(".")[0]
+    for extra, names in EXTRAS.items():
+        if root in names:
+            return MissingExtra(
+                f"this needs the package {root!r}, which is not installed",
+                parameter=root,
+                hint=f"pip install 'heptarm[{extra}]'",
+            )
+    return None
+
+
+def require_extra(extra: str) -> None:
+    """Check that all packages of an extra are installed, without importing them.
+
+    Raises:
+        MissingExtra: one is not; the hint is the command that installs it.
+    """
+    for name in EXTRAS[extra]:
+        error = missing_extra(name) if importlib.util.find_spec(name) is None else None
+        if error is not None:
+            raise error
+
+
+def refuse_windows(what: str) -> None:
+    """Check that something that was written for Linux and macOS does not run on Windows.
+
+    Raises:
+        CommandRejected: this is Windows.
+    """
+    if _PLATFORM == "win32":
+        raise CommandRejected(
+            f"{what} runs on Linux, this is Windows",
+            parameter="platform",
+            value=_PLATFORM,
+            hint="use WSL (wsl --install); a robot can be controlled from Windows, but not over FRI",
+        )
 
 
 def require(module: str, *, extra: str) -> Any:

@@ -1,6 +1,6 @@
 """Control modes, as in `from heptarm.modes import JointImpedance`."""
 
-from heptarm.values.mode.compliance import compliance
+from heptarm.values.mode.compliance import compliance, pressing
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.mode.mode import HandGuiding, Mode, Position
 from heptarm.values.mode.sine import SineImpedance
@@ -13,4 +13,5 @@ __all__ = [
     "Position",
     "SineImpedance",
     "compliance",
+    "pressing",
 ]

@@ -18,7 +18,7 @@ HOME = ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0))
 # ------------------------------------------------------------------------------------- connecting
 
 
-def test_connecting_tells_the_robot_and_its_limits(peer: Peer) -> None:
+def test_connecting_reports_the_robot_and_its_limits(peer: Peer) -> None:
     with peer.arm() as arm:
         assert arm.robot.name == "iiwa14" and arm.robot.q_max[1] == 2.0
         assert arm.capabilities == ("ptp", "lin", "lin_rel", "hold")
@@ -49,7 +49,7 @@ def test_an_observer_neither_takes_control_nor_stops_the_arm(peer: Peer) -> None
     assert "TakeControl" not in kinds and "Stop" not in kinds
 
 
-def test_one_octet_at_a_time() -> None:
+def test_one_byte_at_a_time() -> None:
     peer = Peer(chunk=1)
     peer.runs(1, peer.finished(1))
     with peer.arm() as arm:
@@ -102,7 +102,7 @@ def test_the_key_is_proved() -> None:
         peer.close()
 
 
-def test_a_cabinet_that_says_nothing() -> None:
+def test_a_cabinet_that_sends_nothing() -> None:
     peer = Peer()
     peer.expect(wire.Hello)
     with pytest.raises(ha.ConnectFailed, match="answers nothing"):

@@ -39,7 +39,7 @@ def arm(cabinet: RunningCabinet) -> Iterator[Arm]:
 def silence(arm: Arm) -> Iterator[None]:
     """A block in which any message to the cabinet but a ping is an error."""
     link = arm.connection.link
-    send, stream = link._send, link.send_one_way
+    send, stream = link._send, link.send_target
 
     def refuse(message: Any, *arguments: Any) -> Any:
         if isinstance(message, wire.Ping):
@@ -49,11 +49,11 @@ def silence(arm: Arm) -> Iterator[None]:
     def refuse_target(*_: Any, **__: Any) -> NoReturn:
         raise AssertionError("sends a target")
 
-    link._send, link.send_one_way = refuse, refuse_target  # type: ignore[method-assign]
+    link._send, link.send_target = refuse, refuse_target  # type: ignore[method-assign]
     try:
         yield
     finally:
-        link._send, link.send_one_way = send, stream  # type: ignore[method-assign]
+        link._send, link.send_target = send, stream  # type: ignore[method-assign]
 
 
 def settings_of(arm: Arm) -> tuple[object, ...]:

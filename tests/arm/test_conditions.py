@@ -53,10 +53,10 @@ def test_a_line_down_until_it_touches(arm: ha.Arm) -> None:
     assert lifted.arrived and lifted.stopped_by is None and lifted.fired_at is None
 
 
-def test_touching_softly(arm: ha.Arm) -> None:
-    soft = CartesianImpedance(stiffness=(1000, 1000, 500, 100, 100, 100))
+def test_touching_gently(arm: ha.Arm) -> None:
+    compliant = CartesianImpedance(stiffness=(1000, 1000, 500, 100, 100, 100))
     down = ha.lin_rel(z=-0.5, frame="base", speed_mps=0.05)
-    result = arm.move(down, mode=soft, until=TOUCH & (force > 5))
+    result = arm.move(down, mode=compliant, until=TOUCH & (force > 5))
     assert str(result.stopped_by) == "(force along z of base > 10 N & force > 5 N)"
     assert arm.wait_for_rest().wrench.force[2] < 60.0
 

@@ -31,7 +31,7 @@ from tests.conftest import RunningCabinet
 from tests.retry import answers_late, retry
 
 A7 = np.array([0, 0, 0, 0, 0, 0, 1.0])
-SOFT = CartesianImpedance(stiffness=(1500, 1500, 1500, 150, 150, 150))
+COMPLIANT = CartesianImpedance(stiffness=(1500, 1500, 1500, 150, 150, 150))
 #: Long enough for a busy machine.
 LONG = 10
 
@@ -86,9 +86,9 @@ def test_a_law_moves_the_arm_and_its_parameters_change_while_it_runs(arm: ha.Arm
         turned = max(s.q[6] - start[6] for s in seen)
     assert 0.03 < turned < 0.06
     # the arm is at the commanded position at most two messages later
-    told = np.array([s.q_sent for s in seen])
+    reported = np.array([s.q_sent for s in seen])
     found = np.array([s.q for s in seen])
-    assert min(np.abs(found[2:] - told[k : len(told) - 2 + k]).max() for k in range(3)) < 3e-3
+    assert min(np.abs(found[2:] - reported[k : len(reported) - 2 + k]).max() for k in range(3)) < 3e-3
     assert rt.result is not None and rt.result.cause is ha.Cause.CANCELLED
     assert rt.stats.commanded > 100 and not rt.active
     assert "quality" in rt.report and "latency" in rt.report
@@ -140,7 +140,7 @@ def test_torques_bend_the_springs_of_joint_impedance(arm: ha.Arm) -> None:
 def test_a_wrench_bends_those_of_cartesian_impedance(arm: ha.Arm) -> None:
     before = arm.state.pose.xyz
     params = {"force": [0.0, 0.0, 15.0]}
-    with arm.using(SOFT), arm.fri("wrench", period_ms=LONG, law=press, params=params) as rt:
+    with arm.using(COMPLIANT), arm.fri("wrench", period_ms=LONG, law=press, params=params) as rt:
         assert rt.wait(2.0)
         moved = arm.state.pose.xyz - before
     assert 0.007 < moved[2] < 0.013 and np.abs(moved[:2]).max() < 0.003
@@ -168,7 +168,7 @@ def test_a_monitor_is_a_source_of_states_beside_any_motion(arm: ha.Arm) -> None:
     ("kind", "mode", "code"),
     [
         ("torque", None, Code.MODE_CONFLICT),
-        ("torque", SOFT, Code.MODE_CONFLICT),
+        ("torque", COMPLIANT, Code.MODE_CONFLICT),
         ("wrench", None, Code.MODE_CONFLICT),
         ("wrench", JointImpedance(300.0), Code.MODE_CONFLICT),
         ("position", SineImpedance.sine("z", frequency=1.0, amplitude=5.0), Code.MODE_CONFLICT),
@@ -272,7 +272,7 @@ def test_both_sides_use_the_interface_of_their_peer_only(arm: ha.Arm, cabinet: R
 
 
 @pytest.mark.parametrize("kind", ["position", "monitor"])
-def test_when_nothing_arrives_the_error_says_where_to_look(arm: ha.Arm, kind: str) -> None:
+def test_when_nothing_arrives_the_error_reports_where_to_look(arm: ha.Arm, kind: str) -> None:
     with (
         pytest.raises(ha.ConnectFailed, match="no FRI message arrived.*192.0.2.7.*firewall"),
         arm.fri(kind, period_ms=LONG, host="192.0.2.7", timeout=0.3),  # type: ignore[arg-type]
@@ -282,7 +282,7 @@ def test_when_nothing_arrives_the_error_says_where_to_look(arm: ha.Arm, kind: st
         assert rt.next() is not None
 
 
-def test_another_version_is_told_in_plain_words(arm: ha.Arm) -> None:
+def test_another_version_is_reported_in_plain_words(arm: ha.Arm) -> None:
     with (
         pytest.raises(ha.ConnectFailed, match=r"the other side speaks FRI 1\.x.*this side FRI 2.7"),
         arm.fri("position", period_ms=LONG, version="2.7", timeout=2.0),
@@ -296,7 +296,7 @@ def test_another_version_is_told_in_plain_words(arm: ha.Arm) -> None:
 
 
 @patient
-def test_a_law_that_fails_brakes_the_arm_and_is_told_of(arm: ha.Arm) -> None:
+def test_a_law_that_fails_brakes_the_arm_and_is_reported(arm: ha.Arm) -> None:
     with (
         pytest.raises(ha.StreamError, match=r"the law failed.*ZeroDivisionError: nothing to divide by.*line"),
         arm.fri("position", period_ms=LONG, law=fail) as rt,

@@ -104,7 +104,7 @@ def test_what_ended_an_overlay_rises_at_the_end_of_the_block(
         assert type(error.value) is kind and error.value.code == int(code)
 
 
-def test_the_guards_share_in_a_bad_end_is_told(peer: Peer) -> None:
+def test_the_guards_part_in_a_bad_end_is_reported(peer: Peer) -> None:
     with (
         speaking(peer, number=7, state=SessionState.COMMANDING_ACTIVE),
         peer.arm(timeout=20.0, watchdog=5.0) as arm,
@@ -140,7 +140,9 @@ def test_a_monitor_that_the_cabinet_ends(peer: Peer, quality: str, text: str, ki
         assert rt.next() is not None
         peer.tell(changed(9, States.IDLE, wire.FriQuality[quality], 0, text))
         assert not rt.wait(30.0)
-        peer.tell(changed(9, States.MONITORING_READY, wire.FriQuality.GOOD))  # late event: the session stays ended
+        peer.tell(
+            changed(9, States.MONITORING_READY, wire.FriQuality.GOOD)
+        )  # late event: the session stays ended
         assert rt.next() is None
 
 
@@ -168,7 +170,7 @@ def test_a_link_that_breaks_ends_the_session(peer: Peer) -> None:
         arm.close()
 
 
-def test_a_cabinet_without_the_option_says_which(peer: Peer) -> None:
+def test_a_cabinet_without_the_option_reports_which(peer: Peer) -> None:
     peer.changes["capabilities"] = ("ptp", "hold")
     with (
         peer.arm(timeout=20.0, watchdog=5.0) as arm,

@@ -39,12 +39,12 @@ def arm(table: ha.Arm) -> Iterator[ha.Arm]:
     table.operator.push([0, 0, 0], duration=0.0)
 
 
-def lead(arm: ha.Arm, push: list[float], way: float) -> None:
+def push_along(arm: ha.Arm, push: list[float], covered: float) -> None:
     """Push until a joint has turned by this angle [rad]."""
     before = arm.state.q
     arm.operator.push(push, duration=300.0)
     try:
-        arm.wait_until(lambda state: np.abs(state.q - before).max() > way, timeout=120.0)
+        arm.wait_until(lambda state: np.abs(state.q - before).max() > covered, timeout=120.0)
     finally:
         arm.operator.push([0, 0, 0], duration=0.0)
     arm.wait_until(lambda state: np.abs(state.wrench.force).max() < 1.0)
@@ -60,7 +60,7 @@ def test_led_by_hand_until_the_switch_is_let_go(arm: ha.Arm) -> None:
     arm.wait_until(lambda state: state.mode == HandGuiding())
     arm.operator.guide()
     assert arm.wait_until(lambda state: state.safety.hand_guiding_switch).safety.enabling_switch
-    lead(arm, [0, 15, 15], 0.2)
+    push_along(arm, [0, 15, 15], 0.2)
     assert not handle.done
     arm.operator.let_go()
     result = handle.wait(timeout=20.0)
@@ -115,7 +115,7 @@ def test_led_precisely_along_one_axis(arm: ha.Arm) -> None:
     start = arm.wait_for_rest().pose
     handle = arm.start(ha.hold(30.0), mode=compliance("y", frame="base"))
     assert handle.wait_started(20.0)
-    lead(arm, [10, 10, 10], 0.1)
+    push_along(arm, [10, 10, 10], 0.1)
     handle.cancel()
     handle.wait(timeout=20.0)
     end = arm.wait_for_rest().pose
@@ -194,7 +194,7 @@ def test_taps(arm: ha.Arm) -> None:
 # ------------------------------------------------------------------------------------------ the guard
 
 
-def test_a_guard_stops_at_a_collision_and_says_which_joint(arm: ha.Arm) -> None:
+def test_a_guard_stops_at_a_collision_and_reports_which_joint(arm: ha.Arm) -> None:
     met: list[ha.Collision] = []
     with arm.guarded(arm.collision_guard(10.0), on_collision=met.append):
         assert arm.move(ha.lin_rel(z=0.02, frame="base", speed_mps=0.1)).arrived
@@ -256,7 +256,7 @@ def test_taught_by_hand_and_replayed(arm: ha.Arm) -> None:
     def hand() -> None:
         arm.operator.guide()
         arm.wait_until(lambda state: state.motion is not None and state.motion.active)
-        lead(arm, [0, 6, 6], 0.1)
+        push_along(arm, [0, 6, 6], 0.1)
         arm.operator.let_go()
 
     arm.wait_for_rest()
@@ -265,16 +265,16 @@ def test_taught_by_hand_and_replayed(arm: ha.Arm) -> None:
     whole = arm.teach(ha.hand_guide(joint_velocity=0.5), timeout=60.0)
     person.join()
     assert whole.robot == "iiwa14" and np.ptp(whole.q, axis=0).max() > 0.05
-    way = whole.trimmed().thinned()
-    assert len(way) < len(whole)
-    shares: list[float] = []
-    replay = arm.replay(way, by="spline", speed_scaling=0.3, on_progress=shares.append)
-    assert shares == sorted(shares) and shares[-1] == 1.0
+    covered = whole.trimmed().thinned()
+    assert len(covered) < len(whole)
+    fractions: list[float] = []
+    replay = arm.replay(covered, by="spline", speed_scaling=0.3, on_progress=fractions.append)
+    assert fractions == sorted(fractions) and fractions[-1] == 1.0
     assert replay.result.arrived and replay.deviation < 0.05
-    assert np.abs(arm.wait_for_rest().q - way.q[-1]).max() < 2e-3
-    replay = retry(lambda: arm.replay(way, speed_scaling=0.5), starved)
+    assert np.abs(arm.wait_for_rest().q - covered.q[-1]).max() < 2e-3
+    replay = retry(lambda: arm.replay(covered, speed_scaling=0.5), starved)
     assert replay.result.arrived and replay.deviation < 0.3
-    assert np.abs(arm.wait_for_rest().q - way.q[-1]).max() < 0.01
+    assert np.abs(arm.wait_for_rest().q - covered.q[-1]).max() < 0.01
 
 
 def test_what_cannot_be_replayed(arm: ha.Arm) -> None:
@@ -289,4 +289,4 @@ def test_what_cannot_be_replayed(arm: ha.Arm) -> None:
     with pytest.raises(ha.ShapeError, match="by must be"):
         arm.replay(ha.Trajectory.of([0.0, 1.0], [there, away]), by="foot")  # type: ignore[arg-type]
     with pytest.raises(ha.ShapeError, match="trajectory must be a Trajectory"):
-        arm.replay("way.npz")  # type: ignore[arg-type]
+        arm.replay("path.npz")  # type: ignore[arg-type]

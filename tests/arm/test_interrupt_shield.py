@@ -45,7 +45,7 @@ def test_shields_may_be_nested() -> None:
         outer.release()
 
 
-def test_the_programs_own_handler_hears_of_it() -> None:
+def test_the_programs_own_handler_receives_it() -> None:
     heard: list[int] = []
     signal.signal(signal.SIGINT, lambda number, _: heard.append(number))
     shield = InterruptShield()

@@ -130,7 +130,7 @@ def test_keys_of_the_smartpad(arm: ha.Arm) -> None:
         arm.pad.set_key(4, "x")
     with pytest.raises(ha.ShapeError):
         arm.pad.set_key(1, "x", led="pink")  # type: ignore[arg-type]
-    arm.pad.show("a program says hello")
+    arm.pad.show("a program sends hello")
     with pytest.raises(ha.ShapeError):
         arm.pad.show("x" * 600)
 

@@ -37,7 +37,7 @@ def test_a_lost_connection_ends_motions_and_nothing_goes_on_by_itself(peer: Peer
     arm.close()
 
 
-def test_stop_finds_its_way_when_the_connection_is_lost(peer: Peer) -> None:
+def test_stop_gets_through_when_the_connection_is_lost(peer: Peer) -> None:
     arm = peer.arm()
     peer.drop()
     arm.stop()
@@ -68,7 +68,7 @@ def test_silence_is_noticed() -> None:
     peer.close()
 
 
-def test_heartbeats_go_both_ways() -> None:
+def test_heartbeats_go_both_directions() -> None:
     peer = Peer(heartbeat=0.2)
     with peer.arm(rate=0.0) as arm:
         count = arm.connection.link.offset.count  # type: ignore[union-attr]
@@ -82,7 +82,7 @@ def test_heartbeats_go_both_ways() -> None:
     peer.close()
 
 
-def test_a_cabinet_that_ends_says_so(peer: Peer) -> None:
+def test_a_cabinet_that_ends_reports_it(peer: Peer) -> None:
     arm = peer.arm()
     peer.tell(wire.Goodbye(code=Code.SHUTTING_DOWN, text="bye"))
     with pytest.raises(ha.ConnectionLost, match="bye"):

@@ -13,7 +13,7 @@ from tests.simulators import FASTER
 #: Of the shared virtual cabinet.
 SPEED = FASTER
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
-SOFT = (500.0, 1000.0, 2000.0, 200.0, 200.0, 200.0)
+COMPLIANT = (500.0, 1000.0, 2000.0, 200.0, 200.0, 200.0)
 
 
 def pushed(arm: ha.Arm, seconds: float, *, after: float = 0.0) -> np.ndarray:
@@ -37,15 +37,17 @@ def pushed(arm: ha.Arm, seconds: float, *, after: float = 0.0) -> np.ndarray:
 def test_a_constant_force_bends_the_arm_by_force_over_stiffness(
     arm: ha.Arm, direction: str, index: int
 ) -> None:
-    mode = SineImpedance.force(**{direction: 20.0}, base=CartesianImpedance(SOFT, frame="base"))
+    mode = SineImpedance.force(**{direction: 20.0}, base=CartesianImpedance(COMPLIANT, frame="base"))
     handle = arm.start(ha.hold(), mode=mode)
-    arm.wait_until(lambda state: abs(state.pose.xyz - state.pose_cmd.xyz)[index] > 0.8 * 20.0 / SOFT[index])
-    way = pushed(arm, 1.5)
+    arm.wait_until(
+        lambda state: abs(state.pose.xyz - state.pose_cmd.xyz)[index] > 0.8 * 20.0 / COMPLIANT[index]
+    )
+    travel = pushed(arm, 1.5)
     handle.cancel()
     handle.wait()
     expected = np.zeros(3)
-    expected[index] = 20.0 / SOFT[index]
-    assert way[-1] == pytest.approx(expected, abs=0.02 * 20.0 / SOFT[index] + 2e-4)
+    expected[index] = 20.0 / COMPLIANT[index]
+    assert travel[-1] == pytest.approx(expected, abs=0.02 * 20.0 / COMPLIANT[index] + 2e-4)
 
 
 def test_an_additional_force_and_one_that_swings(arm: ha.Arm) -> None:
@@ -54,12 +56,12 @@ def test_an_additional_force_and_one_that_swings(arm: ha.Arm) -> None:
     )
     mode = SineImpedance.sine("y", frequency=0.5, amplitude=40.0, base=base)
     handle = arm.start(ha.hold(), mode=mode)
-    way = pushed(arm, 3.0, after=0.5)
+    travel = pushed(arm, 3.0, after=0.5)
     handle.cancel()
     handle.wait()
-    assert way[:, 1].max() == pytest.approx(0.02, abs=2e-3)
-    assert way[:, 1].min() == pytest.approx(-0.02, abs=2e-3)
-    assert way[-1, 2] == pytest.approx(-0.01, abs=1e-3)
+    assert travel[:, 1].max() == pytest.approx(0.02, abs=2e-3)
+    assert travel[:, 1].min() == pytest.approx(-0.02, abs=2e-3)
+    assert travel[-1, 2] == pytest.approx(-0.01, abs=1e-3)
 
 
 def test_motions_are_done_in_every_mode_and_the_arm_is_stiff_afterwards(arm: ha.Arm) -> None:
@@ -74,7 +76,7 @@ def test_motions_are_done_in_every_mode_and_the_arm_is_stiff_afterwards(arm: ha.
         assert arm.move(ha.ptp(HOME)).residual < 2e-3
 
 
-def test_a_limit_on_the_deviation_stops_the_motion_and_says_so(arm: ha.Arm) -> None:
+def test_a_limit_on_the_deviation_stops_the_motion_and_reports_it(arm: ha.Arm) -> None:
     base = CartesianImpedance(
         (500.0,) * 3 + (200.0,) * 3, max_deviation=(0.01, 0.01, 0.01, 1, 1, 1), frame="base"
     )

@@ -213,7 +213,7 @@ def test_handles_can_be_awaited(peer: Peer) -> None:
         assert asyncio.run(program(arm)).arrived
 
 
-def test_a_callback_hears_of_the_end(peer: Peer) -> None:
+def test_a_callback_receives_the_end(peer: Peer) -> None:
     heard = threading.Event()
     peer.runs(1, peer.finished(1))
     with peer.arm() as arm:
@@ -245,10 +245,10 @@ def test_ctrl_c_stops_the_arm_and_goes_on(peer: Peer) -> None:
         timer.join()
 
 
-# ----------------------------------------------------------------------- what a program is told
+# ----------------------------------------------------------------------- what a program receives
 
 
-def test_a_handle_that_failed_says_why_and_its_callback_receives_it(peer: Peer) -> None:
+def test_a_handle_that_failed_reports_why_and_its_callback_receives_it(peer: Peer) -> None:
     peer.runs(1, later(0.05, peer.finished(1, wire.Cause.SAFETY, code=int(Code.SAFETY_STOP))))
     peer.runs(2, peer.finished(2))
     seen: list[ha.HeptarmError | None] = []

@@ -41,7 +41,7 @@ def up_to(states: States, last: ha.State) -> Iterator[ha.State]:
 
 
 def passes(places: Array, point: Array) -> float:
-    """How near the way through places, shape (n, 3), comes to a point [m]."""
+    """How near the path through places, shape (n, 3), comes to a point [m]."""
     begin, step = places[:-1], np.diff(places, axis=0)
     length = np.maximum((step**2).sum(axis=1), 1e-18)
     fraction = np.clip(((point - begin) * step).sum(axis=1) / length, 0.0, 1.0)
@@ -66,27 +66,27 @@ def test_an_arc_and_its_orientation(arm: Arm) -> None:
     assert arm.wait_for_rest().pose.angle_to(start) < 1e-3
 
 
-def test_a_blended_program_does_not_stop_and_tells_of_every_motion(arm: Arm) -> None:
+def test_a_blended_program_does_not_stop_and_reports_every_motion(arm: Arm) -> None:
     start = arm.wait_for_rest().pose
     corners = [(0.0, 0.12), (0.08, 0.12), (0.08, 0.0), (0.0, 0.0)]
     sides = [ha.lin(moved(start, x, y), speed_mps=SIDE_SPEED, blend_m=0.02) for x, y in corners]
     states: States = arm.states(size=100_000)
     handle = arm.start(sides)
-    shares = []
+    fractions = []
     while not handle.done:
         arm.wait_until(lambda state, last=arm.state.stamp: state.stamp > last)  # type: ignore[misc]
-        shares.append(handle.progress)
+        fractions.append(handle.progress)
     result = handle.wait()
     assert result.arrived and result.item == 3
-    assert (np.diff(shares) > -0.02).all() and handle.progress == 1.0
+    assert (np.diff(fractions) > -0.02).all() and handle.progress == 1.0
     speeds = []
     last = None
     for state in up_to(states, arm.wait_for_rest()):
         pose = state.groups.pose
         assert pose is not None
         if last is not None and pose.stamp > last.stamp:
-            way = pose.pose.distance_to(last.pose)
-            speeds.append(way / (pose.stamp - last.stamp) * 1e9)
+            travel = pose.pose.distance_to(last.pose)
+            speeds.append(travel / (pose.stamp - last.stamp) * 1e9)
         last = pose
     fast = np.flatnonzero(np.array(speeds) > 0.8 * SIDE_SPEED)
     assert len(fast) > 10 and min(speeds[fast[0] : fast[-1]]) > 0.3 * SIDE_SPEED

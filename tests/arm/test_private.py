@@ -70,7 +70,7 @@ def test_a_simulator_that_dies_is_a_lost_connection(private_target: str) -> None
     arm.close()
 
 
-def test_a_simulator_that_does_not_start_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_simulator_that_does_not_start_reports_why(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "")
     monkeypatch.setenv("JAVA_HOME", "/nonexistent")
     monkeypatch.setenv("PYTHONPATH", "/nonexistent")

@@ -44,16 +44,16 @@ def expected(arm: Arm, q: Array) -> Array:
     return SENSOR * np.sqrt(np.diag(inverse))
 
 
-def test_the_estimate_of_forces_says_how_far_it_may_be_off(arm: Arm) -> None:
+def test_the_estimate_of_forces_reports_how_far_it_may_be_off(arm: Arm) -> None:
     state = settled(arm)
-    told = np.concatenate([state.wrench.force_inaccuracy, state.wrench.torque_inaccuracy])
-    assert told == pytest.approx(expected(arm, state.q), rel=0.01)
+    reported = np.concatenate([state.wrench.force_inaccuracy, state.wrench.torque_inaccuracy])
+    assert reported == pytest.approx(expected(arm, state.q), rel=0.01)
     assert state.wrench.valid(force=5.0, torque=5.0)
     turned = arm.wrench("flange", axes="flange")
     assert (turned.force_inaccuracy > 0.0).all()
 
 
-def test_near_a_singularity_it_is_worthless_and_says_so(arm: Arm) -> None:
+def test_near_a_singularity_it_is_worthless_and_reports_it(arm: Arm) -> None:
     arm.move(ptp(deg(0, 30, 0, -1, 0, 60, 0)))
     assert not settled(arm).wrench.valid()
     arm.move(ptp(deg(0, 30, 0, -90, 0, 60, 0)))

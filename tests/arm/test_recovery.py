@@ -30,7 +30,7 @@ def test_it_tries_again_while_there_is_time(peer: Peer) -> None:
         assert arm.recover(timeout=30.0).done
 
 
-def test_a_cabinet_that_cannot_recover_says_so(peer: Peer) -> None:
+def test_a_cabinet_that_cannot_recover_reports_it(peer: Peer) -> None:
     peer.expect(wire.Recover, wire.Rejected(code=Code.UNSUPPORTED, text="not here"))
     with peer.arm() as arm, pytest.raises(ha.CommandRejected, match="not here"):
         arm.recover()
@@ -62,7 +62,7 @@ def test_a_stiff_arm_that_ends_short_of_its_target_has_not_arrived(peer: Peer) -
     assert "blocks the arm" in short.value.hint
 
 
-def test_a_soft_arm_may_yield(peer: Peer) -> None:
+def test_a_compliant_arm_may_yield(peer: Peer) -> None:
     peer.runs(5, wire.MotionStarted(id=5, item=0), peer.finished(5, residual=0.1))
     with peer.arm() as arm:
         assert arm.move(HOME, mode=JointImpedance(300.0)).arrived

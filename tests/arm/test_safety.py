@@ -54,7 +54,7 @@ def under_way(arm: Arm, handle: ha.MotionHandle) -> ha.MotionHandle:
 
 
 @pytest.mark.parametrize(
-    ("fault", "says", "step"),
+    ("fault", "expected_text", "step"),
     [
         ("emergency_stop", "emergency stop", "release the emergency stop"),
         ("external_emergency_stop", "emergency stop", "release the emergency stop"),
@@ -62,12 +62,12 @@ def under_way(arm: Arm, handle: ha.MotionHandle) -> ha.MotionHandle:
         ("protective_stop", "safety function", "remove the cause of the safety stop"),
     ],
 )
-def test_a_stop_ends_what_runs_and_waits(safe: Arm, fault: str, says: str, step: str) -> None:
+def test_a_stop_ends_what_runs_and_waits(safe: Arm, fault: str, expected_text: str, step: str) -> None:
     handle = under_way(safe, safe.start(FAR))
     waiting = safe.start(ptp(HOME))
     safe.operator.do(fault)
     for one in (handle, waiting):
-        with pytest.raises(ha.MotionAborted, match=says) as ended:
+        with pytest.raises(ha.MotionAborted, match=expected_text) as ended:
             one.wait(timeout=20.0)
         assert ended.value.cause is ha.Cause.SAFETY and ended.value.code == 62
     state = safe.wait_until(lambda s: not s.safety.brakes_open, timeout=20.0)
@@ -153,7 +153,7 @@ def test_the_manual_override_slows_down(safe: Arm) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "says", "code"),
+    ("words", "expected_text", "code"),
     [
         ("drive_error 3", "drive error in A3", 62),
         ("push 0 0 -2000 0.05", r"drive error in A\d: (velocity|.*behind)", 62),  # the drive itself trips
@@ -161,10 +161,10 @@ def test_the_manual_override_slows_down(safe: Arm) -> None:
         ("singularity", "singularity", 53),
     ],
 )
-def test_errors_end_a_motion(safe: Arm, words: str, says: str, code: int) -> None:
+def test_errors_end_a_motion(safe: Arm, words: str, expected_text: str, code: int) -> None:
     handle = under_way(safe, safe.start(FAR))
     safe.operator.do(words)
-    with pytest.raises(ha.MotionAborted, match=says) as ended:
+    with pytest.raises(ha.MotionAborted, match=expected_text) as ended:
         handle.wait(timeout=20.0)
     trips = code == 62
     assert ended.value.cause is (ha.Cause.SAFETY if trips else ha.Cause.FAILED)

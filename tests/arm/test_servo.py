@@ -57,7 +57,7 @@ def test_a_target_is_reached_and_passed_with_a_velocity(arm: ha.Arm) -> None:
     assert sv.stats.refused == 0
 
 
-def test_poses_are_followed_and_one_out_of_reach_is_refused_but_told_of(arm: ha.Arm) -> None:
+def test_poses_are_followed_and_one_out_of_reach_is_refused_but_reported(arm: ha.Arm) -> None:
     with arm.servo("pose", rate=50, speed=0.5, acceleration=1.0, watchdog=2.0) as sv:
         start = sv.start.pose
         goal = ha.Pose.of(start.xyz + [0.0, 0.08, -0.05], start.quat)
@@ -125,7 +125,7 @@ def test_bad_settings_are_refused_before_anything_is_sent(arm: ha.Arm, settings:
         arm.servo("wheel")  # type: ignore[call-overload]
 
 
-def test_a_loop_that_hangs_ends_in_a_stop_and_an_error_that_says_so(arm: ha.Arm) -> None:
+def test_a_loop_that_hangs_ends_in_a_stop_and_an_error_that_reports_it(arm: ha.Arm) -> None:
     with (
         pytest.raises(ha.Starved, match="no target arrived within 60 ms"),
         arm.servo("joint", watchdog=0.06, speed=0.5) as sv,
@@ -185,7 +185,7 @@ def test_the_cabinets_own_time_out_is_renewed_with_the_next_target(arm: ha.Arm) 
         arm.wait_until(lambda state: np.abs(state.q - goal).max() < TOUCH, timeout=20.0)
 
 
-def test_an_impedance_servo_is_soft_and_its_stiffness_can_change(arm: ha.Arm) -> None:
+def test_an_impedance_servo_is_compliant_and_its_stiffness_can_change(arm: ha.Arm) -> None:
     with arm.servo("joint", watchdog=2.0, mode=JointImpedance(300.0)) as sv:
         sv.set(sv.start.q)
         sv.change(JointImpedance(600.0, damping=1.0))

@@ -94,7 +94,7 @@ def test_the_end_of_a_stream() -> None:
 
 
 @pytest.mark.parametrize("body", [b"", b"\xff\xff", b"\x00\x01" + bytes(20), b"\x00\x04" + bytes(200)])
-def test_octets_that_are_no_state(body: bytes) -> None:
+def test_bytes_that_are_no_state(body: bytes) -> None:
     with pytest.raises(RemoteProtocolError, match="state"):
         read_state(body, ClockOffset(), lambda: 0)
 

@@ -38,14 +38,14 @@ def test_poses_are_followed_on_straight_lines(arm: ha.Arm) -> None:
         while sv.tick() and sv.stats.refused == 0 and sv.t < 20.0:
             sv.set(ha.Pose.of([3.0, 0, 0], start.quat))
     assert "not reachable" in sv.stats.text
-    way = (goal.xyz - start.xyz) / np.linalg.norm(goal.xyz - start.xyz)
+    travel = (goal.xyz - start.xyz) / np.linalg.norm(goal.xyz - start.xyz)
     off = np.array(places) - start.xyz
-    assert np.linalg.norm(off - np.outer(off @ way, way), axis=1).max() < 2e-3
+    assert np.linalg.norm(off - np.outer(off @ travel, travel), axis=1).max() < 2e-3
 
 
-def test_a_straight_servo_is_soft_and_renewed_after_its_time_out(arm: ha.Arm) -> None:
-    soft = CartesianImpedance((1500.0,) * 3 + (150.0,) * 3, damping=0.7)
-    with arm.servo("lin", watchdog=2.0, goal_timeout=0.1, mode=soft, speed_mps=0.2) as sv:
+def test_a_straight_servo_is_compliant_and_renewed_after_its_time_out(arm: ha.Arm) -> None:
+    compliant = CartesianImpedance((1500.0,) * 3 + (150.0,) * 3, damping=0.7)
+    with arm.servo("lin", watchdog=2.0, goal_timeout=0.1, mode=compliant, speed_mps=0.2) as sv:
         start = sv.start.pose
         sv.set(start)
         sent = arm.state.stamp
@@ -73,7 +73,7 @@ def test_a_straight_servo_is_soft_and_renewed_after_its_time_out(arm: ha.Arm) ->
         ("pose", {"speed_timeout": 0.5}, "speed_timeout applies"),
     ],
 )
-def test_limits_that_a_kind_does_not_heed_are_refused(
+def test_limits_that_a_kind_does_not_obey_are_refused(
     arm: ha.Arm, kind: str, settings: dict, word: str
 ) -> None:
     with pytest.raises(ha.CommandRejected, match=word):
@@ -87,7 +87,7 @@ def test_the_direct_engine_takes_no_velocity(arm: ha.Arm) -> None:
         sv.set(sv.start.q)
 
 
-def test_home_is_where_the_cabinet_says(arm: ha.Arm) -> None:
+def test_home_is_where_the_cabinet_reports(arm: ha.Arm) -> None:
     assert "ptp_home" in arm.capabilities
     seen = arm.move([ha.ptp_home(speed=0.8, blend_rel=0.2), ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0))])
     assert seen.arrived

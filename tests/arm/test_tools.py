@@ -134,7 +134,7 @@ def test_another_frame_of_the_tool_can_be_the_default(bare: Arm) -> None:
     assert bare.tools["gripper"] == KnownTool("gripper", 2.0, GRIPPER.frames)
 
 
-def test_the_wrench_is_told_where_and_as_one_likes() -> None:
+def test_the_wrench_is_reported_where_and_as_one_likes() -> None:
     """With too light load data, the rest of the weight counts as an external force."""
     heavy = Tool("heavy", mass=3.0, com=(0.0, 0.0, 0.1), tcp=Pose.at(0, 0, 0.2))
     with ha.connect("sim://iiwa14?speed=3&payload=3,0,0,0.1", watchdog=PATIENCE) as arm:
@@ -156,15 +156,15 @@ def test_the_wrench_is_told_where_and_as_one_likes() -> None:
         assert turned.force == pytest.approx(arm.pose("flange").rotation.T @ at_flange.force, abs=0.05)
 
 
-def test_a_servo_motion_under_impedance_wants_the_load_to_be_right() -> None:
-    soft = JointImpedance(500.0)
+def test_a_servo_motion_under_impedance_needs_the_load_to_be_right() -> None:
+    compliant = JointImpedance(500.0)
     with ha.connect("sim://iiwa14?speed=3&payload=5,0,0,0.1", watchdog=PATIENCE) as arm:
         arm.move(ptp(HOME))
-        with pytest.raises(ha.NotReady, match="load data"), arm.servo(mode=soft, watchdog=2.0):
+        with pytest.raises(ha.NotReady, match="load data"), arm.servo(mode=compliant, watchdog=2.0):
             pass
         with arm.tool(Tool("weight", mass=5.0, com=(0, 0, 0.1))):
             settled(arm)
-            with arm.servo(mode=soft, watchdog=2.0) as sv:
+            with arm.servo(mode=compliant, watchdog=2.0) as sv:
                 assert sv.tick()
                 sv.set(arm.state.q)
 
@@ -182,12 +182,12 @@ def test_a_servo_motion_moves_the_chosen_frame(bare: Arm) -> None:
 
 
 def test_the_mode_in_force_is_read_back(bare: Arm) -> None:
-    soft = CartesianImpedance(
+    compliant = CartesianImpedance(
         (1500, 1500, 800, 100, 100, 100), damping=0.8, nullspace_stiffness=20.0, frame="base"
     )
     assert fresh(bare).mode == Position()
-    handle = bare.start(hold(), mode=soft)
-    assert bare.wait_until(lambda s: s.mode != Position(), timeout=10).mode == soft
+    handle = bare.start(hold(), mode=compliant)
+    assert bare.wait_until(lambda s: s.mode != Position(), timeout=10).mode == compliant
     handle.cancel()
     handle.wait(timeout=10)
     with bare.servo(mode=JointImpedance(400.0), watchdog=2.0) as sv:

@@ -59,7 +59,7 @@ def fired(handle: ha.MotionHandle) -> dict[str, ha.MotionEvent]:
     }
 
 
-def test_an_output_is_set_on_the_way_and_the_handle_hears_of_it(arm: ha.Arm) -> None:
+def test_an_output_is_set_on_the_way_and_the_handle_receives_it(arm: ha.Arm) -> None:
     start = arm.wait_for_rest().pose.xyz
     motion = (
         ACROSS.trigger(path.after(0.04), set_output("LEDBlue"))
@@ -83,24 +83,26 @@ def test_an_output_is_set_on_the_way_and_the_handle_hears_of_it(arm: ha.Arm) -> 
 
 def test_triggers_of_blended_motions_and_splines(arm: ha.Arm) -> None:
     start = arm.wait_for_rest().pose
-    corners = [ha.Pose.of(start.xyz + way, start.quat) for way in ((0, 0.1, 0), (0, 0.1, 0.1), (0, 0, 0.1))]
+    corners = [
+        ha.Pose.of(start.xyz + travel, start.quat) for travel in ((0, 0.1, 0), (0, 0.1, 0.1), (0, 0, 0.1))
+    ]
     lines = [
         ha.lin(corner, speed_mps=0.1, blend_m=0.02).trigger(path.after(0.05), notify(f"half of {k}"))
         for k, corner in enumerate(corners)
     ]
     curve = ha.spline([start, corners[0], corners[1], ha.lin(corners[2])], speed_mps=0.1)
     handle = arm.start([*lines, curve.trigger(path.before_end(0.03), notify("near the end"))])
-    told = [(e.kind, e.item, e.segment, e.label) for e in handle.events(timeout=60.0)]
+    reported = [(e.kind, e.item, e.segment, e.label) for e in handle.events(timeout=60.0)]
     assert handle.wait().arrived
-    program = [(kind, item) for kind, item, *_ in told if kind in ("begun", "ended")]
+    program = [(kind, item) for kind, item, *_ in reported if kind in ("begun", "ended")]
     assert program == [(kind, item) for item in range(4) for kind in ("begun", "ended")]
-    assert [(item, label) for kind, item, _, label in told if kind == "trigger"] == [
+    assert [(item, label) for kind, item, _, label in reported if kind == "trigger"] == [
         (0, "half of 0"),
         (1, "half of 1"),
         (2, "half of 2"),
         (3, "near the end"),
     ]
-    assert [(item, segment) for kind, item, segment, _ in told if kind == "segment"] == [
+    assert [(item, segment) for kind, item, segment, _ in reported if kind == "segment"] == [
         (3, k) for k in range(4)
     ]
     assert handle.item == 3 and handle.segment == 3
@@ -130,7 +132,7 @@ def test_events_come_by_callbacks_too_under_override_and_pause(arm: ha.Arm) -> N
     assert first == late == list(handle.events())
 
 
-def test_the_time_that_is_left_is_told(arm: ha.Arm) -> None:
+def test_the_time_that_is_left_is_reported(arm: ha.Arm) -> None:
     handle = arm.start(SLOWLY)
     assert handle.wait_started(20.0)
     state = arm.wait_until(

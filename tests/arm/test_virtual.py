@@ -58,7 +58,7 @@ def test_a_line_and_back_by_its_pose(arm: Arm) -> None:
     assert arm.wait_for_rest().pose.distance_to(before) < 5e-4
 
 
-def test_a_batch_tells_where_it_is(arm: Arm) -> None:
+def test_a_batch_reports_where_it_is(arm: Arm) -> None:
     small = [ptp(HOME + deg(0, 0, 0, 0, 0, 0, angle)) for angle in (5, 10, 0)]
     handle = arm.start(small)
     assert handle.wait(timeout=20.0).item == 2
@@ -168,7 +168,7 @@ def test_an_observer_sees_and_stops_but_does_not_move(arm: Arm, cabinet: Running
     handle.wait(timeout=20.0)
 
 
-def test_two_clients_of_one_process_are_told_apart(arm: Arm, cabinet: RunningCabinet) -> None:
+def test_two_clients_of_one_process_are_distinguished(arm: Arm, cabinet: RunningCabinet) -> None:
     with ha.connect(cabinet.target, control=False) as observer:
         with pytest.raises(ha.NotInControl) as refused:
             observer.move(ptp(HOME))

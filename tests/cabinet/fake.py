@@ -24,8 +24,8 @@ def classes(folder: str = "java") -> str:
     """Class path of the cabinet's jars and the test's own classes, compiled where they have changed."""
     jars = [jar for jar in build.build() if folder != "java" or jar.name == "heptarm-core.jar"]
     sources = sorted((Path(__file__).parent / folder).rglob("*.java"))
-    octets = b"".join(path.read_bytes() for path in (*jars, *sources))
-    out = _OUT / hashlib.sha256(octets).hexdigest()[:16]
+    raw = b"".join(path.read_bytes() for path in (*jars, *sources))
+    out = _OUT / hashlib.sha256(raw).hexdigest()[:16]
     path = os.pathsep.join(str(jar) for jar in jars)
     if not out.exists():
         _OUT.mkdir(parents=True, exist_ok=True)
@@ -48,6 +48,7 @@ class FakeCabinet:
         allow: allow-list.
         heartbeat: of the server [s]; a client may be silent for five of them.
         getter: what each reading of the robot costs [s].
+        datagrams: open the UDP port.
         log: file for its log.
     """
 
@@ -60,10 +61,11 @@ class FakeCabinet:
         allow: str = "",
         heartbeat: float = 2.0,
         getter: float = 0.0,
+        datagrams: bool = True,
     ) -> None:
         self.log = log
         options = ["-Xmx64m", "-Xss512k", "-XX:+UseSerialGC", "-XX:TieredStopAtLevel=1", "-cp", classes()]
-        values = [str(rate), key, allow, str(heartbeat), str(getter)]
+        values = [str(rate), key, allow, str(heartbeat), str(getter), "udp" if datagrams else "tcp"]
         with log.open("w") as file:
             self.process = subprocess.Popen(
                 [toolchain.find_jdk().java, *options, "heptarm.fake.FakeCabinet", *values],

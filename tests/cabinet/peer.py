@@ -10,8 +10,9 @@ from typing import Any, TypeVar
 
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
+from heptarm.wire.datagrams import Datagrams
 from heptarm.wire.frames import Frame, FrameReader, pack
-from heptarm.wire.key import FrameTag, KeyExchange
+from heptarm.wire.key import FrameTag, KeyExchange, datagram_tags
 
 M = TypeVar("M")
 NONCE = bytes(range(32))
@@ -48,6 +49,7 @@ class Peer:
         self._request = 0
         self._seq = 0
         self._tag: FrameTag | None = None
+        self._secret: bytes | None = None
 
     def greet(self, *, name: str = "peer", key: str = "", major: int = wire.MAJOR) -> wire.Welcome:
         hello = self.hello = wire.Hello(major=major, minor=0, name=name, version="0", nonce=NONCE)
@@ -58,6 +60,7 @@ class Peer:
             for one in (hello, message):
                 exchange.add(one.TYPE, one.encode())
             tags = exchange.tags(NONCE, message.nonce)
+            self._secret = exchange.secret(NONCE, message.nonce)
             self.send(wire.Proof(mac=exchange.client_mac()))
             message = self.next()
             self._tag, self.reader.tag = tags
@@ -85,6 +88,11 @@ class Peer:
         while not isinstance(answer := self.ask(wire.TakeControl(watchdog=watchdog)), wire.Accepted):
             assert answer.code == Code.CONTROL_TAKEN and time.monotonic() < deadline, answer
             time.sleep(0.01)
+
+    def open_datagrams(self) -> Datagrams:
+        """The client's end of datagrams of this session."""
+        token = self.ask(wire.OpenDatagrams()).token
+        return Datagrams(self.welcome.session, "client", *datagram_tags(self._secret, token))
 
     def answer(self, request: int) -> Any:
         wanted = request

@@ -43,7 +43,7 @@ def events(peer: Peer, accepted: wire.Accepted) -> list[tuple[str, int]]:
     ]
 
 
-def test_every_item_of_a_batch_is_told_of(peer: Peer) -> None:
+def test_every_item_of_a_batch_is_reported(peer: Peer) -> None:
     accepted = peer.ask(run(blended(0.02), blended(0.04), blended(0.02), ptp(0.0), blended(0.02)))
     assert finished(peer, accepted).cause == wire.Cause.FINISHED
     assert events(peer, accepted) == [*(("MotionStarted", i) for i in range(5)), ("MotionFinished", 4)]

@@ -28,7 +28,7 @@ def controller(connect: Connect) -> Iterator[Peer]:
     peer.ask(wire.ReleaseControl())
 
 
-def test_second_controller_is_told_who_holds_control(connect: Connect, controller: Peer) -> None:
+def test_second_controller_receives_who_holds_control(connect: Connect, controller: Peer) -> None:
     second = connect(name="second")
     assert second.welcome.controller == "first"
     rejected = second.ask(wire.TakeControl())
@@ -171,7 +171,7 @@ def test_a_killed_controller_is_lost_at_once(connect: Connect) -> None:
     observer.ask(wire.ReleaseControl())
 
 
-def test_heartbeat_goes_both_ways(make: Callable[..., FakeCabinet]) -> None:
+def test_heartbeat_goes_both_directions(make: Callable[..., FakeCabinet]) -> None:
     cabinet = make(heartbeat=0.3)
     with Peer(cabinet.port) as peer:
         peer.read_for(0.7, silent=True)

@@ -67,7 +67,7 @@ def test_a_second_hello_is_refused_and_the_session_goes_on(connect: Connect) -> 
 
 
 @pytest.mark.parametrize(
-    "octets",
+    "raw",
     [
         b"GET / HTTP/1.1\r\nHost: cabinet\r\n\r\n",
         b"\x00" * 64,
@@ -75,12 +75,12 @@ def test_a_second_hello_is_refused_and_the_session_goes_on(connect: Connect) -> 
     ],
 )
 @pytest.mark.parametrize("greeted", ["greeted", "not greeted"])
-def test_octets_that_are_no_frame_end_that_connection_with_a_reason(
-    connect: Connect, octets: bytes, greeted: str
+def test_bytes_that_are_no_frame_end_that_connection_with_a_reason(
+    connect: Connect, raw: bytes, greeted: str
 ) -> None:
     other = connect(name="other")
     peer = connect(hello=greeted == "greeted")
-    peer.socket.sendall(octets)
+    peer.socket.sendall(raw)
     assert peer.wait_for(wire.Goodbye).code == Code.BAD_FRAME
     assert peer.is_closed()
     assert isinstance(other.ask(wire.Stop()), wire.Accepted)
@@ -104,7 +104,7 @@ def keyed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[FakeCabinet]:
         yield cabinet
 
 
-def test_the_key_is_proved_both_ways_and_tags_every_frame(keyed: FakeCabinet) -> None:
+def test_the_key_is_proved_both_directions_and_tags_every_frame(keyed: FakeCabinet) -> None:
     with Peer(keyed.port, key=KEY) as peer:
         challenge = peer.wait_for(wire.Challenge)
         exchange = KeyExchange(KEY.encode())
@@ -173,7 +173,7 @@ def test_an_address_that_is_not_on_the_list_is_refused(make: Callable[..., FakeC
             assert peer.is_closed()
 
 
-def test_a_connection_that_never_says_hello_is_closed(make: Callable[..., FakeCabinet]) -> None:
+def test_a_connection_that_never_sends_hello_is_closed(make: Callable[..., FakeCabinet]) -> None:
     cabinet = make()
     with Peer(cabinet.port, hello=False) as peer:
         began = time.monotonic()

@@ -20,7 +20,7 @@ STOP, RELEASE = 0, 1
 
 @pytest.fixture
 def virtual(tmp_path: Path) -> Iterator[tuple[int, Path]]:
-    """Port of a virtual cabinet, and the file that tells its operator which keys to press."""
+    """Port of a virtual cabinet, and the file that names the keys for its operator to press."""
     keys = tmp_path / "keys"
     folder = classes("java_keys").rpartition(":")[2]
     command = [sys.executable, "-m", "heptarm.sim.runtime.cabinet", "--port", "0", "--parent-pipe"]
@@ -34,11 +34,11 @@ def virtual(tmp_path: Path) -> Iterator[tuple[int, Path]]:
     ]
     with subprocess.Popen(command, stdin=subprocess.PIPE) as process:
         assert process.stdin is not None
-        told = keys.with_suffix(".port")
+        reported = keys.with_suffix(".port")
         deadline = time.monotonic() + 60.0
-        while not told.exists() and time.monotonic() < deadline:
+        while not reported.exists() and time.monotonic() < deadline:
             time.sleep(0.02)
-        yield int(told.read_text()), keys
+        yield int(reported.read_text()), keys
         process.stdin.close()
         assert process.wait(timeout=30) == 0
 

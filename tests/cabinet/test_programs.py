@@ -151,7 +151,7 @@ def test_pause_and_override_act_at_once(peer: Peer) -> None:
 
 
 @pytest.mark.parametrize(
-    ("item", "code", "parameter", "says"),
+    ("item", "code", "parameter", "expected_text"),
     [
         (ptp(0, 0, 0, NAN), Code.NOT_FINITE, "items[1].motion.q[3]", "NaN"),
         (ptp(0, 0, 0, -math.inf), Code.NOT_FINITE, "items[1].motion.q[3]", "inf"),
@@ -196,13 +196,13 @@ def test_pause_and_override_act_at_once(peer: Peer) -> None:
     ids=lambda v: v if isinstance(v, str) else "",
 )
 def test_a_bad_item_is_refused_by_name_and_nothing_moves(
-    peer: Peer, item: wire.Item, code: int, parameter: str, says: str
+    peer: Peer, item: wire.Item, code: int, parameter: str, expected_text: str
 ) -> None:
     before = len(peer.all(wire.MotionStarted))
     rejected = peer.ask(run(ptp(1.0), item))
     assert isinstance(rejected, wire.Rejected)
     assert (rejected.code, rejected.parameter[: len(parameter)]) == (code, parameter)
-    assert says in rejected.text + rejected.value
+    assert expected_text in rejected.text + rejected.value
     assert finished(peer, peer.ask(run(ptp(0.0)))).q[0] == 0.0
     assert len(peer.all(wire.MotionStarted)) == before + 1
 
@@ -274,7 +274,7 @@ def test_control_becomes_free_even_if_the_robot_cannot_be_stopped(make: Callable
         assert finished(after, accepted).cause in (wire.Cause.STOPPED, wire.Cause.LOST)
 
 
-def test_the_end_of_the_server_stops_motion_tells_all_and_leaves_no_thread(
+def test_the_end_of_the_server_stops_motion_reports_all_and_leaves_no_thread(
     make: Callable[..., FakeCabinet],
 ) -> None:
     cabinet = make()

@@ -38,7 +38,7 @@ def tidy(peer: Peer) -> None:
     assert isinstance(peer.ask(wire.Recover()), wire.Accepted)
 
 
-def told(peer: Peer, where: Callable[[wire.SafetyChanged], bool]) -> wire.SafetyChanged:
+def reported(peer: Peer, where: Callable[[wire.SafetyChanged], bool]) -> wire.SafetyChanged:
     return peer.wait_for(wire.SafetyChanged, where)
 
 
@@ -66,7 +66,7 @@ def test_a_stop_ends_everything_and_nothing_begins(
         finished = end(peer, one)
         assert (finished.cause, finished.code) == (wire.Cause.SAFETY, Code.SAFETY_STOP)
         assert why in finished.text
-    assert why in told(peer, lambda e: bool(e.bits & bit)).text
+    assert why in reported(peer, lambda e: bool(e.bits & bit)).text
     for refused in (peer.ask(run(ptp(0.1))), peer.ask(wire.ServoOpen())):
         assert isinstance(refused, wire.Rejected) and refused.code == Code.NEEDS_OPERATOR
         assert step in refused.text
@@ -80,7 +80,7 @@ def test_a_stop_ends_everything_and_nothing_begins(
     assert end(peer, peer.ask(run(ptp(0.0)))).cause == wire.Cause.FINISHED
     assert (
         "ready"
-        in told(peer, lambda e: e.bits & (Bits.READY_TO_MOVE | Bits.PAUSED) == Bits.READY_TO_MOVE).text
+        in reported(peer, lambda e: e.bits & (Bits.READY_TO_MOVE | Bits.PAUSED) == Bits.READY_TO_MOVE).text
     )
 
 
@@ -91,7 +91,7 @@ def test_an_enabling_switch_pauses_motions_and_ends_what_is_led_from_outside(pee
     running = peer.ask(run(ptp(1.5)))
     peer.wait_for(wire.MotionStarted, lambda e: e.id == running.id)
     say(peer, "release")
-    told(peer, lambda e: e.mode == wire.OperationMode.T1 and not e.bits & Bits.ENABLING_SWITCH)
+    reported(peer, lambda e: e.mode == wire.OperationMode.T1 and not e.bits & Bits.ENABLING_SWITCH)
     peer.read_for(0.2)
     assert not [e for e in peer.all(wire.MotionFinished) if e.id == running.id]
     left = peer.ask(wire.Recover())
@@ -121,7 +121,7 @@ def test_what_was_accepted_just_before_a_stop_was_seen_needs_an_operator(peer: P
 
 def test_a_new_controller_does_not_end_a_stop(peer: Peer, connect: Connect) -> None:
     say(peer, "emergency stop")
-    told(peer, lambda e: bool(e.bits & Bits.EMERGENCY_STOP))
+    reported(peer, lambda e: bool(e.bits & Bits.EMERGENCY_STOP))
     say(peer, "release")
     peer.ask(wire.ReleaseControl())
     other = connect()

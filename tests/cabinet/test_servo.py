@@ -47,7 +47,7 @@ def reached(peer: Peer, a7: float) -> None:
     peer.ask(wire.Subscribe(groups=wire.Groups.JOINTS, rate=0.0))
 
 
-def told_of(peer: Peer, servo: int) -> None:
+def reported(peer: Peer, servo: int) -> None:
     """Waits until the cabinet reports a refused target."""
     peer.wait_for(wire.ServoStatus, lambda event: event.servo == servo and event.refused > 0)
 
@@ -82,7 +82,7 @@ def test_of_targets_that_come_together_the_newest_wins(cabinet: FakeCabinet) -> 
         assert status(peer, servo).targets == 1000
 
 
-def test_without_a_target_in_time_the_arm_stops_and_says_why(cabinet: FakeCabinet) -> None:
+def test_without_a_target_in_time_the_arm_stops_and_reports_why(cabinet: FakeCabinet) -> None:
     with controller(cabinet.port) as peer:
         servo = opened(peer)
         peer.send(target(servo, 0.3, watchdog=0.05))
@@ -118,7 +118,7 @@ def test_the_first_target_has_a_watchdog_too(cabinet: FakeCabinet) -> None:
         assert finish(peer, servo).cause is wire.Cause.STARVED
 
 
-def test_bad_targets_are_refused_told_of_and_no_sign_of_life(cabinet: FakeCabinet) -> None:
+def test_bad_targets_are_refused_reported_and_no_sign_of_life(cabinet: FakeCabinet) -> None:
     with controller(cabinet.port) as peer:
         servo = opened(peer)
         peer.send(target(servo, 0.2, watchdog=1.0))
@@ -151,7 +151,7 @@ def test_each_kind_of_bad_target_bears_its_code(cabinet: FakeCabinet) -> None:
             fields = {name: getattr(message, name) for name in message.__slots__}
             peer.send(type(message)(**{**fields, "servo": servo, "watchdog": 2.0}))
             if code is Code.UNREACHABLE:  # checked only when it is applied, and closing drops waiting targets
-                told_of(peer, servo)
+                reported(peer, servo)
             peer.ask(wire.ServoClose(servo=servo))
             assert status(peer, servo).code == code
 
@@ -164,7 +164,7 @@ def test_a_servo_motion_begins_only_when_nothing_else_runs(cabinet: FakeCabinet)
         peer.ask(wire.Stop())
 
 
-def test_one_that_ended_by_itself_is_begun_anew_with_the_next_target(cabinet: FakeCabinet) -> None:
+def test_one_that_ended_by_itself_is_begun_again_with_the_next_target(cabinet: FakeCabinet) -> None:
     with controller(cabinet.port) as peer:
         servo = opened(peer, watchdog=2.0)
         peer.send(target(servo, 0.1, watchdog=2.0))
@@ -199,15 +199,15 @@ def test_a_stop_and_a_lost_controller_end_it(cabinet: FakeCabinet) -> None:
 
 
 def test_settings_keep_the_kind_of_the_mode(cabinet: FakeCabinet) -> None:
-    soft = wire.JointImpedance(stiffness=(300.0,) * 7, damping=(0.7,) * 7)
+    compliant = wire.JointImpedance(stiffness=(300.0,) * 7, damping=(0.7,) * 7)
     with controller(cabinet.port) as peer:
-        servo = opened(peer, mode=soft)
-        assert isinstance(peer.ask(wire.ServoSettings(servo=servo, mode=soft)), wire.Accepted)
+        servo = opened(peer, mode=compliant)
+        assert isinstance(peer.ask(wire.ServoSettings(servo=servo, mode=compliant)), wire.Accepted)
         other = peer.ask(wire.ServoSettings(servo=servo, mode=wire.PositionMode()))
         assert isinstance(other, wire.Rejected) and other.code == Code.MODE_CONFLICT
         peer.ask(wire.ServoClose(servo=servo))
         finish(peer, servo)
-        gone = peer.ask(wire.ServoSettings(servo=servo, mode=soft))
+        gone = peer.ask(wire.ServoSettings(servo=servo, mode=compliant))
         assert isinstance(gone, wire.Rejected) and gone.code == Code.UNKNOWN_MOTION
 
 
@@ -241,7 +241,7 @@ def test_the_straight_engine_follows_poses_and_no_joints(cabinet: FakeCabinet) -
         (LINE | {"timing": wire.ServoTiming(speed_timeout=0.5)}, "timing.speed_timeout"),
     ],
 )
-def test_limits_that_an_engine_does_not_heed_are_refused(
+def test_limits_that_an_engine_does_not_obey_are_refused(
     cabinet: FakeCabinet, fields: Any, parameter: str
 ) -> None:
     with controller(cabinet.port) as peer:
@@ -250,11 +250,11 @@ def test_limits_that_an_engine_does_not_heed_are_refused(
         assert (refused.code, refused.parameter) == (Code.UNSUPPORTED, parameter)
 
 
-def test_the_direct_engine_refuses_a_velocity_that_it_would_not_heed(cabinet: FakeCabinet) -> None:
+def test_the_direct_engine_refuses_a_velocity_that_it_would_not_obey(cabinet: FakeCabinet) -> None:
     with controller(cabinet.port) as peer:
         servo = opened(peer, engine=wire.ServoEngine.DIRECT)
         peer.send(wire.ServoJointsVelocity(servo=servo, watchdog=2.0, q=(0.0,) * 7, dq=(0.1,) * 7))
-        told_of(peer, servo)
+        reported(peer, servo)
         peer.ask(wire.ServoClose(servo=servo))
         seen = status(peer, servo)
         assert (seen.refused, seen.applied, seen.code) == (1, 0, Code.UNSUPPORTED)

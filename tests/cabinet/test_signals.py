@@ -21,7 +21,7 @@ def peer(cabinet: FakeCabinet) -> Iterator[Peer]:
         yield peer
 
 
-def wish(**values: float) -> wire.SetSignals:
+def target(**values: float) -> wire.SetSignals:
     pairs = ((name.replace("_", "."), value) for name, value in values.items())
     return wire.SetSignals(values=tuple(wire.SetSignal(signal=n, value=v) for n, v in pairs))
 
@@ -36,7 +36,7 @@ def seen(peer: Peer) -> dict[str, float]:
     return {names[one.index]: one.value for one in state.io.values}
 
 
-def test_signals_are_told_written_and_pushed(peer: Peer) -> None:
+def test_signals_are_reported_written_and_pushed(peer: Peer) -> None:
     lamp, count = peer.welcome.signals[1], peer.welcome.signals[2]
     assert (lamp.name, lamp.direction, lamp.type) == (
         "Flange.Lamp",
@@ -44,7 +44,7 @@ def test_signals_are_told_written_and_pushed(peer: Peer) -> None:
         wire.IoType.BOOLEAN,
     )
     assert (count.low, count.high) == (0, 255) and peer.welcome.groups & wire.Groups.IO
-    assert isinstance(peer.ask(wish(Flange_Lamp=1.0, Cell_Count=200.0, Cell_Level=-2.5)), wire.Accepted)
+    assert isinstance(peer.ask(target(Flange_Lamp=1.0, Cell_Count=200.0, Cell_Level=-2.5)), wire.Accepted)
     known = {"Flange.Button": 0.0, "Flange.Lamp": 1.0, "Cell.Count": 200.0, "Cell.Level": -2.5}
     assert seen(peer) == {**known, "Cell.Offset": 0.0}
 
@@ -63,8 +63,8 @@ def test_signals_are_told_written_and_pushed(peer: Peer) -> None:
     ],
 )
 def test_all_are_written_or_none(peer: Peer, values: dict[str, float], code: Code, parameter: str) -> None:
-    peer.ask(wish(Flange_Lamp=1.0, Cell_Count=7.0, Cell_Level=0.0))
-    answer = peer.ask(wish(**values))
+    peer.ask(target(Flange_Lamp=1.0, Cell_Count=7.0, Cell_Level=0.0))
+    answer = peer.ask(target(**values))
     assert isinstance(answer, wire.Rejected)
     assert (answer.code, answer.parameter) == (code, parameter)
     now = seen(peer)
@@ -84,7 +84,7 @@ def test_a_slow_cabinet_reads_them_a_few_at_a_time(make: Maker) -> None:
 def test_only_the_controller_writes(cabinet: FakeCabinet, peer: Peer) -> None:
     with Peer(cabinet.port) as other:
         for message in (
-            wish(Flange_Lamp=1.0),
+            target(Flange_Lamp=1.0),
             wire.SetKey(slot=0, text="x", led=wire.KeyLed.RED),
             wire.SetProcessData(name="speed", value="1"),
             wire.ShowMessage(severity=wire.Severity.INFO, text="hello"),

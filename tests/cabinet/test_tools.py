@@ -105,7 +105,7 @@ def test_what_no_tool_has_is_refused_when_the_client_is_bypassed(peer: Peer, cas
     assert fitted(peer) == ("", "", "flange")
 
 
-def test_tools_come_and_go_and_the_state_says_so(peer: Peer) -> None:
+def test_tools_come_and_go_and_the_state_reports_it(peer: Peer) -> None:
     assert isinstance(peer.ask(wire.DefineTool(tool=GRIPPER)), wire.Accepted)
     assert fitted(peer) == ("", "", "flange")
     peer.ask(wire.AttachTool(name="gripper", frame=""))
@@ -229,21 +229,21 @@ def test_every_name_of_a_frame_is_known(peer: Peer, frame: str) -> None:
     assert isinstance(answer, wire.Accepted), answer
 
 
-def test_the_mode_in_force_is_told(peer: Peer) -> None:
-    def says(mode: Any) -> bool:
+def test_the_mode_in_force_is_reported(peer: Peer) -> None:
+    def expected_text(mode: Any) -> bool:
         wanted = repr(mode)  # NaN is not equal to itself
         return bool(peer.wait_for(wire.State, lambda s: s.mode is not None and repr(s.mode.mode) == wanted))
 
     peer.ask(wire.Subscribe(groups=wire.Groups.MODE, rate=100.0))
-    assert says(wire.PositionMode())
+    assert expected_text(wire.PositionMode())
     accepted = peer.ask(run(replace(ptp(), motion=wire.Hold(duration=NAN), mode=SPRING)))
-    assert says(SPRING)
+    assert expected_text(SPRING)
     peer.ask(wire.Cancel(id=accepted.id))
     peer.wait_for(wire.MotionFinished, lambda event: event.id == accepted.id)
     servo = peer.ask(wire.ServoOpen(watchdog=2.0, mode=SPRING)).id
     peer.wait_for(wire.MotionStarted, lambda event: event.id == servo)
     softer = replace(SPRING, nullspace_stiffness=7.0)
     assert isinstance(peer.ask(wire.ServoSettings(servo=servo, mode=softer)), wire.Accepted)
-    assert says(softer)
+    assert expected_text(softer)
     peer.ask(wire.ServoClose(servo=servo))
     peer.wait_for(wire.MotionFinished, lambda event: event.id == servo)

@@ -59,7 +59,7 @@ def finish(peer: Peer, number: int) -> wire.MotionFinished:
     return peer.wait_for(wire.MotionFinished, lambda event: event.id == number, timeout=30.0)
 
 
-def told(peer: Peer, number: int) -> list[tuple[str, int]]:
+def received(peer: Peer, number: int) -> list[tuple[str, int]]:
     """The events of a program, in their order."""
     return [
         (type(m).__name__, m.item)
@@ -81,7 +81,7 @@ def lamp(port: int) -> tuple[float, float]:
         return state.io.values[1].value, state.io.values[3].value
 
 
-def test_an_output_is_set_on_the_way_and_an_event_told_of(cabinet: FakeCabinet, peer: Peer) -> None:
+def test_an_output_is_set_on_the_way_and_an_event_reported(cabinet: FakeCabinet, peer: Peer) -> None:
     peer.ask(wire.SetSignals(values=(wire.SetSignal(signal=LAMP, value=0.0),)))
     number = started(
         peer,
@@ -107,7 +107,7 @@ def test_an_output_is_set_on_the_way_and_an_event_told_of(cabinet: FakeCabinet, 
     assert lamp(cabinet.port) == (1.0, 2.5)
 
 
-def test_each_item_has_its_own_and_all_is_told_in_order(peer: Peer) -> None:
+def test_each_item_has_its_own_and_all_is_reported_in_order(peer: Peer) -> None:
     label = wire.Notify(label="x")
     number = started(
         peer,
@@ -116,7 +116,7 @@ def test_each_item_has_its_own_and_all_is_told_in_order(peer: Peer) -> None:
         turn(0.1),
     )
     finish(peer, number)
-    assert told(peer, number) == [
+    assert received(peer, number) == [
         ("MotionStarted", 0),
         ("TriggerFired", 0),
         ("ItemReached", 0),
@@ -129,12 +129,12 @@ def test_each_item_has_its_own_and_all_is_told_in_order(peer: Peer) -> None:
     ]
 
 
-def test_an_item_is_told_of_when_it_ends_also_before_a_break_condition(peer: Peer) -> None:
+def test_an_item_is_reported_when_it_ends_also_before_a_break_condition(peer: Peer) -> None:
     until = wire.Condition(nodes=(wire.SignalIs(signal="Flange.Button", value=True),))
     guarded = [wire.Item(motion=turn(a).motion, until=until) for a in (0.05, 0.1)]
     number = started(peer, *guarded)
     finish(peer, number)
-    assert told(peer, number) == [
+    assert received(peer, number) == [
         ("MotionStarted", 0),
         ("ItemReached", 0),
         ("MotionStarted", 1),
@@ -150,7 +150,7 @@ def test_a_cancelled_motion_fires_no_more(peer: Peer) -> None:
     assert fired(peer, number) == []
 
 
-def test_an_output_that_the_robot_does_not_write_is_told_of(make: Maker) -> None:
+def test_an_output_that_the_robot_does_not_write_is_reported(make: Maker) -> None:
     with controlling(make().port) as peer:
         peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="jammed"))
         number = started(peer, turn(0.1, trigger(wire.SetSignal(signal=LAMP, value=1.0), at(0.02))))

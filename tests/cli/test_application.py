@@ -84,14 +84,14 @@ def test_a_foreign_application_runs_with_its_own_process_data(lab: Path) -> None
 
 
 @needs_javac
-def test_its_error_is_told_and_process_data_can_be_given(lab: Path) -> None:
+def test_its_error_is_reported_and_process_data_can_be_given(lab: Path) -> None:
     done = sim(lab, "--app-data", "lab.times=6")
     assert done.returncode == 1
     assert "a stiff neck" in done.stderr
 
 
 @needs_javac
-def test_what_does_not_compile_is_told_with_the_compilers_words(lab: Path) -> None:
+def test_what_does_not_compile_is_reported_with_the_compilers_words(lab: Path) -> None:
     (lab / "src" / "lab" / "Bad.java").write_text("class Bad { int x = nothing; }")
     with pytest.raises(CommandRejected, match=r"(?s)does not compile.*nothing"):
         compile_application(lab, lab)
@@ -324,7 +324,7 @@ def test_dialogs_are_answered_from_a_file_and_by_options(asking: Path) -> None:
 
 
 @needs_javac
-def test_a_typed_line_answers_a_dialog_that_says_what_to_type(asking: Path) -> None:
+def test_a_typed_line_answers_a_dialog_that_reports_what_to_type(asking: Path) -> None:
     command = [
         sys.executable,
         "-m",

@@ -70,7 +70,7 @@ def test_an_error_of_the_host_ends_with_a_line_of_heptarm() -> None:
     assert last.startswith("heptarm: the virtual cabinet does not start") and "--port" not in last
 
 
-def test_sim_on_a_taken_port_says_so() -> None:
+def test_sim_on_a_taken_port_reports_it() -> None:
     with sim() as ready:
         done = run("sim", "--port", str(ready["port"]))
         assert done.returncode == 1 and str(ready["port"]) in done.stderr and "--port" in done.stderr
@@ -97,13 +97,13 @@ def test_move_ptp_in_degrees_with_negative_angles(target: str) -> None:
     assert done["q"][6] == pytest.approx(math.radians(-5), abs=1e-3)
 
 
-def test_servo_swings_an_axis_and_tells_how_the_stream_went(target: str) -> None:
+def test_servo_swings_an_axis_and_reports_how_the_stream_went(target: str) -> None:
     words = ("servo", "--axis", "6", "--rate", "20", "--duration", "2", "--json", "--target", target)
     done = retry(lambda: run(*words), starved)
-    told = json.loads(done.stdout)
-    assert told["received"] == told["sent"] > 1
-    assert told["refused"] == told["late"] == 0 and told["largest_lag_rad"] < 0.5
-    done = retry(lambda: run("servo", "--duration", "1", "--target", target), starved)
+    reported = json.loads(done.stdout)
+    assert reported["received"] == reported["sent"] > 1
+    assert reported["refused"] == reported["late"] == 0 and reported["largest_lag_rad"] < 0.5
+    done = retry(lambda: run("servo", "--duration", "1", "--datagrams", "--target", target), starved)
     rate = re.search(r" targets at ([\d.]+) Hz", done.stdout)
     assert rate and 1.0 < float(rate[1]) < 110.0 and "when applied" in done.stdout
     assert run("servo", "--axis", "8", "--target", target).returncode == 1
@@ -114,7 +114,7 @@ def test_move_lin_and_lin_rel(target: str) -> None:
         "move", "ptp", "0", "30", "0", "-90", "0", "60", "0", "--deg", "--speed", "0.5", "--target", target
     )
     (down,) = objects(
-        "move", "lin_rel", "--z", "-0.05", "--frame", "base", "--speed", "0.5", "--target", target
+        "move", "lin-rel", "--z", "-0.05", "--frame", "base", "--speed", "0.5", "--target", target
     )
     x, y, z = down["xyz"]
     pose = [f"{v:.6f}" for v in (x, y + 0.05, z)]
@@ -140,8 +140,8 @@ def test_dry_run_moves_nothing(target: str) -> None:
             ("A2", "150.00", "[-120, 120] deg"),
         ),
         (("move", "ptp", "0", "nan", "0", "-1", "0", "1", "0"), ("nan",)),
-        (("move", "lin_rel", "--x", "3"), ("Can not plan motion",)),
-        (("move", "lin_rel", "--x", "0.01", "--speed", "1.5"), ("speed", "(0, 1]")),
+        (("move", "lin-rel", "--x", "3"), ("Can not plan motion",)),
+        (("move", "lin-rel", "--x", "0.01", "--speed", "1.5"), ("speed", "(0, 1]")),
     ],
 )
 def test_refusals_are_one_sentence_and_exit_code_1(
@@ -167,6 +167,7 @@ def test_doctor_looks_at_a_cabinet(target: str) -> None:
     verdicts = {one["what"]: one for one in objects("doctor", "--target", target)}
     assert verdicts["session"]["how"] == verdicts["network"]["how"] == verdicts["safety"]["how"] == "ok"
     assert "us median" in verdicts["round trip"]["found"]
+    assert re.search(r"\d+ of \d+ pings answered by UDP", verdicts["datagrams"]["found"])
 
 
 def test_doctor_names_what_to_do_when_nobody_answers() -> None:
@@ -176,8 +177,8 @@ def test_doctor_names_what_to_do_when_nobody_answers() -> None:
 
 def test_install_cabinet_writes_sources_and_steps_once(tmp_path: Path) -> None:
     out = tmp_path / "cabinet"
-    (told,) = objects("install-cabinet", "--out", str(out))
-    assert told["protocol"] == f"{MAJOR}.{MINOR}"
+    (reported,) = objects("install-cabinet", "--out", str(out))
+    assert reported["protocol"] == f"{MAJOR}.{MINOR}"
     assert (out / "src/heptarm/app/HeptarmApplication.java").exists()
     assert (out / "src/heptarm/wire/Messages.java").exists()
     assert (

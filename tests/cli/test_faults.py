@@ -22,7 +22,7 @@ def test_a_timed_fault_happens_and_goes() -> None:
         assert left.returncode == 1 and "release the emergency stop" in left.stdout
 
 
-def test_a_fault_that_is_none_says_what_there_is() -> None:
+def test_a_fault_that_is_none_reports_what_there_is() -> None:
     done = run("sim", "--port", "0", "--fault", "explosion@1")
     assert done.returncode == 1 and "emergency_stop" in done.stderr
     assert "@" in run("sim", "--port", "0", "--fault", "emergency_stop").stderr

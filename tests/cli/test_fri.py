@@ -25,7 +25,7 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-class Told(list[Any]):
+class Reported(list[Any]):
     """Output and input of a controller process."""
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
@@ -41,7 +41,7 @@ class Told(list[Any]):
 @contextmanager
 def controller(
     port: int, *arguments: str, version: str = "1.15", typed: bool = False
-) -> Iterator[tuple[Any, Told]]:
+) -> Iterator[tuple[Any, Reported]]:
     """`heptarm sim --fri`: its output, including its end."""
     command = [*HEPTARM, "sim", "--json", "--fri", version, "--fri-client", f"127.0.0.1:{port}"]
     with ctrl_c_interrupts():
@@ -53,18 +53,18 @@ def controller(
         )
     with started as process:
         assert process.stdout is not None
-        told = Told(process)
+        reported = Reported(process)
         try:
-            yield json.loads(process.stdout.readline()), told
+            yield json.loads(process.stdout.readline()), reported
         finally:
             process.send_signal(signal.SIGINT)
-            told.extend(json.loads(line) for line in process.stdout)
+            reported.extend(json.loads(line) for line in process.stdout)
             assert process.wait(timeout=30) == 0
 
 
-def test_a_bare_controller_serves_any_client_and_says_how_it_went() -> None:
+def test_a_bare_controller_serves_any_client_and_reports_how_it_went() -> None:
     with Client(0, realtime=False) as client:
-        with controller(client.port, "--fri-period", "10") as (ready, told):
+        with controller(client.port, "--fri-period", "10") as (ready, reported):
             assert ready["ready"] and ready["command"] == "position" and ready["port"] != client.port
             begin = client.wait("COMMANDING_ACTIVE", timeout=60.0).q.copy()
             goal = begin + 0.05
@@ -72,9 +72,9 @@ def test_a_bare_controller_serves_any_client_and_says_how_it_went() -> None:
                 client.command(q=goal)
                 if np.abs(s.q - goal).max() < 2e-3:
                     break
-        client.wait("IDLE", timeout=20.0)  # the controller says goodbye
-    assert {"event": "StateChanged", "text": "session COMMANDING_WAIT -> COMMANDING_ACTIVE"} in told
-    assert told[-1]["ended"] and told[-1]["answers"]["on_time"] > 10 and told[-1]["refused"] == 0
+        client.wait("IDLE", timeout=20.0)  # the controller sends goodbye
+    assert {"event": "StateChanged", "text": "session COMMANDING_WAIT -> COMMANDING_ACTIVE"} in reported
+    assert reported[-1]["ended"] and reported[-1]["answers"]["on_time"] > 10 and reported[-1]["refused"] == 0
 
 
 def test_a_bare_controller_has_signals_and_asks_for_frames() -> None:
@@ -83,7 +83,7 @@ def test_a_bare_controller_has_signals_and_asks_for_frames() -> None:
         Client(0, realtime=False) as client,
         controller(
             client.port, "--fri-period", "10", *signals, "--fri-frame", "Part", version="2.7", typed=True
-        ) as (_, told),
+        ) as (_, reported),
     ):
         client.wait("COMMANDING_ACTIVE", timeout=60.0)
         assert client.inputs == {"Cell.Door": False} and client.outputs == {"Cell.Part": 0, "Cell.Level": 0.0}
@@ -91,13 +91,13 @@ def test_a_bare_controller_has_signals_and_asks_for_frames() -> None:
         client.frame("Part", Pose.at(0.5, 0.0, 0.1))
         client.output("part", 7)
         client.output("Cell.Level", 0.5)
-        told.say("set Cell.Door true")
+        reported.say("set Cell.Door true")
         for s in client:
             if s.io.door and s.io.part == 7 and s.io.level == 0.5:
                 break
-        told.say("set Cell.Door 3")
-        told.say("open the door")
-    texts = [one.get("text", "") for one in told]
+        reported.say("set Cell.Door 3")
+        reported.say("open the door")
+    texts = [one.get("text", "") for one in reported]
     for line in ("output Cell.Part = 7", "output Cell.Level = 0.5", "frame Part = 500, 0, 100, 1, 0, 0, 0"):
         assert line in texts
 
@@ -110,7 +110,7 @@ def test_a_bare_controller_has_a_posture_an_impedance_a_force_and_faults() -> No
         Client(0, realtime=False) as client,
         controller(client.port, "--fri-period", "10", *options, *posture, version="2.7", typed=True) as (
             _,
-            told,
+            reported,
         ),
     ):
         state = client.wait("COMMANDING_ACTIVE", timeout=60.0)
@@ -120,11 +120,11 @@ def test_a_bare_controller_has_a_posture_an_impedance_a_force_and_faults() -> No
             deflection = s.tau_ext / 500.0
             if np.abs(deflection).max() > 0.01 and s.q - s.q_ipo == pytest.approx(deflection, abs=2e-3):
                 break
-        told.say("emergency_stop")
+        reported.say("emergency_stop")
         client.wait("MONITORING_READY", timeout=30.0)
-        told.say("clear")
+        reported.say("clear")
         client.wait("COMMANDING_ACTIVE", timeout=30.0)
-    ends = [one["text"] for one in told if one.get("event") == "OverlayEnded"]
+    ends = [one["text"] for one in reported if one.get("event") == "OverlayEnded"]
     assert len(ends) == 2 and "safety stop" in ends[0]
 
 
@@ -142,11 +142,11 @@ def test_torques_begin_on_an_impedance_that_holds_the_arm() -> None:
 
 def test_the_network_of_a_bare_controller_has_faults() -> None:
     faults = ("--fri-network", "loss=0.5", "--fri-network", "delay=0.001")
-    with Client(0, realtime=False) as client, controller(client.port, *faults) as (_, told):
+    with Client(0, realtime=False) as client, controller(client.port, *faults) as (_, reported):
         client.wait("MONITORING_WAIT", timeout=60.0)
         for _ in zip(range(30), client, strict=False):
             pass
-    assert told[-1]["answers"]["lost"] > 5
+    assert reported[-1]["answers"]["lost"] > 5
 
 
 @pytest.mark.parametrize(

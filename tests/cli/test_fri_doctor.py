@@ -56,13 +56,13 @@ def test_somebody_elses_application_is_listened_to(tmp_path: Path) -> None:
             *("bench", "--fri", "--listen", "--fri-port", str(port), "--duration", "1", "--json"),
             *("--plot", str(picture)),
         )
-    told = json.loads(done.stdout)
-    assert told["messages"] > 10 and told["period_s"] == 0.01 and told["latency_s"]["p50"] > 0
-    assert done.returncode == (0 if told["good"] else 1)
+    reported = json.loads(done.stdout)
+    assert reported["messages"] > 10 and reported["period_s"] == 0.01 and reported["latency_s"]["p50"] > 0
+    assert done.returncode == (0 if reported["good"] else 1)
     assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 20_000
 
 
-def test_an_application_that_starts_no_overlay_is_told_of() -> None:
+def test_an_application_that_starts_no_overlay_is_reported() -> None:
     port = free_port()
     with controller(port, "--fri-period", "10", "--fri-command", "monitor"):
         found = verdicts("--listen", "--fri-port", str(port), "--seconds", "2")

@@ -200,7 +200,7 @@ def test_a_private_simulator_takes_the_key_and_no_other_process_sees_it(key_file
             assert observer.controller == arm.controller
 
 
-def test_a_cabinet_that_is_open_to_all_says_so_on_the_smartpad_and_in_doctor(
+def test_a_cabinet_that_is_open_to_all_reports_it_on_the_smartpad_and_in_doctor(
     tmp_path: Path, key_file: Path
 ) -> None:
     risk = "any program in the network can move"
@@ -303,7 +303,7 @@ def test_keys_are_made_listed_and_forgotten(config: Path) -> None:
     assert run("key", "new", "--target", "sim://iiwa14").returncode == 1
 
 
-def test_install_cabinet_makes_a_key_unless_it_is_told_not_to(tmp_path: Path) -> None:
+def test_install_cabinet_makes_a_key_unless_declined(tmp_path: Path) -> None:
     def key_in(folder: Path) -> object:
         return read_process_data(folder / "RoboticsAPI.data.xml")["heptarm.key"]
 
@@ -314,9 +314,9 @@ def test_install_cabinet_makes_a_key_unless_it_is_told_not_to(tmp_path: Path) ->
     if sys.platform != "win32":
         assert stat.S_IMODE((tmp_path / "keyed/RoboticsAPI.data.xml").stat().st_mode) == 0o600
 
-    (told,) = objects("install-cabinet", "--out", str(tmp_path / "named"), "--target", "10.0.0.9")
+    (reported,) = objects("install-cabinet", "--out", str(tmp_path / "named"), "--target", "10.0.0.9")
     stored = keys.stored_key("10.0.0.9", 30001)
-    assert told["key_file"] == str(stored.file) and key_in(tmp_path / "named") == keys.read_key_file(
+    assert reported["key_file"] == str(stored.file) and key_in(tmp_path / "named") == keys.read_key_file(
         stored.file
     )
     objects("install-cabinet", "--out", str(tmp_path / "once more"), "--target", "10.0.0.9")

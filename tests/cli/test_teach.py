@@ -8,7 +8,7 @@ from tests.cli.running import objects, run, sim
 
 
 def test_taught_and_replayed(tmp_path: Path) -> None:
-    file = tmp_path / "way.npz"
+    file = tmp_path / "path.npz"
     hand = [word for second in range(2, 40, 2) for word in ("--fault", f"push 0 4 4 0.3@{second}")]
     with sim(*hand, "--speed", "2") as ready:
         target = ("--target", ready["target"])

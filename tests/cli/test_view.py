@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import io
-import shutil
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,36 +13,6 @@ import heptarm as ha
 from tests.cli.running import sim
 
 pytest.importorskip("viser")
-webdriver = pytest.importorskip("selenium.webdriver")
-
-_OPTIONS = (
-    "--headless=new",
-    "--no-sandbox",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--window-size=1000,750",
-)
-
-
-@pytest.fixture
-def browser(tmp_path: Path) -> Iterator[object]:
-    binary = shutil.which("chromium") or shutil.which("google-chrome")
-    driver = shutil.which("chromedriver")
-    if binary is None or driver is None:
-        pytest.skip("no Chromium here: apt-get install chromium chromium-driver")
-    options = webdriver.ChromeOptions()
-    options.binary_location = binary
-    for option in (*_OPTIONS, f"--user-data-dir={tmp_path / 'profile'}"):
-        options.add_argument(option)
-    running = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
-    yield running
-    running.quit()
 
 
 def _picture(browser: object) -> np.ndarray:
@@ -53,7 +21,7 @@ def _picture(browser: object) -> np.ndarray:
     return imread(io.BytesIO(browser.get_screenshot_as_png()), format="png")[..., :3]
 
 
-def _share(picture: np.ndarray, low: tuple[float, ...], high: tuple[float, ...]) -> float:
+def _fraction(picture: np.ndarray, low: tuple[float, ...], high: tuple[float, ...]) -> float:
     return float(((picture >= low) & (picture <= high)).all(axis=-1).mean())
 
 
@@ -81,7 +49,7 @@ def test_the_view_shows_the_arm_and_follows_it(browser: object, tmp_path: Path) 
         browser.get(ready["view"])
         first = _settled(browser)
         browser.save_screenshot(str(tmp_path / "view.png"))
-        assert _share(first, (0.55, 0.55, 0.55), (0.9, 0.9, 0.9)) > 0.005, "no silver links"
+        assert _fraction(first, (0.55, 0.55, 0.55), (0.9, 0.9, 0.9)) > 0.005, "no silver links"
         with ha.connect(ready["target"]) as arm:
             arm.move(ha.ptp(ha.deg(60, 50, 0, -60, 0, 60, 0)))
         second = _settled(browser)

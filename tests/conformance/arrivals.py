@@ -34,13 +34,13 @@ def several_points(client: Client) -> None:
     path = swing(client)
     wanted = goal(client, *(point(0.3 * (k + 1), here + path * np.sin(1.0 + k)) for k in range(4)))
     sent = succeeds(client, wanted)
-    told = client.feedback(sent)
-    assert told
-    for one in told:
+    reported = client.feedback(sent)
+    assert reported
+    for one in reported:
         before = sum(p.time < one.time for p in wanted.points)
         # a message is made in one step and the step may be right at a point's time
         assert one.index is None or abs(one.index - before) <= 1, (one.index, one.time)
-    numbers = [one.index for one in told if one.index is not None]
+    numbers = [one.index for one in reported if one.index is not None]
     assert numbers == sorted(numbers)
 
 
@@ -48,8 +48,10 @@ def several_points(client: Client) -> None:
 def several_points_with_velocities(client: Client) -> None:
     here = client.place().q
     path = swing(client)
-    way = [point(0.3 * k, here + 0.2 * k * path, dq=tuple(0.6 * path if k < 4 else REST)) for k in (1, 2, 3)]
-    succeeds(client, goal(client, *way, point(1.4, here + 0.9 * path, dq=REST)))
+    travel = [
+        point(0.3 * k, here + 0.2 * k * path, dq=tuple(0.6 * path if k < 4 else REST)) for k in (1, 2, 3)
+    ]
+    succeeds(client, goal(client, *travel, point(1.4, here + 0.9 * path, dq=REST)))
 
 
 @case
@@ -96,14 +98,14 @@ def feedback_is_in_the_arms_order_and_adds_up(client: Client) -> None:
     sent = succeeds(
         client, TrajectoryGoal(backwards, (TrajectoryPoint(1.2, tuple(there[::-1].tolist()), dq=REST),))
     )
-    told = client.feedback(sent)
-    assert len(told) >= 3
-    for one in told:
+    reported = client.feedback(sent)
+    assert len(reported) >= 3
+    for one in reported:
         assert one.joints == client.joints
         np.testing.assert_allclose(one.error, one.desired.q - one.actual.q, atol=1e-9)
         low, high = np.minimum(here, there) - TOUCH, np.maximum(here, there) + TOUCH
         assert ((one.desired.q >= low) & (one.desired.q <= high)).all()
-    assert all(a.elapsed <= b.elapsed for a, b in itertools.pairwise(told))
+    assert all(a.elapsed <= b.elapsed for a, b in itertools.pairwise(reported))
 
 
 @case
@@ -113,11 +115,11 @@ def the_next_goal_begins_where_the_last_ended(client: Client) -> None:
 
 
 @case
-def an_empty_way_back(client: Client) -> None:
+def an_empty_return(client: Client) -> None:
     here = client.place().q
     path = swing(client)
-    way = (point(0.4, here + path), point(0.8, here))
-    succeeds(client, goal(client, *way))
+    travel = (point(0.4, here + path), point(0.8, here))
+    succeeds(client, goal(client, *travel))
     assert np.abs(client.place().q - here).max() < TOUCH
 
 

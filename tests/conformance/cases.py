@@ -11,5 +11,5 @@ from tests.conformance.case import CASES, UNFIT
 
 __all__ = ["CASES", "UNFIT"]
 
-for _topic in ("refusals", "arrivals", "interruptions", "deviations", "surroundings"):
+for _topic in ("refusals", "arrivals", "interruptions", "deviations", "surroundings", "instants", "streams"):
     importlib.import_module(f"tests.conformance.{_topic}")

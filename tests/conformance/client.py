@@ -48,11 +48,13 @@ class Client(Protocol):
         joints: names of the arm's joints, from the base on.
         preempted: in which states a goal may end whose place another one took.
         timely: whether its clock is exact, so that times may be held against it.
+        empty_stops: whether an empty trajectory on the topic stops the arm, as in ROS 1; in ROS 2 it is refused.
     """
 
     joints: tuple[str, ...]
     preempted: tuple[GoalOutcome, ...]
     timely: bool
+    empty_stops: bool
 
     def now(self) -> float:
         """Time for a goal's start [s]."""
@@ -103,5 +105,5 @@ class Client(Protocol):
         ...
 
     def topic(self, goal: TrajectoryGoal) -> None:
-        """Send a trajectory to the topic; one without joints and points stops."""
+        """Send a trajectory to the topic."""
         ...

@@ -29,8 +29,8 @@ def wide_goal_tolerances_of_one_point(client: Client) -> None:
 def wide_goal_tolerances_of_several_points(client: Client) -> None:
     here = client.place().q
     path = swing(client)
-    way = (point(0.3, here + path / 2), point(0.7, here + path))
-    succeeds(client, goal(client, *way, goal_tolerance=tolerances(client, 0.1)))
+    travel = (point(0.3, here + path / 2), point(0.7, here + path))
+    succeeds(client, goal(client, *travel, goal_tolerance=tolerances(client, 0.1)))
 
 
 @case

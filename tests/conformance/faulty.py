@@ -49,19 +49,21 @@ class _Unruly:
         ] = []  # instead of those of the last, this and the next tick; empty: as they are
 
     def torque(self, control: Any, sensed: Any) -> Any:
-        told, how = sensed.after, _behaviour
+        reported, how = sensed.after, _behaviour
         if how == "follows" and not self._taken:
             return self._honest(control, sensed)
         self._taken = self._taken or [sensed.before, sensed.now, sensed.now]
         here = self._taken[2]
-        self._late.append(told)
+        self._late.append(reported)
         late = self._late.popleft() if len(self._late) > LAG else here
-        there = {"frozen": here, "lags": late, "follows": here + np.clip(told - here, -CATCH_UP, CATCH_UP)}[
-            how
-        ]
+        there = {
+            "frozen": here,
+            "lags": late,
+            "follows": here + np.clip(reported - here, -CATCH_UP, CATCH_UP),
+        }[how]
         self._taken = [*self._taken[1:], there]
         sensed.before, sensed.now, sensed.after = self._taken
-        if how == "follows" and (there == told).all():
+        if how == "follows" and (there == reported).all():
             self._taken, self._late = [], deque()
         return self._honest(control, sensed)
 

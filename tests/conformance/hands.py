@@ -25,11 +25,14 @@ def along(probe: Probe, z: float, **more: Any) -> Any:
     return probe.make("heptarm_msgs/Motion", kind=3, pose=towards(probe, z), **more)
 
 
-def push(stage: Stage, sent: Sent, way: float) -> None:
+def push(stage: Stage, sent: Sent, covered: float) -> None:
     """Push until a joint has turned by this angle [rad]."""
-    before = until(lambda: sent.told, "no feedback")[-1].position
+    before = until(lambda: sent.reported, "no feedback")[-1].position
     stage.do("push 0 6 6 300")
-    until(lambda: np.abs(np.subtract(sent.told[-1].position, before)).max() > way, "the arm is not guided")
+    until(
+        lambda: np.abs(np.subtract(sent.reported[-1].position, before)).max() > covered,
+        "the arm is not guided",
+    )
     stage.do("push 0 0 0 0")
 
 
@@ -41,7 +44,7 @@ def case_the_arm_touches_once_and_twice(probe: Probe, stage: Stage) -> None:
     assert contact.contact and abs(contact.pose.pose.position.z - TABLE) < 0.015
     assert contact.pose.header.frame_id == "link_0" and contact.force.z > 8.0
     assert 0.05 < contact.travel < 0.15 and len(contact.position) == 7 and math.isnan(contact.spread)
-    assert sent.told and max(one.travel for one in sent.told) > 0.05
+    assert sent.reported and max(one.travel for one in sent.reported) > 0.05
 
     def height() -> float:
         return float(done(probe.call("get_pose", "GetPose", frame="flange")).pose.position.z)
@@ -70,17 +73,17 @@ def case_a_touch_is_cancelled_and_preempted(probe: Probe, stage: Stage) -> None:
     home(probe)
     slowly = {"direction": "-z", "frame": "base", "distance": 0.08, "force": 20.0, "speed_mps": 0.02}
     sent = probe.send("touch", "Touch", **slowly)
-    until(lambda: sent.told and sent.told[-1].travel > 2e-3, "the arm does not set out")
+    until(lambda: sent.reported and sent.reported[-1].travel > 2e-3, "the arm does not set out")
     follow = probe.tell("servo/velocity", "sensor_msgs/JointState", name=["A7"], velocity=[0.2])
     follow()  # a servo topic has no place in the queue
     sent.cancel()
     refused(sent.end(), "cancelled")
     sent = probe.send("touch", "Touch", **slowly)
-    until(lambda: sent.told and sent.told[-1].travel > 2e-3, "the arm does not set out")
+    until(lambda: sent.reported and sent.reported[-1].travel > 2e-3, "the arm does not set out")
     home(probe)
     refused(sent.end(), "preempted")
     sent = probe.send("touch", "Touch", **slowly)
-    until(lambda: sent.told and sent.told[-1].travel > 2e-3, "the arm does not set out")
+    until(lambda: sent.reported and sent.reported[-1].travel > 2e-3, "the arm does not set out")
     done(probe.call("stop", "std_srvs/Trigger"))
     refused(sent.end(), "stopped")
     states = probe.listen("state", "heptarm_msgs/RobotState")
@@ -123,20 +126,22 @@ def case_triggers_write_outputs_and_notify(probe: Probe, stage: Stage) -> None:
     sent = probe.send("run_program", "RunProgram", motions=program)
     assert done(sent.end()).item == 2
     until(lambda: lit("MediaFlange.LEDRed"), "the output is not written")
-    fed = [one for feedback in sent.told for one in feedback.events]  # the last one may arrive after the result
-    assert fed[0].kind == "begun" and {feedback.item for feedback in sent.told} == {0, 1, 2}
-    assert any(feedback.remaining > 0.0 for feedback in sent.told)
+    fed = [
+        one for feedback in sent.reported for one in feedback.events
+    ]  # the last one may arrive after the result
+    assert fed[0].kind == "begun" and {feedback.item for feedback in sent.reported} == {0, 1, 2}
+    assert any(feedback.remaining > 0.0 for feedback in sent.reported)
     number = fed[0].motion
     last = ("ended", 2)
     until(lambda: any((one.motion, one.kind, one.item) == (number, *last) for one in list(news)), "no events")
-    told = [one for one in news if one.motion == number]
-    kinds = [(one.kind, one.item) for one in told]
+    received = [one for one in news if one.motion == number]
+    kinds = [(one.kind, one.item) for one in received]
     assert kinds[0] == ("begun", 0) and kinds[-1] == last, kinds
-    fired = {one.signal or one.label: one for one in told if one.kind == "trigger"}
+    fired = {one.signal or one.label: one for one in received if one.kind == "trigger"}
     assert set(fired) == {"LEDRed", "nearly there"} and all(one.item == 0 for one in fired.values())
     assert 0.0 < fired["LEDRed"].time < fired["nearly there"].time
     assert fired["LEDRed"].code == 0 and len(fired["LEDRed"].position) == 7
-    assert [one.segment for one in told if one.kind == "segment"] == [0, 1]
+    assert [one.segment for one in received if one.kind == "segment"] == [0, 1]
     blue = trigger("path.before_end()", signal="LEDBlue", value=1.0)
     done(act(probe, "move_joints", "MoveJoints", position=HOME, speed=0.6, triggers=[blue]))
     until(lambda: lit("MediaFlange.LEDBlue"), "the output is not written")
@@ -165,11 +170,11 @@ def case_a_collision_guard_stops_motions_and_makes_compliant(probe: Probe, stage
     until(lambda: states and not states[-1].motion, "the arm does not rest")
     count = len(states)
 
-    def told() -> bool:
+    def received() -> bool:
         turn()
         return len(states) > count + 50
 
-    until(told, "no states")
+    until(received, "no states")
     assert not any(one.motion for one in states[count:]), "a servo topic is not followed after a collision"
     done(probe.call("collision_guard", "SetCollisionGuard", disable=True))
     home(probe)
@@ -185,7 +190,9 @@ def case_a_collision_guard_stops_motions_and_makes_compliant(probe: Probe, stage
     until(lambda: states[-1].motion, "the arm is not compliant")
     home(probe)  # the guard is disabled, and a command replaces the compliant hold
     refused(probe.call("collision_guard", "SetCollisionGuard", threshold=[-1.0]), "threshold")
-    refused(probe.call("collision_guard", "SetCollisionGuard", reaction="flee"), "flee", "brake, soft")
+    refused(
+        probe.call("collision_guard", "SetCollisionGuard", reaction="flee"), "flee", "brake, compliant_mode"
+    )
 
 
 def case_the_arm_is_guided_by_hand(probe: Probe, stage: Stage) -> None:
@@ -199,9 +206,9 @@ def case_the_arm_is_guided_by_hand(probe: Probe, stage: Stage) -> None:
     assert after.y - before.y > 0.005 and abs(after.z - before.z) < 5e-3
     limits = {"joint_velocity": 0.5, "q_max": [0.8] + [math.nan] * 6}
     sent = probe.send("guide", "Guide", **limits)
-    until(lambda: sent.told, "no feedback")
+    until(lambda: sent.reported, "no feedback")
     stage.do("guide")
-    until(lambda: sent.told[-1].held, "the switch is not seen")
+    until(lambda: sent.reported[-1].held, "the switch is not seen")
     push(stage, sent, 0.03)
     stage.do("let_go")
     result = done(sent.end())
@@ -219,17 +226,19 @@ def case_a_trajectory_is_taught_and_replayed(probe: Probe, stage: Stage) -> None
     push(stage, sent, 0.06)
     stage.do("press 1 client")
     taught = done(sent.end())
-    way = taught.trajectory
+    covered = taught.trajectory
     assert "the key 'done'" in taught.message and taught.name == "wave"
-    assert 2 <= len(way.points) < taught.recorded and list(way.joint_names) == [f"A{i}" for i in range(1, 8)]
+    assert 2 <= len(covered.points) < taught.recorded and list(covered.joint_names) == [
+        f"A{i}" for i in range(1, 8)
+    ]
     again = probe.send("replay", "Replay", name="wave", by="spline", speed_scaling=0.5)
     result = done(again.end())
     assert result.deviation < 0.1 and math.isnan(result.lag)
-    assert max(one.progress for one in again.told) > 0.2
+    assert max(one.progress for one in again.reported) > 0.2
     tries: list[Any] = []
 
     def repeated() -> bool:
-        tries.append(act(probe, "replay", "Replay", trajectory=way))
+        tries.append(act(probe, "replay", "Replay", trajectory=covered))
         if not tries[-1].success:  # a busy machine may fall silent
             refused(tries[-1], "for want of targets")
         return bool(tries[-1].success)
@@ -237,11 +246,11 @@ def case_a_trajectory_is_taught_and_replayed(probe: Probe, stage: Stage) -> None
     until(repeated, "the trajectory is not replayed")
     assert tries[-1].deviation < 0.3 and math.isfinite(tries[-1].lag)
     slowly = probe.send("replay", "Replay", name="wave", speed_scaling=0.05)
-    until(lambda: slowly.told and slowly.told[-1].progress > 0.01, "it does not begin")
+    until(lambda: slowly.reported and slowly.reported[-1].progress > 0.01, "it does not begin")
     slowly.cancel()
     refused(slowly.end(), "cancelled")
     sent = probe.send("teach", "Teach", free="xyz", frame="base", whole=True)
-    until(lambda: sent.told and sent.told[-1].recorded > 20, "nothing is recorded")
+    until(lambda: sent.reported and sent.reported[-1].recorded > 20, "nothing is recorded")
     sent.cancel()
     taught = done(sent.end())
     assert taught.name == "last" and len(taught.trajectory.points) > 20
@@ -252,7 +261,7 @@ def case_a_trajectory_is_taught_and_replayed(probe: Probe, stage: Stage) -> None
 def case_somebody_taps_the_arm(probe: Probe, stage: Stage) -> None:
     home(probe)
     sent = probe.send("wait_for_taps", "WaitForTaps", count=2, gap=10.0)
-    until(lambda: sent.told, "no feedback")
+    until(lambda: sent.reported, "no feedback")
     over = Event()
 
     def tap() -> None:
@@ -268,7 +277,7 @@ def case_somebody_taps_the_arm(probe: Probe, stage: Stage) -> None:
         hand.join()
     refused(act(probe, "wait_for_taps", "WaitForTaps", timeout=0.2), "not tapped 2 times")
     sent = probe.send("wait_for_taps", "WaitForTaps")
-    until(lambda: sent.told, "no feedback")
+    until(lambda: sent.reported, "no feedback")
     sent.cancel()
     refused(sent.end(), "cancelled")
     refused(act(probe, "wait_for_taps", "WaitForTaps", force=9999.0), "force")

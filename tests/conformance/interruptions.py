@@ -152,31 +152,31 @@ def _brakes(client: Client) -> tuple[Array, Array]:
     assert client.result(sent).outcome is GoalOutcome.CANCELED
     rests(client)
     track = client.track(begin)
-    times, way = np.array([time for time, _ in track]), np.array([sign * q[6] for _, q in track])
+    times, travel = np.array([time for time, _ in track]), np.array([sign * q[6] for _, q in track])
     apart = (
         np.diff(times, prepend=-1.0) > 2e-3
     )  # stamps may be nearer where the clocks' difference was corrected
-    return times[apart], way[apart]
+    return times[apart], travel[apart]
 
 
 @case
 def cancelling_makes_no_jump(client: Client) -> None:
-    times, way = undisturbed(client, lambda: _brakes(client))
+    times, travel = undisturbed(client, lambda: _brakes(client))
     # a spline may go faster between two points than the trajectory does, and a stream falters on a busy machine
-    speeds = np.diff(way) / np.diff(times)
-    assert way[-1] - way[0] > 5e-3, "it was under way"
+    speeds = np.diff(travel) / np.diff(times)
+    assert travel[-1] - travel[0] > 5e-3, "it was under way"
     assert speeds.max() < 1.2, speeds
     assert speeds.min() > -0.1, speeds
 
 
 @case
-def cancelling_brakes_as_the_parameter_says(client: Client) -> None:
+def cancelling_brakes_as_the_parameter_reports(client: Client) -> None:
     assert client.set(max_deceleration_on_cancel=0.5)
     found: list[float] = []
     # a stream that falters on a busy machine brakes, too; no such run can pass by chance
     while not found or (len(found) < 5 and not 0.3 < found[-1] < 0.8):
-        times, way = undisturbed(client, lambda: _brakes(client))
-        left = way[-1] - way
+        times, travel = undisturbed(client, lambda: _brakes(client))
+        left = travel[-1] - travel
         # with constant deceleration the square root of the remaining distance falls linearly
         inside = (left > 0.01) & (left < 0.1)
         assert inside.sum() > 5, left
@@ -228,8 +228,8 @@ def the_deceleration_is_a_parameter(client: Client) -> None:
         # the last report is close to where the arm started to brake; a client may look much later
         return sign * float(rests(client)[6] - client.feedback(sent)[-1].actual.q[6])
 
-    ways = []
+    paths = []
     for deceleration in (8.0, 0.5):
         assert client.set(max_deceleration_on_cancel=deceleration)
-        ways.append(undisturbed(client, braked))
-    assert ways[1] > ways[0] + 0.05, ways
+        paths.append(undisturbed(client, braked))
+    assert paths[1] > paths[0] + 0.05, paths

@@ -17,7 +17,9 @@ from heptarm.model.kinematics import forward
 from heptarm.values.robot import robot
 from tests.conformance.stage import Stage
 
-WORLD = "MediaFlange.UserButton&lt;bool MediaFlange.LEDBlue&gt;bool MediaFlange.LEDRed&gt;bool Cell.Offset&gt;i16"
+WORLD = (
+    "MediaFlange.UserButton&lt;bool MediaFlange.LEDBlue&gt;bool MediaFlange.LEDRed&gt;bool Cell.Offset&gt;i16"
+)
 PROJECT = f"""<persistence><processDataContainer>
 <processData dataType="java.lang.String" id="heptarm.io" value="{WORLD}"/>
 <processData dataType="java.lang.Integer" id="cell.count" value="3"/>
@@ -35,7 +37,7 @@ class Sent(Protocol):
     """A goal that was sent."""
 
     @property
-    def told(self) -> list[Any]:
+    def reported(self) -> list[Any]:
         """Its feedback so far."""
         ...
 
@@ -73,6 +75,10 @@ class Probe(Protocol):
 
     def point(self, positions: list[float], seconds: float) -> Any:
         """A point of a trajectory."""
+        ...
+
+    def seconds(self, duration: Any) -> float:
+        """A duration of a message [s]."""
         ...
 
     def query(self) -> Any:
@@ -125,9 +131,9 @@ def home(probe: Probe) -> None:
 
 def case_signals_are_listed_written_and_published(probe: Probe, stage: Stage) -> None:
     seen = probe.listen("signals", "heptarm_msgs/Signals", latched=True)
-    told = done(probe.call("signals", "GetSignals"))
-    assert list(told.names) == [word.partition("&")[0] for word in WORLD.split()]
-    assert list(told.outputs) == [False, True, True, True] and told.kinds[3] == "integer"
+    reported = done(probe.call("signals", "GetSignals"))
+    assert list(reported.names) == [word.partition("&")[0] for word in WORLD.split()]
+    assert list(reported.outputs) == [False, True, True, True] and reported.kinds[3] == "integer"
     done(probe.call("set_signals", "SetSignals", names=["offset", "LEDRed"], values=[-30.0, 1.0]))
     until(lambda: seen and dict(zip(seen[-1].names, seen[-1].values))["Cell.Offset"] == -30.0, "no signal")
     done(probe.call("set_led", "SetText", value="blue"))
@@ -162,17 +168,25 @@ def case_a_condition_ends_a_motion(probe: Probe, stage: Stage) -> None:
     home(probe)
     states = probe.listen("state", "heptarm_msgs/RobotState")
     until(lambda: states, "no states")
-    ended = probe.send("move_joints", "MoveJoints", joint_names=["A1"], position=[2.0], until="io.user_button")
+    ended = probe.send(
+        "move_joints", "MoveJoints", joint_names=["A1"], position=[2.0], until="io.user_button"
+    )
     until(lambda: states[-1].position[0] > 0.05, "the arm does not set out")
     stage.do("set UserButton true")
     result = done(ended.end())
     assert "UserButton" in result.stopped_by or "user_button" in result.stopped_by, result.stopped_by
     assert states[-1].position[0] < 1.9
     stage.do("set UserButton false")
-    result = done(act(probe, "move_joints", "MoveJoints", position=HOME, until="~io.user_button | (force > 900)"))
+    result = done(
+        act(probe, "move_joints", "MoveJoints", position=HOME, until="~io.user_button | (force > 900)")
+    )
     assert "user_button" in result.stopped_by.casefold().replace("userbutton", "user_button")
     bad = "__import__('os').system('true')"
-    refused(act(probe, "move_joints", "MoveJoints", position=HOME, until=bad), "must be a condition", "force.along")
+    refused(
+        act(probe, "move_joints", "MoveJoints", position=HOME, until=bad),
+        "must be a condition",
+        "force.along",
+    )
     refused(act(probe, "move_joints", "MoveJoints", position=HOME, until="force > 9999"), "9999")
     home(probe)
 
@@ -278,7 +292,14 @@ def case_modes_with_all_their_parameters(probe: Probe, stage: Stage) -> None:
         "frame": "base",
     }
     done(probe.call("mode/sine_impedance", "SetSineImpedance", **sine))
-    done(act(probe, "run_program", "RunProgram", motions=[probe.make("heptarm_msgs/Motion", kind=6, duration=0.6)]))
+    done(
+        act(
+            probe,
+            "run_program",
+            "RunProgram",
+            motions=[probe.make("heptarm_msgs/Motion", kind=6, duration=0.6)],
+        )
+    )
     for pattern in (
         {"pattern": "force", "force": [0.0, 0.0, 5.0, 0.0, 0.0, 0.0], "total_time": [1.0]},
         {"pattern": "sine", "direction": "z", "frequency": 2.0, "amplitude": 5.0},
@@ -287,7 +308,10 @@ def case_modes_with_all_their_parameters(probe: Probe, stage: Stage) -> None:
     ):
         done(probe.call("mode/force_pattern", "SetForcePattern", **pattern))
     refused(probe.call("mode/force_pattern", "SetForcePattern", pattern="star"), "star", "lissajous")
-    refused(probe.call("mode/force_pattern", "SetForcePattern", pattern="force", force=[1.0]), "must have 6 numbers")
+    refused(
+        probe.call("mode/force_pattern", "SetForcePattern", pattern="force", force=[1.0]),
+        "must have 6 numbers",
+    )
     refused(probe.call("mode/sine_impedance", "SetSineImpedance", **{**sine, "nullspace": six}), "nullspace")
     done(probe.call("mode/position", "std_srvs/Trigger"))
 
@@ -345,7 +369,9 @@ def case_an_fri_session_is_opened_commanded_and_closed(probe: Probe, stage: Stag
         if status and status[-1].kind:
             return True
         answer = probe.call("fri/open", "OpenFri", kind=kind, period_ms=10, **settings)
-        return answer.success and bool(until(lambda: status and (status[-1].kind or status[-1].text), "no status"))
+        return answer.success and bool(
+            until(lambda: status and (status[-1].kind or status[-1].text), "no status")
+        )
 
     def watched() -> bool:
         return stands("monitor", io=["LEDRed"]) and status[-1].received > 10
@@ -391,8 +417,141 @@ def case_the_desired_state_of_a_trajectory(probe: Probe, stage: Stage) -> None:
     until(lambda: probe.query() is None, "the trajectory does not end")
 
 
+def case_forward_controllers_are_followed(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    states = probe.listen("state", "heptarm_msgs/RobotState")
+    until(lambda: states, "no states")
+    start = states[-1].position[6]
+    pushed = 0
+
+    def push() -> bool:
+        nonlocal pushed
+        pushed = min(pushed + 1, 60)
+        data = [*HOME[:6], start + 0.004 * pushed]
+        probe.tell("/surface/forward_position_controller/commands", "std_msgs/Float64MultiArray", data=data)()
+        return abs(states[-1].position[6] - start - 0.24) < 5e-3
+
+    until(push, "the positions are not followed")
+    until(
+        lambda: all(abs(one.position[6] - start - 0.24) < 5e-3 for one in states[-30:]),
+        "it does not hold the last one",
+    )
+    turn = probe.tell(
+        "/surface/forward_velocity_controller/commands", "std_msgs/Float64MultiArray", data=[0.0] * 6 + [-0.2]
+    )
+    until(lambda: turn() or states[-1].position[6] < start + 0.1, "the velocities are not followed")
+    until(lambda: all(abs(one.velocity[6]) < 1e-3 for one in states[-30:]), "silence does not end it")
+    there = states[-1].position[6]
+    probe.tell(
+        "/surface/forward_position_controller/commands", "std_msgs/Float64MultiArray", data=[0.0] * 6
+    )()
+    far = [*HOME[:6], there + 2.0]
+    probe.tell("/surface/forward_position_controller/commands", "std_msgs/Float64MultiArray", data=far)()
+    time.sleep(0.3)
+    assert abs(states[-1].position[6] - there) < 5e-3, "neither six numbers nor a jump move the arm"
+
+
+def case_a_twist_moves_the_flange_and_silence_ends_it(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    poses = probe.listen("pose", "geometry_msgs/PoseStamped")
+    states = probe.listen("state", "heptarm_msgs/RobotState")
+    until(lambda: poses and states, "no poses")
+
+    def place() -> np.ndarray:
+        at = poses[-1].pose.position
+        return np.array([at.x, at.y, at.z])
+
+    def push(kind: str, name: str, move: np.ndarray, **more: Any) -> None:
+        """Move on until the flange has moved by this much, with 0.05 m/s."""
+        begin, along = place(), move / np.linalg.norm(move)
+        fields = dict(zip("xyz", (0.05 * along).tolist()))
+        twist = probe.make("geometry_msgs/Twist", linear=probe.make("geometry_msgs/Vector3", **fields))
+        if kind == "geometry_msgs/TwistStamped":
+            more["twist"] = twist
+        else:
+            more["linear"] = twist.linear
+        send = probe.tell(name, kind, **more)
+        until(lambda: send() or (place() - begin) @ along > np.linalg.norm(move), "the flange does not move")
+        until(
+            lambda: all(np.abs(one.velocity).max() < 1e-3 for one in states[-30:]), "silence does not end it"
+        )
+        moved = place() - begin
+        assert moved @ along < 2.0 * np.linalg.norm(move), "it does not stop"
+        assert np.linalg.norm(moved - (moved @ along) * along) < 5e-3, "it leaves its line"
+
+    push("geometry_msgs/TwistStamped", "servo/twist", np.array([0.0, 0.04, 0.0]))
+    push("geometry_msgs/Twist", "servo/twist_unstamped", np.array([0.0, -0.03, 0.02]))
+    turned = poses[-1].pose.orientation
+    header = probe.make("std_msgs/Header", frame_id="flange")
+    spin = probe.make("geometry_msgs/Twist", angular=probe.make("geometry_msgs/Vector3", z=0.2))
+    send = probe.tell("servo/twist", "geometry_msgs/TwistStamped", header=header, twist=spin)
+    begin, at = states[-1].position[6], place()
+    until(lambda: send() or states[-1].position[6] > begin + 0.05, "the flange does not turn about its axis")
+    assert np.linalg.norm(place() - at) < 5e-3 and poses[-1].pose.orientation != turned
+    until(lambda: not states[-1].motion, "the servo motion does not end")
+    moon = probe.make("std_msgs/Header", frame_id="moon")
+    at = place()
+    probe.tell("servo/twist", "geometry_msgs/TwistStamped", header=moon, twist=spin)()
+    time.sleep(0.3)
+    assert np.linalg.norm(place() - at) < 1e-3
+
+
+def case_a_joint_jog_moves_the_named_joints(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    states = probe.listen("state", "heptarm_msgs/RobotState")
+    until(lambda: states, "no states")
+    jog = probe.tell("servo/jog", "control_msgs/JointJog", joint_names=["A7"], velocities=[0.2])
+    until(lambda: jog() or states[-1].position[6] > 0.1, "the joint does not move")
+    until(lambda: all(abs(one.velocity[6]) < 1e-3 for one in states[-30:]), "silence does not end it")
+    assert np.abs(np.array(states[-1].position[:6]) - HOME[:6]).max() < 5e-3
+    there = states[-1].position[6]
+    probe.tell("servo/jog", "control_msgs/JointJog", joint_names=["A7"], displacements=[0.2])()
+    time.sleep(0.3)
+    assert abs(states[-1].position[6] - there) < 1e-3, "displacements are not supported"
+
+
+def case_the_state_of_the_controller_agrees_with_itself(probe: Probe, stage: Stage) -> None:
+    home(probe)
+    found = probe.listen("controller_state", "control_msgs/JointTrajectoryControllerState")
+    measured = probe.listen("/joint_states", "sensor_msgs/JointState")
+    scaling = probe.listen("speed_scaling", "std_msgs/Float64", latched=True)
+    until(lambda: found and scaling and measured, "no state of the controller")
+    names = ("reference", "feedback") if hasattr(found[-1], "reference") else ("desired", "actual")
+    wanted, actual = (getattr(found[-1], name) for name in names)
+    np.testing.assert_allclose(wanted.positions, HOME, atol=5e-3)
+    assert list(found[-1].joint_names) == [f"A{i}" for i in range(1, 8)]
+    done(probe.call("set_override", "SetNumber", value=0.5))
+    until(lambda: scaling[-1].data == 0.5, "the speed scaling is not published")
+    there = HOME[6] + 0.3
+    path = {"joint_names": [f"A{i}" for i in range(1, 8)], "points": [probe.point([*HOME[:6], there], 2.0)]}
+    count = len(found)
+    probe.tell("joint_trajectory", "trajectory_msgs/JointTrajectory", **path)()
+    until(lambda: getattr(found[-1], names[0]).positions[6] > HOME[6] + 0.2, "the reference does not move")
+    done(probe.call("set_override", "SetNumber", value=1.0))
+    until(lambda: scaling[-1].data == 1.0, "the speed scaling is not published")
+    moving = 0
+    for one in list(found)[count:]:
+        wanted, actual = (getattr(one, name) for name in names)
+        np.testing.assert_allclose(
+            one.error.positions, np.subtract(wanted.positions, actual.positions), atol=1e-9
+        )
+        if abs(wanted.velocities[6]) > 1e-3:  # the trajectory is a straight line in time
+            moving += 1
+            seconds = probe.seconds(wanted.time_from_start)
+            assert abs(wanted.positions[6] - HOME[6] - 0.15 * seconds) < 5e-3
+    assert moving > 10
+    stamps = [(one.header.stamp, one.position[6]) for one in list(measured)]
+    same = [
+        (getattr(one, names[1]).positions[6], value)
+        for one in list(found)[-50:]
+        for stamp, value in stamps
+        if stamp == one.header.stamp
+    ]
+    assert same and all(a == b for a, b in same), "its feedback is the joint state of the same stamp"
+    until(lambda: probe.query() is None, "the trajectory does not end")
+
+
 #: All cases by name.
 CASES = {
     name.removeprefix("case_"): case for name, case in list(globals().items()) if name.startswith("case_")
 }
-

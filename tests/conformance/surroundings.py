@@ -76,8 +76,8 @@ def _scaled(client: Client, factor: float) -> None:
         sent = client.send(wanted)
         ended = client.result(sent)
         assert ended.outcome is GoalOutcome.SUCCEEDED, ended
-        told = client.feedback(sent)
-        late = [one for one in told if one.elapsed > 0.3]
+        reported = client.feedback(sent)
+        late = [one for one in reported if one.elapsed > 0.3]
         for one in late:
             late = one.time - factor * one.elapsed
             # a spline of the cabinet takes less time than a trajectory that is slower than it need be
@@ -123,67 +123,12 @@ def a_trajectory_on_the_topic_takes_a_goals_place(client: Client) -> None:
     arrives(client, last(wanted, client))
 
 
-def _streamed(client: Client, rate: float) -> None:
-    """Stream a swing of 0.3 rad in 4 s, one point a message, as MoveIt Servo does."""
-    here, duration = client.place().q, 4.0
-    away = 0.3 * (np.arange(7) == 6) * (-1.0 if here[6] > 0 else 1.0)
-    begin = client.now()
-    count = round(duration * rate)
-    for k in range(1, count + 1):
-        fraction = 0.5 - 0.5 * np.cos(np.pi * k / count)
-        client.topic(goal(client, point(1.0 / rate, here + fraction * away)))
-        client.sleep(max(0.0, begin + k / rate - client.now()))
-    took = client.now() - begin
-    arrives(client, here + away)
-    track = client.track(begin)
-    progress = np.array([(q - here) @ away / (away @ away) for _, q in track])
-    assert progress.max() < 1.03, "it overshoots"
-    if took > 1.1 * duration:  # the machine was too busy to send at this rate
-        return
-    times = np.array([time for time, _ in track]) - begin
-    reached = np.interp(0.5 * duration, times, progress)
-    assert (0.4 if client.timely else 0.2) < reached < 0.6, f"it lags: {reached:.2f}"
-    if not client.timely:  # a busy machine delivers the messages in bursts
-        return
-    speeds = np.diff(np.interp(np.arange(0.25, 0.75, 0.025) * duration, times, progress)) / (0.025 * duration)
-    fastest = 0.5 * np.pi / duration
-    ratios = (speeds / fastest).round(2).tolist()
-    assert min(ratios) > 0.6 and max(ratios) < 1.2, f"it stops between the points: {ratios}"
-
-
-@case
-def points_streamed_at_50_hz_are_followed(client: Client) -> None:
-    _streamed(client, 50.0)
-
-
-@case
-def points_streamed_at_100_hz_are_followed(client: Client) -> None:
-    _streamed(client, 100.0)
-
-
-@case
-def points_streamed_at_250_hz_are_followed(client: Client) -> None:
-    _streamed(client, 250.0)
-
-
 @case
 def a_goal_takes_the_place_of_a_trajectory_on_the_topic(client: Client) -> None:
     here = client.place().q
     client.topic(long(client))
     under_way(client, here)
     succeeds(client, step(client, time=0.6, size=-0.5))
-
-
-@case
-def an_empty_trajectory_on_the_topic_stops_a_goal(client: Client) -> None:
-    here = client.place().q
-    sent = client.send(long(client))
-    under_way(client, here)
-    client.topic(TrajectoryGoal((), ()))
-    ended = client.result(sent)
-    assert ended.outcome is not GoalOutcome.SUCCEEDED and ended.code is not ErrorCode.SUCCESSFUL, ended
-    rest = rests(client)
-    stays(client, rest)
 
 
 @case

@@ -9,7 +9,7 @@ from tests.doubles.test_doubles import HERE, _command, _compile
 
 BREAKING = (
     "a line down stops on the table and returns",
-    "it says which condition fired",
+    "it reports which condition fired",
     "the table pushes back",
     "a condition that holds at the start ends the motion at once",
     "without a firing there is no info",
@@ -20,7 +20,7 @@ BREAKING = (
     "30 mm before the end",
     "waiting in vain",
     "waiting for what holds",
-    "an observer is told of what holds when it is enabled",
+    "an observer receives what holds when it is enabled",
     "bad values are refused",
 )
 
@@ -39,7 +39,7 @@ def test_conditions_of_a_sunrise_application(tmp_path: Path) -> None:
 TRIGGERING = (
     "triggers of a batch's motions go off in order",
     "the container knows",
-    "a listener hears of segments",
+    "a listener receives segments",
     "the motion is the spline",
     "break conditions of a part are refused",
 )

@@ -15,7 +15,7 @@ SAID = (
     "relative to the path it turns along",
     "led by the joints it arrives as well",
     "one container for the batch",
-    "its motions are told of in order",
+    "its motions are reported in order",
     "blending cuts the corner",
     "cancelling ends all of it",
     "a spline arrives",

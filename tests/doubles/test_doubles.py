@@ -123,9 +123,9 @@ SERVING = (
     "or what was set",
     "no runtime before the motion is commanded",
     "SmartServo arrives",
-    "the goal is told of",
+    "the goal is reported",
     "the destination can be read back",
-    "a velocity leads a little further, then the arm rests",
+    "a velocity moves it a little further, then the arm rests",
     "a Cartesian destination",
     "out of reach",
     "behind a limit",
@@ -135,13 +135,13 @@ SERVING = (
     "limits that are none are refused",
     "SmartServoLIN arrives",
     "on a straight line",
-    "its goal is told of, too",
+    "its goal is reported, too",
     "and can be read back",
     "out of its reach",
     "it stops",
     "a servo motion without destinations times out",
     "impedance control may begin",
-    "it follows softly",
+    "it follows with compliance",
     "the kind of the mode cannot change",
 )
 
@@ -154,7 +154,7 @@ def test_servo_motions_of_a_sunrise_application(tmp_path: Path) -> None:
     assert said.read_text().splitlines() == [f"{one} = true" for one in SERVING]
 
 
-YIELDING = (
+COMPLIANT = (
     "it has Sunrise's defaults",
     "directions are set by name and by group",
     "a copy is one of its own",
@@ -184,11 +184,11 @@ YIELDING = (
 
 
 def test_cartesian_impedance_of_a_sunrise_application(tmp_path: Path) -> None:
-    _compile(HERE / "java" / "Yielding.java", tmp_path)
+    _compile(HERE / "java" / "Compliant.java", tmp_path)
     said = tmp_path / "said.txt"
-    done = _run("sample.Yielding", tmp_path, f"sample.file={said}")
+    done = _run("sample.Compliant", tmp_path, f"sample.file={said}")
     assert done.returncode == 0, done.stdout + done.stderr
-    assert said.read_text().splitlines() == [f"{one} = true" for one in YIELDING]
+    assert said.read_text().splitlines() == [f"{one} = true" for one in COMPLIANT]
 
 
 def test_deselecting_an_application_is_no_failure(tmp_path: Path) -> None:
@@ -267,7 +267,7 @@ def test_an_application_that_does_not_exist_is_named(tmp_path: Path) -> None:
     assert "sample.Missing" in done.stdout + done.stderr
 
 
-def test_the_jar_of_doubles_says_what_it_is() -> None:
+def test_the_jar_of_doubles_reports_what_it_is() -> None:
     import zipfile
 
     (jar,) = (jar for jar in _resources.jars() if "doubles" in jar.name)

@@ -22,7 +22,7 @@ SAID = (
     "an output out of its range is not written",
     "cancelling the motion ends the overlay",
     "the session monitors on",
-    "all states were told",
+    "all states were reported",
     "without a client await times out",
 )
 

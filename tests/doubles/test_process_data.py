@@ -38,7 +38,7 @@ def test_what_does_not_fit_is_refused(text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "expected_text"),
     [
         ("<a><processData id='x' dataType='java.lang.Integer' value='1.5'/></a>", "process data x"),
         ("<a><processData id='x' dataType='java.lang.Boolean' value='yes'/></a>", "must be true or false"),
@@ -46,8 +46,8 @@ def test_what_does_not_fit_is_refused(text: str) -> None:
         ("no xml", "not a project file"),
     ],
 )
-def test_a_broken_project_file_is_refused(tmp_path: Path, text: str, says: str) -> None:
+def test_a_broken_project_file_is_refused(tmp_path: Path, text: str, expected_text: str) -> None:
     file = tmp_path / "data.xml"
     file.write_text(text)
-    with pytest.raises(ValueError, match=says):
+    with pytest.raises(ValueError, match=expected_text):
         project.read_process_data(file)

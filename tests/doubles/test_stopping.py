@@ -13,7 +13,7 @@ SAID = (
     "releasing it does not move the arm = true",
     "a drive error fails the motion = true",
     "and switches the drives off = true",
-    "T2 wants the enabling switch = true",
+    "T2 needs the enabling switch = true",
     "and then moves = true",
     "listeners = [paused, ready false, ready true, resumed, safety NOSTOP, safety STOP0, safety STOP1]",
 )

@@ -18,7 +18,7 @@ SAID = (
     "a tool that is nowhere cannot move",
     "what is not declared pulls",
     "and impedance control may not begin",
-    "a tool takes its share",
+    "a tool takes its part",
     "with the workpiece nothing is felt",
     "and impedance control may begin",
     "the torque depends on where it is measured",
@@ -81,7 +81,7 @@ def test_tools_as_a_sunrise_application_uses_them(tmp_path: Path, project: Path)
     assert said.read_text().splitlines() == [f"{one} = true" for one in SAID]
 
 
-def test_a_project_file_tells_its_tools_and_places(project: Path) -> None:
+def test_a_project_file_reports_its_tools_and_places(project: Path) -> None:
     found = templates.read_project(project)
     gripper, cube = found.templates
     assert (gripper.name, gripper.is_tool, gripper.mass, gripper.moved) == ("Gripper", True, 3.0, "Tip")
@@ -92,14 +92,14 @@ def test_a_project_file_tells_its_tools_and_places(project: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "expected_text"),
     [
         ("no xml", "not a project file"),
         (PROJECT.replace("120.0", "high"), "transformation z must be a number, got 'high'"),
     ],
 )
-def test_a_broken_project_is_refused(tmp_path: Path, text: str, says: str) -> None:
+def test_a_broken_project_is_refused(tmp_path: Path, text: str, expected_text: str) -> None:
     file = tmp_path / "data.xml"
     file.write_text(text)
-    with pytest.raises(ValueError, match=says):
+    with pytest.raises(ValueError, match=expected_text):
         templates.read_project(file)

@@ -64,7 +64,7 @@ SAID = (
     "its function goes with it",
     "and calls fail",
     "STOP ME",
-    "the stop and its end were told",
+    "the stop and its end were reported",
     "and the motion went on by itself",
     "PRESS ME",
     "the second half of a double key",
@@ -148,7 +148,7 @@ def test_a_tour_through_sunrise(tmp_path: Path, project: Path) -> None:
     assert (tmp_path / "touring.log").read_text().startswith("time jointPosition_A1 ")
 
 
-def test_a_project_file_tells_classes_of_tools_and_arms_of_frames(project: Path) -> None:
+def test_a_project_file_reports_classes_of_tools_and_arms_of_frames(project: Path) -> None:
     found = templates.read_project(project)
     assert [one.type for one in found.templates] == ["sample.Pen"]
     assert found.redundancies == (("Table/Corner", (0.25, 2, 28)),)

@@ -1,4 +1,4 @@
-"""Every example runs as it stands."""
+"""Every example runs unchanged."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ import pytest
 from tests.retry import busy, retry
 from tests.simulators import FASTER, PATIENT, PATIENT_AND_FASTER
 
-#: Of the virtual cabinet that the examples share.
+#: Of the virtual cabinet shared by the examples.
 SPEED = FASTER
 #: These have one of their own in real time: they look at the clock of this machine, or answer FRI.
 REAL_TIME = (
     *("03_async_cancel.py", "06_servo.py", "07_fri.py", "10_recovery.py", "12_straight_servo.py"),
-    "13_hand_guiding.py",
+    *("13_hand_guiding.py", "18_teleoperation.py"),
 )
 RUNNER = """
 import runpy, sys

@@ -33,19 +33,19 @@ def test_golden_monitoring_message_reads_and_writes_back_to_the_same_bytes() -> 
     assert codec.encode_monitoring(seen, Version.V1_15) == MONITORING_1X
 
 
-@pytest.mark.parametrize(("octets", "wire"), [(COMMAND_1X, Version.V1_15), (COMMAND_27, Version.V2_7)])
-def test_golden_commands_read_and_write_back_to_the_same_bytes(octets: bytes, wire: Version) -> None:
-    seen = codec.decode_command(octets, wire)
+@pytest.mark.parametrize(("raw", "wire"), [(COMMAND_1X, Version.V1_15), (COMMAND_27, Version.V2_7)])
+def test_golden_commands_read_and_write_back_to_the_same_bytes(raw: bytes, wire: Version) -> None:
+    seen = codec.decode_command(raw, wire)
     assert seen.header.sequence == seen.header.reflected in (1300, 1301)
-    assert codec.encode_command(seen, wire) == octets
+    assert codec.encode_command(seen, wire) == raw
 
 
 def test_template_writes_the_golden_commands() -> None:
-    for octets, wire in ((COMMAND_1X, Version.V1_15), (COMMAND_27, Version.V2_7)):
-        seen = codec.decode_command(octets, wire)
+    for raw, wire in ((COMMAND_1X, Version.V1_15), (COMMAND_27, Version.V2_7)):
+        seen = codec.decode_command(raw, wire)
         template = CommandTemplate(wire)
         template.q[:] = seen.q
-        assert template.encode(seen.header.sequence, seen.header.reflected) == octets
+        assert template.encode(seen.header.sequence, seen.header.reflected) == raw
 
 
 @every_version
@@ -101,13 +101,13 @@ def test_template_agrees_with_the_codec(
 
 @every_version
 @settings(max_examples=80)
-@given(data=st.data(), octets=st.binary(max_size=200))
-def test_any_octets_only_raise_malformed(wire: Version, data: st.DataObject, octets: bytes) -> None:
+@given(data=st.data(), raw=st.binary(max_size=200))
+def test_any_bytes_only_raise_malformed(wire: Version, data: st.DataObject, raw: bytes) -> None:
     good = bytearray(codec.encode_monitoring(data.draw(some.monitorings(wire)), wire))
     for _ in range(data.draw(st.integers(1, 4))):
         good[data.draw(st.integers(0, len(good) - 1))] = data.draw(st.integers(0, 255))
     reader = MonitoringReader(wire)
-    for candidate in (octets, bytes(good), bytes(good[: len(good) // 2])):
+    for candidate in (raw, bytes(good), bytes(good[: len(good) // 2])):
         for read in (
             reader.read,
             lambda one: codec.decode_monitoring(one, wire),
@@ -151,8 +151,8 @@ def test_another_version_is_named_in_words() -> None:
 def test_version_is_recognised_from_one_datagram(wire: Version) -> None:
     joints = (0.1,) * 7
     monitor = m.MonitorData(q=joints, q_cmd=None if wire.traits.quaternions else joints)
-    octets = codec.encode_monitoring(m.Monitoring(m.Header(1, 0), monitor=monitor), wire)
-    assert version.recognise(octets) is wire
+    raw = codec.encode_monitoring(m.Monitoring(m.Header(1, 0), monitor=monitor), wire)
+    assert version.recognise(raw) is wire
 
 
 def test_what_a_version_cannot_carry_is_refused_on_writing() -> None:

@@ -25,9 +25,9 @@ def begun(*, q: tuple[float, ...] = START, dq: tuple[float, ...] = STILL, period
     return guard
 
 
-def run(guard: JointGuard, wishes: Iterable[object]) -> np.ndarray:
+def run(guard: JointGuard, targets: Iterable[object]) -> np.ndarray:
     """Sent commands, shape (n, 7)."""
-    return np.array([list(guard.position(wish)) for wish in wishes])  # type: ignore[arg-type]
+    return np.array([list(guard.position(wanted)) for wanted in targets])  # type: ignore[arg-type]
 
 
 def check(
@@ -51,7 +51,7 @@ wild = st.floats(allow_nan=True, allow_infinity=True) | st.floats(-3.5, 3.5)
 @st.composite
 def requests(draw: st.DrawFn) -> list[tuple[float, ...] | None]:
     """Jumps, ramps, sines, noise, NaN and pauses, one after the other."""
-    wishes: list[tuple[float, ...] | None] = []
+    targets: list[tuple[float, ...] | None] = []
     for _ in range(draw(st.integers(1, 5))):
         kind, size = (
             draw(st.sampled_from(["jump", "ramp", "sine", "noise", "brake"])),
@@ -61,7 +61,7 @@ def requests(draw: st.DrawFn) -> list[tuple[float, ...] | None]:
         random = np.random.default_rng(draw(st.integers(0, 1000)))
         for index in range(size):
             if kind == "brake":
-                wishes.append(None)
+                targets.append(None)
                 continue
             with np.errstate(invalid="ignore", over="ignore"):
                 offset = {
@@ -70,19 +70,19 @@ def requests(draw: st.DrawFn) -> list[tuple[float, ...] | None]:
                     "sine": 0.3 * math.sin(pace * index * 1e-3),
                     "noise": random.uniform(-3, 3),
                 }[kind]
-                wishes.append(tuple(value + offset for value in level))
-    return wishes
+                targets.append(tuple(value + offset for value in level))
+    return targets
 
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(wishes=requests(), period=st.sampled_from([1e-3, 2e-3, 5e-3, 1e-2, 0.1]), data=st.data())
+@given(targets=requests(), period=st.sampled_from([1e-3, 2e-3, 5e-3, 1e-2, 0.1]), data=st.data())
 def test_whatever_is_asked_the_limits_hold(
-    wishes: list[tuple[float, ...] | None], period: float, data: st.DataObject
+    targets: list[tuple[float, ...] | None], period: float, data: st.DataObject
 ) -> None:
     q = tuple(data.draw(st.floats(low, high)) for low, high in zip(LIMITS.q_min, LIMITS.q_max, strict=True))
     dq = tuple(data.draw(st.floats(-0.9, 0.9)) * most for most in LIMITS.dq_max)
     guard = begun(q=q, dq=dq, period=period)
-    sent = run(guard, wishes)
+    sent = run(guard, targets)
     check(guard, sent, q, dq)
     stopped = run(guard, [None] * (1 + int(4.0 / period)))
     check(guard, np.vstack((sent, stopped)), q, dq)
@@ -101,15 +101,15 @@ def test_braking_never_goes_further_than_foretold(
     v: float, a: float, top: float, jerk: float, period: float
 ) -> None:
     top, jerk = top * period**2, jerk * period**3
-    speed, acceleration, way, furthest = 2.0 * v * period, a * top, 0.0, 0.0
+    speed, acceleration, travel, furthest = 2.0 * v * period, a * top, 0.0, 0.0
     foretold = overrun(speed, acceleration, top, jerk)
     for _ in range(100_000):
         if abs(speed) < 1e-15 and abs(acceleration) < 1e-15:
             break
         acceleration = brake(speed, acceleration, top, jerk)
         speed += acceleration
-        way += speed
-        furthest = max(furthest, way)
+        travel += speed
+        furthest = max(furthest, travel)
     else:
         pytest.fail("braking does not end")
     assert furthest <= foretold + 1e-9 * (1 + foretold)
@@ -120,9 +120,9 @@ def test_a_motion_within_the_limits_passes_unchanged() -> None:
     times = np.arange(1, 4001) * 1e-3
     rise = np.minimum(times, 1.0)
     envelope = rise**3 * (10.0 - 15.0 * rise + 6.0 * rise**2)
-    wishes = np.array(START) + (0.1 * envelope * np.sin(2.0 * times))[:, None]
+    targets = np.array(START) + (0.1 * envelope * np.sin(2.0 * times))[:, None]
     guard = begun()
-    assert (run(guard, wishes.tolist()) == wishes).all()
+    assert (run(guard, targets.tolist()) == targets).all()
     assert not guard.report.lines and not guard.was_limited
 
 
@@ -131,13 +131,13 @@ def test_a_step_is_walked_up_without_overshoot_and_ends_exactly() -> None:
     sent = run(guard, [goal] * 1500)
     check(guard, sent)
     assert (sent <= np.array(goal) + 1e-12).all() and tuple(sent[-1]) == goal and guard.is_still
-    assert np.abs(sent[900] - goal).max() < 1e-6, "and it takes little more than the fastest way"
+    assert np.abs(sent[900] - goal).max() < 1e-6, "and it takes little more than the fastest path"
     assert any(
         "A1: velocity limited" in line and "500 rad/s requested" in line for line in guard.report.lines
     )
 
 
-def test_no_number_keeps_the_last_wish_and_is_named() -> None:
+def test_no_number_keeps_the_last_target_and_is_named() -> None:
     guard = begun()
     broken = (math.nan, *START[1:])
     sent = run(guard, [broken] * 10)
@@ -182,7 +182,7 @@ def test_a_start_in_motion_has_no_jump() -> None:
     )
 
 
-def test_the_reach_around_the_interpolator_bounds_the_wish() -> None:
+def test_the_reach_around_the_interpolator_bounds_the_target() -> None:
     guard = JointGuard(Limits.of(robot("iiwa14"), reach=0.05))
     guard.start(START, STILL, period=1e-3)
     for _ in range(2000):
@@ -191,13 +191,13 @@ def test_the_reach_around_the_interpolator_bounds_the_wish() -> None:
     assert guard.report.counts[Limited.POSITION][0] == 2000
 
 
-@given(wishes=st.lists(st.tuples(*[wild] * 7), min_size=1, max_size=50))
-def test_torques_keep_magnitude_and_rate_and_start_from_zero(wishes: list[tuple[float, ...]]) -> None:
+@given(targets=st.lists(st.tuples(*[wild] * 7), min_size=1, max_size=50))
+def test_torques_keep_magnitude_and_rate_and_start_from_zero(targets: list[tuple[float, ...]]) -> None:
     guard = begun()
-    sent = np.array([STILL, *(list(guard.torque(one)) for one in wishes)])
+    sent = np.array([STILL, *(list(guard.torque(one)) for one in targets)])
     assert (np.abs(sent) <= LIMITS.tau_max).all() and np.isfinite(sent).all()
     assert (np.abs(np.diff(sent, axis=0)) <= np.multiply(LIMITS.dtau_max, 1e-3) * (1 + 1e-9)).all()
-    force = np.array([list(guard.force(one[:6])) for one in wishes])
+    force = np.array([list(guard.force(one[:6])) for one in targets])
     assert (np.abs(force) <= LIMITS.wrench_max).all()
 
 

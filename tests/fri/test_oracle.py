@@ -229,7 +229,7 @@ def oracle_of_command(value: m.Command, classes: dict[str, Any]) -> Any:
 @every_version
 @some_examples
 @given(data=st.data())
-def test_monitoring_messages_are_the_same_octets(wire: Version, data: st.DataObject) -> None:
+def test_monitoring_messages_are_the_same_bytes(wire: Version, data: st.DataObject) -> None:
     value = data.draw(some.monitorings(wire))
     ours = codec.encode_monitoring(value, wire)
     theirs = oracle_of_monitoring(value, ORACLE)
@@ -240,7 +240,7 @@ def test_monitoring_messages_are_the_same_octets(wire: Version, data: st.DataObj
 @every_version
 @some_examples
 @given(data=st.data())
-def test_command_messages_are_the_same_octets(wire: Version, data: st.DataObject) -> None:
+def test_command_messages_are_the_same_bytes(wire: Version, data: st.DataObject) -> None:
     value = data.draw(some.commands(wire))
     ours = unwrap(codec.encode_command(value, wire), wire)
     assert ORACLE["Command"].FromString(ours) == oracle_of_command(value, ORACLE)
@@ -253,15 +253,15 @@ def test_command_messages_are_the_same_octets(wire: Version, data: st.DataObject
 def test_what_the_library_writes_is_read_packed_or_not(wire: Version, data: st.DataObject) -> None:
     monitoring, command = data.draw(some.monitorings(wire)), data.draw(some.commands(wire))
     for classes in (ORACLE, CONTRARY):
-        octets = wrap(oracle_of_monitoring(monitoring, classes).SerializeToString(), wire)
-        assert codec.decode_monitoring(octets, wire) == monitoring
-        assert MonitoringReader(wire).read(octets).message == monitoring
-        octets = wrap(oracle_of_command(command, classes).SerializeToString(), wire)
-        assert codec.decode_command(octets, wire) == command
+        raw = wrap(oracle_of_monitoring(monitoring, classes).SerializeToString(), wire)
+        assert codec.decode_monitoring(raw, wire) == monitoring
+        assert MonitoringReader(wire).read(raw).message == monitoring
+        raw = wrap(oracle_of_command(command, classes).SerializeToString(), wire)
+        assert codec.decode_command(raw, wire) == command
 
 
-def test_golden_octets_are_what_the_library_reads() -> None:
+def test_golden_bytes_are_what_the_library_reads() -> None:
     seen = ORACLE["Monitoring"].FromString(MONITORING_1X)
     assert seen.header.sequence == 1301 and seen.connection.state == 4 and len(seen.monitor.q.value) == 7
-    for octets, wire in ((COMMAND_1X, Version.V1_15), (COMMAND_27, Version.V2_7)):
-        assert len(ORACLE["Command"].FromString(unwrap(octets, wire)).data.q.value) == 7
+    for raw, wire in ((COMMAND_1X, Version.V1_15), (COMMAND_27, Version.V2_7)):
+        assert len(ORACLE["Command"].FromString(unwrap(raw, wire)).data.q.value) == 7

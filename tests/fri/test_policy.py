@@ -58,9 +58,9 @@ def test_ramp_down_brakes_where_it_is_and_lets_torques_fall() -> None:
     _, guard, fallback = moving_then_silent(policy)
     assert guard.is_still and fallback.is_braking
     end = 10**12 + 1000 * MS
-    for late, share in ((0, 1.0), (50, 0.5), (100, 0.0), (900, 0.0)):
+    for late, fraction in ((0, 1.0), (50, 0.5), (100, 0.0), (900, 0.0)):
         tau, _ = fallback.efforts(end + late * MS)
-        assert tau == pytest.approx([5.0 * share] * 7)
+        assert tau == pytest.approx([5.0 * fraction] * 7)
 
 
 def test_a_command_after_a_pause_is_taken_up_again() -> None:

@@ -26,9 +26,9 @@ def begun(limits: PoseLimits = LIMITS, *, twist: tuple[float, ...] = REST, perio
     return guard
 
 
-def run(guard: PoseGuard, wishes: Iterable[object]) -> np.ndarray:
+def run(guard: PoseGuard, targets: Iterable[object]) -> np.ndarray:
     """Sent commands, shape (n, 7)."""
-    return np.array([guard.pose(wish) for wish in wishes])  # type: ignore[arg-type]
+    return np.array([guard.pose(wanted) for wanted in targets])  # type: ignore[arg-type]
 
 
 def check(guard: PoseGuard, sent: np.ndarray, twist: tuple[float, ...] = REST) -> None:
@@ -49,11 +49,11 @@ def check(guard: PoseGuard, sent: np.ndarray, twist: tuple[float, ...] = REST) -
 
 def test_a_motion_within_the_limits_passes_as_it_is() -> None:
     guard = begun()
-    wishes = [
+    targets = [
         moved(START, [0.025 * (1 - math.cos(2 * t * 1e-3)), 0, 0, 0, 0.2 * (1 - math.cos(t * 1e-3)), 0])
         for t in range(2000)
     ]
-    assert run(guard, wishes) == pytest.approx(np.array(wishes), abs=1e-15)
+    assert run(guard, targets) == pytest.approx(np.array(targets), abs=1e-15)
     assert guard.report.lines == []
 
 
@@ -85,12 +85,12 @@ def test_the_other_quaternion_of_a_rotation_is_no_motion() -> None:
     assert guard.report.lines == [] and guard.is_still
 
 
-def test_what_is_no_number_keeps_the_last_wish() -> None:
+def test_what_is_no_number_keeps_the_last_target() -> None:
     guard = begun()
     goal = moved(START, (0.01, 0.0, 0.0, 0.0, 0.0, 0.1))
     run(guard, [goal] * 1000)
-    for wish in ((NAN,) * 7, (math.inf,) * 7, (*goal[:3], 0.0, 0.0, 0.0, 0.0), (goal[0], NAN, *goal[2:])):
-        assert guard.pose(wish) == pytest.approx(goal) and guard.was_limited
+    for wanted in ((NAN,) * 7, (math.inf,) * 7, (*goal[:3], 0.0, 0.0, 0.0, 0.0), (goal[0], NAN, *goal[2:])):
+        assert guard.pose(wanted) == pytest.approx(goal) and guard.was_limited
     assert any("flange: target not finite in 3 cycles" in line for line in guard.report.lines)
     assert any("rotation: target not finite in 3 cycles" in line for line in guard.report.lines)
     sent = run(guard, [(NAN, NAN, goal[2] + 0.02, NAN, NAN, NAN, NAN)] * 1000)
@@ -105,9 +105,9 @@ def test_it_starts_with_the_interpolators_speed_and_brakes_from_it() -> None:
     last = np.array(guard.sent)
     sent = run(guard, [None] * 400)
     assert guard.is_still and np.ptp(sent[-200:], axis=0).max() == 0.0
-    way = between(last.tolist(), sent[-1].tolist())
-    assert np.linalg.norm(way[:3]) == pytest.approx(0.02 / 2 / LIMITS.acceleration, rel=0.02)  # v²/2a
-    assert np.cross(way[:3], twist[:3]) == pytest.approx(np.zeros(3), abs=1e-12), "straight on"
+    travel = between(last.tolist(), sent[-1].tolist())
+    assert np.linalg.norm(travel[:3]) == pytest.approx(0.02 / 2 / LIMITS.acceleration, rel=0.02)  # v²/2a
+    assert np.cross(travel[:3], twist[:3]) == pytest.approx(np.zeros(3), abs=1e-12), "straight on"
 
 
 def test_the_reach_is_a_ball_around_the_interpolator() -> None:
@@ -121,18 +121,18 @@ def test_the_reach_is_a_ball_around_the_interpolator() -> None:
 
 
 coordinate = st.floats(-1.0, 1.0) | st.sampled_from([NAN, math.inf, 1e300, 0.5])
-wishes = st.lists(
+targets = st.lists(
     st.tuples(st.tuples(*[coordinate] * 7) | st.just(None) | st.just(START), st.integers(1, 120)),
     min_size=1,
     max_size=8,
 )
 
 
-@given(wishes, st.sampled_from([1e-3, 5e-3]))
+@given(targets, st.sampled_from([1e-3, 5e-3]))
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_whatever_is_asked_the_limits_are_kept(asked: list[tuple[object, int]], period: float) -> None:
     guard = begun(period=period)
-    sent = run(guard, [wish for wish, count in asked for _ in range(count)])
+    sent = run(guard, [wanted for wanted, count in asked for _ in range(count)])
     check(guard, sent)
     home = run(guard, [START] * round(30.0 / period / 5))
     check(guard, np.vstack((sent, home)))
@@ -146,24 +146,24 @@ def test_a_limit_that_is_none() -> None:
 
 
 @given(
-    wishes=st.lists(st.floats(-3.0, 3.0) | st.just(NAN) | st.none(), min_size=1, max_size=20),
+    targets=st.lists(st.floats(-3.0, 3.0) | st.just(NAN) | st.none(), min_size=1, max_size=20),
     speed=st.floats(-0.9, 0.9),
 )
 @settings(max_examples=40, deadline=None)
-def test_the_elbow_keeps_its_limits_too(wishes: list[float | None], speed: float) -> None:
+def test_the_elbow_keeps_its_limits_too(targets: list[float | None], speed: float) -> None:
     guard, begin = PoseGuard(LIMITS), 0.3
     guard.start(START, period=1e-3, e1=begin, e1_speed=speed * LIMITS.elbow_velocity)
     sent = [begin - speed * LIMITS.elbow_velocity * 1e-3, begin]
-    for wish in wishes:
+    for wanted in targets:
         for _ in range(40):
             guard.pose(START)
-            sent.append(guard.elbow(wish))
+            sent.append(guard.elbow(wanted))
     speeds = np.diff(sent) / 1e-3
     assert np.abs(speeds).max() <= LIMITS.elbow_velocity * 1.000001
     assert np.abs(np.diff(speeds)).max() / 1e-3 <= LIMITS.elbow_acceleration * 1.000001 + 1e-6
 
 
-def test_an_elbow_reaches_its_wish_and_the_report_names_it() -> None:
+def test_an_elbow_reaches_its_target_and_the_report_names_it() -> None:
     guard = begun()
     guard.start(START, period=1e-3, e1=0.0)
     for _ in range(3000):

@@ -67,8 +67,8 @@ def kinds(session: Session) -> list[Kind]:
 def heard(session: Session, wire: Version, datagram: bytes, now: int, **setpoint: object) -> m.Command | None:
     """One turn: the decoded answer."""
     session.receive(datagram, now)
-    octets = session.answer(Setpoint(**setpoint))  # type: ignore[arg-type]
-    return None if octets is None else codec.decode_command(octets, wire)
+    raw = session.answer(Setpoint(**setpoint))  # type: ignore[arg-type]
+    return None if raw is None else codec.decode_command(raw, wire)
 
 
 @every_version
@@ -83,18 +83,18 @@ def test_a_session_from_idle_to_commanding_and_back(wire: Version) -> None:
         SessionState.MONITORING_READY,
         SessionState.IDLE,
     ]
-    wish = tuple(value + 0.001 for value in IPO)
+    target = tuple(value + 0.001 for value in IPO)
     answers = []
     for index, state in enumerate(states):
-        answers.append(heard(session, wire, monitoring(wire, index, state), index * MS, q=wish))
+        answers.append(heard(session, wire, monitoring(wire, index, state), index * MS, q=target))
         assert session.state is state
     idle, waiting, ready, mirror, active, after, end = answers
     assert idle is None and end is None, "in IDLE there is never an answer"
     echo = None if wire.traits.quaternions else (0.25,) * 7
     for one in (waiting, ready, after):
         assert one is not None and one.q == echo and one.tau is None
-    assert mirror is not None and mirror.q == IPO, "COMMANDING_WAIT mirrors, whatever is wished"
-    assert active is not None and active.q == wish
+    assert mirror is not None and mirror.q == IPO, "COMMANDING_WAIT mirrors, whatever is wanted"
+    assert active is not None and active.q == target
     assert [one.header for one in answers if one] == [m.Header(i, i + 1) for i in range(5)]
     assert kinds(session).count(Kind.STATE) == 6
     assert session.counters.answered == 5 and session.counters.commanded == 1 and session.counters.lost == 0
@@ -116,7 +116,7 @@ def test_every_command_mode_gets_the_fields_it_needs(mode: CommandMode) -> None:
         assert (one.pose is not None) == (mode is CommandMode.CARTESIAN_POSE)
 
 
-def test_torque_and_wrench_and_pose_arrive_as_wished() -> None:
+def test_torque_and_wrench_and_pose_arrive_as_wanted() -> None:
     wire, active = Version.V2_5, SessionState.COMMANDING_ACTIVE
     session, tau, wrench = Session(), tuple(map(float, range(7))), tuple(map(float, range(6)))
     pose = m.Transformation("ipo", (9.0,) * 7)
@@ -144,10 +144,10 @@ def test_every_multiplier_th_message_is_answered(multiplier: int, answers: int) 
         session.receive(
             monitoring(wire, index, SessionState.MONITORING_READY, multiplier=multiplier), index * MS
         )
-        octets = session.answer()
+        raw = session.answer()
         assert session.answer() is None, "one message, one answer"
-        if octets is not None:
-            assert codec.decode_command(octets, wire).header.reflected == index
+        if raw is not None:
+            assert codec.decode_command(raw, wire).header.reflected == index
     assert session.counters.answered == answers
 
 
@@ -198,16 +198,16 @@ def test_a_new_session_begins_while_the_client_runs() -> None:
 
 
 @pytest.mark.parametrize("spoken", [Version.V1_15, Version.V2_5, Version.V2_7])
-@pytest.mark.parametrize("told", [Version.V1_15, Version.V2_5, Version.V2_7])
-def test_a_wrong_version_is_named_in_words_and_once(spoken: Version, told: Version) -> None:
-    session = Session(told)
+@pytest.mark.parametrize("reported", [Version.V1_15, Version.V2_5, Version.V2_7])
+def test_a_wrong_version_is_named_in_words_and_once(spoken: Version, reported: Version) -> None:
+    session = Session(reported)
     for index in range(5):
         sample = session.receive(monitoring(spoken, index, SessionState.MONITORING_WAIT), index * MS)
-        assert (sample is not None) == (spoken is told)
-    if spoken is told:
-        assert session.trouble == "" and session.version is told
+        assert (sample is not None) == (spoken is reported)
+    if spoken is reported:
+        assert session.trouble == "" and session.version is reported
         return
-    assert "speaks FRI" in session.trouble and told.value in session.trouble
+    assert "speaks FRI" in session.trouble and reported.value in session.trouble
     assert kinds(session) == [Kind.WRONG_VERSION] and session.answer() is None
     assert session.counters.malformed == 5
 
@@ -220,8 +220,8 @@ def test_version_is_taken_from_the_first_datagram_and_follows_a_new_one(wire: Ve
     other = Version.V2_7 if not wire.traits.framed else Version.V1_15
     assert session.receive(monitoring(other, 0, SessionState.MONITORING_WAIT), 10**9)
     assert session.version is other
-    octets = session.answer()
-    assert octets is not None and codec.decode_command(octets, other)
+    raw = session.answer()
+    assert raw is not None and codec.decode_command(raw, other)
 
 
 def test_a_position_that_is_no_number_is_no_message() -> None:
@@ -235,7 +235,7 @@ def test_a_position_that_is_no_number_is_no_message() -> None:
     assert session.answer() is None and session.counters.malformed == 1
 
 
-def test_without_an_interpolator_position_it_answers_with_a_header_and_says_so() -> None:
+def test_without_an_interpolator_position_it_answers_with_a_header_and_reports_it() -> None:
     session = Session()
     answer = heard(
         session, Version.V1_15, monitoring(Version.V1_15, 0, SessionState.COMMANDING_WAIT, ipo=None), 0
@@ -276,7 +276,7 @@ def test_latency_and_jitter_are_measured_from_the_times_passed_in() -> None:
     assert session.jitter.longest == pytest.approx(300e-6)
 
 
-def test_safety_and_quality_are_told() -> None:
+def test_safety_and_quality_are_reported() -> None:
     wire, session = Version.V1_15, Session()
     for index, (quality, safety) in enumerate(
         [(Quality.POOR, 0), (Quality.GOOD, 0), (Quality.GOOD, 1), (Quality.EXCELLENT, 0)]
@@ -285,8 +285,8 @@ def test_safety_and_quality_are_told() -> None:
             monitoring(wire, index, SessionState.MONITORING_WAIT, quality=quality, safety=m.Safety(safety)),
             index * MS,
         )
-    told = [event.text for event in session.events() if event.kind in (Kind.QUALITY, Kind.SAFETY)]
-    assert told == [
+    reported = [event.text for event in session.events() if event.kind in (Kind.QUALITY, Kind.SAFETY)]
+    assert reported == [
         "quality POOR -> GOOD",
         "safety state STOP_0",
         "quality GOOD -> EXCELLENT",
@@ -301,8 +301,8 @@ def test_safety_and_quality_are_told() -> None:
 def test_any_message_is_answered_legally_or_not_at_all(wire: Version, data: st.DataObject) -> None:
     session = Session(wire)
     for now in range(2):
-        octets = codec.encode_monitoring(data.draw(some.monitorings(wire)), wire)
-        session.receive(octets, now * MS)
+        raw = codec.encode_monitoring(data.draw(some.monitorings(wire)), wire)
+        session.receive(raw, now * MS)
         answer = session.answer()
         if answer is not None:
             assert session.state is not SessionState.IDLE
@@ -323,9 +323,9 @@ class Exchange(RuleBasedStateMachine):
 
     def _send(self, datagram: bytes) -> None:
         self.session.receive(datagram, self.now)
-        octets = self.session.answer(Setpoint(q=(0.3,) * 7))
-        if octets is not None:
-            self.answers.append(codec.decode_command(octets, Version.V1_15))
+        raw = self.session.answer(Setpoint(q=(0.3,) * 7))
+        if raw is not None:
+            self.answers.append(codec.decode_command(raw, Version.V1_15))
 
     @rule(state=st.sampled_from(SessionState), skip=st.integers(0, 3))
     def message(self, state: SessionState, skip: int) -> None:
@@ -349,10 +349,10 @@ class Exchange(RuleBasedStateMachine):
             self._send(monitoring(Version.V1_15, self.sequence, self.state))
             assert len(self.answers) == before
 
-    @rule(octets=st.binary(max_size=40))
-    def garbage(self, octets: bytes) -> None:
+    @rule(raw=st.binary(max_size=40))
+    def garbage(self, raw: bytes) -> None:
         before = self.session.state
-        self._send(octets)
+        self._send(raw)
         assert self.session.state is before
 
     @invariant()

@@ -16,7 +16,7 @@ from heptarm.values.robot import robot
 
 LIMITS = Limits.of(robot("iiwa14"))
 PERIOD = 5e-3
-Way = Callable[[float, float], tuple[float, float]]
+Travel = Callable[[float, float], tuple[float, float]]
 
 
 def goes_on(speed: float, time: float) -> tuple[float, float]:
@@ -45,22 +45,22 @@ def coasts(speed: float, time: float) -> tuple[float, float]:
 @pytest.mark.parametrize("speed", [-1.2, -0.3, 0.0, 0.05, 1.4])
 @pytest.mark.parametrize("time", [0.03, 0.06, 0.15, 0.5])
 @pytest.mark.parametrize("controller", [goes_on, stands, brakes])
-def test_place_and_speed_are_told_from_the_way(controller: Way, time: float, speed: float) -> None:
+def test_place_and_speed_are_reported_from_the_way(controller: Travel, time: float, speed: float) -> None:
     chain, lag = 0.4, 2 * PERIOD
-    way, end = controller(speed, time)
-    then, now = chain - lag * speed, chain + way - lag * end
+    travel, end = controller(speed, time)
+    then, now = chain - lag * speed, chain + travel - lag * end
     for is_exact in (True, False):
         (place,), (later,) = joints_after_gap(
             [chain], [speed], [then], [now], time=time, period=PERIOD, is_exact=is_exact
         )
         # a lagging reading has caught up when the arm rests
         assert later == pytest.approx(end, abs=2.1 * lag * abs(speed) / time + 1e-12)
-        assert place == pytest.approx(chain + way, abs=2.1 * lag * abs(speed) + 1e-12)
+        assert place == pytest.approx(chain + travel, abs=2.1 * lag * abs(speed) + 1e-12)
 
 
 @pytest.mark.parametrize("time", [0.03, 0.06, 0.12, 0.4])
 @pytest.mark.parametrize("controller", [goes_on, stands, brakes, coasts])
-def test_what_is_sent_after_it_makes_no_step_of_the_velocity(controller: Way, time: float) -> None:
+def test_what_is_sent_after_it_makes_no_step_of_the_velocity(controller: Travel, time: float) -> None:
     guard, start = JointGuard(LIMITS), (0.1, 0.4, -0.1, -1.2, 0.2, 0.9, 0.0)
     guard.start(start, (0.0,) * 7, period=PERIOD)
     goal = [value + 1.0 for value in start]
@@ -69,8 +69,8 @@ def test_what_is_sent_after_it_makes_no_step_of_the_velocity(controller: Way, ti
     speeds = [v / PERIOD for v in guard.v]
     assert max(speeds) > 0.9
     chain = [q - v for q, v in zip(guard.q, guard.v, strict=True)]
-    ways, ends = zip(*(controller(v, time) for v in speeds), strict=True)
-    there = np.add(chain, ways)
+    paths, ends = zip(*(controller(v, time) for v in speeds), strict=True)
+    there = np.add(chain, paths)
     places, later = joints_after_gap(
         chain, speeds, chain, there.tolist(), time=time, period=PERIOD, is_exact=True
     )
@@ -86,24 +86,28 @@ def test_what_is_sent_after_it_makes_no_step_of_the_velocity(controller: Way, ti
 
 
 def test_an_arm_that_was_pushed_or_jumps_in_its_readings_is_not_followed() -> None:
-    soft = {"time": 0.06, "period": PERIOD, "is_exact": False}
-    assert joints_after_gap([0.4], [0.0], [0.3], [0.1], **soft) == ([0.4], [0.0])  # type: ignore[arg-type]
-    (place,), (speed,) = joints_after_gap([0.4], [0.5], [0.3], [2.0], **soft)  # type: ignore[arg-type]
+    compliant = {"time": 0.06, "period": PERIOD, "is_exact": False}
+    assert joints_after_gap([0.4], [0.0], [0.3], [0.1], **compliant) == ([0.4], [0.0])  # type: ignore[arg-type]
+    (place,), (speed,) = joints_after_gap([0.4], [0.5], [0.3], [2.0], **compliant)  # type: ignore[arg-type]
     assert place == pytest.approx(0.4 + 0.03) and speed == 0.5, "no further than with the old speed"
-    exact = {**soft, "is_exact": True}
+    exact = {**compliant, "is_exact": True}
     assert joints_after_gap([0.4], [0.0], [0.4], [0.9], **exact) == ([0.4], [0.0])  # type: ignore[arg-type]
 
 
 @given(st.floats(-2, 2), st.floats(-1, 1), st.floats(1e-3, 2.0))
-def test_the_speed_is_never_more_than_before_nor_the_other_way(speed: float, way: float, time: float) -> None:
-    gone, later = motion_in_gap(speed, way, time)
+def test_the_speed_is_never_more_than_before_nor_the_other_way(
+    speed: float, travel: float, time: float
+) -> None:
+    gone, later = motion_in_gap(speed, travel, time)
     assert abs(later) <= abs(speed) and later * speed >= 0.0
     assert abs(gone) <= abs(speed * time) and gone * speed >= 0.0
 
 
 def test_a_pose_is_carried_on_along_its_direction() -> None:
     assert vector_in_gap((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), 0.05) == ([0.0] * 3, [0.0] * 3)
-    way, speed = vector_in_gap((0.0, 0.2, 0.0), (0.5, 0.01, 0.0), 0.05)  # it continued, and was pushed aside
-    assert way == pytest.approx([0.0, 0.01, 0.0]) and speed == pytest.approx([0.0, 0.2, 0.0])
-    way, speed = vector_in_gap((0.0, 0.2, 0.0), (0.0, -0.01, 0.0), 0.05)
-    assert way == speed == [0.0, 0.0, 0.0]
+    travel, speed = vector_in_gap(
+        (0.0, 0.2, 0.0), (0.5, 0.01, 0.0), 0.05
+    )  # it continued, and was pushed aside
+    assert travel == pytest.approx([0.0, 0.01, 0.0]) and speed == pytest.approx([0.0, 0.2, 0.0])
+    travel, speed = vector_in_gap((0.0, 0.2, 0.0), (0.0, -0.01, 0.0), 0.05)
+    assert travel == speed == [0.0, 0.0, 0.0]

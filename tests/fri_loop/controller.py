@@ -91,13 +91,13 @@ class Controller:
         """Send one message and record the answers received so far."""
         with contextlib.suppress(BlockingIOError, ConnectionRefusedError):
             while True:
-                octets = self._sock.recv(2048)
-                self.answers.append(codec.decode_command(octets, self.wire))
+                raw = self._sock.recv(2048)
+                self.answers.append(codec.decode_command(raw, self.wire))
                 self._reflected = self.answers[-1].header.sequence
-        octets = self.mangle(self.datagram())
-        if octets is not None:
+        raw = self.mangle(self.datagram())
+        if raw is not None:
             with contextlib.suppress(ConnectionRefusedError):
-                self._sock.sendto(octets, ("127.0.0.1", self.port))
+                self._sock.sendto(raw, ("127.0.0.1", self.port))
         self.sequence += 1
 
     def _run(self) -> None:

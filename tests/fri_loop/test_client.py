@@ -189,14 +189,14 @@ def test_loss_duplicates_reordering_and_garbage_end_no_session(client: Client) -
     controller = Controller(client.port)
     rng, kept = random.Random(3), []
 
-    def mangle(octets: bytes) -> bytes | None:
+    def mangle(raw: bytes) -> bytes | None:
         chance = rng.random()
-        kept.append(octets)
+        kept.append(raw)
         if chance < 0.1:
             return None
         if chance < 0.15 and len(kept) > 2:
             return kept[-2]
-        return rng.randbytes(40) if chance < 0.2 else octets
+        return rng.randbytes(40) if chance < 0.2 else raw
 
     controller.mangle = mangle
     with controller.running():
@@ -211,7 +211,7 @@ def test_loss_duplicates_reordering_and_garbage_end_no_session(client: Client) -
     assert stats.restarts == 0 and client.session is ACTIVE and stats.answered > 200
 
 
-def test_a_wrong_version_is_told_in_words() -> None:
+def test_a_wrong_version_is_reported_in_words() -> None:
     with Client(0, version="1.15", realtime=False) as client:
         controller = Controller(client.port, wire=Version.V2_7)
         wanted = pytest.raises(Timeout, match='speaks FRI 2.7 ."3.0"., this side FRI 1.14-1.16')
@@ -254,7 +254,7 @@ def test_signals_are_read_and_written(client: Client) -> None:
                 client.output(name, value)
 
 
-def test_a_frame_that_is_asked_for_is_told(client: Client) -> None:
+def test_a_frame_that_is_asked_for_is_reported(client: Client) -> None:
     controller = Controller(client.port, wire=Version.V2_7)
     controller.requested = (m.Transformation("PBase", ()),)
     with controller.running():

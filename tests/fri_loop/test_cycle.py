@@ -63,9 +63,9 @@ class Bench:
             self.controller.state = state
         for _ in range(count):
             self.now += MS
-            octets = self.cycle.turn(self.controller.datagram(), self.now)
-            if octets is not None:
-                self.sent.append(codec.decode_command(octets, self.controller.wire))
+            raw = self.cycle.turn(self.controller.datagram(), self.now)
+            if raw is not None:
+                self.sent.append(codec.decode_command(raw, self.controller.wire))
             self.cycle.finish(self.now + 30_000)
             self.controller.sequence += 1
 
@@ -107,7 +107,7 @@ def test_what_happens_is_published() -> None:
     assert math.isnan(states[0].q_sent[0]) and states[0].t == 0.0
 
 
-def test_a_jump_at_the_start_of_commanding_becomes_a_gentle_way() -> None:
+def test_a_jump_at_the_start_of_commanding_becomes_a_gentle_travel() -> None:
     bench = Bench()
     bench.activate()
     bench.command(tuple(value + 0.3 for value in IPO))
@@ -206,7 +206,7 @@ def test_a_torque_law() -> None:
     assert bench.states[-1].tau_sent == pytest.approx((2.0,) * 7)
 
 
-def test_a_law_that_fails_brakes_the_arm_and_says_why() -> None:
+def test_a_law_that_fails_brakes_the_arm_and_reports_why() -> None:
     bench = Bench(law=fails_later)
     bench.activate()
     bench.run(400)
@@ -283,7 +283,7 @@ def test_a_law_reads_inputs_and_writes_outputs() -> None:
 
 
 @pytest.mark.parametrize("wire", Version)
-def test_frames_are_told_as_each_version_has_them(wire: Version) -> None:
+def test_frames_are_reported_as_each_version_has_them(wire: Version) -> None:
     bench = Bench(wire=wire)
     bench.controller.requested = (m.Transformation("PBase", (), m.TimeStamp(1, 2)),)
     half = math.sqrt(0.5)

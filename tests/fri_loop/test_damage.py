@@ -45,20 +45,20 @@ def check_limits(answer: bytes | None, wire: Version) -> None:
 
 def damaged(datagram: bytes, random: random.Random) -> bytes:
     """One to three flipped bits; rarely a cut, a repetition, or an exchanged byte."""
-    octets = bytearray(datagram)
+    raw = bytearray(datagram)
     what = random.random()
     if what < 0.85:
         for _ in range(random.choice((1, 1, 2, 3))):
-            at = random.randrange(len(octets))
-            octets[at] ^= 1 << random.randrange(8)
+            at = random.randrange(len(raw))
+            raw[at] ^= 1 << random.randrange(8)
     elif what < 0.9:
-        del octets[random.randrange(len(octets)) :]
+        del raw[random.randrange(len(raw)) :]
     elif what < 0.95:
-        at = random.randrange(len(octets))
-        octets[at:at] = octets[random.randrange(len(octets)) :][: random.randrange(20)]
+        at = random.randrange(len(raw))
+        raw[at:at] = raw[random.randrange(len(raw)) :][: random.randrange(20)]
     else:
-        octets[random.randrange(len(octets))] = random.randrange(256)
-    return bytes(octets)
+        raw[random.randrange(len(raw))] = random.randrange(256)
+    return bytes(raw)
 
 
 @pytest.mark.parametrize(
@@ -79,13 +79,13 @@ def test_flipped_bits_never_stop_the_loop_nor_pass_a_limit(wire: Version, mode: 
     for index in range(DAMAGED):
         controller.state = SessionState(1 + index // 40 % 4)
         twins.step()
-        octets = damaged(controller.datagram(), chance)
+        raw = damaged(controller.datagram(), chance)
         controller.sequence += 1
         for bench in (twins.pure, twins.other):
             bench.now += MS
-        answer = cycle.turn(octets, twins.pure.now)
+        answer = cycle.turn(raw, twins.pure.now)
         cycle.finish(twins.pure.now + 30_000)
-        assert twins._native(octets) == answer
+        assert twins._native(raw) == answer
         check_limits(answer, wire)
         for bench in (twins.pure, twins.other):
             assert not bench.cycle.failure and not bench.cycle.is_ending

@@ -70,14 +70,14 @@ class Twins:
         size = native.turn(datagram, bench.now)
         if size == HANDBACK:
             native.sync_to_python()
-            octets = bench.cycle.turn(datagram, bench.now)
+            raw = bench.cycle.turn(datagram, bench.now)
             bench.cycle.finish(bench.now + 30_000)
             session = bench.cycle.session
             if session.sample is not None and session.received == bench.now:
                 self._last = datagram
             if self._last:
                 native.sync_from_python(self._last)
-            return octets
+            return raw
         self.plain += 1
         if size == LAW:
             states = bench.layout.states
@@ -187,14 +187,14 @@ def test_laws(law: object) -> None:
 
 
 @pytest.mark.parametrize("wire", [Version.V1_15, Version.V2_5])
-def test_every_octet_of_a_message_damaged(wire: Version) -> None:
+def test_every_byte_of_a_message_damaged(wire: Version) -> None:
     """The native part refuses what Python refuses; a zero tag or an illegal pose ends the decoding."""
     twins = Twins(wire=wire)
     twins.step(state=SessionState.COMMANDING_WAIT)
-    for octet in range(len(twins.pure.controller.datagram())):
-        for bit in range(8) if EXAMPLES > 25 else (3, octet % 8):
+    for byte in range(len(twins.pure.controller.datagram())):
+        for bit in range(8) if EXAMPLES > 25 else (3, byte % 8):
             datagram = bytearray(twins.pure.controller.datagram())
-            datagram[octet] ^= 1 << bit
+            datagram[byte] ^= 1 << bit
             twins.message(bytes(datagram))
             twins.pure.controller.sequence += 1
             twins.step()
@@ -269,12 +269,12 @@ def test_whatever_happens(data: st.DataObject, wire: Version) -> None:
         elif what == "repeat":
             twins.message(kept[-1])
         elif what in ("damage", "cut"):
-            octets = bytearray(controller.datagram())
+            raw = bytearray(controller.datagram())
             if what == "cut":
-                octets = octets[: data.draw(st.integers(0, len(octets)))]
+                raw = raw[: data.draw(st.integers(0, len(raw)))]
             else:
-                octets[data.draw(st.integers(0, len(octets) - 1))] ^= 1 << data.draw(st.integers(0, 7))
-            twins.message(bytes(octets))
+                raw[data.draw(st.integers(0, len(raw) - 1))] ^= 1 << data.draw(st.integers(0, 7))
+            twins.message(bytes(raw))
         for _ in range(data.draw(st.integers(1, 12))):
             kept.append(controller.datagram())
             if what == "silence":

@@ -63,7 +63,7 @@ def test_without_a_command_the_interpolator_is_mirrored(wire: Version) -> None:
         _ = bench.states[0].pose_sent
 
 
-def test_a_commanded_pose_is_reached_without_a_jump_and_told_in_metres() -> None:
+def test_a_commanded_pose_is_reached_without_a_jump_and_reported_in_metres() -> None:
     bench = posing()
     goal = Pose.of((0.15, 0.2, 0.3), (0.0, 0.0, math.sin(0.1), math.cos(0.1)))
     command(bench, tuple(goal.array.tolist()))
@@ -92,7 +92,7 @@ def test_a_law_begins_at_the_interpolators_pose() -> None:
     assert sent(bench, 1)[0] == pytest.approx(HOME, abs=1e-5), "the next one begins there again"
 
 
-def test_a_law_may_assign_a_pose_and_numbers_that_are_none_keep_the_last_wish() -> None:
+def test_a_law_may_assign_a_pose_and_numbers_that_are_none_keep_the_last_target() -> None:
     def law(state: State, out: Output, params: Params) -> None:
         out.pose = Pose.at(0.1, 0.2, 0.31) if state.t < 0.4 else np.full(7, NAN)
 
@@ -159,7 +159,7 @@ def test_the_elbow_is_commanded_with_a_pose() -> None:
     bench.activate()
     bench.run(3)
     assert bench.sent[-1].redundancy == m.Redundancy(m.RedundancyStrategy.E1, 0.1), (
-        "mirrored until it is wished"
+        "mirrored until it is wanted"
     )
     words = np.zeros(at.COMMAND_WORDS)
     words[at.C_E1] = 0.4
@@ -208,9 +208,9 @@ def test_after_a_long_silence_a_flange_that_went_on_is_not_halted() -> None:
         assert after[1] - after[0] == pytest.approx(kept * speed, abs=5e-6)
 
 
-def with_pose(octets: bytes, pose: m.Transformation) -> bytes:
+def with_pose(raw: bytes, pose: m.Transformation) -> bytes:
     """A datagram with another interpolator's pose."""
-    value = codec.decode_monitoring(octets, Version.V2_5)
+    value = codec.decode_monitoring(raw, Version.V2_5)
     if value.ipo is not None:
         value = replace(value, ipo=replace(value.ipo, pose=pose))
     return codec.encode_monitoring(value, Version.V2_5)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Names that stand for two ideas, or for one that two languages implement, with the reason why.
-TOLD_APART: dict[str, str] = {
+HOMONYMS: dict[str, str] = {
     "Arm": "the same API for programs in the cabinet (Java) and on the workstation (Python)",
     "MotionHandle": "the same API for programs in the cabinet (Java) and on the workstation (Python)",
     "MotionStatus": "the running program, as the cabinet samples it (Java) and as a state has it (Python)",
@@ -28,12 +28,12 @@ TOLD_APART: dict[str, str] = {
     "MotionListener": "the interface in Java is called through the one in Python",
     "SharedState": "the two sides of one memory, written by Python and read by Java",
     "Violation": "a field outside the schema's range, in the codecs of both languages",
-    "IoDirection": "FRI's own enumeration beside the protocol's; heptarm.fri.protocol tells them apart",
-    "IoType": "FRI's own enumeration beside the protocol's; heptarm.fri.protocol tells them apart",
-    "OperationMode": "FRI's own enumeration beside heptarm's; heptarm.fri.protocol tells them apart",
-    "Redundancy": "FRI's own message beside the value; heptarm.fri.protocol tells them apart",
-    "RobotInfo": "FRI's own message beside the protocol's; heptarm.fri.protocol tells them apart",
-    "Safety": "FRI's own enumeration beside the group of a state; heptarm.fri.protocol tells them apart",
+    "IoDirection": "FRI's own enumeration beside the protocol's; heptarm.fri.protocol distinguishes them",
+    "IoType": "FRI's own enumeration beside the protocol's; heptarm.fri.protocol distinguishes them",
+    "OperationMode": "FRI's own enumeration beside heptarm's; heptarm.fri.protocol distinguishes them",
+    "Redundancy": "FRI's own message beside the value; heptarm.fri.protocol distinguishes them",
+    "RobotInfo": "FRI's own message beside the protocol's; heptarm.fri.protocol distinguishes them",
+    "Safety": "FRI's own enumeration beside the group of a state; heptarm.fri.protocol distinguishes them",
     "Session": "the sans-IO machine of each of the two protocols: heptarm.wire and heptarm.fri",
     "SessionState": "the states of each of the two protocols: heptarm.wire and heptarm.fri",
     "State": "what a program reads: of an arm (heptarm.State), of an FRI session (heptarm.fri.State)",
@@ -90,16 +90,16 @@ def _carried(where: set[str]) -> bool:
 
 
 def test_a_class_name_stands_for_one_idea() -> None:
-    twice = {name: where for name, where in duplicates().items() if name not in TOLD_APART}
+    twice = {name: where for name, where in duplicates().items() if name not in HOMONYMS}
     listed = "\n".join(f"  {name}: {', '.join(where)}" for name, where in twice.items())
     assert not twice, (
         f"{len(twice)} class names stand for more than one thing:\n{listed}\n"
         "Rename one after what it is in the field's terms; a leading underscore does for what one module needs. "
-        "Where a package tells two apart for a reason, add the name to TOLD_APART with the reason."
+        "Where a package distinguishes two for a reason, add the name to HOMONYMS with the reason."
     )
 
 
-def test_what_is_told_apart_is_there_and_has_a_reason() -> None:
-    gone = TOLD_APART.keys() - duplicates().keys()
-    assert not gone, f"{sorted(gone)} stand for one thing only: take them out of TOLD_APART"
-    assert all(len(reason.split()) > 3 for reason in TOLD_APART.values())
+def test_what_is_distinguished_is_there_and_has_a_reason() -> None:
+    gone = HOMONYMS.keys() - duplicates().keys()
+    assert not gone, f"{sorted(gone)} stand for one thing only: take them out of HOMONYMS"
+    assert all(len(reason.split()) > 3 for reason in HOMONYMS.values())

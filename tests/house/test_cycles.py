@@ -112,7 +112,14 @@ def test_nobody_reaches_into_an_arm() -> None:
     """Scenarios, skills, tools and tests use what an arm offers, `arm.connection` where they need the messages."""
     root = SOURCES.parent
     inside = re.compile(r"\b(?!self\b|cls\b)\w+\._(connection|transport)\b")
-    folders = ("src/heptarm/testing", "src/heptarm/skills", "src/heptarm/cli", "src/heptarm/ros", "tests", "bench")
+    folders = (
+        "src/heptarm/testing",
+        "src/heptarm/skills",
+        "src/heptarm/cli",
+        "src/heptarm/ros",
+        "tests",
+        "bench",
+    )
     found = [
         f"{path.relative_to(root)}:{number}: {line.strip()}"
         for folder in folders

@@ -138,7 +138,7 @@ def test_a_file_with_another_content_ends_the_set_up(tmp_path: Path, which: str)
 
 
 @posix
-def test_where_locked_files_are_not_to_be_had_it_says_so_and_takes_others(tmp_path: Path) -> None:
+def test_where_locked_files_are_not_to_be_had_it_reports_it_and_takes_others(tmp_path: Path) -> None:
     code, said, calls = set_up(tmp_path, locked=MISSING)
     assert code == 0 and "the newest are installed, without checksums" in said
     assert calls[-1] == "-m pip install -q -e .[all]"

@@ -139,4 +139,4 @@ def test_unknown_names_are_refused(
 ) -> None:
     monkeypatch.setattr(command.sys, "argv", ["bench", "--group", "frei"])
     assert command.main() == 2
-    assert "no group 'frei'; there are fri, motion" in capsys.readouterr().err
+    assert "no group 'frei'; there are contact, fri, lab, motion" in capsys.readouterr().err

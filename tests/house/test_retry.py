@@ -81,7 +81,7 @@ def test_always():
     assert "much too late" in done.stdout and done.stdout.splitlines().count("attempt") == 3
 
 
-def test_a_run_with_too_many_fails_whoever_made_them(tmp_path: Path) -> None:
+def test_a_run_with_too_many_fails_a_client_that_made_them(tmp_path: Path) -> None:
     body = """
 @pytest.mark.parametrize("number", range(9))
 def test_each(number):

@@ -24,6 +24,6 @@ def denavit_hartenberg(robot: RobotModel, q: np.ndarray) -> np.ndarray:
     return t
 
 
-def random_q(robot: RobotModel, rng: np.random.Generator, share: float = 1.0) -> np.ndarray:
+def random_q(robot: RobotModel, rng: np.random.Generator, part: float = 1.0) -> np.ndarray:
     """Joint positions within this fraction of the limits, shape (7,) [rad]."""
-    return rng.uniform(share * robot.q_min, share * robot.q_max)
+    return rng.uniform(part * robot.q_min, part * robot.q_max)

@@ -124,10 +124,10 @@ def test_gravity_is_the_slope_of_the_potential(robot: RobotModel) -> None:
     rng = np.random.default_rng(23)
     for _ in range(20):
         q = random_q(robot, rng)
-        share = gravity(robot, q, load=LOAD) - gravity(robot, q)
+        fraction = gravity(robot, q, load=LOAD) - gravity(robot, q)
         point = (forward(robot, q) @ np.append(LOAD.com, 1.0))[:3]
         weight = LOAD.mass * np.array(GRAVITY)
-        assert np.abs(share + jacobian(robot, q, point)[:3].T @ weight).max() < 1e-10
+        assert np.abs(fraction + jacobian(robot, q, point)[:3].T @ weight).max() < 1e-10
         assert np.abs(gravity(robot, q, acceleration=(0, 0, 0))).max() == 0.0
     assert np.abs(gravity(robot, np.zeros(7))).max() < 0.5  # upright, hardly anything to hold
 

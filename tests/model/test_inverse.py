@@ -198,7 +198,7 @@ def test_a_path_through_the_wrist_singularity_is_continuous(robot: RobotModel) -
     assert q[5] < 0
 
 
-def test_unreachable_says_why(robot: RobotModel) -> None:
+def test_unreachable_reports_why(robot: RobotModel) -> None:
     far = robot.d_se + robot.d_ew
     with pytest.raises(
         Unreachable, match=rf"the {robot.title} reaches .* to {far:.3f} m .bring the target"

@@ -32,7 +32,7 @@ def test_the_same_seed_gives_the_same_run_with_any_threads(action: str) -> None:
     assert not (third[0] == one[0]).all()
 
 
-def test_episodes_end_by_their_length_and_begin_anew() -> None:
+def test_episodes_end_by_their_length_and_begin_again() -> None:
     arms = BatchReach(ReachTask(steps=20), envs=4, starts="together")
     goals = arms.target.copy()
     for count in range(1, 21):
@@ -68,11 +68,11 @@ def test_late_commands_come_late() -> None:
     for late in (0, 3):
         arms = BatchReach(task, envs=1, randomisation=Randomisation(latency=(late, late)), starts="together")
         begin = arms.q.copy()
-        ways = []
+        paths = []
         for _ in range(6):
             arms.step(np.ones((1, 7)))
-            ways.append(float(np.abs(arms.q - begin).max()))
-        moved.append(ways)
+            paths.append(float(np.abs(arms.q - begin).max()))
+        moved.append(paths)
     assert moved[1][:3] == pytest.approx([0.0] * 3, abs=1e-9)
     assert moved[1][3:] == pytest.approx(moved[0][:3], rel=0.02)
 
@@ -87,7 +87,7 @@ def test_a_slow_servo_trails() -> None:
     assert trails[0] > 2 * trails[1]
 
 
-def test_an_unknown_payload_bends_a_soft_arm_more_than_a_stiff_one() -> None:
+def test_an_unknown_payload_bends_a_compliant_arm_more_than_a_stiff_one() -> None:
     sags = []
     for stiffness in (300.0, inf):
         draw = Randomisation(payload=(2.0, 2.0), stiffness=(stiffness, stiffness))
@@ -129,9 +129,9 @@ def test_the_plant_moves_alike() -> None:
     assert one.observation == pytest.approx(other.observation, abs=0.01)
 
 
-def test_a_plant_with_joint_impedance_and_a_weight_yields() -> None:
-    soft = Randomisation(stiffness=(300.0, 300.0), payload=(1.0, 1.0))
-    arms = BatchReach(ReachTask(), envs=1, starts="together", engine=PlantEngine, randomisation=soft)
+def test_a_plant_with_joint_impedance_and_a_weight_complies() -> None:
+    compliant = Randomisation(stiffness=(300.0, 300.0), payload=(1.0, 1.0))
+    arms = BatchReach(ReachTask(), envs=1, starts="together", engine=PlantEngine, randomisation=compliant)
     for _ in range(45):
         arms.step(np.zeros((1, 7)))
     assert 0.002 < float((arms.task.tip(arms.command) - arms.task.tip(arms.q))[0, 2]) < 0.05

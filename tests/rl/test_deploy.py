@@ -48,7 +48,7 @@ def test_the_shipped_policy_reaches_its_targets(reached: EpisodeReport) -> None:
     np.testing.assert_allclose(reached.paths, reached.task.tip(reached.joints))
 
 
-def test_the_one_with_the_feature_does_so_softly_and_late() -> None:
+def test_the_one_with_the_feature_does_so_gently_and_late() -> None:
     with ha.connect(FAST, watchdog=5.0) as arm:
         settings = DeploySettings(mode=JointImpedance(300.0), latency=0.06, homing=0.6)
         report = tried(arm, shipped(feature=True), [POINT], settings=settings)

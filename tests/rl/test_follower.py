@@ -19,7 +19,7 @@ def follower() -> Follower:
     return Follower(shipped(feature=True), JOINTS)
 
 
-def test_it_reaches_an_arm_that_does_what_it_is_told(follower: Follower) -> None:
+def test_it_reaches_an_arm_that_does_what_it_is_reported(follower: Follower) -> None:
     q = np.array(follower.task.home)
     follower.on_target((0.55, 0.1, 0.4))
     for step in range(100):
@@ -51,7 +51,7 @@ def test_another_robots_joints_are_passed_over(follower: Follower, names: list[s
     assert follower.command(0.0) is None
 
 
-def test_without_a_target_or_fresh_joints_it_is_silent_and_begins_anew(follower: Follower) -> None:
+def test_without_a_target_or_fresh_joints_it_is_silent_and_begins_again(follower: Follower) -> None:
     home = np.array(follower.task.home)
     follower.on_joints(JOINTS, home.tolist(), ZERO, 0.0)
     assert follower.command(0.0) is None

@@ -112,7 +112,7 @@ def test_at_the_edge_of_its_reach_a_cartesian_arm_does_not_run_off() -> None:
     assert (np.abs(q) <= task.model.q_max).all()
 
 
-def test_starts_and_targets_lie_where_the_task_says() -> None:
+def test_starts_and_targets_lie_where_the_task_reports() -> None:
     task = ReachTask()
     random = np.random.default_rng(3)
     assert np.abs(task.starts(random, 1000) - task.home).max() <= 0.125

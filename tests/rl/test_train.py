@@ -129,7 +129,7 @@ def test_checkpoints_are_written_under_way(tmp_path: Path) -> None:
     assert seen == [False, False, True, True]
 
 
-def test_what_cannot_go_on_says_why(tmp_path: Path) -> None:
+def test_what_cannot_go_on_reports_why(tmp_path: Path) -> None:
     path = tmp_path / "reach.npz"
     with pytest.raises(HeptarmError, match="does not exist"):
         train(resume=path)

@@ -27,6 +27,7 @@ class Bare:
 
     preempted = (GoalOutcome.PREEMPTED,)
     timely = True
+    empty_stops = True
 
     def __init__(self) -> None:
         self._values: dict[str, object] = {}
@@ -38,7 +39,7 @@ class Bare:
         self._slept = 0.0  # less than a period: it has not passed yet
         self._late: deque[KinematicState] = deque()
         self._ends: dict[int, GoalResult] = {}
-        self._told: dict[int, list[GoalFeedback]] = {}
+        self._reported: dict[int, list[GoalFeedback]] = {}
         self._track: list[tuple[float, Array]] = []
 
     def now(self) -> float:
@@ -60,7 +61,7 @@ class Bare:
         try:
             if not self._active:
                 raise GoalRefused("inactive")
-            return SentGoal(True, handle=self._runner.accept(goal, now=self._time, state=self._measured()))
+            return SentGoal(True, handle=self._runner.accept(goal, now=self.now(), state=self._measured()))
         except GoalRefused as error:
             return SentGoal(False, error.reason)
 
@@ -92,7 +93,7 @@ class Bare:
                 one.elapsed,
                 one.index,
             )
-            for one in self._told.get(sent.handle, [])
+            for one in self._reported.get(sent.handle, [])
         ]
 
     def behave(self, how: str) -> None:
@@ -120,7 +121,7 @@ class Bare:
         if goal.points:
             self.send(replace(goal, from_topic=True))
         else:
-            self._runner.abort("stopped", now=self._time)
+            self._runner.cancel(self._runner.goal, self._time)
 
     def _measured(self) -> MeasuredJoints:
         return MeasuredJoints(self._time, self._q, self._dq, self._scaling)
@@ -130,7 +131,7 @@ class Bare:
         step = self._runner.advance(self._time, self._measured())
         self._collect(step.results)
         if step.feedback is not None:
-            self._told.setdefault(step.feedback.number, []).append(step.feedback)
+            self._reported.setdefault(step.feedback.number, []).append(step.feedback)
         if step.command is None or self._how == "frozen":
             self._dq = np.zeros(7)
             return
@@ -154,5 +155,5 @@ def test_case(name: str) -> None:
 
 
 def test_there_are_enough_cases_and_all_codes_are_among_their_ends() -> None:
-    assert len(CASES) >= 60
+    assert len(CASES) >= 130
     assert {code.name for code in ErrorCode} >= {"PATH_TOLERANCE_VIOLATED", "GOAL_TOLERANCE_VIOLATED"}

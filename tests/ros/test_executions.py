@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from heptarm.ros.trajectory.goal import (
 from heptarm.ros.trajectory.runner import GoalFeedback
 from heptarm.values.condition.collision import Collision
 from heptarm.values.motion.ptp import ptp
-from heptarm.values.result import MotionEvent
+from heptarm.values.result import Cause, MotionEvent
 from heptarm.values.state import State
 from tests.conftest import RunningCabinet
 
@@ -105,9 +106,9 @@ def recorder(driver: Driver) -> Recorder:
 def goal(driver: Driver, away: np.ndarray = AWAY, duration: float = 2.0) -> TrajectoryGoal:
     """A goal to a position, on a curve."""
     now = driver.arm.state.q_cmd
-    shares = 0.5 * (1 - np.cos(np.pi * np.linspace(0, 1, 11)[1:]))
+    fractions = 0.5 * (1 - np.cos(np.pi * np.linspace(0, 1, 11)[1:]))
     times = np.linspace(0, duration, 11)[1:]
-    points = [TrajectoryPoint(float(t), tuple(now + s * away)) for t, s in zip(times, shares, strict=True)]
+    points = [TrajectoryPoint(float(t), tuple(now + s * away)) for t, s in zip(times, fractions, strict=True)]
     return TrajectoryGoal(joints=driver.configuration.joints, points=tuple(points))
 
 
@@ -188,6 +189,30 @@ def _commanded(driver: Driver, recorder: Recorder) -> None:
     assert recorder.ends[-1].outcome is GoalOutcome.SUCCEEDED, recorder.ends
 
 
+@pytest.mark.parametrize("execution", ["servo"], indirect=True)
+def test_a_malformed_goal_leaves_a_command_alone(driver: Driver) -> None:
+    handle = driver.start(ptp(HOME + 0.2))
+    bad = goal(driver)
+    for wrong in (replace(bad, points=()), replace(bad, joints=("elbow", *bad.joints[1:]))):
+        with pytest.raises(GoalRefused):
+            driver.accept(wrong)
+    assert handle.wait().cause is Cause.FINISHED
+    assert np.abs(driver.arm.state.q - HOME - 0.2).max() < 0.01
+
+
+@pytest.mark.parametrize("execution", ["servo"], indirect=True)
+def test_a_twist_moves_and_silence_ends_it(driver: Driver) -> None:
+    begin = driver.arm.state.pose.xyz
+    deadline = time.monotonic() + PATIENCE
+    while driver.arm.state.pose.xyz[1] < begin[1] + 0.03 and time.monotonic() < deadline:
+        driver.follow_twist(np.array([0.0, 0.1, 0.0, 0.0, 0.0, 0.0]))
+        time.sleep(0.02)
+    driver.arm.wait_for_rest(timeout=PATIENCE)
+    moved = driver.arm.state.pose.xyz - begin
+    assert 0.03 <= moved[1] < 0.15
+    assert np.abs(moved[[0, 2]]).max() < 5e-3
+
+
 def test_an_unknown_execution_is_refused_by_name() -> None:
     with pytest.raises(CommandRejected, match="teleport"):
         NodeConfiguration.of({"execution": "teleport"})
@@ -207,7 +232,9 @@ def test_a_spline_goes_through_the_points_as_fast_as_the_trajectory(cabinet: Run
         assert recorder.ends[-1].outcome is GoalOutcome.SUCCEEDED, recorder.ends
         took = (recorder.moved[-1] - recorder.moved[0]) * 1e-9
         assert 0.6 * 4.0 < took < 1.25 * 4.0
-        off = max(float(np.abs(told.desired.q - told.actual.q).max()) for told in recorder.feedback)
+        off = max(
+            float(np.abs(received.desired.q - received.actual.q).max()) for received in recorder.feedback
+        )
         assert off < 0.02  # the cabinet chooses the curve between the points
     finally:
         driver.close()

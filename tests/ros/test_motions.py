@@ -127,7 +127,11 @@ def test_a_message_is_the_motion_that_python_makes(given: SimpleNamespace, wante
         (message(1, speed_mps=-1.0), LimitError, "speed_mps"),
         (message(4), ShapeError, "segments"),
         (message(4, segments=[segment(7)]), CommandRejected, "got 7"),
-        (message(5, joint_names=["A1", "A2"], position=[0.0, 0.1, 0.0]), ShapeError, "2 numbers for each point, got 3"),
+        (
+            message(5, joint_names=["A1", "A2"], position=[0.0, 0.1, 0.0]),
+            ShapeError,
+            "2 numbers for each point, got 3",
+        ),
         (message(5), ShapeError, "7 numbers for each point, got 0"),
         (message(1, redundancy=[0.0] * 4), ShapeError, "4 numbers"),
         (message(0, near=[0.0] * 7, redundancy=[0.1]), CommandRejected, "both choose"),

@@ -21,10 +21,10 @@ def goal(*, start: float | None = None) -> TrajectoryGoal:
     """A curve of one second; every joint moves differently."""
     times = np.linspace(0.0, 1.0, 11)[1:]
     away = np.linspace(0.1, 0.4, 7)
-    way = [HOME + away * (10 * t**3 - 15 * t**4 + 6 * t**5) for t in times]
+    travel = [HOME + away * (10 * t**3 - 15 * t**4 + 6 * t**5) for t in times]
     speed = [away * 30 * t**2 * (1 - t) ** 2 for t in times]
     points = tuple(
-        TrajectoryPoint(float(t), tuple(q), tuple(v)) for t, q, v in zip(times, way, speed, strict=True)
+        TrajectoryPoint(float(t), tuple(q), tuple(v)) for t, q, v in zip(times, travel, speed, strict=True)
     )
     return TrajectoryGoal(NAMES, points, start)
 
@@ -107,7 +107,7 @@ def test_a_cancelled_goal_brakes_from_the_speed_that_it_has(stage: Stage, scalin
     speeds = np.diff(np.array([*before, *(stage.step().command.q for _ in range(400))]), axis=0) / PERIOD
     slowing = np.abs(np.diff(speeds, axis=0)) / PERIOD
     assert np.abs(speeds[0]).max() > 0.5 * scaling
-    assert slowing.max() < 2.6, "no faster than the parameter says, but for one step"
+    assert slowing.max() < 2.6, "no faster than the parameter reports, but for one step"
     assert (np.abs(speeds[-1]) < 1e-9).all()
 
 
@@ -174,12 +174,12 @@ def test_the_law_mirrors_before_there_are_set_points_and_brakes_after_the_last(s
     for k in range(200):
         session.t = k * PERIOD
         done.append(session.commanded())
-    way = np.array(done)
-    np.testing.assert_allclose(way[:100], rows)
-    braking = np.diff(way[98:], n=2, axis=0) / PERIOD**2
+    travel = np.array(done)
+    np.testing.assert_allclose(travel[:100], rows)
+    braking = np.diff(travel[98:], n=2, axis=0) / PERIOD**2
     assert np.abs(braking).max() < 2.0 + 1e-6
-    np.testing.assert_allclose(way[-1], rows[-1] + speed * 0.4 / 2.0 / 2.0, atol=1e-3)
-    assert (way[-1] == way[-2]).all(), "at rest"
+    np.testing.assert_allclose(travel[-1], rows[-1] + speed * 0.4 / 2.0 / 2.0, atol=1e-3)
+    assert (travel[-1] == travel[-2]).all(), "at rest"
 
 
 def test_over_fri_a_goal_is_commanded_at_its_times_however_late_this_process_is(session: Session) -> None:
@@ -202,8 +202,8 @@ def test_over_fri_a_goal_is_commanded_at_its_times_however_late_this_process_is(
             overlay.command(runner.advance(now, MeasuredJoints(now, HOME, np.zeros(7))))
         done.append(session.commanded())
         times.append(100.0 + session.t + PERIOD - start)  # it is there a period later
-    told = wanted.positions(begin + np.maximum(times, 0.0))
-    assert np.abs(np.array(done) - told).max() < 1e-9
+    reported = wanted.positions(begin + np.maximum(times, 0.0))
+    assert np.abs(np.array(done) - reported).max() < 1e-9
 
 
 def test_over_fri_a_cancellation_takes_effect_ahead_of_what_is_commanded(session: Session) -> None:

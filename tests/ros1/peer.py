@@ -239,6 +239,7 @@ class Client:
 
     preempted = (GoalOutcome.PREEMPTED,)
     timely = False
+    empty_stops = True
 
     def __init__(self, stage: Stage | None, name: str = "/heptarm", prefix: str = "") -> None:
         self.stage, self.name = stage, name
@@ -248,7 +249,7 @@ class Client:
         self.status = collect(f"{name}/status", Status)
         self._action = actionlib.ActionClient(f"{name}/follow_joint_trajectory", FollowJointTrajectoryAction)
         self._topic = rospy.Publisher(f"{name}/joint_trajectory", JointTrajectory, queue_size=1)
-        self._told: dict[int, list[ReceivedFeedback]] = {}
+        self._reported: dict[int, list[ReceivedFeedback]] = {}
         self._before: dict[str, object] = {}  # of parameters that were changed, by their paths
 
     def ready(self) -> None:
@@ -275,9 +276,9 @@ class Client:
         return [(time, np.array(message.position)) for time, message in found if time >= begin]
 
     def send(self, goal: TrajectoryGoal) -> SentGoal:
-        told: list[ReceivedFeedback] = []
+        reported: list[ReceivedFeedback] = []
         handle = self._action.send_goal(
-            action_goal(goal), feedback_cb=lambda _, feedback: told.append(self._telling(feedback))
+            action_goal(goal), feedback_cb=lambda _, feedback: reported.append(self._telling(feedback))
         )
         status = until(
             lambda: handle.get_goal_status() if handle.get_goal_status() != GoalStatus.PENDING else 0,
@@ -286,10 +287,21 @@ class Client:
         if status == GoalStatus.REJECTED:
             until(lambda: handle.get_result() is not None, "a rejected goal has no result")
             result = handle.get_result()
-            assert result.error_string, "a rejection says why"
+            assert result.error_string, "a rejection reports why"
             return SentGoal(False, ErrorCode(result.error_code), handle)
-        self._told[id(handle)] = told
+        self._reported[id(handle)] = reported
         return SentGoal(True, handle=handle)
+
+    def send_all(self, goals: list[TrajectoryGoal]) -> list[SentGoal]:
+        """Send goals without waiting between them; wait until each is accepted or rejected."""
+        handles = [self._action.send_goal(action_goal(goal)) for goal in goals]
+        pending = (GoalStatus.PENDING, GoalStatus.LOST)
+        until(
+            lambda: all(one.get_goal_status() not in pending for one in handles),
+            "the goals are neither accepted nor rejected",
+        )
+        rejected = [one.get_goal_status() == GoalStatus.REJECTED for one in handles]
+        return [SentGoal(not refused, handle=one) for one, refused in zip(handles, rejected)]
 
     def cancel(self, sent: SentGoal) -> bool:
         handle: Any = sent.handle
@@ -313,7 +325,7 @@ class Client:
         return ReceivedResult(outcome, code, result.error_string)
 
     def feedback(self, sent: SentGoal) -> list[ReceivedFeedback]:
-        return list(self._told[id(sent.handle)])
+        return list(self._reported[id(sent.handle)])
 
     def behave(self, how: str) -> None:
         assert self.stage is not None

@@ -1,7 +1,7 @@
 """Cases of conformance against the node: messages, actionlib, driver, cabinet, plant.
 
 Here those that the node of ROS 2 leaves out, as all of them run against the runner alone; `make conformance` runs all,
-with each way of execution.
+with each path of execution.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import pytest
 from tests.conformance.cases import CASES, UNFIT
 from tests.ros1.peer import Client
 
-WAY = os.environ.get("EXECUTION", "servo")
+TRAVEL = os.environ.get("EXECUTION", "servo")
 #: The messages of ROS 1 have no field for these.
 UNKNOWN = ("rejects_several_degrees_of_freedom",)
 NAMES = list(CASES) if os.environ.get("CONFORMANCE") == "all" else list(CASES)[1::2]
@@ -21,6 +21,6 @@ NAMES = list(CASES) if os.environ.get("CONFORMANCE") == "all" else list(CASES)[1
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in UNKNOWN])
 def test_case(client: Client, name: str) -> None:
-    if name in UNFIT.get(WAY, {}):
-        pytest.skip(UNFIT[WAY][name])
+    if name in UNFIT.get(TRAVEL, {}):
+        pytest.skip(UNFIT[TRAVEL][name])
     CASES[name](client)

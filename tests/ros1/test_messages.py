@@ -13,6 +13,8 @@ SUMS = {
     "FollowJointTrajectoryResult": "493383b18409bfb604b4e26c676401d2",
     "FollowJointTrajectoryActionFeedback": "d8920dc4eae9fc107e00999cce4be641",
     "FollowJointTrajectoryFeedback": "10817c60c2486ef6b33e97dcd87f4474",
+    "JointTrajectoryControllerState": "10817c60c2486ef6b33e97dcd87f4474",
+    "JointJog": "1685da700c8c2e1254afc92a5fb89c96",
     "JointTolerance": "f544fe9c16cf04547e135dd6063ff5be",
 }
 

@@ -31,15 +31,15 @@ def poses(client: Client):
     return one
 
 
-def test_a_motion_of_joints_tells_how_far_it_is(client: Client, joints) -> None:
-    told: list[float] = []
+def test_a_motion_of_joints_reports_how_far_it_is(client: Client, joints) -> None:
+    reported: list[float] = []
     goal = MoveJointsGoal(position=HOME, speed=0.5)
-    joints.send_goal(goal, feedback_cb=lambda feedback: told.append(feedback.progress))
+    joints.send_goal(goal, feedback_cb=lambda feedback: reported.append(feedback.progress))
     assert joints.wait_for_result(LONG)
     assert joints.get_state() == GoalStatus.SUCCEEDED and joints.get_result().success
     assert joints.get_result().residual < 1e-3
     # actionlib drops feedback that arrives after the result, by another path
-    assert told == sorted(told) and 0.0 < told[-1] <= 1.0
+    assert reported == sorted(reported) and 0.0 < reported[-1] <= 1.0
     assert np.abs(rests(client) - HOME).max() < 2e-3
 
 

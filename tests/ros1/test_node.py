@@ -14,7 +14,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
 from std_srvs.srv import Trigger
 
-from tests.conformance.case import arrives, long, quiet, rests, step
+from tests.conformance.case import arrives, goal, long, point, quiet, rests, step
+from tests.conformance.streams import streamed
 from tests.ros1.peer import Client, NodeProcess, call, collect, fresh, publisher, until
 
 
@@ -173,3 +174,14 @@ def test_parameters_change_while_the_node_runs_and_the_fixed_ones_do_not(
     rospy.set_param("/heptarm/constraints/goal_time", -5.0)
     node.waits_for("parameters not applied")
     rospy.delete_param("/heptarm/constraints/goal_time")
+
+
+def test_streams_and_replaced_trajectories_leave_no_warnings(client: Client, node: NodeProcess) -> None:
+    begin = len(node.said)
+    here, last = streamed(client, rate=100.0)
+    arrives(client, last)
+    client.topic(goal(client, point(5.0, here)))
+    client.sleep(0.3)
+    client.topic(goal(client, point(1.0, here)))
+    arrives(client, here)
+    assert "WARN" not in node.said[begin:], node.said[begin:]

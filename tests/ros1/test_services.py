@@ -91,7 +91,7 @@ def test_cartesian_and_sine_impedance_hold_the_arm(client: Client) -> None:
     until(lambda: abs(client.place().q[6] - here[6]) < 0.05, "the arm does not arrive")
 
 
-def test_a_mode_waits_for_rest_or_says_that_something_runs(client: Client) -> None:
+def test_a_mode_waits_for_rest_or_reports_that_something_runs(client: Client) -> None:
     sent = client.send(step(client, time=20.0, size=6.0))
     until(lambda: client.feedback(sent), "the goal does not begin")
     answer = call("/heptarm/mode/joint_impedance", SetJointImpedance, stiffness=[1500.0], damping=[])

@@ -23,8 +23,8 @@ class Sent:
     """A goal of ROS 1."""
 
     def __init__(self, client: actionlib.ActionClient, goal: Any) -> None:
-        self.told: list[Any] = []
-        self._handle = client.send_goal(goal, feedback_cb=lambda _, feedback: self.told.append(feedback))
+        self.reported: list[Any] = []
+        self._handle = client.send_goal(goal, feedback_cb=lambda _, feedback: self.reported.append(feedback))
 
     def cancel(self) -> None:
         self._handle.cancel()
@@ -66,6 +66,9 @@ class Client:
         return self.make(
             "trajectory_msgs/JointTrajectoryPoint", positions=positions, time_from_start=duration
         )
+
+    def seconds(self, duration: Any) -> float:
+        return float(duration.to_sec())
 
     def query(self) -> Any:
         try:

@@ -46,6 +46,8 @@ DEFAULTS: dict[str, object] = {
     "max_deceleration_on_cancel": 2.0,
     "allow_nonzero_velocity_at_trajectory_end": False,
     "allow_partial_joints_goal": False,
+    "allow_integration_in_goal_trajectories": False,
+    "cmd_timeout": 0.0,
     "constraints__goal_time": PATIENT["constraints__goal_time"],
     "constraints__stopped_velocity_tolerance": 0.02,
     "constraints__A7__trajectory": 0.0,
@@ -295,6 +297,11 @@ def _value(value: object) -> ParameterValue:
     return ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
 
 
+def parameter(name: str, value: object) -> Parameter:
+    """A parameter to set."""
+    return Parameter(name=name, value=_value(value))
+
+
 def fresh(ros: Ros, found: list[Any]) -> Any:
     """A copy of the newest of a topic's messages with headers, measured from now on."""
     now = ros.node.get_clock().now().nanoseconds * 1e-9
@@ -307,6 +314,7 @@ class Client:
 
     preempted = (GoalOutcome.ABORTED,)
     timely = False
+    empty_stops = False
 
     def __init__(
         self,
@@ -320,7 +328,7 @@ class Client:
         self.states = ros.collect(JointState, f"{name.rpartition('/')[0]}/joint_states")
         self.status = ros.collect(Status, f"{name}/status", latched=True)
         self._topic = ros.node.create_publisher(JointTrajectory, f"{name}/joint_trajectory", 1)
-        self._told: dict[int, list[ReceivedFeedback]] = {}
+        self._reported: dict[int, list[ReceivedFeedback]] = {}
         self._changed: set[str] = set()
         self._how, self._override = "follows", 1.0
 
@@ -351,15 +359,22 @@ class Client:
         return [(time, np.array(message.position)) for time, message in found if time >= begin]
 
     def send(self, goal: TrajectoryGoal) -> SentGoal:
-        told: list[ReceivedFeedback] = []
+        reported: list[ReceivedFeedback] = []
         future = self._action.send_goal_async(
-            action_goal(goal), feedback_callback=lambda message: told.append(self._telling(message.feedback))
+            action_goal(goal),
+            feedback_callback=lambda message: reported.append(self._telling(message.feedback)),
         )
         handle = self.ros.wait(future, "the goal is neither accepted nor rejected")
         if not handle.accepted:
             return SentGoal(False)
-        self._told[id(handle)] = told
+        self._reported[id(handle)] = reported
         return SentGoal(True, handle=(handle, handle.get_result_async()))
+
+    def send_all(self, goals: list[TrajectoryGoal]) -> list[SentGoal]:
+        """Send goals without waiting between them; wait until each is accepted or rejected."""
+        futures = [self._action.send_goal_async(action_goal(goal)) for goal in goals]
+        handles = [self.ros.wait(future, "a goal is neither accepted nor rejected") for future in futures]
+        return [SentGoal(handle.accepted, handle=handle) for handle in handles]
 
     def cancel(self, sent: SentGoal) -> bool:
         handle, _ = sent.handle  # type: ignore[misc]
@@ -375,7 +390,7 @@ class Client:
 
     def feedback(self, sent: SentGoal) -> list[ReceivedFeedback]:
         handle, _ = sent.handle  # type: ignore[misc]
-        return list(self._told[id(handle)])
+        return list(self._reported[id(handle)])
 
     def restore(self) -> None:
         """Undo what a case has changed."""
@@ -400,9 +415,7 @@ class Client:
     def set(self, **values: object) -> bool:
         self._changed |= values.keys()
         request = SetParameters.Request(
-            parameters=[
-                Parameter(name=name.replace("__", "."), value=_value(value)) for name, value in values.items()
-            ]
+            parameters=[parameter(name.replace("__", "."), value) for name, value in values.items()]
         )
         answer = self.ros.call(SetParameters, f"{self.name}/set_parameters", request)
         return all(one.successful for one in answer.results)

@@ -1,7 +1,7 @@
 """Cases of conformance against the node: messages, executor, driver, cabinet, plant.
 
 Here every other case; the rest run against the node of ROS 1, and all of them against the runner alone.
-`make conformance` runs all of them, with each way of execution.
+`make conformance` runs all of them, with each path of execution.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ import pytest
 from tests.conformance.cases import CASES, UNFIT
 from tests.ros2.peer import Client
 
-WAY = os.environ.get("EXECUTION", "servo")
+TRAVEL = os.environ.get("EXECUTION", "servo")
 NAMES = list(CASES) if os.environ.get("CONFORMANCE") == "all" else list(CASES)[::2]
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_case(client: Client, name: str) -> None:
-    if name in UNFIT.get(WAY, {}):
-        pytest.skip(UNFIT[WAY][name])
+    if name in UNFIT.get(TRAVEL, {}):
+        pytest.skip(UNFIT[TRAVEL][name])
     CASES[name](client)

@@ -25,12 +25,12 @@ class Moves:
     """A client of one action."""
 
     def __init__(self, ros: Ros, kind: Any, name: str) -> None:
-        self.ros, self.kind, self.told = ros, kind, []
+        self.ros, self.kind, self.reported = ros, kind, []
         self._client = ros.act(kind, name)
 
     def start(self, **goal: Any) -> Any:
         future = self._client.send_goal_async(
-            self.kind.Goal(**goal), feedback_callback=lambda one: self.told.append(one.feedback.progress)
+            self.kind.Goal(**goal), feedback_callback=lambda one: self.reported.append(one.feedback.progress)
         )
         handle = self.ros.wait(future, "no answer")
         assert handle.accepted
@@ -49,8 +49,10 @@ def joints(ros: Ros, client: Client) -> Moves:
 def test_a_motion_of_joints_a_line_and_an_arc(ros: Ros, client: Client, joints: Moves) -> None:
     status, result = joints.end(joints.start(position=HOME, speed=0.5))
     assert status == GoalStatus.STATUS_SUCCEEDED and result.success and result.residual < 1e-3
-    until(lambda: joints.told and joints.told[-1] == 1.0, "the end is not told")  # it arrives by another path
-    assert joints.told == sorted(joints.told)
+    until(
+        lambda: joints.reported and joints.reported[-1] == 1.0, "the end is not reported"
+    )  # it arrives by another path
+    assert joints.reported == sorted(joints.reported)
     assert np.abs(rests(client) - HOME).max() < 2e-3
     seen = ros.collect(PoseStamped, f"{client.name}/pose")
     poses = Moves(ros, MovePose, f"{client.name}/move_pose")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
 import signal
 from collections.abc import Callable, Iterator
@@ -12,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from heptarm_msgs.msg import RobotState, Status
 from lifecycle_msgs.msg import Transition
-from rcl_interfaces.srv import DescribeParameters, ListParameters
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParametersAtomically
 from rclpy.qos import ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Empty
@@ -20,9 +21,10 @@ from std_srvs.srv import Trigger
 
 import heptarm as ha
 from heptarm.ros.node import parameters
-from tests.conformance.case import TOUCH, long, rests, step, succeeds, under_way
+from tests.conformance.case import TOUCH, arrives, goal, long, point, rests, step, succeeds, under_way
 from tests.conformance.stage import Stage
-from tests.ros2.peer import Client, NodeProcess, Ros, fresh, until
+from tests.conformance.streams import streamed
+from tests.ros2.peer import Client, NodeProcess, Ros, fresh, parameter, until
 
 Start = Callable[..., NodeProcess]
 
@@ -71,7 +73,7 @@ def test_it_waits_for_a_cabinet_and_starts_by_itself(ros: Ros, spare: Stage, nod
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_told_to_end_in_mid_air_it_leaves_the_arm_at_rest(
+def test_asked_to_end_in_mid_air_it_leaves_the_arm_at_rest(
     ros: Ros, spare: Stage, nodes: Start, number: int
 ) -> None:
     node = nodes(spare.target, name="short", space="/alone")
@@ -95,8 +97,8 @@ def test_every_parameter_is_described(client: Client, ros: Ros) -> None:
     ours = [*parameters.PARAMETERS, *parameters.joint_parameters([f"A{i}" for i in range(1, 8)])]
     assert {one.name for one in ours} <= set(names)
     request = DescribeParameters.Request(names=[one.name for one in ours])
-    told = ros.call(DescribeParameters, "/heptarm/describe_parameters", request).descriptors
-    for one, descriptor in zip(ours, told):
+    reported = ros.call(DescribeParameters, "/heptarm/describe_parameters", request).descriptors
+    for one, descriptor in zip(ours, reported):
         assert descriptor.description == one.text
         if isinstance(one.default, float):
             assert descriptor.floating_point_range[0].to_value == one.high
@@ -107,6 +109,62 @@ def test_every_parameter_is_described(client: Client, ros: Ros) -> None:
 def test_parameters_that_count_later_are_refused_while_connected(client: Client) -> None:
     assert not client.set(prefix="left_")
     assert not client.set(state_rate=1e9)
+
+
+def test_parameters_that_are_set_together_apply_together_or_not_at_all(client: Client, ros: Ros) -> None:
+    def atomically(**values: float) -> bool:
+        given = [parameter(name, value) for name, value in values.items()]
+        request = SetParametersAtomically.Request(parameters=given)
+        kind, name = SetParametersAtomically, "/heptarm/set_parameters_atomically"
+        return bool(ros.call(kind, name, request).result.successful)
+
+    def start_tolerance() -> float:
+        request = GetParameters.Request(names=["start_tolerance"])
+        return float(ros.call(GetParameters, "/heptarm/get_parameters", request).values[0].double_value)
+
+    assert not atomically(start_tolerance=0.2, max_deceleration_on_cancel=99.0)
+    assert start_tolerance() == 0.05
+    assert not atomically(start_tolerance=0.2, state_rate=50.0), "one of them cannot change now"
+    assert start_tolerance() == 0.05
+    try:
+        assert atomically(start_tolerance=0.2, max_deceleration_on_cancel=3.0)
+        assert start_tolerance() == 0.2
+    finally:
+        assert atomically(start_tolerance=0.05, max_deceleration_on_cancel=2.0)
+
+
+def test_quality_of_service_may_be_overridden(ros: Ros, spare: Stage, nodes: Start) -> None:
+    override = {"qos_overrides./quality/joint_states.publisher.reliability": "best_effort"}
+    nodes(spare.target, space="/quality", **override)
+    client = Client(ros, spare, "/quality/heptarm")
+    reliable = ReliabilityPolicy.RELIABLE
+
+    def kinds(topic: str) -> set[ReliabilityPolicy]:
+        return {p.qos_profile.reliability for p in ros.node.get_publishers_info_by_topic(topic)}
+
+    for _ in range(2):  # also after the node was configured again
+        until(lambda: client.status and client.status[-1].active, "the node is not active")
+        until(lambda: kinds("/quality/joint_states") == {ReliabilityPolicy.BEST_EFFORT}, "no override")
+        assert kinds("/quality/heptarm/pose") == {reliable}
+        for step_of_life in ("DEACTIVATE", "CLEANUP", "CONFIGURE", "ACTIVATE"):
+            assert client.change(getattr(Transition, f"TRANSITION_{step_of_life}"))
+
+
+def test_a_node_without_a_simulator_reports_how_to_start_one(nodes: Start) -> None:
+    if importlib.util.find_spec("mujoco") is not None:
+        pytest.skip("this Python has a simulator")
+    nodes("sim://iiwa14", space="/alone").waits_for("heptarm sim --port 30001")
+
+
+def test_streams_and_replaced_trajectories_leave_no_warnings(client: Client, node: NodeProcess) -> None:
+    begin = len(node.said)
+    here, last = streamed(client, rate=100.0)
+    arrives(client, last)
+    client.topic(goal(client, point(5.0, here)))
+    client.sleep(0.3)
+    client.topic(goal(client, point(1.0, here)))
+    arrives(client, here)
+    assert "WARN" not in node.said[begin:], node.said[begin:]
 
 
 # ----------------------------------------------------------------------------------------- states
@@ -127,7 +185,7 @@ def test_joint_states_are_complete_ordered_and_stamped_by_this_machine(client: C
     assert before <= stamps[-1] <= client.now()
 
 
-def test_states_are_reliable_as_moveit_wants_them(client: Client, ros: Ros) -> None:
+def test_states_are_reliable_as_moveit_needs_them(client: Client, ros: Ros) -> None:
     publishers = ros.node.get_publishers_info_by_topic("/joint_states")
     assert publishers and all(p.qos_profile.reliability is ReliabilityPolicy.RELIABLE for p in publishers)
 
@@ -192,10 +250,10 @@ def test_a_joint_command_moves_and_a_stop_stops(client: Client, ros: Ros) -> Non
 
 def test_pose_and_line_commands(client: Client, ros: Ros) -> None:
     poses = ros.collect(PoseStamped, "/heptarm/pose")
-    for name, way in (("lin", 0.03), ("pose", -0.03)):
+    for name, travel in (("lin", 0.03), ("pose", -0.03)):
         rests(client)
         goal = fresh(ros, poses)
-        z = goal.pose.position.z = goal.pose.position.z + way
+        z = goal.pose.position.z = goal.pose.position.z + travel
         publish(client, PoseStamped, f"/heptarm/command/{name}", goal)
         until(lambda: abs(poses[-1].pose.position.z - z) < 2e-3, f"{name} gets there")  # noqa: B023
     rests(client)

@@ -23,6 +23,8 @@ from sensor_msgs.msg import JointState
 
 from heptarm.model.kinematics import forward
 from heptarm.ros.node.parameters import PARAMETERS, NodeConfiguration, joint_parameters
+from heptarm.ros.trajectory.goal import TrajectoryGoal, TrajectoryPoint
+from heptarm.ros.trajectory.stream import is_streamed
 from heptarm.values.robot import ROBOTS
 from tests.conformance.stage import Stage
 from tests.interrupts import ctrl_c_interrupts
@@ -87,14 +89,14 @@ def test_an_arm_expands_with_the_limits_of_its_data_sheet(model: str) -> None:
         (robot.dq_max, "velocity"),
         (robot.tau_max, "effort"),
     ):
-        told = [float(joint.find("limit").get(name)) for joint in joints]  # type: ignore[union-attr,arg-type]
-        np.testing.assert_allclose(told, values, rtol=1e-7)
+        reported = [float(joint.find("limit").get(name)) for joint in joints]  # type: ignore[union-attr,arg-type]
+        np.testing.assert_allclose(reported, values, rtol=1e-7)
     mass = sum(float(m.get("value")) for m in arm.iter("mass"))  # type: ignore[arg-type]
     assert 20.0 < mass < 35.0
 
 
 @pytest.mark.parametrize("model", ROBOTS)
-def test_its_flange_is_where_heptarm_says(model: str) -> None:
+def test_its_flange_is_where_heptarm_reports(model: str) -> None:
     arm = expand(URDF / "heptarm.urdf.xacro", model=model)
     rng = np.random.default_rng(7)
     for _ in range(5):
@@ -154,7 +156,7 @@ def test_the_numbers_are_written_by_their_script() -> None:
 
 
 @pytest.mark.parametrize("name", PACKAGES)
-def test_a_package_says_what_it_is_and_installs_what_it_has(name: str) -> None:
+def test_a_package_reports_what_it_is_and_installs_what_it_has(name: str) -> None:
     folder = ROS2 / name
     manifest = ET.parse(folder / "package.xml").getroot()
     assert manifest.findtext("name") == name and manifest.findtext("license") == "Apache-2.0"
@@ -178,14 +180,15 @@ def test_all_interfaces_are_built() -> None:
 
 def test_upstreams_interfaces_are_upstreams() -> None:
     """The hashes of control_msgs, by which two machines find out whether they mean the same."""
-    share = Path(sys.prefix) / "share" / "control_msgs"
+    folder = Path(sys.prefix) / "share" / "control_msgs"
     for name, begin in (
         ("action/FollowJointTrajectory", "ff29901b2693f5d"),
         ("msg/JointTolerance", "c254f9cece0f3b7"),
         ("msg/JointComponentTolerance", "739ea7566931944"),
+        ("msg/JointTrajectoryControllerState", "51d8dd89cc624cb"),
         ("srv/QueryTrajectoryState", "4a0935dffef18bc"),
     ):
-        hashes = yaml.safe_load((share / f"{name}.json").read_text())["type_hashes"]
+        hashes = yaml.safe_load((folder / f"{name}.json").read_text())["type_hashes"]
         assert hashes[0]["hash_string"] == hashes[0]["hash_string"].replace("RIHS01_", "RIHS01_")
         assert hashes[0]["hash_string"].startswith(f"RIHS01_{begin}"), name
 
@@ -277,25 +280,60 @@ class Anything:
         return self
 
 
-def test_moveits_launch_file_uses_files_that_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
-    path = ROS2 / "heptarm_moveit_config/launch/move_group.launch.py"
+def started(path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+    """What a launch file starts; the packages that it needs are replaced by `Anything`."""
     tree = ast.parse(path.read_text())
     for one in ast.walk(tree):
         if isinstance(one, ast.ImportFrom) and one.module:
             module = types.ModuleType(one.module)
             for name in one.names:
                 setattr(module, name.name, Anything(name.name))
-            if one.module.split(".")[0] not in ("os",):
-                monkeypatch.setitem(sys.modules, one.module, module)
+            monkeypatch.setitem(sys.modules, one.module, module)
     space: dict[str, Any] = {}
     exec(compile(tree, str(path), "exec"), space)
     Anything.made.clear()
     space["generate_launch_description"]()
-    assert len(space["_start"](None)) == 2
-    named = [named["file_path"] for _, _, named in Anything.made if "file_path" in named]
-    assert len(named) == 6
-    for file in named:
-        assert (ROS2 / "heptarm_moveit_config" / file).is_file(), file
+    found: list[Any] = space["_start"](None)
+    for _, _, named in Anything.made:
+        if "file_path" in named:
+            assert (ROS2 / "heptarm_moveit_config" / named["file_path"]).is_file(), named["file_path"]
+    return found
+
+
+def test_moveits_launch_file_uses_files_that_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    path = ROS2 / "heptarm_moveit_config/launch/move_group.launch.py"
+    assert len(started(path, monkeypatch)) == 2
+    assert sum("file_path" in named for _, _, named in Anything.made) == 6
+
+
+def test_moveit_servo_is_started_with_its_configuration(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert len(started(ROS2 / "heptarm_moveit_config/launch/servo.launch.py", monkeypatch)) == 1
+    nodes = [named for name, _, named in Anything.made if name == "Node"]
+    assert nodes[0]["package"] == "moveit_servo"
+    servo = nodes[0]["parameters"][0]["moveit_servo"]
+    assert servo["command_out_topic"] == "/heptarm/joint_trajectory"
+    assert servo["command_out_type"] == "trajectory_msgs/JointTrajectory"
+    semantic = expand(ROS2 / "heptarm_moveit_config/config/heptarm.srdf.xacro")
+    assert [group.get("name") for group in semantic.findall("group")] == [servo["move_group_name"]]
+    # a window has at least three points, and is short enough to be a stream for the node
+    assert 3 * servo["publish_period"] < servo["max_expected_latency"]
+    names = NodeConfiguration.of({}).joints
+    points = round(2.0 * servo["max_expected_latency"] / servo["publish_period"])
+    times = tuple(TrajectoryPoint(servo["publish_period"] * k, (0.0,) * 7) for k in range(points))
+    window = TrajectoryGoal(names, times, 100.0 - servo["max_expected_latency"], from_topic=True)
+    assert is_streamed(window, 100.0)
+
+
+@pytest.mark.parametrize("path", sorted(ROOT.glob("ros[12]/**/launch/*.*")), ids=lambda path: path.name)
+def test_every_launch_file_can_be_read(path: Path) -> None:
+    if path.suffix == ".py":
+        tree = ast.parse(path.read_text())
+        assert any(
+            isinstance(one, ast.FunctionDef) and one.name == "generate_launch_description"
+            for one in tree.body
+        )
+    else:
+        assert ET.parse(path).getroot().tag == "launch"
 
 
 @pytest.mark.skipif(

@@ -22,9 +22,9 @@ class Sent:
     """A goal of ROS 2."""
 
     def __init__(self, ros: Ros, client: ActionClient, goal: Any) -> None:
-        self.told: list[Any] = []
+        self.reported: list[Any] = []
         self._ros = ros
-        sent = client.send_goal_async(goal, feedback_callback=lambda one: self.told.append(one.feedback))
+        sent = client.send_goal_async(goal, feedback_callback=lambda one: self.reported.append(one.feedback))
         self._handle = ros.wait(sent, "no answer")
         assert self._handle.accepted
         self._result = self._handle.get_result_async()
@@ -70,6 +70,9 @@ class Client:
         return self.make(
             "trajectory_msgs/JointTrajectoryPoint", positions=positions, time_from_start=to_duration(seconds)
         )
+
+    def seconds(self, duration: Any) -> float:
+        return float(duration.sec + duration.nanosec * 1e-9)
 
     def query(self) -> Any:
         answer = self.call("query_state", "control_msgs/QueryTrajectoryState")

@@ -132,10 +132,10 @@ class Answering:
         self.asked.append(question)
         return self.willing
 
-    def does(self, action: commissioning.PersonAction) -> None:
+    def does(self, action: commissioning.PersonTask) -> None:
         raise AssertionError(action)
 
-    def finds(self, action: commissioning.PersonAction) -> bool:
+    def finds(self, action: commissioning.PersonTask) -> bool:
         return False
 
     def reads(self, question: str) -> str:

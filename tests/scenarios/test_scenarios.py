@@ -18,9 +18,12 @@ from heptarm.cli.options import NO_TARGET, CommandTarget
 from heptarm.testing import Outcome, Report, Risk, Verdict
 from heptarm.testing.runner import tidy
 from heptarm.testing.scenario import LINES
+from tests.long import LONG
 
 #: Simulated seconds per second.
 SPEED = 4.0
+#: Of the noise.
+SEED = 7
 
 
 @pytest.fixture(scope="module")
@@ -38,6 +41,22 @@ def test_the_virtual_cabinet_shows(arm: ha.Arm, name: str) -> None:
     assert np.abs(arm.state.q - testing.HOME).max() < 2e-3 or not report.outcomes[0].scenario.moves
 
 
+#: Where contact and force matter; the long run shows everything with noisy sensors.
+NOISY = [one.name for one in testing.scenarios() if LONG or one.risk is Risk.CONTACT]
+
+
+@pytest.fixture(scope="module")
+def noisy_arm() -> Iterator[ha.Arm]:
+    with ha.connect(testing.stage(speed=SPEED, sensors=f"noisy:{SEED}"), watchdog=10.0, timeout=30.0) as arm:
+        yield arm
+
+
+@pytest.mark.parametrize("name", NOISY)
+def test_it_shows_the_same_with_noisy_sensors(noisy_arm: ha.Arm, name: str) -> None:
+    report = testing.run(noisy_arm, only=[name])
+    assert report.outcomes[0].verdict is Verdict.SHOWN, report.table()
+
+
 def test_each_line_has_a_scenario_and_each_scenario_a_title() -> None:
     every = testing.scenarios()
     assert {one.line for one in every} == set(LINES)
@@ -47,7 +66,7 @@ def test_each_line_has_a_scenario_and_each_scenario_a_title() -> None:
 
 
 class Real:
-    """An arm that says it is a real one."""
+    """An arm that reports it is a real one."""
 
     is_virtual = False
 
@@ -96,7 +115,7 @@ def test_a_robot_is_asked_for_and_slow(arm: ha.Arm) -> None:
     assert nobody.outcomes[0].verdict is Verdict.LEFT_OUT and not nobody.ok
 
 
-def test_what_fails_is_told_with_what_was_measured(arm: ha.Arm) -> None:
+def test_what_fails_is_reported_with_what_was_measured(arm: ha.Arm) -> None:
     def show(_: ha.Arm) -> None:
         from heptarm.testing.measure import near
 
@@ -131,12 +150,13 @@ def test_the_command_names_runs_and_reports(
         "contact": False,
         "faults": False,
         "sim_speed": 4.0,
+        "noisy": False,
         "yes": False,
         "target": NO_TARGET,
     }
     assert check.check("model", list_only=True, junit=None, as_json=True, **options) == 0
-    told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert told[0]["scenario"] == "model.forward" and told[0]["risk"] == "still"
+    reported = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert reported[0]["scenario"] == "model.forward" and reported[0]["risk"] == "still"
 
     class Lent:
         """The arm of these tests, which the command must not close."""

@@ -34,7 +34,7 @@ class Call:
     Attributes:
         do: sets it.
         name: of the parameter in the API, as its errors have it.
-        size: entries that `do` wants; the bad one is the last.
+        size: entries that `do` needs; the bad one is the last.
         filler: what the others are.
         but: reasons for being bad that mean something else in the API.
     """
@@ -71,7 +71,7 @@ def _moving(make: Callable[[Any], Any]) -> Callable[[Arm, Any], object]:
     return lambda arm, value: arm.start(make(value))
 
 
-def _soft(make: Callable[[Any], Any]) -> Callable[[Arm, Any], object]:
+def _compliant(make: Callable[[Any], Any]) -> Callable[[Arm, Any], object]:
     return lambda arm, value: arm.start(ha.hold(1.0), mode=make(value))
 
 
@@ -138,55 +138,58 @@ CALLS: dict[str, Call] = {
     "HandGuide.cartesian_velocity": Call(
         _moving(lambda v: hand_guide(cartesian_velocity=v)), "cartesian_velocity"
     ),
-    "JointImpedance.stiffness": Call(_soft(JointImpedance), "stiffness", 7),
-    "JointImpedance.damping": Call(_soft(lambda v: JointImpedance(300.0, damping=v)), "damping", 7),
-    "CartesianImpedance.stiffness": Call(_soft(CartesianImpedance), "stiffness", 6),
-    "CartesianImpedance.damping": Call(_soft(lambda v: CartesianImpedance(damping=v)), "damping", 6),
+    "JointImpedance.stiffness": Call(_compliant(JointImpedance), "stiffness", 7),
+    "JointImpedance.damping": Call(_compliant(lambda v: JointImpedance(300.0, damping=v)), "damping", 7),
+    "CartesianImpedance.stiffness": Call(_compliant(CartesianImpedance), "stiffness", 6),
+    "CartesianImpedance.damping": Call(_compliant(lambda v: CartesianImpedance(damping=v)), "damping", 6),
     "CartesianImpedance.nullspace_stiffness": Call(
-        _soft(lambda v: CartesianImpedance(nullspace_stiffness=v)), "nullspace_stiffness"
+        _compliant(lambda v: CartesianImpedance(nullspace_stiffness=v)), "nullspace_stiffness"
     ),
     "CartesianImpedance.nullspace_damping": Call(
-        _soft(lambda v: CartesianImpedance(nullspace_damping=v)), "nullspace_damping"
+        _compliant(lambda v: CartesianImpedance(nullspace_damping=v)), "nullspace_damping"
     ),
     "CartesianImpedance.additional_force": Call(
-        _soft(lambda v: CartesianImpedance(additional_force=v)), "additional_force", 6
+        _compliant(lambda v: CartesianImpedance(additional_force=v)), "additional_force", 6
     ),
-    "CartesianImpedance.max_force": Call(_soft(lambda v: CartesianImpedance(max_force=v)), "max_force", 6),
+    "CartesianImpedance.max_force": Call(
+        _compliant(lambda v: CartesianImpedance(max_force=v)), "max_force", 6
+    ),
     "CartesianImpedance.max_velocity": Call(
-        _soft(lambda v: CartesianImpedance(max_velocity=v)), "max_velocity", 6
+        _compliant(lambda v: CartesianImpedance(max_velocity=v)), "max_velocity", 6
     ),
     "CartesianImpedance.max_deviation": Call(
-        _soft(lambda v: CartesianImpedance(max_deviation=v)), "max_deviation", 6
+        _compliant(lambda v: CartesianImpedance(max_deviation=v)), "max_deviation", 6
     ),
-    "CartesianImpedance.frame": Call(_soft(lambda v: CartesianImpedance(frame=v)), "frame"),
-    "SineImpedance.amplitude": Call(_soft(lambda v: SineImpedance(amplitude=v)), "amplitude", 6),
-    "SineImpedance.frequency": Call(_soft(lambda v: SineImpedance(frequency=v)), "frequency", 6),
-    "SineImpedance.phase": Call(_soft(lambda v: SineImpedance(phase=v)), "phase", 6),
-    "SineImpedance.bias": Call(_soft(lambda v: SineImpedance(bias=v)), "bias", 6),
-    "SineImpedance.force_limit": Call(_soft(lambda v: SineImpedance(force_limit=v)), "force_limit", 6),
+    "CartesianImpedance.frame": Call(_compliant(lambda v: CartesianImpedance(frame=v)), "frame"),
+    "SineImpedance.amplitude": Call(_compliant(lambda v: SineImpedance(amplitude=v)), "amplitude", 6),
+    "SineImpedance.frequency": Call(_compliant(lambda v: SineImpedance(frequency=v)), "frequency", 6),
+    "SineImpedance.phase": Call(_compliant(lambda v: SineImpedance(phase=v)), "phase", 6),
+    "SineImpedance.bias": Call(_compliant(lambda v: SineImpedance(bias=v)), "bias", 6),
+    "SineImpedance.force_limit": Call(_compliant(lambda v: SineImpedance(force_limit=v)), "force_limit", 6),
     "SineImpedance.position_limit": Call(
-        _soft(lambda v: SineImpedance(position_limit=v)), "position_limit", 6
+        _compliant(lambda v: SineImpedance(position_limit=v)), "position_limit", 6
     ),
-    "SineImpedance.total_time": Call(_soft(lambda v: SineImpedance(total_time=v)), "total_time"),
-    "SineImpedance.rise_time": Call(_soft(lambda v: SineImpedance(rise_time=v)), "rise_time"),
-    "SineImpedance.hold_time": Call(_soft(lambda v: SineImpedance(hold_time=v)), "hold_time"),
-    "SineImpedance.fall_time": Call(_soft(lambda v: SineImpedance(fall_time=v)), "fall_time"),
+    "SineImpedance.total_time": Call(_compliant(lambda v: SineImpedance(total_time=v)), "total_time"),
+    "SineImpedance.rise_time": Call(_compliant(lambda v: SineImpedance(rise_time=v)), "rise_time"),
+    "SineImpedance.hold_time": Call(_compliant(lambda v: SineImpedance(hold_time=v)), "hold_time"),
+    "SineImpedance.fall_time": Call(_compliant(lambda v: SineImpedance(fall_time=v)), "fall_time"),
     "SpiralPattern.frequency": Call(
-        _soft(lambda v: SineImpedance.spiral("xy", frequency=v, amplitude=1.0, total_time=1.0)),
+        _compliant(lambda v: SineImpedance.spiral("xy", frequency=v, amplitude=1.0, total_time=1.0)),
         "frequency[0]",
     ),
     "SpiralPattern.amplitude": Call(
-        _soft(lambda v: SineImpedance.spiral("xy", frequency=1.0, amplitude=v, total_time=1.0)),
+        _compliant(lambda v: SineImpedance.spiral("xy", frequency=1.0, amplitude=v, total_time=1.0)),
         "amplitude[0]",
     ),
     "SpiralPattern.stiffness": Call(
-        _soft(
+        _compliant(
             lambda v: SineImpedance.spiral("xy", frequency=1.0, amplitude=1.0, total_time=1.0, stiffness=v)
         ),
         "stiffness",
     ),
     "SpiralPattern.total_time": Call(
-        _soft(lambda v: SineImpedance.spiral("xy", frequency=1.0, amplitude=1.0, total_time=v)), "total_time"
+        _compliant(lambda v: SineImpedance.spiral("xy", frequency=1.0, amplitude=1.0, total_time=v)),
+        "total_time",
     ),
     "Condition.nodes": Call(_until(lambda v: reduce(or_, [force > 900.0] * (len(v) - 1))), "until"),
     "ForceAbove.frame": Call(_until(lambda v: Force(frame=v) > 5), "frame"),

@@ -48,11 +48,19 @@ def picture(cabinet: PrivateCabinet) -> tuple[object, ...]:
     """The state that a refused request might have changed."""
     with ha.connect(f"sim://{cabinet.host}:{cabinet.port}", control=False, timeout=PATIENCE) as arm:
         arm.subscribe(groups=("joints", "motion", "safety", "mode", "io"))
-        state = arm.wait_until(lambda s: s.groups.io is not None and s.groups.mode is not None, timeout=PATIENCE)
+        state = arm.wait_until(
+            lambda s: s.groups.io is not None and s.groups.mode is not None, timeout=PATIENCE
+        )
         assert state.motion is not None and state.groups.mode is not None
         motion, control = state.motion, state.groups.mode
-        told = (motion.id, motion.queued, motion.override, control.mode, control.tool, control.workpiece)
-        return (*told, control.frame, tuple(state.io.items()), tuple(np.round(state.q, 4)), arm.controller)
+        reported = (motion.id, motion.queued, motion.override, control.mode, control.tool, control.workpiece)
+        return (
+            *reported,
+            control.frame,
+            tuple(state.io.items()),
+            tuple(np.round(state.q, 4)),
+            arm.controller,
+        )
 
 
 def requests(kind: str) -> list[Case]:
@@ -111,7 +119,7 @@ def wire_code(name: str) -> int:
 
 
 @pytest.mark.parametrize("kind", [wire.ServoJoints, wire.ServoJointsVelocity, wire.ServoPose])
-def test_each_bad_target_is_counted_and_told_of(cabinet: PrivateCabinet, kind: type[Message]) -> None:
+def test_each_bad_target_is_counted_and_reported(cabinet: PrivateCabinet, kind: type[Message]) -> None:
     with Peer(cabinet.port, name="bypass") as peer:
         peer.take_control()
         for case in requests("oneway"):
@@ -124,7 +132,7 @@ def test_each_bad_target_is_counted_and_told_of(cabinet: PrivateCabinet, kind: t
             peer.send(dataclasses.replace(case.message, servo=number))
             assert isinstance(peer.ask(wire.ServoClose(servo=number)), wire.Accepted)
             status = peer.wait_for(
-                wire.ServoStatus, lambda told, number=number: told.servo == number, timeout=PATIENCE
+                wire.ServoStatus, lambda reported, number=number: reported.servo == number, timeout=PATIENCE
             )  # type: ignore[misc]
             assert (status.refused, status.applied, status.code) == (1, 0, case.bad.code), (case, status)
             peer.wait_for(

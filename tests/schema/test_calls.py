@@ -48,9 +48,9 @@ def _given(case: Bad, size: int, filler: float) -> Any:
 def test_the_client_refuses_with_the_cabinets_code(arm: ha.Arm, field: str) -> None:
     call = CALLS[field]
     before = arm.wait_for_rest(timeout=PATIENCE)
-    told = refused()[field]
-    assert any(bad.why not in call.but for bad in told)
-    for bad in told:
+    reported = refused()[field]
+    assert any(bad.why not in call.but for bad in reported)
+    for bad in reported:
         if bad.why in call.but:
             continue
         value = _given(bad, call.size, call.filler)

@@ -17,10 +17,10 @@ VECTORS = [
 
 
 @pytest.mark.parametrize(("name", "number", "body"), VECTORS, ids=[name for name, *_ in VECTORS])
-def test_python_reads_and_writes_the_golden_octets(name: str, number: int, body: bytes) -> None:
+def test_python_reads_and_writes_the_golden_bytes(name: str, number: int, body: bytes) -> None:
     assert recoded(number, body) == f"{body.hex()} ok"
 
 
-def test_java_reads_and_writes_the_golden_octets(recode: Callable[..., list[str]]) -> None:
+def test_java_reads_and_writes_the_golden_bytes(recode: Callable[..., list[str]]) -> None:
     answers = recode([(number, body) for _, number, body in VECTORS])
     assert answers == [f"{body.hex()} ok" for *_, body in VECTORS]

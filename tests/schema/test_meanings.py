@@ -60,7 +60,7 @@ def moving(motion: Motion, **more: object) -> Callable[[Arm], object]:
 
 NODE = "items[0].until.nodes[0]"
 WRONG = {
-    "moved frame": Wrong(
+    "motion frame": Wrong(
         run(STEP, frame="nowhere"),
         "items[0].frame",
         moving(ha.lin_rel(z=0.01, moving="nowhere")),

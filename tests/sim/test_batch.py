@@ -104,8 +104,8 @@ def test_a_blend_goes_from_one_speed_to_the_other() -> None:
     track = run(plant, Order(1, "batch", parts=parts))
     speed = speeds(track, plant)
     assert speed.max() == pytest.approx(SPEED, rel=0.01)
-    way = points(plant, track.q_cmd)[1:, 1] - start.xyz[1]
-    between = speed[(way > 0.09) & (way < 0.25)]
+    travel = points(plant, track.q_cmd)[1:, 1] - start.xyz[1]
+    between = speed[(travel > 0.09) & (travel < 0.25)]
     assert between.min() == pytest.approx(0.1, rel=0.03) and (np.diff(between) < 1e-4).all()
 
 
@@ -137,8 +137,8 @@ def test_progress_is_that_of_the_motion_under_way() -> None:
         seen.append((len(ear.parts), plant.snapshot.progress))
     assert sorted(seen[:-1]) == seen[:-1], "it went back"
     for part in range(4):
-        shares = [share for number, share in seen[:-1] if number == part]
-        assert shares[0] < 0.02 and shares[-1] > 0.98
+        fractions = [fraction for number, fraction in seen[:-1] if number == part]
+        assert fractions[0] < 0.02 and fractions[-1] > 0.98
 
 
 def test_without_blending_every_motion_ends_where_it_should() -> None:
@@ -164,7 +164,7 @@ def test_a_motion_of_a_batch_that_cannot_be_planned_is_named() -> None:
     assert plant.idle
 
 
-def test_motions_that_lead_nowhere_are_passed_over() -> None:
+def test_motions_that_guide_nowhere_are_passed_over() -> None:
     plant, ear = ready(), PartEar()
     start = start_of(plant)
     here = Order(1, "lin", pose=numbers(start), blending=(0, 0.02, 0))

@@ -55,7 +55,7 @@ def test_an_arc_is_round_on_the_measured_pose(plane: str, angle: float) -> None:
 
 @pytest.mark.parametrize("reference", ["base", "path"])
 @pytest.mark.parametrize("type_", ["variable", "constant", "joint"])
-def test_the_orientation_is_led_as_the_order_says(type_: str, reference: str) -> None:
+def test_the_orientation_is_led_as_the_order_reports(type_: str, reference: str) -> None:
     if (type_, reference) == ("joint", "path"):
         pytest.skip("the joints know no path")
     plant = ready()
@@ -87,10 +87,10 @@ def test_a_joint_orientation_on_a_line_ends_at_its_target() -> None:
     order = Order(1, "lin", pose=numbers(end), tcp=numbers(TCP), orientation=Orientation("joint"))
     track = run(plant, order)
     seen = poses(plant, track.q_cmd)
-    way = end.xyz - start.xyz
+    travel = end.xyz - start.xyz
     for pose in seen[::20]:
-        s = (pose.xyz - start.xyz) @ way / (way @ way)
-        assert np.linalg.norm(start.xyz + s * way - pose.xyz) < 1e-6
+        s = (pose.xyz - start.xyz) @ travel / (travel @ travel)
+        assert np.linalg.norm(start.xyz + s * travel - pose.xyz) < 1e-6
     assert seen[-1].angle_to(end) < 1e-6
     run(plant, replace(order, id=2, pose=numbers(start), orientation=Orientation("constant")))
     assert poses(plant, plant.snapshot.q_cmd[None])[0].angle_to(end) < 1e-6

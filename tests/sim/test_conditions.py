@@ -42,10 +42,10 @@ DOWN = {
 def broken(order: dict[str, object], condition: Condition) -> tuple[Order, list[str]]:
     heard: list[str] = []
     watch = ConditionWatch(condition, lambda: heard.append("fired"), breaks=True)
-    return Order(1, **order, watches=(watch,), listener=Told(heard)), heard  # type: ignore[arg-type]
+    return Order(1, **order, watches=(watch,), listener=Reported(heard)), heard  # type: ignore[arg-type]
 
 
-class Told:
+class Reported:
     def __init__(self, heard: list[str]) -> None:
         self.heard = heard
 
@@ -135,8 +135,8 @@ def test_a_line_down_onto_a_push_brakes_on_its_path() -> None:
     plant.apply_wrench((0.0, 0.0, 15.0))
     track = run(plant)
     assert heard == ["started", "fired", "condition"]
-    way = forward(plant.robot, track.q_cmd[-1])[:3, 3] - start
-    assert -0.15 < way[2] < -0.04 and np.abs(way[:2]).max() < 1e-3
+    travel = forward(plant.robot, track.q_cmd[-1])[:3, 3] - start
+    assert -0.15 < travel[2] < -0.04 and np.abs(travel[:2]).max() < 1e-3
     assert np.abs(track.acceleration).max() < 1.2 * plant.robot.ddq_max.max()
     plant.submit(Order(2, "ptp", joints=READY))  # and the next motion starts where it came to rest
     run(plant)
@@ -153,7 +153,7 @@ def test_what_is_queued_behind_it_goes_on_from_there() -> None:
 
 
 @pytest.mark.parametrize(
-    ("reference", "distance", "delay", "way"),
+    ("reference", "distance", "delay", "travel"),
     [
         (0, 0.05, 0.0, 0.05),
         (0, 0.0, 0.0, 0.0),
@@ -164,7 +164,7 @@ def test_what_is_queued_behind_it_goes_on_from_there() -> None:
     ],
 )
 def test_a_trigger_goes_off_at_a_point_of_the_path(
-    reference: int, distance: float, delay: float, way: float
+    reference: int, distance: float, delay: float, travel: float
 ) -> None:
     plant, seen = ready(), []
     start = forward(plant.robot, plant.snapshot.q)[:3, 3]
@@ -176,7 +176,7 @@ def test_a_trigger_goes_off_at_a_point_of_the_path(
     plant.submit(Order(1, **DOWN, watches=(ConditionWatch(point, fired),)))  # type: ignore[arg-type]
     track = run(plant)
     assert len(seen) == 1
-    assert seen[0] == pytest.approx(way, abs=0.012 if reference and delay else 2e-3)
+    assert seen[0] == pytest.approx(travel, abs=0.012 if reference and delay else 2e-3)
     end = float(np.linalg.norm(forward(plant.robot, track.q_cmd[-1])[:3, 3] - start))
     assert end == pytest.approx(0.2, abs=1e-6)
 
@@ -188,7 +188,7 @@ def test_a_point_beyond_the_path_is_never_reached() -> None:
     assert heard == ["started", "done"]
 
 
-def test_on_a_joint_motion_the_moved_frame_counts() -> None:
+def test_on_a_joint_motion_the_motion_frame_counts() -> None:
     plant = ready()
     joints = (0.5, *READY[1:])
     order, heard = broken(
@@ -196,8 +196,8 @@ def test_on_a_joint_motion_the_moved_frame_counts() -> None:
     )
     start = forward(plant.robot, plant.snapshot.q)[:3, 3]
     run(plant, order)
-    way = float(np.linalg.norm(forward(plant.robot, plant.snapshot.q_cmd)[:3, 3] - start))
-    assert heard == ["started", "fired", "condition"] and 0.1 < way < 0.14
+    travel = float(np.linalg.norm(forward(plant.robot, plant.snapshot.q_cmd)[:3, 3] - start))
+    assert heard == ["started", "fired", "condition"] and 0.1 < travel < 0.14
 
 
 def test_a_servo_motion_breaks_too() -> None:
@@ -221,17 +221,17 @@ def test_an_observer_hears_edges_whatever_moves() -> None:
     plant.step(100)
     pushed(plant, (8.0, 0.0, 0.0))
     late: list[bool] = []
-    told: list[bool] = []
+    reported: list[bool] = []
     plant.condition_monitor.observe(
         WrenchAbove(frame=OWN, components=ALL, threshold=5.0), late.append, at_once=False
     )
     plant.condition_monitor.observe(
-        WrenchAbove(frame=OWN, components=ALL, threshold=5.0), told.append, at_once=True
+        WrenchAbove(frame=OWN, components=ALL, threshold=5.0), reported.append, at_once=True
     )
     plant.step(10)
     plant.apply_wrench((0.0, 0.0, 0.0))
     plant.step(300)
-    assert heard == [True, False] and late == [False] and told == [True, False]
+    assert heard == [True, False] and late == [False] and reported == [True, False]
     plant.condition_monitor.forget(number)
     pushed(plant, (8.0, 0.0, 0.0))
     assert heard == [True, False]
@@ -264,7 +264,7 @@ def test_a_line_down_stops_on_a_table() -> None:
     plant.step(200)
     state = plant.snapshot
     assert 0.3 < forward(plant.robot, state.q)[2, 3] < 0.33
-    assert 10.0 < state.wrench[2] < 60.0
+    assert 5.0 < state.wrench[2] < 20.0
 
 
 @pytest.mark.parametrize("text", ["", "1,2,3", "0,0,0,1,1,0", "0,0,0,1,1,x", "0,0,nan,1,1,1"])

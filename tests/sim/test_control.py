@@ -18,7 +18,7 @@ from tests.sim.driving import READY, Ear, numbers, ready
 
 HERE = np.array(READY)
 NAN = math.nan
-SOFT = CartesianImpedance((500.0, 500.0, 500.0, 100.0, 100.0, 100.0), frame="base")
+COMPLIANT = CartesianImpedance((500.0, 500.0, 500.0, 100.0, 100.0, 100.0), frame="base")
 
 
 def holding(mode: Any, *, duration: float = NAN, **terms: Any) -> tuple[Plant, Ear]:
@@ -42,20 +42,20 @@ def tip(plant: Plant, *, commanded: bool = False) -> Pose:
     return Pose.from_matrix(forward(plant.robot, state.q_cmd if commanded else state.q))
 
 
-def yielded(plant: Plant) -> Any:
+def deviated(plant: Plant) -> Any:
     return tip(plant).xyz - tip(plant, commanded=True).xyz
 
 
 @pytest.mark.parametrize("kind", ["hold", "servo", "direct"])
 def test_a_push_moves_the_hand_by_force_over_stiffness(kind: str) -> None:
     plant = ready()
-    plant.submit(Order(7, kind, mode=SOFT))
+    plant.submit(Order(7, kind, mode=COMPLIANT))
     plant.apply_wrench((10.0, -15.0, 20.0))
     plant.step(1500)
-    assert yielded(plant) == pytest.approx(np.array([10.0, -15.0, 20.0]) / 500.0, rel=0.02)
+    assert deviated(plant) == pytest.approx(np.array([10.0, -15.0, 20.0]) / 500.0, rel=0.02)
 
 
-def test_the_moved_frame_yields_not_the_flange() -> None:
+def test_the_motion_frame_complies_not_the_flange() -> None:
     tool = Pose.at(z=0.3)
     turning = CartesianImpedance((5000, 5000, 5000, 30, 300, 300))
     plant, _ = holding(turning, tcp=numbers(tool))
@@ -74,7 +74,7 @@ def test_the_axes_of_a_named_frame_come_with_the_order() -> None:
     plant, _ = holding(table, axes=tuple(turn.quat.tolist()))
     plant.apply_wrench(tuple(turn.rotation @ (0.0, 9.0, 0.0)))
     plant.step(1500)
-    assert turn.rotation.T @ yielded(plant) == pytest.approx([0.0, 0.03, 0.0], abs=8e-4)
+    assert turn.rotation.T @ deviated(plant) == pytest.approx([0.0, 0.03, 0.0], abs=8e-4)
 
 
 @pytest.mark.parametrize(
@@ -86,11 +86,11 @@ def test_the_axes_of_a_named_frame_come_with_the_order() -> None:
     ],
 )
 @pytest.mark.parametrize("kind", ["hold", "servo"])
-def test_an_exceeded_limit_stops_the_arm_and_the_order_says_which(
+def test_an_exceeded_limit_stops_the_arm_and_the_order_reports_which(
     kind: str, limits: dict[str, Any], text: str
 ) -> None:
     plant, ear = ready(), Ear()
-    plant.submit(Order(7, kind, mode=CartesianImpedance(SOFT.stiffness, **limits), listener=ear))
+    plant.submit(Order(7, kind, mode=CartesianImpedance(COMPLIANT.stiffness, **limits), listener=ear))
     plant.apply_wrench((0.0, 5.0, 0.0))
     plant.step(800)
     assert ear.causes == ["started"], "a smaller push does not"
@@ -110,7 +110,7 @@ def test_an_exceeded_limit_stops_the_arm_and_the_order_says_which(
 
 
 def test_a_motion_waits_for_a_pattern_that_shall_not_be_cut_off() -> None:
-    wave = SineImpedance.sine("y", frequency=4.0, amplitude=10.0, base=SOFT)
+    wave = SineImpedance.sine("y", frequency=4.0, amplitude=10.0, base=COMPLIANT)
     for stays, most in ((False, 700), (True, 1400)):
         mode = wave.timed(total_time=0.8, stay_active=stays)
         plant, ear = holding(mode, duration=0.1)
@@ -120,7 +120,7 @@ def test_a_motion_waits_for_a_pattern_that_shall_not_be_cut_off() -> None:
 
 
 def test_a_cancel_does_not_wait_for_a_pattern() -> None:
-    wave = SineImpedance.sine("y", frequency=4.0, amplitude=10.0, base=SOFT)
+    wave = SineImpedance.sine("y", frequency=4.0, amplitude=10.0, base=COMPLIANT)
     plant, ear = holding(wave.timed(total_time=60.0, stay_active=True))
     plant.step(300)
     plant.cancel(7)
@@ -129,30 +129,30 @@ def test_a_cancel_does_not_wait_for_a_pattern() -> None:
 
 
 def test_an_overlaid_force_swings_the_hand_as_far_as_the_dynamics_let_it() -> None:
-    wave = SineImpedance.sine("y", frequency=0.25, amplitude=10.0, base=SOFT)
+    wave = SineImpedance.sine("y", frequency=0.25, amplitude=10.0, base=COMPLIANT)
     plant, _ = holding(wave)
-    way = []
+    travel = []
     for _ in range(6000):
         plant.tick()
-        way.append(yielded(plant)[1])
-    seen = np.array(way[2000:])  # one whole turn, slow enough for the hand to follow the force
+        travel.append(deviated(plant)[1])
+    seen = np.array(travel[2000:])  # one whole turn, slow enough for the hand to follow the force
     assert seen.max() == pytest.approx(10.0 / 500.0, rel=0.05)
     assert seen.min() == pytest.approx(-10.0 / 500.0, rel=0.05)
 
 
 def test_parameters_change_while_a_servo_motion_runs_and_the_kind_does_not() -> None:
     plant = ready()
-    plant.submit(Order(7, "servo", mode=SOFT))
+    plant.submit(Order(7, "servo", mode=COMPLIANT))
     plant.apply_wrench((0.0, 10.0, 0.0))
     plant.step(1200)
-    assert yielded(plant)[1] == pytest.approx(0.02, rel=0.02)
+    assert deviated(plant)[1] == pytest.approx(0.02, rel=0.02)
     plant.change_mode(7, CartesianImpedance((250.0,) * 3 + (100.0,) * 3, frame="base"))
     plant.step(1500)
-    assert yielded(plant)[1] == pytest.approx(0.04, rel=0.02)
+    assert deviated(plant)[1] == pytest.approx(0.04, rel=0.02)
     plant.change_mode(7, JointImpedance(4000.0))
-    plant.change_mode(6, SOFT)
+    plant.change_mode(6, COMPLIANT)
     plant.step(500)
-    assert yielded(plant)[1] == pytest.approx(0.04, rel=0.02)
+    assert deviated(plant)[1] == pytest.approx(0.04, rel=0.02)
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ def test_parameters_change_while_a_servo_motion_runs_and_the_kind_does_not() -> 
 def test_modes_follow_each_other_without_a_blow(then: Any) -> None:
     plant, ear = ready(), Ear()
     plant.apply_wrench((0.0, 10.0, 0.0))
-    plant.submit(Order(1, "hold", duration=1.0, mode=SOFT))
+    plant.submit(Order(1, "hold", duration=1.0, mode=COMPLIANT))
     slowly = (0.2,) * 7
     plant.submit(Order(2, "ptp", joints=tuple(HERE + 0.1), joint_velocity=slowly, mode=then, listener=ear))
     fastest = 0.0

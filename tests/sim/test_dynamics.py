@@ -66,13 +66,13 @@ def duration(order: Order) -> float:
 
 @pytest.mark.parametrize("limit", LIMITS)
 @pytest.mark.parametrize("kind", CARTESIAN)
-def test_limits_along_a_path_are_heeded(kind: str, limit: str) -> None:
+def test_limits_along_a_path_are_obeyed(kind: str, limit: str) -> None:
     assert duration(limited(ORDERS[kind], **{limit: LIMITS[limit]})) > 1.1 * duration(ORDERS[kind])
 
 
 @pytest.mark.parametrize("limit", AXES)
 @pytest.mark.parametrize("kind", ORDERS)
-def test_limits_of_the_axes_are_heeded(kind: str, limit: str) -> None:
+def test_limits_of_the_axes_are_obeyed(kind: str, limit: str) -> None:
     assert duration(limited(ORDERS[kind], **{limit: (0.02,) * 7})) > 1.1 * duration(ORDERS[kind])
 
 

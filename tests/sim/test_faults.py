@@ -38,25 +38,25 @@ def test_an_order_right_after_a_stop_is_not_stopped() -> None:
 
 
 def test_a_profile_on_the_edge_between_two_kinds_is_found() -> None:
-    for way in (0.2, *np.linspace(1e-4, 3.0, 500)):
-        profile = change(REST, 1.0, ProfileLimits(1.48 / way, 10.0 / way, 100.0 / way))
+    for travel in (0.2, *np.linspace(1e-4, 3.0, 500)):
+        profile = change(REST, 1.0, ProfileLimits(1.48 / travel, 10.0 / travel, 100.0 / travel))
         assert profile.at(profile.duration)[0] == pytest.approx(1.0, abs=1e-9)
-        brake(profile.at(profile.duration / 3), ProfileLimits(1.48 / way, 10.0 / way, 100.0 / way))
+        brake(profile.at(profile.duration / 3), ProfileLimits(1.48 / travel, 10.0 / travel, 100.0 / travel))
 
 
-@pytest.mark.parametrize("way", [4.7e-9, 1.2e-8, 1.9e-8, 1e-6, 1e-3])
-def test_a_motion_of_next_to_no_length_can_be_braked_at_any_time(way: float) -> None:
-    limits = ProfileLimits(1.7 / way, 10.0 / way, 100.0 / way)
+@pytest.mark.parametrize("travel", [4.7e-9, 1.2e-8, 1.9e-8, 1e-6, 1e-3])
+def test_a_motion_of_next_to_no_length_can_be_braked_at_any_time(travel: float) -> None:
+    limits = ProfileLimits(1.7 / travel, 10.0 / travel, 100.0 / travel)
     law = change(REST, 1.0, limits)
     for at in np.linspace(0.0, law.duration, 40):
         stop = brake(law.at(float(at)), limits)
         assert abs(stop.at(stop.duration)[1]) < 1e-3 * limits.velocity
 
 
-@pytest.mark.parametrize("way", [1e-9, 1e-6, 1e-3, 0.2])
-def test_a_ptp_of_any_length_ends(way: float) -> None:
+@pytest.mark.parametrize("travel", [1e-9, 1e-6, 1e-3, 0.2])
+def test_a_ptp_of_any_length_ends(travel: float) -> None:
     plant, ear = ready(), Ear()
-    run(plant, Order(1, "ptp", joints=(way, *READY[1:]), listener=ear))
+    run(plant, Order(1, "ptp", joints=(travel, *READY[1:]), listener=ear))
     assert ear.causes == ["started", "done"]
 
 
@@ -127,7 +127,7 @@ def test_an_override_out_of_range_does_no_harm(override: float) -> None:
 
 
 @pytest.mark.parametrize("how", ["jump", "lost"])
-def test_a_path_that_fails_under_way_brakes_the_axes_and_says_why(
+def test_a_path_that_fails_under_way_brakes_the_axes_and_reports_why(
     how: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plant, ear = ready(), Ear()

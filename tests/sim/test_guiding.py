@@ -25,7 +25,7 @@ def begun(guide: HandGuide | None = None, *, model: str = "iiwa14") -> tuple[Pla
     return plant, ear
 
 
-def lead(plant: Plant, force: tuple[float, ...], seconds: float) -> tuple[np.ndarray, np.ndarray]:
+def push_along(plant: Plant, force: tuple[float, ...], seconds: float) -> tuple[np.ndarray, np.ndarray]:
     """Push for a time; positions and speeds of every tick, shape (n, 7)."""
     plant.apply_wrench(force)
     q, dq = [], []
@@ -51,7 +51,7 @@ def one(axis: int, value: float) -> list[float]:
     return [value if i == axis else NAN for i in range(7)]
 
 
-def test_it_stands_until_the_switch_is_held_and_does_not_sink() -> None:
+def test_it_waits_until_the_switch_is_held_and_does_not_sink() -> None:
     plant, ear = ready(), Ear()
     start = plant.snapshot.q
     plant.submit(Order(1, "guide", guide=hand_guide(), listener=ear))
@@ -70,7 +70,7 @@ def test_it_stands_until_the_switch_is_held_and_does_not_sink() -> None:
 def test_a_hand_moves_it_and_it_stays_where_it_was_led() -> None:
     plant, ear = begun()
     start = plant.snapshot.q
-    q, _ = lead(plant, (0.0, 12.0, 0.0), 1.0)
+    q, _ = push_along(plant, (0.0, 12.0, 0.0), 1.0)
     assert np.abs(q[-1] - start).max() > 0.1
     assert np.abs(plant.snapshot.q_cmd - plant.snapshot.q).max() < 2e-3
     finish(plant)
@@ -85,14 +85,14 @@ def test_light_hands_are_enough_on_both_arms() -> None:
     for model in ("iiwa7", "iiwa14"):
         plant, _ = begun(model=model)
         start = plant.snapshot.q
-        lead(plant, (0.0, 0.0, 5.0), 0.3)
+        push_along(plant, (0.0, 0.0, 5.0), 0.3)
         assert np.abs(plant.snapshot.q - start).max() > 0.01
 
 
 @pytest.mark.parametrize("force", [(0.0, 0.0, -100.0), (0.0, 0.0, 100.0), (80.0, 80.0, 0.0)])
 def test_no_axis_leaves_its_own_limits(force: tuple[float, ...]) -> None:
     plant, ear = begun()
-    q, _ = lead(plant, force, 2.0)
+    q, _ = push_along(plant, force, 2.0)
     assert (q > plant.robot.q_min).all() and (q < plant.robot.q_max).all()
     plant.apply_wrench(force)  # a person continues to push
     finish(plant)
@@ -101,17 +101,17 @@ def test_no_axis_leaves_its_own_limits(force: tuple[float, ...]) -> None:
 
 def test_a_limit_holds_one_axis_and_leaves_the_others_free() -> None:
     plant, _ = begun(hand_guide(q_max=one(0, 0.2)))
-    q, dq = lead(plant, SIDEWAYS, 1.5)
+    q, dq = push_along(plant, SIDEWAYS, 1.5)
     assert 0.15 < q[-1, 0] < 0.2 and q[:, 0].max() < 0.2
     assert abs(dq[-1, 0]) < 0.02
     assert np.abs(q[-1, 1:] - q[700, 1:]).max() > 0.1
-    back, _ = lead(plant, (0.0, -20.0, 0.0), 1.0)
+    back, _ = push_along(plant, (0.0, -20.0, 0.0), 1.0)
     assert back[-1, 0] < q[-1, 0] - 0.02
 
 
 def test_a_limit_can_hold_all_axes_until_the_switch_is_let_go() -> None:
     plant, ear = begun(hand_guide(q_max=one(0, 0.2), at_limit="all"))
-    q, _ = lead(plant, SIDEWAYS, 2.0)
+    q, _ = push_along(plant, SIDEWAYS, 2.0)
     assert q[:, 0].max() < 0.2
     assert np.abs(q[-1] - q[-500]).max() < 2e-3
     assert not plant.idle
@@ -121,7 +121,7 @@ def test_a_limit_can_hold_all_axes_until_the_switch_is_let_go() -> None:
 
 def test_beyond_its_limit_an_axis_is_free_to_return_or_pulled_back() -> None:
     plant, _ = begun(hand_guide(q_max=one(1, 0.3)))  # A2 is at 0.5
-    out, _ = lead(plant, (40.0, 0.0, -40.0), 0.5)
+    out, _ = push_along(plant, (40.0, 0.0, -40.0), 0.5)
     assert out[:, 1].max() < 0.52
     plant, _ = begun(hand_guide(q_max=one(1, 0.3), outside="pull"))
     plant.step(1500)
@@ -130,10 +130,10 @@ def test_beyond_its_limit_an_axis_is_free_to_return_or_pulled_back() -> None:
 
 def test_speed_limits() -> None:
     plant, _ = begun(hand_guide(joint_velocity=0.3))
-    _, dq = lead(plant, SIDEWAYS, 1.0)
+    _, dq = push_along(plant, SIDEWAYS, 1.0)
     assert 0.2 < np.abs(dq).max() < 0.45
     plant, _ = begun(hand_guide(cartesian_velocity=0.1))
-    q, dq = lead(plant, (0.0, 0.0, 40.0), 1.0)
+    q, dq = push_along(plant, (0.0, 0.0, 40.0), 1.0)
     speeds = [
         np.linalg.norm(jacobian(plant.robot, a)[:3] @ b) for a, b in zip(q[::20], dq[::20], strict=True)
     ]
@@ -147,7 +147,7 @@ def test_reduced_speed_in_t1() -> None:
     plant.resume()
     plant.submit(Order(1, "guide", guide=hand_guide(), listener=ear))
     plant.step(50)
-    q, dq = lead(plant, (0.0, 0.0, 40.0), 1.0)
+    q, dq = push_along(plant, (0.0, 0.0, 40.0), 1.0)
     speeds = [
         np.linalg.norm(jacobian(plant.robot, a)[:3] @ b) for a, b in zip(q[::20], dq[::20], strict=True)
     ]
@@ -160,7 +160,7 @@ def test_reduced_speed_in_t1() -> None:
 @pytest.mark.parametrize("fast", [False, True])
 def test_cancelling_brakes_it(fast: bool) -> None:
     plant, ear = begun()
-    lead(plant, SIDEWAYS, 0.3)
+    push_along(plant, SIDEWAYS, 0.3)
     (plant.stop_fast if fast else plant.stop)()
     plant.step(600)
     assert ear.causes == ["started", "cancelled"]
@@ -169,15 +169,15 @@ def test_cancelling_brakes_it(fast: bool) -> None:
 
 def test_a_pause_holds_it_and_then_it_goes_on() -> None:
     plant, ear = begun()
-    lead(plant, SIDEWAYS, 0.3)
+    push_along(plant, SIDEWAYS, 0.3)
     plant.pause()
     plant.step(500)
     there = plant.snapshot.q
-    q, _ = lead(plant, SIDEWAYS, 0.3)
+    q, _ = push_along(plant, SIDEWAYS, 0.3)
     assert np.abs(q - there).max() < 0.01
     plant.resume()
     plant.step(300)
-    lead(plant, SIDEWAYS, 0.3)
+    push_along(plant, SIDEWAYS, 0.3)
     assert np.abs(plant.snapshot.q - there).max() > 0.05
     finish(plant)
     assert ear.causes == ["started", "done"]
@@ -185,7 +185,7 @@ def test_a_pause_holds_it_and_then_it_goes_on() -> None:
 
 def test_errors_end_it_at_rest() -> None:
     plant, ear = begun()
-    lead(plant, SIDEWAYS, 0.3)
+    push_along(plant, SIDEWAYS, 0.3)
     plant.abort(0, "Command Position violates limit A1")
     plant.step(600)
     assert ear.heard[-1] == ("error", "Command Position violates limit A1")
@@ -196,7 +196,7 @@ def test_what_comes_behind_it_begins_where_it_was_led_to() -> None:
     plant, ear = begun()
     after = Ear()
     plant.submit(Order(2, "ptp", joints=(0.0, 0.5, 0.0, -1.3, 0.0, 0.9, 0.0), listener=after))
-    lead(plant, SIDEWAYS, 0.5)
+    push_along(plant, SIDEWAYS, 0.5)
     plant.safety.let_go()
     track = run(plant)
     assert np.abs(np.diff(track.q_cmd, axis=0)).max() < 3e-3
@@ -205,7 +205,7 @@ def test_what_comes_behind_it_begins_where_it_was_led_to() -> None:
 
 
 def test_cancelling_while_a_stop_brakes_it_brakes_it_no_other_way() -> None:
-    ways = []
+    paths = []
     for cancels in (False, True):
         plant, _ = begun()
         plant.apply_wrench(SIDEWAYS)
@@ -214,9 +214,9 @@ def test_cancelling_while_a_stop_brakes_it_brakes_it_no_other_way() -> None:
         plant.step(5)
         if cancels:
             plant.stop()
-        way = []
+        travel = []
         for _ in range(300):
             plant.tick()
-            way.append(plant.snapshot.q)
-        ways.append(np.array(way))
-    assert np.abs(ways[0] - ways[1]).max() < 1e-9
+            travel.append(plant.snapshot.q)
+        paths.append(np.array(travel))
+    assert np.abs(paths[0] - paths[1]).max() < 1e-9

@@ -17,7 +17,7 @@ from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.pose import Pose
 from heptarm.values.robot import robot
-from tests.sim.yielding import ASKEW, DOWN, Arm
+from tests.sim.compliant import ASKEW, DOWN, Arm
 
 STIFFNESS = (1000.0, 2000.0, 500.0, 100.0, 200.0, 50.0)
 PUSH = (20.0, 20.0, 20.0, 2.0, 2.0, 2.0)
@@ -47,18 +47,18 @@ def test_a_push_moves_the_hand_by_force_over_stiffness(index: int, model: str, t
     wanted = arm.wanted
     arm.push = turned(wanted.rotation, along(index, PUSH[index]))
     arm.step(1.2)
-    yielded = along(index, PUSH[index] / STIFFNESS[index])
-    assert arm.law.deviation == pytest.approx(yielded, abs=0.02 * abs(yielded[index]))
+    deviated = along(index, PUSH[index] / STIFFNESS[index])
+    assert arm.law.deviation == pytest.approx(deviated, abs=0.02 * abs(deviated[index]))
     moved = wanted.inverse() @ arm.pose  # by the kinematics of the arm, not the model of the law
     measured = np.concatenate([moved.xyz, 2.0 * moved.quat[:3]])
-    assert measured[index] == pytest.approx(yielded[index], rel=0.02)
+    assert measured[index] == pytest.approx(deviated[index], rel=0.02)
     arm.push = np.zeros(6)
     arm.step(1.0)
     assert arm.law.deviation == pytest.approx(np.zeros(6), abs=2e-4), "it comes back"
 
 
 @pytest.mark.parametrize("frame", [BASE, "table"])
-def test_the_frame_says_whose_axes_the_directions_are(frame: str) -> None:
+def test_the_frame_reports_whose_axes_the_directions_are(frame: str) -> None:
     axes = np.eye(3) if frame == BASE else Pose.xyz_abc(a=0.7, b=0.4).rotation
     mode = CartesianImpedance((4000, 4000, 500, 200, 200, 200), frame=frame)
     arm = Arm(mode, axes=None if frame == BASE else axes)
@@ -106,7 +106,7 @@ def test_a_direction_without_stiffness_can_be_led_and_stays_where_it_is_left() -
 
 @pytest.mark.parametrize("index", range(6))
 @pytest.mark.parametrize("damping", [0.1, 0.7])
-def test_it_swings_as_its_damping_ratio_says(damping: float, index: int) -> None:
+def test_it_swings_as_its_damping_ratio_reports(damping: float, index: int) -> None:
     arm = Arm(CartesianImpedance(STIFFNESS, damping=damping), tcp=HAND)
     arm.tick()
     # along one direction Λ couples to the others; along a mode of K and Λ the arm is a single oscillator
@@ -144,26 +144,26 @@ def test_each_direction_may_be_damped_otherwise() -> None:
 def test_it_follows_a_moving_set_point() -> None:
     far = np.array(ASKEW) + (0.4, -0.2, 0.3, 0.5, -0.4, 0.3, 0.6)
 
-    def way(time: float) -> Any:
+    def travel(time: float) -> Any:
         x = min(1.0, max(0.0, time / 1.5))
         return np.array(ASKEW) + (10 * x**3 - 15 * x**4 + 6 * x**5) * (far - ASKEW)
 
     arm = Arm(CartesianImpedance(), tcp=HAND)
     arm.step(0.01)
-    seen = np.abs(arm.step(2.0, way))
+    seen = np.abs(arm.step(2.0, travel))
     assert seen[:, :3].max() < 1e-3
     assert seen[:, 3:].max() < 5e-3
     assert arm.data.qpos[:7] == pytest.approx(far, abs=2e-3), "the elbow as well"
 
 
-def test_the_elbow_yields_like_a_spring_of_its_own_and_the_hand_stays() -> None:
+def test_the_elbow_complies_like_a_spring_of_its_own_and_the_hand_stays() -> None:
     arm = Arm(CartesianImpedance(nullspace_stiffness=50.0), tcp=HAND)
     j = jacobian(arm.robot, ASKEW, arm.wanted.xyz)
-    way = np.linalg.svd(j)[2][6]  # moves the elbow and not the hand; norm 1
+    travel = np.linalg.svd(j)[2][6]  # moves the elbow and not the hand; norm 1
     arm.step(0.002)
     arm.data.qfrc_applied[:7] = 0.0
-    push = arm.sensed.mass @ way
-    push *= 5.0 / float(way @ push)  # 5 Nm along the motion of the elbow
+    push = arm.sensed.mass @ travel
+    push *= 5.0 / float(travel @ push)  # 5 Nm along the motion of the elbow
     original = arm.law.torque
 
     def pushed(sensed: Any) -> Any:
@@ -171,7 +171,7 @@ def test_the_elbow_yields_like_a_spring_of_its_own_and_the_hand_stays() -> None:
 
     arm.law.torque = pushed  # type: ignore[method-assign]
     arm.step(1.5)
-    assert way @ (arm.data.qpos[:7] - ASKEW) == pytest.approx(5.0 / 50.0, rel=0.05)
+    assert travel @ (arm.data.qpos[:7] - ASKEW) == pytest.approx(5.0 / 50.0, rel=0.05)
     assert np.abs(arm.law.deviation[:3]).max() < 1e-3
     arm.law.torque = original  # type: ignore[method-assign]
     seen = np.abs(arm.step(1.5))
@@ -180,13 +180,13 @@ def test_the_elbow_yields_like_a_spring_of_its_own_and_the_hand_stays() -> None:
 
 
 def test_stiffness_changes_under_load_without_a_blow() -> None:
-    soft = CartesianImpedance((300.0,) * 3 + (100.0,) * 3)
-    arm = Arm(soft)
+    compliant_mode = CartesianImpedance((300.0,) * 3 + (100.0,) * 3)
+    arm = Arm(compliant_mode)
     arm.push = turned(arm.wanted.rotation, along(2, -15.0))
     arm.step(1.5)
     assert arm.law.deviation[2] == pytest.approx(-0.05, rel=0.02)
     before = arm.torque
-    arm.law.change(replace(soft, stiffness=(3000.0,) * 3 + (100.0,) * 3))
+    arm.law.change(replace(compliant_mode, stiffness=(3000.0,) * 3 + (100.0,) * 3))
     for _ in range(100):
         arm.tick()
         assert np.abs(arm.torque - before).max() < 12.0
@@ -205,7 +205,7 @@ def test_the_force_of_control_can_be_limited() -> None:
     assert arm.law.deviation[2] == pytest.approx(10.0 / 2000.0, rel=0.02), "below the limit it is a spring"
     arm.push = turned(arm.wanted.rotation, along(2, 25.0))
     arm.step(0.5)
-    assert arm.law.deviation[2] > 0.02, "above it the arm gives way"
+    assert arm.law.deviation[2] > 0.02, "above it the arm complies"
     assert arm.law.force[2] == -20.0
     assert arm.law.violation == ""
 
@@ -256,10 +256,10 @@ def lowering(arm: Arm, depth: float, speed: float) -> Any:
     for _ in range(steps):
         q += np.linalg.pinv(jacobian(arm.robot, q)) @ (0, 0, -depth / steps, 0, 0, 0)
         path.append(q.copy())
-    ways = np.array(path).T
+    paths = np.array(path).T
     times = np.linspace(0.0, depth / speed, steps + 1)
     begin = arm.time + 0.01
-    return lambda t: np.array([np.interp(t - begin, times, column) for column in ways])
+    return lambda t: np.array([np.interp(t - begin, times, column) for column in paths])
 
 
 @pytest.mark.parametrize("stiffness", [500.0, 5000.0])

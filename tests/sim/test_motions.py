@@ -22,7 +22,7 @@ def pose_of(plant: Plant) -> Pose:
 
 
 @pytest.mark.parametrize("model", ["iiwa7", "iiwa14"])
-def test_a_ptp_arrives_within_1e_4_rad_and_says_so_once(model: str) -> None:
+def test_a_ptp_arrives_within_1e_4_rad_and_reports_it_once(model: str) -> None:
     plant, ear = ready(model), Ear()
     goal = (0.4, 0.2, -0.3, -1.0, 0.5, 0.6, -0.7)
     run(plant, Order(1, "ptp", joints=goal, listener=ear))
@@ -34,9 +34,9 @@ def test_a_ptp_is_a_straight_line_in_joint_space() -> None:
     plant = ready()
     goal = np.array((0.4, 0.2, -0.3, -1.0, 0.5, 0.6, -0.7))
     track = run(plant, Order(1, "ptp", joints=tuple(goal)))
-    way = goal - READY
-    s = (track.q_cmd - READY) @ way / (way @ way)
-    assert np.abs(track.q_cmd - READY - s[:, None] * way).max() < 1e-9
+    travel = goal - READY
+    s = (track.q_cmd - READY) @ travel / (travel @ travel)
+    assert np.abs(track.q_cmd - READY - s[:, None] * travel).max() < 1e-9
 
 
 @pytest.mark.parametrize("fraction", [1.0, 0.3, 0.05])
@@ -77,10 +77,10 @@ def test_a_lin_is_straight_on_the_measured_pose(tcp: Pose) -> None:
     goal = Pose(start.xyz + [0.05, 0.25, -0.1], (start @ Pose.xyz_abc(a=0.4, b=-0.2)).quat)
     track = run(plant, Order(1, "lin", pose=numbers(goal), tcp=numbers(tcp)))
     poses = [Pose.from_matrix(forward(plant.robot, q)) @ tcp for q in track.q[::10]]
-    way, angle = goal.xyz - start.xyz, start.angle_to(goal)
+    travel, angle = goal.xyz - start.xyz, start.angle_to(goal)
     for pose in poses:
-        s = np.clip((pose.xyz - start.xyz) @ way / (way @ way), 0, 1)
-        assert np.linalg.norm(start.xyz + s * way - pose.xyz) <= 0.5e-3
+        s = np.clip((pose.xyz - start.xyz) @ travel / (travel @ travel), 0, 1)
+        assert np.linalg.norm(start.xyz + s * travel - pose.xyz) <= 0.5e-3
         assert abs(start.angle_to(pose) - s * angle) <= np.radians(0.2)
     assert poses[-1].distance_to(goal) < 2e-4 and poses[-1].angle_to(goal) < 5e-4
 
@@ -106,7 +106,7 @@ def test_a_lin_rel_in_base_axes_and_in_the_tool_s_own() -> None:
     assert moved.abc[0] == pytest.approx(0.3, abs=1e-3)
 
 
-def test_a_hold_lasts_as_long_as_it_says() -> None:
+def test_a_hold_lasts_as_long_as_it_reports() -> None:
     plant = ready()
     track = run(plant, Order(1, "hold", duration=0.25))
     assert 250 <= len(track.q) <= 260
@@ -141,11 +141,11 @@ def test_what_cannot_be_planned_is_refused_and_changes_nothing(
 
 @settings(max_examples=12, deadline=None)
 @given(st.lists(st.floats(-0.97, 0.97), min_size=7, max_size=7))
-def test_any_reachable_ptp_keeps_positions_and_speeds_within_limits(shares: list[float]) -> None:
+def test_any_reachable_ptp_keeps_positions_and_speeds_within_limits(fractions: list[float]) -> None:
     robot = ROBOTS["iiwa14"]
     plant = Plant("iiwa14", q=tuple(robot.q_max * 0.3))
     plant.model.opt.disableflags |= 1 << 4  # no contacts: a random goal may lie inside the floor
-    goal = tuple(robot.q_max * shares)
+    goal = tuple(robot.q_max * fractions)
     track = run(plant, Order(1, "ptp", joints=goal))
     assert (np.abs(track.q) <= robot.q_max + 1e-3).all()
     assert (np.abs(track.dq) <= robot.dq_max * 1.02).all()
@@ -165,7 +165,7 @@ def test_the_same_commands_give_the_same_states_bit_by_bit() -> None:
 
 
 @pytest.mark.parametrize("share", [1.0, 0.3])
-def test_a_lin_keeps_every_axis_speed_acceleration_and_jerk(share: float) -> None:
+def test_a_lin_keeps_every_axis_speed_acceleration_and_jerk(part: float) -> None:
     plant = ready()
     robot = plant.robot
     offset = numbers(Pose.xyz_abc(-0.1, 0.4, 0.1, a=0.4))
@@ -174,7 +174,7 @@ def test_a_lin_keeps_every_axis_speed_acceleration_and_jerk(share: float) -> Non
         "lin_rel",
         offset=offset,
         reference=(0, 0, 0, 1),
-        joint_jerk=(share,) * 7,
+        joint_jerk=(part,) * 7,
         cart_velocity=3.0,
         cart_acceleration=50.0,
         cart_jerk=900.0,
@@ -182,4 +182,4 @@ def test_a_lin_keeps_every_axis_speed_acceleration_and_jerk(share: float) -> Non
     track = run(plant, order)
     assert (np.abs(np.diff(track.q_cmd, axis=0)) * 1e3 <= robot.dq_max * 1.01).all()
     assert (np.abs(track.acceleration) <= robot.ddq_max * 1.02).all()
-    assert (np.abs(np.diff(track.acceleration, axis=0)) * 1e3 <= share * robot.dddq_max * 1.1).all()
+    assert (np.abs(np.diff(track.acceleration, axis=0)) * 1e3 <= part * robot.dddq_max * 1.1).all()

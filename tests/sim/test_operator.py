@@ -28,7 +28,7 @@ def test_every_word_of_the_help_is_understood(words: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "says"),
+    ("words", "expected_text"),
     [
         ("", "actions are"),
         ("explode", "emergency_stop"),
@@ -48,9 +48,9 @@ def test_every_word_of_the_help_is_understood(words: str) -> None:
         ("answer 0", "no open dialog"),
     ],
 )
-def test_what_is_not_understood_changes_nothing(words: str, says: str) -> None:
+def test_what_is_not_understood_changes_nothing(words: str, expected_text: str) -> None:
     plant = ready()
-    with pytest.raises(ValueError, match=says):
+    with pytest.raises(ValueError, match=expected_text):
         SimulatedOperator(plant).do(words)
     assert not plant.safety.latched and plant.safety.mode is OperationMode.AUT
 

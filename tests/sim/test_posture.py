@@ -19,8 +19,8 @@ def _difference(a: float, b: float) -> float:
 @pytest.mark.parametrize("name", ["iiwa7", "iiwa14"])
 def test_arm_angle_and_status_are_those_of_the_model(name: str) -> None:
     robot = ROBOTS[name]
-    for shares in np.random.default_rng(0).uniform(-1, 1, (2000, 7)):
-        q = (robot.q_max * shares).tolist()
+    for fractions in np.random.default_rng(0).uniform(-1, 1, (2000, 7)):
+        q = (robot.q_max * fractions).tolist()
         e1, status = posture(robot, q)
         wanted = inverse_kinematics.redundancy(robot, q)
         assert status == wanted.status

@@ -46,9 +46,9 @@ def test_cancelling_brakes_on_the_path_within_the_limits(ticks: int) -> None:
     plant.cancel(1)
     track = run(plant)
     assert ear.causes[-1] == "cancelled" and ear.causes.count("cancelled") == 1
-    way = np.array(THERE) - READY
-    s = (track.q_cmd - READY) @ way / (way @ way)
-    assert np.abs(track.q_cmd - READY - s[:, None] * way).max() < 1e-9, "it left the path"
+    travel = np.array(THERE) - READY
+    s = (track.q_cmd - READY) @ travel / (travel @ travel)
+    assert np.abs(track.q_cmd - READY - s[:, None] * travel).max() < 1e-9, "it left the path"
     assert (np.abs(track.acceleration) <= plant.robot.ddq_max * 1.01).all()
     assert at_rest(plant)
 

@@ -122,7 +122,7 @@ def test_a_target_that_stays_ends_the_motion_after_its_timeout() -> None:
     assert ear.causes == ["started", "done"]
 
 
-def test_a_velocity_that_leads_out_of_the_limits_stops_the_arm() -> None:
+def test_a_velocity_that_goes_out_of_the_limits_stops_the_arm() -> None:
     plant, ear = serving(servo_timing=ServoTiming(speed_timeout=1.0))
     edge = HERE.copy()
     edge[6] = plant.robot.q_max[6] - 0.01
@@ -219,7 +219,7 @@ def test_a_motion_planned_behind_an_impedance_motion_starts_where_the_arm_is() -
 
 @pytest.mark.parametrize("fast", [False, True], ids=["path", "fast"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_whoever_cancels_a_motion_that_a_stop_halts_turns_nothing_back(kind: str, fast: bool) -> None:
+def test_a_client_that_cancels_a_motion_that_a_stop_halts_turns_nothing_back(kind: str, fast: bool) -> None:
     for lag in (*range(0, 16, 3), 17, 18, 19, 25, 60):
         plant, ear = serving(kind, joint_velocity=(0.2,) * 7, joint_acceleration=(0.2,) * 7)
         plant.shared.post(7, HERE + 0.5)
@@ -235,3 +235,41 @@ def test_whoever_cancels_a_motion_that_a_stop_halts_turns_nothing_back(kind: str
         assert (speed > -1e-6).all() and (speed <= 0.2 * plant.robot.dq_max * 1.001).all()
         to_rest(plant)
         assert ear.causes[-1] == "cancelled"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_safety_stop_lets_no_axis_gain_speed_and_the_target_is_reached_afterwards(kind: str) -> None:
+    for seed in range(40):
+        random = np.random.default_rng(seed)
+        plant, _ = serving(kind)
+        target = HERE + random.uniform(-0.4, 0.4, 7)
+        plant.shared.post(7, target)
+        plant.step(int(random.integers(1, 400)))
+        before = np.abs(plant.interpolator.command.speed)
+        plant.safety.request_stop(StopRequest.EMERGENCY_STOP)
+        # an axis may finish the change of its acceleration, at the jerk of a stop
+        most = before + plant.robot.ddq_max**2 / (2 * 20.0 * plant.robot.dddq_max) + 1e-3
+        speeds = np.abs(np.diff(commands(plant, 300), axis=0)) * 1e3
+        assert (speeds <= most).all(), (seed, (speeds.max(axis=0) - before).max())
+        longest = float((before / plant.robot.ddq_max).max()) + 0.06
+        assert (speeds[int(longest * 1e3) :] < 1e-6).all(), seed
+        plant.safety.withdraw()
+        plant.safety.resume()
+        plant.step(3000)
+        assert np.abs(plant.snapshot.q - target).max() < 1e-3
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_resumed_before_it_rests_a_servo_motion_rests_and_then_goes_on(kind: str) -> None:
+    plant, _ = serving(kind)
+    target = HERE + 0.4
+    plant.shared.post(7, target)
+    plant.step(150)
+    plant.safety.request_stop(StopRequest.OPERATOR_SAFETY)
+    plant.step(5)
+    plant.safety.withdraw()
+    plant.safety.resume()
+    path = commands(plant, 3000)
+    change = np.abs(np.diff(path, n=2, axis=0)) * 1e6
+    assert (change <= plant.robot.ddq_max * 1.5).all(), "no jump"
+    assert np.abs(plant.snapshot.q - target).max() < 1e-3

@@ -16,7 +16,7 @@ from heptarm.values.mode.impedance import CartesianImpedance
 from heptarm.values.mode.sine import SineImpedance
 from heptarm.values.pose import Pose
 from heptarm.values.robot import robot
-from tests.sim.yielding import ASKEW, Arm
+from tests.sim.compliant import ASKEW, Arm
 
 NOWHERE = np.zeros(6)
 #: Of an amplitude or a frequency: what the issue of this feature promises.
@@ -203,7 +203,7 @@ def test_a_constant_force_sets_in_gently_and_lasts() -> None:
 # ------------------------------------------------------------------------------------------- a free hand
 
 
-def test_a_free_hand_yields_to_a_constant_force_by_force_over_stiffness() -> None:
+def test_a_free_hand_complies_to_a_constant_force_by_force_over_stiffness() -> None:
     arm = Arm(SineImpedance.force(z=-10.0, stiffness=500.0))
     arm.step(1.2)
     assert arm.law.deviation == pytest.approx([0, 0, -0.02, 0, 0, 0], abs=4e-4)
@@ -218,7 +218,7 @@ def test_a_free_hand_swings_slowly_as_its_spring_lets_it() -> None:
     assert beat == pytest.approx(0.5, rel=0.1)
 
 
-def test_a_position_limit_holds_a_soft_arm_back() -> None:
+def test_a_position_limit_holds_a_compliant_arm_back() -> None:
     base = CartesianImpedance((200.0,) * 3 + (200.0,) * 3)
     mode = SineImpedance(base, bias=[20.0, 0, 0, 0, 0, 0], position_limit=[0.01] + [math.nan] * 5)
     arm = Arm(mode)  # 10 cm without the limit

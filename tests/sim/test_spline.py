@@ -106,9 +106,9 @@ def test_every_segment_has_its_speed_and_a_corner_is_a_halt() -> None:
     start = start_of(plant)
     lines = [segment("lin", to(start, 0, y, 0), v) for y, v in ((0.1, 0.3), (0.2, 0.1), (0.3, 0.3))]
     track = run(plant, Order(1, "spline", parts=tuple(lines)))
-    way, speed = points(plant, track.q_cmd)[1:, 1] - start.xyz[1], speeds(track, plant)
-    assert speed[(way > 0.1) & (way < 0.2)].max() <= 0.1 * 1.05
-    assert speed[(way > 0.12) & (way < 0.18)].min() >= 0.1 * 0.95
+    travel, speed = points(plant, track.q_cmd)[1:, 1] - start.xyz[1], speeds(track, plant)
+    assert speed[(travel > 0.1) & (travel < 0.2)].max() <= 0.1 * 1.05
+    assert speed[(travel > 0.12) & (travel < 0.18)].min() >= 0.1 * 0.95
     assert speed.max() == pytest.approx(0.3, rel=0.02)
     plant = ready()
     corner = to(start, 0, 0.1, 0)

@@ -38,21 +38,21 @@ def places(plant: Plant, ticks: int, tcp: Pose | None = None) -> tuple[Array, li
 
 def beside(line: Array, start: Array, end: Array) -> float:
     """Largest distance of points from a line [m]."""
-    way = (end - start) / np.linalg.norm(end - start)
+    travel = (end - start) / np.linalg.norm(end - start)
     off = line - start
-    return float(np.linalg.norm(off - np.outer(off @ way, way), axis=1).max())
+    return float(np.linalg.norm(off - np.outer(off @ travel, travel), axis=1).max())
 
 
-def test_from_rest_the_moved_frame_goes_straight_and_turns_in_step() -> None:
+def test_from_rest_the_motion_frame_goes_straight_and_turns_in_step() -> None:
     plant, _, start = serving(TCP)
     goal = Pose.of(start.xyz + [0.05, 0.12, -0.08], start.quat) @ Pose.xyz_abc(0, 0, 0, 0.4, 0.2, 0.0)
     plant.shared.post(7, goal.array)
     line, poses = places(plant, 2500, TCP)
     assert poses[-1].distance_to(goal) < 1e-9 and poses[-1].angle_to(goal) < 1e-9
     assert beside(line, start.xyz, goal.xyz) < 1e-6
-    share = np.linalg.norm(line - start.xyz, axis=1) / start.distance_to(goal)
+    fraction = np.linalg.norm(line - start.xyz, axis=1) / start.distance_to(goal)
     turned = np.array([start.angle_to(pose) for pose in poses]) / start.angle_to(goal)
-    assert np.abs(share - turned).max() < 1e-6
+    assert np.abs(fraction - turned).max() < 1e-6
 
 
 @pytest.mark.parametrize("turned", [False, True])

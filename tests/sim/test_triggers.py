@@ -24,10 +24,10 @@ class Log:
     """Events of an order, each with the position of the set-point, shape (3,) [m]."""
 
     plant: Plant
-    told: list[tuple[str, Array]] = field(default_factory=list)
+    reported: list[tuple[str, Array]] = field(default_factory=list)
 
     def add(self, what: str) -> None:
-        self.told.append((what, forward(self.plant.robot, self.plant.interpolator.command.after)[:3, 3]))
+        self.reported.append((what, forward(self.plant.robot, self.plant.interpolator.command.after)[:3, 3]))
 
     def watch(self, name: str, condition: Condition, *, part: int = -1) -> ConditionWatch:
         return ConditionWatch(condition, lambda: self.add(name), part=part)
@@ -43,11 +43,11 @@ class Log:
 
     @property
     def names(self) -> list[str]:
-        return [name for name, _ in self.told]
+        return [name for name, _ in self.reported]
 
-    def way(self, name: str) -> Array:
+    def travel(self, name: str) -> Array:
         """Position of an event relative to the start of the motion, shape (3,) [m]."""
-        return dict(self.told)[name] - self.told[0][1]
+        return dict(self.reported)[name] - self.reported[0][1]
 
 
 def point(reference: PathReference, distance: float, delay: float = 0.0) -> PathReached:
@@ -62,9 +62,12 @@ def corner(
     here = Pose.from_matrix(forward(plant.robot, plant.snapshot.q))
     parts = tuple(
         Order(
-            1, "lin", pose=tuple(Pose(here.xyz + way, here.quat).array.tolist()), blending=(0.0, blend, 0.0)
+            1,
+            "lin",
+            pose=tuple(Pose(here.xyz + travel, here.quat).array.tolist()),
+            blending=(0.0, blend, 0.0),
         )
-        for way in ((0.0, 0.1, 0.0), (0.0, 0.1, 0.1))
+        for travel in ((0.0, 0.1, 0.0), (0.0, 0.1, 0.1))
     )
     paced = tuple(Order(1, "lin", pose=p.pose, blending=p.blending, cart_velocity=SPEED) for p in parts)
     return Order(1, kind, parts=paced, listener=log, part_listener=log, watches=watches)
@@ -97,7 +100,7 @@ def test_points_count_from_the_ends_of_their_own_part(kind: str) -> None:
         ("second half", 0.1, 0.05),
         ("last end", 0.1, 0.1),
     ):
-        assert log.way(name) == pytest.approx((0.0, y, z), abs=1e-3), name
+        assert log.travel(name) == pytest.approx((0.0, y, z), abs=1e-3), name
 
 
 def test_a_blended_motion_begins_in_the_middle_of_the_blend() -> None:
@@ -105,7 +108,7 @@ def test_a_blended_motion_begins_in_the_middle_of_the_blend() -> None:
     log = Log(plant)
     order = corner(plant, log, log.watch("second", point(START, 0.0), part=1), blend=0.03)
     run(plant, order)
-    _, y, z = log.way("second")
+    _, y, z = log.travel("second")
     assert 0.07 < y < 0.1 and y + z == pytest.approx(0.1, abs=2e-3) and z > 1e-3
 
 
@@ -116,14 +119,14 @@ def test_other_conditions_count_while_their_part_runs() -> None:
     watches = (log.watch("second", held, part=1), log.watch("first", held, part=0))
     run(plant, corner(plant, log, *watches))
     assert log.names == ["started", "first", "part 1", "second", "done"]
-    assert log.way("second") == pytest.approx((0.0, 0.1, 0.0), abs=1e-3)
+    assert log.travel("second") == pytest.approx((0.0, 0.1, 0.0), abs=1e-3)
 
 
 def test_a_delay_may_reach_into_the_next_part() -> None:
     plant = ready()
     log = Log(plant)
     run(plant, corner(plant, log, log.watch("late", point(END, 0.0, delay=0.5), part=0)))
-    y, z = log.way("late")[1:]
+    y, z = log.travel("late")[1:]
     assert y == pytest.approx(0.1, abs=1e-3) and 0.005 < z < 0.06
 
 
@@ -141,7 +144,7 @@ def test_override_and_pause_move_no_point() -> None:
     plant.override = 0.8
     run(plant)
     assert paused == ["started"] and log.names == ["started", "part 1", "point", "done"]
-    assert log.way("point") == pytest.approx((0.0, 0.1, 0.05), abs=1e-3)
+    assert log.travel("point") == pytest.approx((0.0, 0.1, 0.05), abs=1e-3)
 
 
 def test_what_is_cancelled_before_does_not_fire() -> None:
@@ -166,7 +169,7 @@ def test_an_arm_that_is_there_already_has_the_ends_only() -> None:
     assert log.names == ["started", "start", "end", "done"]
 
 
-def test_segments_of_a_joint_spline_are_told_of() -> None:
+def test_segments_of_a_joint_spline_are_reported() -> None:
     plant = ready()
     log = Log(plant)
     knots = [(0.1 * k, *READY[1:]) for k in (1, 2, 2, 3)]  # the third one has no length

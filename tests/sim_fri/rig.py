@@ -158,7 +158,7 @@ class Rig:
             if self.controller.state is state:
                 return self
             self.run(1)
-        raise AssertionError(f"{self.controller.state.name} instead of {state.name}: {self.told}")
+        raise AssertionError(f"{self.controller.state.name} instead of {state.name}: {self.reported}")
 
     def ready(self) -> Rig:
         self.controller.open()
@@ -181,7 +181,7 @@ class Rig:
         return [event for event in self.events if isinstance(event, OverlayEnded)][-1]
 
     @property
-    def told(self) -> list[str]:
+    def reported(self) -> list[str]:
         return [event.text for event in self.events if isinstance(event, (Refused, OverlayEnded))]
 
     def command(self, **fields: object) -> None:

@@ -58,7 +58,7 @@ def test_the_arm_follows_a_law_one_receive_period_behind(version: Version, recei
     rig.client.law = sine(0.3, start)
     first = len(rig.arm.track)
     rig.run(2000)
-    assert rig.controller.state is State.COMMANDING_ACTIVE, rig.told
+    assert rig.controller.state is State.COMMANDING_ACTIVE, rig.reported
     # a message, its answer in the next tick, one receive period of transfer: the delay in ticks
     delay = receive[0] * receive[1] + (0 if receive[0] * receive[1] == 1 else 1)
     ticks = np.arange(500, 2000)
@@ -109,18 +109,18 @@ def test_a_pose_is_reached_with_the_a3_that_goes_with_it() -> None:
     done = 400
 
     def law(message: m.Monitoring) -> m.Command:
-        share = min(1.0, (message.header.sequence - first) / done)
-        x, y, z = (1e3 * (start.xyz + share * np.array((0.05, -0.04, 0.03)))).tolist()
+        fraction = min(1.0, (message.header.sequence - first) / done)
+        x, y, z = (1e3 * (start.xyz + fraction * np.array((0.05, -0.04, 0.03)))).tolist()
         i, j, k, w = start.quat.tolist()
         pose = m.Transformation("any", (x, y, z, w, i, j, k))
         return m.Command(
-            m.Header(0, 0), pose=pose, redundancy=m.Redundancy(m.RedundancyStrategy.E1, a3 + 0.1 * share)
+            m.Header(0, 0), pose=pose, redundancy=m.Redundancy(m.RedundancyStrategy.E1, a3 + 0.1 * fraction)
         )
 
     first = rig.client.seen[-1].header.sequence
     rig.client.law = law
     rig.run(done + 20)
-    assert rig.controller.state is State.COMMANDING_ACTIVE, rig.told
+    assert rig.controller.state is State.COMMANDING_ACTIVE, rig.reported
     reached = Pose.from_matrix(forward(rig.arm.robot, rig.arm.q))
     assert reached.xyz == pytest.approx(start.xyz + (0.05, -0.04, 0.03), abs=1e-6)
     assert reached.angle_to(start) < 1e-6 and rig.arm.q[2] == pytest.approx(a3 + 0.1, abs=1e-6)
@@ -136,7 +136,7 @@ def test_a_pose_without_redundancy_keeps_a3() -> None:
 
     rig.client.law = law
     rig.run(10)
-    assert rig.controller.state is State.COMMANDING_ACTIVE, rig.told
+    assert rig.controller.state is State.COMMANDING_ACTIVE, rig.reported
     assert rig.arm.q[2] == pytest.approx(READY[2], abs=1e-9) and rig.arm.q[3] != READY[3]
 
 

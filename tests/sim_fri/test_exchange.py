@@ -56,11 +56,11 @@ def test_the_client_sees_signals_and_writes_outputs(version: Version) -> None:
         (m.IoValue("Tool.Pressure", m.IoType.ANALOG, OUT, float("nan")), "an illegal value"),
     ],
 )
-def test_a_signal_that_may_not_be_written_is_told_once(value: m.IoValue, text: str) -> None:
+def test_a_signal_that_may_not_be_written_is_reported_once(value: m.IoValue, text: str) -> None:
     rig = with_signals().ready()
     rig.client.extra = m.Command(m.Header(0, 0), io=(value,))
     rig.run(20)
-    assert len(rig.told) == 1 and text in rig.told[0]
+    assert len(rig.reported) == 1 and text in rig.reported[0]
     assert tuple(rig.controller.exchange.signals.values()) == SIGNALS
     assert rig.controller.state is State.MONITORING_READY
 
@@ -109,7 +109,9 @@ def test_the_client_provides_a_frame_that_is_asked_for(version: Version) -> None
     assert [wanted.name for wanted in rig.client.seen[-1].requested] == ["PBase", "Part"]
     assert rig.controller.exchange.frames == {"PBase": frame}
     assert [event.transformation for event in rig.events if isinstance(event, FrameProvided)] == [frame]
-    assert any("'Nobody'" in text for text in rig.told) and any("not finite" in text for text in rig.told)
+    assert any("'Nobody'" in text for text in rig.reported) and any(
+        "not finite" in text for text in rig.reported
+    )
 
 
 # ------------------------------------------------------------------------------ counters
@@ -163,7 +165,7 @@ def test_an_answer_to_what_was_never_sent_is_refused() -> None:
         rig.controller.receive(encode_command(stray, Version.V1_15), rig.now)
     assert rig.controller.traffic.refused == 2
     rig.run(1)
-    assert rig.told == ["an answer to a message that this session did not send, or sent too long ago"]
+    assert rig.reported == ["an answer to a message that this session did not send, or sent too long ago"]
 
 
 @pytest.mark.parametrize(
@@ -181,7 +183,7 @@ def test_a_client_of_another_version_is_named(cabinet: Version, client: Version,
     rig.run(1)
     rig.controller.receive(encode_command(m.Command(m.Header(300, 0)), client), rig.now)
     rig.run(1)
-    assert len(rig.told) == 1 and text in rig.told[0]
+    assert len(rig.reported) == 1 and text in rig.reported[0]
 
 
 def test_an_answer_that_only_another_version_can_read_names_both() -> None:
@@ -193,10 +195,10 @@ def test_an_answer_that_only_another_version_can_read_names_both() -> None:
         encode_command(m.Command(m.Header(300, 0), transformations=(frame,)), Version.V1_15), rig.now
     )
     rig.run(1)
-    assert "likely cause: the client speaks FRI 1.14-1.16, this cabinet FRI 2.5" in rig.told[0]
+    assert "likely cause: the client speaks FRI 1.14-1.16, this cabinet FRI 2.5" in rig.reported[0]
 
 
-def test_garbage_is_counted_and_told_of_at_most_twenty_times() -> None:
+def test_garbage_is_counted_and_reported_at_most_twenty_times() -> None:
     rig = Rig().active()
     generator = random.Random(1)
     for size in range(300):
@@ -204,7 +206,7 @@ def test_garbage_is_counted_and_told_of_at_most_twenty_times() -> None:
     own = encode_monitoring(rig.client.seen[-1], Version.V1_15)  # a monitoring message is no command
     rig.controller.receive(own, rig.now)
     rig.run(20)
-    assert rig.controller.traffic.refused == 301 and len(rig.told) <= 20
+    assert rig.controller.traffic.refused == 301 and len(rig.reported) <= 20
     assert rig.controller.state is State.COMMANDING_ACTIVE
 
 

@@ -45,11 +45,11 @@ def test_a_good_line_carries_everything_at_once() -> None:
         (LinkFaults(reorder=0.1), lambda d: d.reordered, 0.1),
     ],
 )
-def test_a_share_is_that_share(
-    faults: LinkFaults, count: Callable[[LinkFaultCounts], int], share: float
+def test_a_fraction_is_that_fraction(
+    faults: LinkFaults, count: Callable[[LinkFaultCounts], int], fraction: float
 ) -> None:
     found, damage = sent(faults)
-    assert count(damage) == pytest.approx(2000 * share, rel=0.2)
+    assert count(damage) == pytest.approx(2000 * fraction, rel=0.2)
     assert damage.passed == 2000 - damage.lost + damage.duplicated and len(found) == damage.passed
 
 
@@ -207,8 +207,8 @@ def test_a_cabinet_can_speak_another_version(own: Version, other: Version) -> No
     datagram = rig.controller.tick(Arm().reading(), rig.now)
     assert datagram is not None
     strange = scenario.sent(datagram, own, 0.0)
-    told, spoken = recognise(strange), decode_monitoring(strange, other)
-    assert told is other or {told, other} == {Version.V1_11, Version.V1_15}
+    reported, spoken = recognise(strange), decode_monitoring(strange, other)
+    assert reported is other or {reported, other} == {Version.V1_11, Version.V1_15}
     assert spoken.header == decode_monitoring(datagram, own).header
 
 

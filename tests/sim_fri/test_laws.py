@@ -23,11 +23,11 @@ IIWA = robot("iiwa14")
 def test_the_arm_follows_a_sine_within_a_milliradian() -> None:
     both = Lockstep(laws.sine, {"amplitude": 0.3, "frequency": 0.4})
     both.run(4.0)
-    wished = np.array([laws.swing(k * 1e-3, 0.3, 0.4) for k in range(len(both.track))])
+    wanted = np.array([laws.swing(k * 1e-3, 0.3, 0.4) for k in range(len(both.track))])
     found = np.array([state.q for state in both.track]) - both.start
     assert both.ends == both.limited == []
     assert np.abs(found).max() > 0.28
-    assert np.abs(found - wished[:, None]).max() < 1e-3
+    assert np.abs(found - wanted[:, None]).max() < 1e-3
 
 
 def test_lost_and_late_messages_do_not_jolt_an_arm_in_motion() -> None:
@@ -44,7 +44,7 @@ def test_lost_and_late_messages_do_not_jolt_an_arm_in_motion() -> None:
     assert np.abs(np.diff(dq, axis=0)).max() * 1e3 < 15.0
 
 
-def test_torques_alone_lead_the_floating_arm_and_hold_it_against_a_push() -> None:
+def test_torques_alone_move_the_floating_arm_and_hold_it_against_a_push() -> None:
     params = {"start": BENT, "goal": BENT + OFFSET}
     both = Lockstep(
         laws.balance, params, command=CommandMode.TORQUE, control=JointImpedance(0.0), q=tuple(BENT)
@@ -78,8 +78,8 @@ def step(both: Lockstep) -> None:
 
 
 def no_number(both: Lockstep) -> None:
-    for wish in (np.full(7, np.nan), np.full(7, np.inf), both.start):
-        both.command(wish)
+    for target in (np.full(7, np.nan), np.full(7, np.inf), both.start):
+        both.command(target)
         both.run(0.2)
     assert np.abs(both.plant.snapshot.q - both.start).max() < 1e-3
 
@@ -100,21 +100,21 @@ def far_too_fast(both: Lockstep) -> None:
         (far_too_fast, ("velocity limited", "position limited")),
     ],
 )
-def test_wild_wishes_move_the_arm_within_its_limits_and_are_named(
+def test_wild_targets_move_the_arm_within_its_limits_and_are_named(
     wild: Callable[[Lockstep], None], words: tuple[str, ...]
 ) -> None:
     both = Lockstep()
     both.run(0.05)
     wild(both)
     q, dq = (np.array([getattr(state, name) for state in both.track]) for name in ("q", "dq"))
-    told: Array = np.array([state.q_cmd for state in both.track])
+    reported: Array = np.array([state.q_cmd for state in both.track])
     assert both.ends == [], "the session lives"
-    for positions in (q, told):
+    for positions in (q, reported):
         assert (positions >= IIWA.q_min).all() and (positions <= IIWA.q_max).all()
     # the drives follow with less than a percent of overshoot
     assert (np.abs(dq) <= 1.01 * IIWA.dq_max).all()
     assert (np.abs(np.diff(dq, axis=0)) <= 1.2e-3 * IIWA.ddq_max).all()
-    assert (np.abs(np.diff(told, axis=0)) <= 1e-3 * IIWA.dq_max).all()
-    assert (np.abs(np.diff(told, n=2, axis=0)) <= 1e-6 * IIWA.ddq_max * 1.001).all()
+    assert (np.abs(np.diff(reported, axis=0)) <= 1e-3 * IIWA.dq_max).all()
+    assert (np.abs(np.diff(reported, n=2, axis=0)) <= 1e-6 * IIWA.ddq_max * 1.001).all()
     for word in words:
         assert any(word in line for line in both.limited), both.limited

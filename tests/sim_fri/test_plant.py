@@ -78,12 +78,12 @@ def swing(world: World, amplitude: float) -> Law:
         assert message.monitor is not None and message.monitor.stamp is not None
         stamp = message.monitor.stamp
         time = stamp.seconds + stamp.nanoseconds * 1e-9 - start
-        return replace(mirror(message), q=tuple(wish(time, amplitude).tolist()))
+        return replace(mirror(message), q=tuple(target(time, amplitude).tolist()))
 
     return law
 
 
-def wish(time: float, amplitude: float) -> Array:
+def target(time: float, amplitude: float) -> Array:
     return np.array(READY) + amplitude * 0.5 * (1.0 - cos(2.0 * time))
 
 
@@ -96,7 +96,7 @@ def test_a_position_overlay_is_tracked_within_a_milliradian(period: int, behind:
     world.run(3000)
     assert world.ends == []
     # the state after a tick is a tick later than the message that the tick's command answers
-    late = [world.q[first + k] - wish((k + 1 - behind) * 1e-3, 0.3) for k in range(100, 3000)]
+    late = [world.q[first + k] - target((k + 1 - behind) * 1e-3, 0.3) for k in range(100, 3000)]
     assert float(np.abs(late).max()) < 1e-3 and start > 0
 
 
@@ -135,8 +135,8 @@ def test_a_wrench_pushes_with_its_force_against_the_spring() -> None:
     here = world.plant.snapshot.q
     world.client.law = lambda message: replace(mirror(message), wrench=(0.0, 0.0, -10.0, 0.0, 0.0, 0.0))
     world.run(2500)
-    way = forward(world.plant.robot, world.plant.snapshot.q) - forward(world.plant.robot, here)
-    assert world.ends == [] and way[2, 3] == pytest.approx(-10.0 / 500.0, abs=1e-3)
+    travel = forward(world.plant.robot, world.plant.snapshot.q) - forward(world.plant.robot, here)
+    assert world.ends == [] and travel[2, 3] == pytest.approx(-10.0 / 500.0, abs=1e-3)
 
 
 def test_an_overlay_that_ends_at_speed_brakes_within_the_axes_acceleration() -> None:

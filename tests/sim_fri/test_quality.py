@@ -105,14 +105,14 @@ def test_every_receive_period_is_judged_once_and_by_the_rule(
     counts = meter.counts
     assert counts.on_time + counts.late + counts.lost == len(answers)
     assert counts.on_time == sum(a is not None and a <= receive_ms * MS for a in answers)
-    share = meter.fraction
+    part = meter.fraction
     expected = (
         Quality.EXCELLENT
-        if share >= 0.99 - 1e-12
+        if part >= 0.99 - 1e-12
         else Quality.GOOD
-        if share >= 0.95 - 1e-12
+        if part >= 0.95 - 1e-12
         else Quality.FAIR
-        if share >= 0.75 - 1e-12
+        if part >= 0.75 - 1e-12
         else Quality.POOR
     )
     assert meter.quality is expected

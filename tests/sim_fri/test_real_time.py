@@ -28,7 +28,7 @@ print("end", flush=True)
 """
 
 
-def test_it_runs_until_it_is_stopped_and_says_goodbye() -> None:
+def test_it_runs_until_it_is_stopped_and_sends_goodbye() -> None:
     peer = Peer(Version.V2_7)
     peer.socket.settimeout(60.0)
     command = [sys.executable, "-c", PROGRAM, str(peer.address[1])]

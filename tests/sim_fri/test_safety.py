@@ -34,7 +34,7 @@ def test_an_emergency_stop_ends_the_overlay_and_the_next_one_works() -> None:
     assert world.controller.state is State.COMMANDING_ACTIVE
 
 
-def test_operation_mode_and_drives_are_told() -> None:
+def test_operation_mode_and_drives_are_reported() -> None:
     world = World()
     assert world.arm.reading().operation_mode is m.OperationMode.AUT
     world.plant.safety.choose(OperationMode.T1)

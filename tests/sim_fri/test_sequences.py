@@ -98,9 +98,9 @@ class Session(RuleBasedStateMachine):
 
         self.rig.client.law = law
 
-    @rule(octets=st.binary(max_size=200))
-    def garbage(self, octets: bytes) -> None:
-        self.rig.controller.receive(octets, self.rig.now)
+    @rule(raw=st.binary(max_size=200))
+    def garbage(self, raw: bytes) -> None:
+        self.rig.controller.receive(raw, self.rig.now)
 
     @rule(data=st.data(), version=st.sampled_from(Version))
     def stranger(self, data: st.DataObject, version: Version) -> None:
@@ -113,7 +113,7 @@ class Session(RuleBasedStateMachine):
         self.rig.controller.close()
 
     @invariant()
-    def only_legal_ways(self) -> None:
+    def only_legal_transitions(self) -> None:
         changes = [e for e in self.rig.events if isinstance(e, StateChanged)]
         assert all((change.before, change.state) in LEGAL for change in changes)
         assert all(first.state is second.before for first, second in pairwise(changes))
@@ -154,11 +154,11 @@ def test_damaged_answers_raise_nothing(damage: list[tuple[int, int]], version: V
     rig.controller.open()
     rig.run(3)
     whole = encode_command(m.Command(m.Header(0, 2), q=READY, tau=(0.0,) * 7, wrench=(0.0,) * 6), version)
-    octets = bytearray(whole)
+    raw = bytearray(whole)
     for place, value in damage:
-        octets[place % len(octets)] = value
-    rig.controller.receive(bytes(octets), rig.now)
+        raw[place % len(raw)] = value
+    rig.controller.receive(bytes(raw), rig.now)
     traffic = rig.controller.traffic
     assert traffic.taken + traffic.stale + traffic.refused >= 1
-    if version is Version.V2_7 and bytes(octets) != whole:
-        assert traffic.refused == 1, "a CRC sees every damage of a few octets"
+    if version is Version.V2_7 and bytes(raw) != whole:
+        assert traffic.refused == 1, "a CRC sees every damage of a few bytes"

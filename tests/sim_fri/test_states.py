@@ -114,8 +114,8 @@ def test_a_client_may_mirror_the_measured_position_of_a_compliant_arm(mode: m.Co
     rig.run(1)
     assert np.abs(rig.arm.q - rig.arm.q_ipo).max() < 0.003  # the set-point begins at the interpolator's ...
     rig.run(50)
-    assert rig.controller.state is State.COMMANDING_ACTIVE, rig.told
-    assert rig.arm.q == pytest.approx(sagged, abs=1e-6)  # ... and goes where the client wants it
+    assert rig.controller.state is State.COMMANDING_ACTIVE, rig.reported
+    assert rig.arm.q == pytest.approx(sagged, abs=1e-6)  # ... and goes where the client needs it
 
 
 def test_commanding_wait_to_ready_when_the_application_stops() -> None:

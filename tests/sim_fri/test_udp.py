@@ -105,7 +105,7 @@ class Bench:
         self.peer.socket.close()
 
     @property
-    def told(self) -> list[str]:
+    def reported(self) -> list[str]:
         return [event.text for event in self.events if isinstance(event, Refused)]
 
 
@@ -150,7 +150,7 @@ def test_every_version_and_mode_from_opening_to_closing(version: Version, mode: 
             State.MONITORING_READY,
             State.IDLE,
         ]
-        assert b.peer.sources == {(HERE, b.server.port)} and b.told == []
+        assert b.peer.sources == {(HERE, b.server.port)} and b.reported == []
 
 
 @pytest.mark.parametrize(("period", "multiplier"), [(1, 2), (5, 1), (2, 5)])
@@ -162,7 +162,7 @@ def test_periods_and_multipliers_over_sockets(period: int, multiplier: int) -> N
         assert b.controller.quality is m.Quality.EXCELLENT and meter.counts.lost == meter.counts.late == 0
 
 
-def test_the_arm_does_what_the_client_says() -> None:
+def test_the_arm_does_what_the_client_reports() -> None:
     with bench() as b:
         b.active()
         first = b.peer.client.seen[-1].header.sequence
@@ -187,7 +187,7 @@ def test_a_second_session_comes_from_the_same_port() -> None:
         assert again.port == b.server.port
 
 
-def test_strangers_are_ignored_and_told_of() -> None:
+def test_strangers_are_ignored_and_reported() -> None:
     with bench() as b, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         b.active()
         stranger.bind((HERE, 0))
@@ -195,7 +195,7 @@ def test_strangers_are_ignored_and_told_of() -> None:
             stranger.sendto(b.peer.datagram, (HERE, b.server.port))
         b.run(5)
         assert b.server.strangers == 3 and b.controller.state is State.COMMANDING_ACTIVE
-        assert len(b.told) == 1 and f"{HERE}:{stranger.getsockname()[1]} was ignored" in b.told[0]
+        assert len(b.reported) == 1 and f"{HERE}:{stranger.getsockname()[1]} was ignored" in b.reported[0]
 
 
 def test_a_flood_holds_up_nothing() -> None:

@@ -18,7 +18,7 @@ WRITERS = {
 
 
 @given(st.data(), st.sampled_from(Version))
-def test_octet_for_octet_as_the_codec(data: st.DataObject, version: Version) -> None:
+def test_byte_for_byte_as_the_codec(data: st.DataObject, version: Version) -> None:
     message = data.draw(messages.monitorings(version))
     assert WRITERS[version].encode(message) == encode_monitoring(message, version)
 

@@ -41,7 +41,7 @@ class Conformance:
         ours.close()
         theirs.close()
 
-    def test_bytes_go_both_ways(self, pair: Pair) -> None:
+    def test_bytes_go_both_directions(self, pair: Pair) -> None:
         ours, theirs = pair
         ours.send(b"up")
         theirs.send(b"down")
@@ -139,7 +139,7 @@ class Conformance:
         if transport.wait_readable(5.0):
             ended.set()
 
-    def test_a_closed_end_says_so(self, pair: Pair) -> None:
+    def test_a_closed_end_reports_it(self, pair: Pair) -> None:
         ours, _ = pair
         ours.close()
         ours.close()

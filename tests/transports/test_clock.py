@@ -24,7 +24,7 @@ def test_the_real_clock_is_never_early() -> None:
         assert clock.nanos() >= due
 
 
-def test_a_step_clock_moves_when_told() -> None:
+def test_a_step_clock_moves_on_request() -> None:
     clock: Clock = StepClock(5)
     clock.sleep_until(7)
     clock.sleep_until(5)

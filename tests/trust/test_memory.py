@@ -37,7 +37,7 @@ def test_calls_from_java_to_python_leave_nothing_behind() -> None:
 
 
 def test_a_soak_leaves_nothing_behind_and_loses_nothing() -> None:
-    """A minute of everything at once, three with LONG=1. `make soak MINUTES=60` tells the growth exactly."""
+    """A minute of everything at once, three with LONG=1. `make soak MINUTES=60` reports the growth exactly."""
     verdict = soak(180.0 if LONG else 60.0)
     assert verdict.lost == []
     assert verdict.grown == {}

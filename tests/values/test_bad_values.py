@@ -24,7 +24,7 @@ from tests.bad_values import HOME, HUGE, POSE, REPORTS, Call, made_by, methods_o
 
 MODULES = (heptarm, heptarm.fri, heptarm.when, heptarm.modes, heptarm.do, heptarm.model)
 #: Made with a running process or a connection; tests/arm/test_bad_values.py has these.
-CONNECTED = ("connect", "target_from_env", "Client")
+CONNECTED = ("connect", "target_from_env", "Client", "Recorder", "TwoSignalGripper")
 #: Values whose methods are called, by the name in a report.
 OBJECTS: dict[str, object] = {
     "Pose": POSE,
@@ -36,6 +36,7 @@ OBJECTS: dict[str, object] = {
     "Tool": heptarm.Tool("t", frames={"tip": POSE}),
     "Trajectory": bad_values.BY_ANNOTATION["Trajectory"],
     "CollisionGuard": heptarm.CollisionGuard.of(20.0),
+    "CollisionModel": heptarm.CollisionModel("iiwa14", scene="table"),
     "CartesianImpedance": CartesianImpedance(),
     "timed": SineImpedance(),
     "force": force,
@@ -48,17 +49,19 @@ OBJECTS: dict[str, object] = {
     "path": path,
     "Condition": force > 10.0,
     "Output": Output(),
+    "Recording": bad_values.RECORDING,
     "Params.set": Params(*Params.flat({"gain": 1.0}), changed=lambda: None),
 }
 
 
-#: Methods that a program has no reason to call; and `save`, which writes a file.
-CALLED_BY_HEPTARM = ("given", "longest_duration", "path_time", "replace", "save", "turn_time")
+#: Methods that a program has no reason to call; and `save` and `plot`, which draw and write.
+CALLED_BY_HEPTARM = ("given", "longest_duration", "path_time", "plot", "replace", "save", "turn_time")
 #: What a correct call raises here: a state without torques is stale, and there is no file.
 EXPECTED: dict[str, type[Exception]] = {
     "CollisionGuard.collision": heptarm.StaleState,
     "CollisionGuard.seen": heptarm.StaleState,
     "Trajectory.load": FileNotFoundError,
+    "load": heptarm.CommandRejected,
 }
 
 

@@ -44,11 +44,11 @@ def test_an_arc_keeps_its_distance_from_the_axis(
     if np.linalg.norm(flat) * abs(angle) < 1e-3:
         return
     motion = arc(START, angle, centre=centre, plane=normal)
-    for share, pose in ((0.5, motion.via), (1.0, motion.end)):
+    for fraction, pose in ((0.5, motion.via), (1.0, motion.end)):
         at = pose.xyz - centre
         assert at @ axis == pytest.approx(lever @ axis, abs=1e-9)
         across = np.cross(axis, flat)
-        wanted = flat * math.cos(share * angle) + across * math.sin(share * angle)
+        wanted = flat * math.cos(fraction * angle) + across * math.sin(fraction * angle)
         assert at - (at @ axis) * axis == pytest.approx(wanted, abs=1e-9)
     assert motion.end.angle_to(START) < 1e-9
 

@@ -40,7 +40,7 @@ def test_wrong_limits_are_refused(given: dict[str, object], complaint: str) -> N
         ha.hand_guide(**given)  # type: ignore[arg-type]
 
 
-def test_yielding_is_soft_where_it_is_told_to_be() -> None:
+def test_compliant_is_compliant_where_it_is_reported_to_be() -> None:
     mode = compliance("xa", frame="base", stiffness=3000.0, turning=200.0)
     assert isinstance(mode, CartesianImpedance) and mode.frame == "base"
     assert mode.stiffness.tolist() == [0.0, 3000.0, 3000.0, 200.0, 200.0, 0.0]
@@ -104,8 +104,8 @@ def test_a_spline_goes_through_points_of_it() -> None:
 
 def test_files(tmp_path: Path) -> None:
     whole = taught()
-    file = whole.save(tmp_path / "way")
-    assert file.name == "way.npz" and ha.Trajectory.load(file) == whole
+    file = whole.save(tmp_path / "travel")
+    assert file.name == "path.npz" and ha.Trajectory.load(file) == whole
     other = tmp_path / "other.npz"
     np.savez(other, format="something", times=whole.times, q=whole.q, robot="")
     broken = tmp_path / "broken.npz"

@@ -18,7 +18,7 @@ from heptarm.values.mode.sine import SineImpedance
 from heptarm.wire import messages as wire
 
 NAN = math.nan
-SOFT = CartesianImpedance((2000, 2000, 300, 200, 200, 200), nullspace_stiffness=10.0)
+COMPLIANT = CartesianImpedance((2000, 2000, 300, 200, 200, 200), nullspace_stiffness=10.0)
 
 MAKERS: list[Callable[[], Mode]] = [
     Position,
@@ -26,12 +26,12 @@ MAKERS: list[Callable[[], Mode]] = [
     lambda: JointImpedance([800.0] * 7, damping=0.5),
     lambda: JointImpedance(range(100, 800, 100), damping=[0.1 * i for i in range(7)]),
     CartesianImpedance,
-    lambda: CartesianImpedance(SOFT.stiffness, frame=BASE),
+    lambda: CartesianImpedance(COMPLIANT.stiffness, frame=BASE),
     lambda: CartesianImpedance(max_force=[10.0, NAN, NAN, NAN, NAN, NAN], max_force_stops=True),
     lambda: CartesianImpedance(max_velocity=[0.1] * 6, max_deviation=[0.01] * 6, additional_force=[1.0] * 6),
     SineImpedance,
     lambda: SineImpedance.force(z=-10.0),
-    lambda: SineImpedance.sine("x", frequency=2.0, amplitude=8.0, base=SOFT),
+    lambda: SineImpedance.sine("x", frequency=2.0, amplitude=8.0, base=COMPLIANT),
     lambda: SineImpedance.lissajous("xy", frequency=2.0, amplitude=8.0, stiffness=500.0),
     lambda: SineImpedance.spiral("yz", frequency=2.0, amplitude=8.0, total_time=10.0),
 ]
@@ -43,16 +43,14 @@ def test_equal_hashed_and_pickled_by_value(make: Callable[[], Mode]) -> None:
     assert mode == make()
     assert hash(mode) == hash(make())
     assert pickle.loads(pickle.dumps(mode)) == mode
-    with pytest.raises(
-        (AttributeError, TypeError)
-    ):  # Python 3.10 raises TypeError where a slot is missing
+    with pytest.raises((AttributeError, TypeError)):  # Python 3.10 raises TypeError where a slot is missing
         setattr(mode, fields(mode)[0].name if fields(mode) else "stiffness", None)
 
 
 def test_all_differ() -> None:
     modes = [make() for make in MAKERS]
     assert len(set(modes)) == len(modes)
-    assert SOFT.stiffness.tolist() != SOFT
+    assert COMPLIANT.stiffness.tolist() != COMPLIANT
 
 
 def test_defaults_are_the_cabinets() -> None:
@@ -88,30 +86,30 @@ def test_arrays_are_copied_and_frozen() -> None:
 
 
 def test_a_copy_with_other_values_is_checked_as_well() -> None:
-    assert replace(SOFT, damping=1.0).stiffness.tolist() == SOFT.stiffness.tolist()
+    assert replace(COMPLIANT, damping=1.0).stiffness.tolist() == COMPLIANT.stiffness.tolist()
     with pytest.raises(LimitError, match=r"damping\[0\] must .*got 2"):
-        replace(SOFT, damping=2.0)
+        replace(COMPLIANT, damping=2.0)
 
 
 def test_a_constant_force_acts_where_it_was_asked_for() -> None:
-    mode = SineImpedance.force(z=-10.0, c=1.5, stiffness=50.0, base=SOFT)
+    mode = SineImpedance.force(z=-10.0, c=1.5, stiffness=50.0, base=COMPLIANT)
     assert mode.bias.tolist() == [0.0, 0.0, -10.0, 1.5, 0.0, 0.0]
     assert mode.base.stiffness.tolist() == [2000.0, 2000.0, 50.0, 50.0, 200.0, 200.0]
     assert not mode.amplitude.any()
-    assert SineImpedance.force(z=-10.0, base=SOFT).base == SOFT
+    assert SineImpedance.force(z=-10.0, base=COMPLIANT).base == COMPLIANT
 
 
 @pytest.mark.parametrize(("direction", "index"), [("x", 0), ("y", 1), ("z", 2), ("a", 5), ("b", 4), ("c", 3)])
 def test_a_sine_swings_in_one_direction(direction: str, index: int) -> None:
     mode = SineImpedance.sine(
-        direction, frequency=2.0, amplitude=8.0, phase=0.3, bias=-1.0, stiffness=250.0, base=SOFT
+        direction, frequency=2.0, amplitude=8.0, phase=0.3, bias=-1.0, stiffness=250.0, base=COMPLIANT
     )
     for name, value in (("frequency", 2.0), ("amplitude", 8.0), ("phase", 0.3), ("bias", -1.0)):
         content = getattr(mode, name)
         assert content[index] == value
         assert np.count_nonzero(content) == 1
     assert mode.base.stiffness[index] == 250.0
-    assert np.count_nonzero(mode.base.stiffness != SOFT.stiffness) == 1
+    assert np.count_nonzero(mode.base.stiffness != COMPLIANT.stiffness) == 1
 
 
 def test_lissajous_and_spiral_swing_in_a_plane() -> None:

@@ -194,6 +194,7 @@ def test_refuses_with_value_range_and_remedy(
     with pytest.raises(error, match=text):
         make()
 
+
 DYNAMICS = Dynamics(speed_mps=0.1, joint_speed=0.3)
 
 
@@ -208,14 +209,22 @@ def test_dynamics_are_shared_and_keywords_go_before_them() -> None:
 
 def test_help_lists_every_keyword() -> None:
     names = list(inspect.signature(lin).parameters)
-    assert names[:2] == ["pose", "near"] and {"dynamics", "speed_mps", "joint_jerk", "blend_rad"} <= set(names)
-    assert "speed" in inspect.signature(ptp).parameters and "speed_mps" not in inspect.signature(ptp).parameters
+    assert names[:2] == ["pose", "near"] and {"dynamics", "speed_mps", "joint_jerk", "blend_rad"} <= set(
+        names
+    )
+    assert (
+        "speed" in inspect.signature(ptp).parameters and "speed_mps" not in inspect.signature(ptp).parameters
+    )
 
 
 @pytest.mark.parametrize(
     ("make", "error", "text"),
     [
-        (lambda: ptp(Q, dynamics=DYNAMICS), CommandRejected, "dynamics has speed_mps, which ptp does not have"),
+        (
+            lambda: ptp(Q, dynamics=DYNAMICS),
+            CommandRejected,
+            "dynamics has speed_mps, which ptp does not have",
+        ),
         (lambda: spl(POSE, dynamics=DYNAMICS), CommandRejected, "joint_speed, which spl does not have"),
         (lambda: lin(POSE, dynamics=0.3), ShapeError, "dynamics must be a Dynamics, got 0.3"),
         (lambda: lin(POSE, speed=0.3), TypeError, "unexpected keyword argument 'speed'; .*speed_mps"),

@@ -29,6 +29,7 @@ VECTORS = {
         (Path(__file__).parents[2] / "schema" / "golden" / "key.json").read_text()
     ).items()
 }
+DATAGRAMS = [VECTORS[f"{name}_datagram{end}"] for end in ("", "_without_key") for name in ("target", "pong")]
 KEY = b"k" * 32
 NONCES = bytes(32), bytes(range(32))
 
@@ -67,7 +68,10 @@ def test_java_computes_the_golden_vectors() -> None:
     given = [v["hello"], v["challenge"], v["proof"], without_mac(v["welcome"])]
     nonces = Hello.decode(v["hello"]).nonce, Challenge.decode(v["challenge"]).nonce
     frames = v["stop_frame"][:-16], v["accepted_frame"][:-16]
-    arguments = [v["key"].decode(), *(one.hex() for one in (*given, *nonces, *frames))]
+    arguments = [
+        v["key"].decode(),
+        *(one.hex() for one in (*given, *nonces, *frames, v["token"], *DATAGRAMS)),
+    ]
     command = [toolchain.find_jdk().java, "-cp", fake.classes(), "heptarm.fake.KeyProbe", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60)
     assert [bytes.fromhex(line) for line in done.stdout.split()] == [
@@ -75,6 +79,7 @@ def test_java_computes_the_golden_vectors() -> None:
         v["cabinet_mac"],
         v["stop_frame"][-16:],
         v["accepted_frame"][-16:],
+        *4 * [b"\0\0\0\5"],
     ]
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.node import Node
+from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from heptarm.errors import HeptarmError
 from heptarm.ros.interface.context import NodeContext
@@ -31,8 +32,9 @@ class Commands:
                 self._on_message(row),
                 1,
                 callback_group=at_once if row.at_once else one_topic,
+                qos_overriding_options=QoSOverridingOptions.with_default_policies(),
             )
-            for row in topics_of(context.driver.configuration.values["names"])
+            for row in topics_of(context.driver.configuration.values)
         ]
         self._services = [
             node.create_service(

@@ -29,6 +29,7 @@ def ros(node: Node) -> RosAdapter:
         seconds=lambda message: float(message.sec + message.nanosec * 1e-9),
         duration=_duration,
         level=lambda level: bytes([level]),
+        empty_stops=False,
     )
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 from rclpy.lifecycle import State as LifecycleState
 from rclpy.parameter import Parameter as RosParameter
@@ -52,6 +53,7 @@ class HeptarmNode(LifecycleNode):
         self._trajectories: TrajectoryAction | None = None
         self._actions: ActionServers | None = None
         self._ending = threading.Event()
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)  # a simulated clock may stand still, or jump
         for one in sorted(parameters.PARAMETERS, key=lambda one: one.name != "names"):
             self._declare(one)  # `names` first: it selects the defaults of the others
         for one in parameters.joint_parameters(self.get_parameter("joint_names").value or []):
@@ -61,7 +63,7 @@ class HeptarmNode(LifecycleNode):
         self._start_timer = None
         if self.get_parameter("autostart").value:
             group = MutuallyExclusiveCallbackGroup()
-            self._start_timer = self.create_timer(0.05, self._start, callback_group=group)
+            self._start_timer = self.create_timer(0.05, self._start, callback_group=group, clock=self._steady)
 
     # ------------------------------------------------------------------------------- parameters
 
@@ -142,7 +144,10 @@ class HeptarmNode(LifecycleNode):
         self._actions = ActionServers(self, context, group)
         self._commands = Commands(self, context)
         self._report_timer = self.create_timer(
-            1.0 / values["diagnostics_rate"], self._report, callback_group=MutuallyExclusiveCallbackGroup()
+            1.0 / values["diagnostics_rate"],
+            self._report,
+            callback_group=MutuallyExclusiveCallbackGroup(),
+            clock=self._steady,
         )
         log.info(
             f"heptarm {_version()}, {arm.robot.title}, cabinet {arm.cabinet!r} with software {arm.software}"
@@ -207,6 +212,9 @@ class HeptarmNode(LifecycleNode):
         for publisher in (*self._state_publishers, self._events):
             if publisher is not None and self._can_publish:
                 publisher.state(state)
+        driver, states = self.driver, self._states
+        if driver is not None and states is not None and self._can_publish:
+            states.controller_state(state, driver)
 
     def on_feedback(self, feedback: GoalFeedback) -> None:
         """Publish feedback of a goal."""

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+import math
+
+from control_msgs.msg import JointTrajectoryControllerState
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, TransformStamped, WrenchStamped
 from heptarm_msgs.msg import RobotState, Status
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
 from tf2_msgs.msg import TFMessage
 
 from heptarm.ros.interface.messages import RosAdapter
 from heptarm.ros.interface.state_messages import StateMessages, TransformMessages
 from heptarm.ros.node.diagnostics import Diagnosis
+from heptarm.ros.node.driver import Driver
 from heptarm.ros.node.parameters import NodeConfiguration
+from heptarm.ros.trajectory.execution import speed_scaling
 from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
 
@@ -26,22 +33,39 @@ class StatePublisher:
         self._messages = StateMessages(
             ros, configuration, stamped=(PoseStamped, WrenchStamped), state=RobotState, status=Status
         )
+        mine = {"qos_overriding_options": QoSOverridingOptions.with_default_policies()}
         self._states = {
-            "joint_states": node.create_publisher(JointState, "joint_states", 10),
-            "external_torques": node.create_publisher(JointState, "~/external_torques", 10),
-            "pose": node.create_publisher(PoseStamped, "~/pose", 10),
-            "wrench": node.create_publisher(WrenchStamped, "~/wrench", 10),
-            "state": node.create_publisher(RobotState, "~/state", 10),
+            "joint_states": node.create_publisher(JointState, "joint_states", 10, **mine),
+            "external_torques": node.create_publisher(JointState, "~/external_torques", 10, **mine),
+            "pose": node.create_publisher(PoseStamped, "~/pose", 10, **mine),
+            "wrench": node.create_publisher(WrenchStamped, "~/wrench", 10, **mine),
+            "state": node.create_publisher(RobotState, "~/state", 10, **mine),
         }
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._status = node.create_publisher(Status, "~/status", latched)
+        self._controller = node.create_publisher(
+            JointTrajectoryControllerState, "~/controller_state", 10, **mine
+        )
+        self._scaling = node.create_publisher(Float64, "~/speed_scaling", latched)
+        self._last_scaling = math.nan
         self._diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
 
     def state(self, state: State) -> None:
-        """Publish a state."""
+        """Publish a state, and the fraction of its speed at which a trajectory is executed if that has changed."""
         full = self._states["state"].get_subscription_count() > 0
         for name, message in self._messages.states(state, full=full):
             self._states[name].publish(message)
+        scaling = speed_scaling(state)
+        if scaling != self._last_scaling:
+            self._last_scaling = scaling
+            self._scaling.publish(Float64(data=scaling))
+
+    def controller_state(self, state: State, driver: Driver) -> None:
+        """Publish where the trajectory is at the time of the state that was published last, and what the arm does."""
+        if self._controller.get_subscription_count() > 0:
+            sample = driver.at(1e-9 * state.sampled)
+            kind = JointTrajectoryControllerState
+            self._controller.publish(self._messages.controller_state(kind, state, sample))
 
     def status(self, diagnosis: Diagnosis, state: State | None, *, connected: bool, active: bool) -> None:
         """Publish the status if it has changed."""
@@ -58,7 +82,13 @@ class StatePublisher:
 
     def destroy(self) -> None:
         """Destroy the publishers."""
-        for publisher in (*self._states.values(), self._status, self._diagnostics):
+        for publisher in (
+            *self._states.values(),
+            self._status,
+            self._controller,
+            self._scaling,
+            self._diagnostics,
+        ):
             self._node.destroy_publisher(publisher)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from control_msgs.action import FollowJointTrajectory
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.task import Future
 
@@ -118,7 +119,8 @@ class TrajectoryAction:
         check()
         if marked.done():
             return
-        timer = self._node.create_timer(_CANCELING_PERIOD, check, callback_group=self._group)
+        clock = Clock(clock_type=ClockType.STEADY_TIME)
+        timer = self._node.create_timer(_CANCELING_PERIOD, check, callback_group=self._group, clock=clock)
         await marked
         self._node.destroy_timer(timer)
 
@@ -129,17 +131,22 @@ class TrajectoryAction:
         with self._lock:
             handle = self._handles.get(value.number)
         if handle is not None and handle.is_active:
-            joints = self._driver.configuration.joints
-            handle.publish_feedback(messages.feedback(self._ros, value, joints))
+            driver = self._driver
+            message = messages.feedback(self._ros, value, driver.configuration.joints, now=driver.now)
+            handle.publish_feedback(message)
 
     def on_result(self, result: GoalResult) -> None:
         """Log a result and pass it to its client."""
+        with self._accepting, self._lock:
+            future = self._results.get(result.number)
         log = self._node.get_logger()
         if result.code is ErrorCode.SUCCESSFUL:
             log.info(f"goal {result.number} {result.outcome.value}: {result.text}")
+        elif future is None and result.outcome is GoalOutcome.PREEMPTED:
+            log.debug(
+                f"trajectory {result.number} of the topic: {result.text}"
+            )  # as clients of a topic intend
         else:
             log.warning(f"goal {result.number} {result.outcome.value} ({result.code.name}): {result.text}")
-        with self._accepting, self._lock:
-            future = self._results.get(result.number)
         if future is not None:
             future.set_result(result)

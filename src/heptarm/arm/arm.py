@@ -7,6 +7,7 @@ import contextlib
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Literal, overload
 
@@ -21,18 +22,22 @@ from heptarm.arm.fri.session import Fri
 from heptarm.arm.link.connection import STATE_RATE, Connection
 from heptarm.arm.link.state_stream import GROUPS, States
 from heptarm.arm.motion import program
-from heptarm.arm.motion.handle import BreakRule, MotionHandle, check_timeout
+from heptarm.arm.motion.foresight import Foresight
+from heptarm.arm.motion.handle import LONGEST_STREAM, STREAM_SIZE, BreakRule, MotionHandle, check_timeout
 from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
 from heptarm.arm.motion.servo import JointServo, PoseServo, ServoKeywords, ServoRequest, documented
 from heptarm.arm.translate.conditions import condition_message
 from heptarm.errors import CommandRejected, HeptarmError, ShapeError, Timeout
+from heptarm.record.recorder import Recorder
 from heptarm.skills import collision_guard as guarding
 from heptarm.skills import replay as replaying
 from heptarm.skills import teaching
 from heptarm.skills import touch as touching
-from heptarm.values.arrays import callback, instance, integer, within, word
+from heptarm.values.arrays import callback, instance, integer, shown, within, word
+from heptarm.values.clearance import CollisionCheck
 from heptarm.values.condition.condition import Condition, check_condition
+from heptarm.values.condition.reaction import Reaction, check_reaction
 from heptarm.values.frames import BASE, TOOL, check_name
 from heptarm.values.mode.mode import MODES, Mode, check_mode
 from heptarm.values.motion.motion import Motion
@@ -50,7 +55,6 @@ _log = logging.getLogger("heptarm.arm")
 
 #: States that a stream of all states keeps for a slow loop.
 _STREAM_SIZE = 2000
-_LONGEST_STREAM = 1_000_000
 #: Longest wait, after an error, for the arm to rest so that its tool can be changed [s].
 _TOOL_PATIENCE = 5.0
 _STOPS = {kind.name.lower(): kind for kind in wire.StopKind}
@@ -65,6 +69,7 @@ class Arm:
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
         self._tooling = Tooling(connection)
+        self._foresight = Foresight(connection, self._tooling)
         self._io = Io(connection)
         self._pad = Pad(connection)
         self._speed = 1.0
@@ -140,6 +145,7 @@ class Arm:
             self.subscribe(groups=("joints", "motion", "safety"))
             self.stop()
             self._connection.wait_for(RestDetector(self._connection), REST_TIMEOUT)
+            self._connection.left_at_rest = True
             self.release_control()
         except HeptarmError as error:
             _log.warning("closing: %s", error)
@@ -266,23 +272,57 @@ class Arm:
         return self._connection.history()
 
     def states(
-        self, *, rate: float | None = None, duration: float | None = None, size: int = _STREAM_SIZE
+        self,
+        *,
+        rate: float | None = None,
+        duration: float | None = None,
+        until: MotionHandle | None = None,
+        size: int | None = None,
     ) -> States:
         """Iterate over states, each at most once.
 
         Args:
             rate: at most this many per second [Hz], the newest each time; None: every pushed state, in order.
-            duration: end after this time [s]; None: never.
-            size: without a rate, number of states kept for a slow loop; `States.lost` counts those dropped.
+            duration: end after the states of this time [s]; None: never.
+            until: every state of this motion to its end, as `MotionHandle.states`; without a rate and a duration.
+            size: without a rate, number of states kept for a slow loop, 2000, and 100,000 of a motion;
+                `States.lost` counts those dropped.
 
         Raises:
             LimitError: a rate or duration that is not positive.
+            CommandRejected: `until` beside a rate or a duration.
         """
+        if until is not None:
+            instance(until, MotionHandle, "until")
+            if rate is not None or duration is not None:
+                raise CommandRejected(
+                    "until must be given without rate and duration: it returns every state of the motion",
+                    parameter="until",
+                    hint="leave them out, or skip states in the loop",
+                )
+            return until.states(size=STREAM_SIZE if size is None else size)
         return self._connection.stream(
             rate=None if rate is None else within(rate, "rate", 0.0, 1e4, above=True, unit="Hz"),
             duration=None if duration is None else within(duration, "duration", 0.0, 1e9, unit="s"),
-            size=integer(size, "size", 1, _LONGEST_STREAM),
+            size=integer(_STREAM_SIZE if size is None else size, "size", 1, LONGEST_STREAM),
         )
+
+    def record(self, path: str | Path, *, rate: float | None = None) -> Recorder:
+        """A recording of everything that happens while the `with` block runs; `heptarm.load` reads it.
+
+        Pushed states, FRI cycles at their own rate, requests, events and errors go to the file in a thread of its own.
+        The file is complete to its last half second even if this program is killed.
+
+        Args:
+            path: the file, MCAP; it is replaced.
+            rate: have at least so many states pushed per second meanwhile [Hz]; None: as many as are.
+
+        Raises:
+            LimitError: a rate outside its range.
+            CommandRejected: the file cannot be written (when the block begins).
+            MissingExtra: the package mcap is not installed (when the block begins).
+        """
+        return Recorder(self._connection, Path(instance(path, (str, Path), "path")), rate=rate)
 
     def wait_until(self, condition: Callable[[State], object], *, timeout: float = 30.0) -> State:
         """Wait until a condition holds for a pushed state; checked by this program, not by the cabinet.
@@ -332,6 +372,26 @@ class Arm:
     def speed(self, value: float) -> None:
         self._speed = within(value, "speed", 0.0, 1.0, above=True)
 
+    @property
+    def collision_check(self) -> CollisionCheck | None:
+        """Checks the path of each motion before it is sent, such as a `heptarm.CollisionModel`; None: nothing does.
+
+        `move` and `start` then refuse a path on which bodies would touch. Servo motions, FRI and hand guiding have no
+        path that could be checked. It is no safety function: it knows only its own model of the scene.
+        """
+        return self._foresight.check
+
+    @collision_check.setter
+    def collision_check(self, value: CollisionCheck | None) -> None:
+        if value is not None and not callable(getattr(value, "first_on", None)):
+            raise ShapeError(
+                f"collision_check must have a method first_on, got {shown(value)}",
+                parameter="collision_check",
+                value=value,
+                hint='for example heptarm.CollisionModel("iiwa14", scene="table")',
+            )
+        self._foresight.check = value
+
     def move(
         self,
         motion: Motion | Sequence[Motion],
@@ -339,6 +399,7 @@ class Arm:
         mode: Mode | None = None,
         speed: float | None = None,
         until: Condition | None = None,
+        then: Reaction | None = None,
         timeout: float | None = None,
     ) -> Result:
         """Carry out a motion, or several as one batch, and wait until it has ended.
@@ -348,7 +409,9 @@ class Arm:
             mode: control mode of all of them; None: that of `using`, otherwise position.
             speed: ceiling for this call, (0, 1]; the lower one of this and `arm.speed` applies.
             until: break condition, as in `until=force > 10`: the motion ends when it holds, and the motions after it
-                do not begin. See heptarm.when; the result names the part that fired, and where.
+                do not begin. See heptarm.when; the result names the part that fired, where, and the forces.
+            then: what the arm does when `until` has ended the motion: "stay" where it has braked, "relax", or
+                `Retreat(distance)`; done by the cabinet. None: "stay", or that of the enclosing block.
             timeout: longest wait [s]; None: three times the longest plausible duration plus 15 s.
 
         Returns:
@@ -357,6 +420,7 @@ class Arm:
 
         Raises:
             CommandRejected: refused before anything moved; LimitError and others name the value and the range.
+            CollisionForeseen: `collision_check` found bodies that would touch.
             MotionAborted: ended early; carries cause, state and history.
             ConnectionLost: the connection was lost; the cabinet stops the arm.
             Timeout: not ended in time; the arm was stopped.
@@ -375,7 +439,7 @@ class Arm:
                 hint="give a timeout, a hold with a duration, or use arm.start()",
             )
         with self._connection.stopping_on_interrupt():
-            handle = self._send(motions, mode=mode, speed=speed, until=until, when="queue")
+            handle = self._send(motions, mode=mode, speed=speed, until=until, then=then, when="queue")
             try:
                 result = handle.wait(timeout=timeout)
             except Timeout:
@@ -390,6 +454,7 @@ class Arm:
         mode: Mode | None = None,
         speed: float | None = None,
         until: Condition | None = None,
+        then: Reaction | None = None,
         when: Literal["queue", "replace", "reject"] = "queue",
     ) -> MotionHandle:
         """Begin a motion, or several as one batch, and return at once.
@@ -399,6 +464,7 @@ class Arm:
             mode: control mode of all of them; None: that of `using`, otherwise position.
             speed: ceiling for this call, (0, 1].
             until: break condition; see `move`.
+            then: reaction to it; see `move`.
             when: while another motion runs: "queue" behind it, "replace" it, or "reject" this one.
 
         Raises:
@@ -406,7 +472,9 @@ class Arm:
             ConnectionLost: the connection has ended.
         """
         with self._connection.stopping_on_interrupt():
-            return self._send(program.listed(motion), mode=mode, speed=speed, until=until, when=when)
+            return self._send(
+                program.listed(motion), mode=mode, speed=speed, until=until, then=then, when=when
+            )
 
     @contextlib.contextmanager
     def using(self, mode: Mode) -> Iterator[None]:
@@ -424,7 +492,11 @@ class Arm:
 
     @contextlib.contextmanager
     def breaking_on(
-        self, condition: Condition, *, error: Callable[[Result], HeptarmError] | None = None
+        self,
+        condition: Condition,
+        *,
+        error: Callable[[Result], HeptarmError] | None = None,
+        then: Reaction = "stay",
     ) -> Iterator[None]:
         """A block whose motions and servo motions also end when a condition holds.
 
@@ -432,13 +504,14 @@ class Arm:
             condition: break condition, in addition to `until` of each motion; see heptarm.when.
             error: called with the result of a motion that it ended; returns the error that `move` and `wait` raise.
                 Called from the link's thread, so it must not block. None: the motion ends with a result.
+            then: reaction of motions in the block that name none; see `move`. Servo motions have none.
 
         Raises:
-            ShapeError: not a condition.
+            ShapeError: not a condition, or not a reaction.
         """
         if error is not None:
             callback(error, "error")
-        rule = BreakRule(check_condition(condition, "condition"), error)
+        rule = BreakRule(check_condition(condition, "condition"), error, check_reaction(then))
         self._breaks = (*self._breaks, rule)
         try:
             yield
@@ -453,6 +526,21 @@ class Arm:
             until = rule.condition if until is None else until | rule.condition
         return until
 
+    def _then(
+        self, then: Reaction | None, until: Condition | None, breaks: tuple[BreakRule, ...]
+    ) -> Reaction:
+        """The reaction of a motion: its own, or that of the innermost block."""
+        if then is None:
+            return breaks[-1].then if breaks else "stay"
+        if until is None and not breaks:
+            raise ShapeError(
+                "then is the reaction to a break condition, but the motion has none",
+                parameter="then",
+                value=then,
+                hint="give until, for example until=force > 10",
+            )
+        return check_reaction(then)
+
     def _send(
         self,
         motions: tuple[Motion, ...],
@@ -460,11 +548,13 @@ class Arm:
         mode: Mode | None,
         speed: float | None,
         until: Condition | None,
+        then: Reaction | None,
         when: str,
     ) -> MotionHandle:
         ceiling, breaks = self._speed, self._breaks
         if speed is not None:
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
+        self._foresight.examine(motions, when)
         return program.send(
             self._connection,
             self._tooling,
@@ -473,6 +563,7 @@ class Arm:
             mode=self._mode if mode is None else mode,
             until=self._until(until, breaks),
             when=when,
+            then=self._then(then, until, breaks),
             breaks=breaks,
         )
 

@@ -20,6 +20,7 @@ from heptarm.errors import ShapeError
 from heptarm.io import tcp
 from heptarm.io.clock import RealClock
 from heptarm.io.keys import find_key
+from heptarm.io.targets import SavedTarget
 from heptarm.io.transport import Transport
 from heptarm.values.arrays import finite, flag, instance, within, word
 from heptarm.wire import messages as wire
@@ -54,12 +55,15 @@ def connect(
     groups: tuple[str, ...] = GROUPS,
     on_disconnect: Literal["stop", "finish"] = "stop",
     watchdog: float = CONNECTION.default,
+    datagrams: bool = False,
+    black_box: bool = True,
 ) -> Arm:
     """Connect to an arm.
 
     Args:
         target: "ADDRESS[:PORT]" of a cabinet; "sim://iiwa14" or "sim://iiwa7?speed=5" for a private simulator that
-            ends with the arm; "sim://HOST:PORT" for a running one. None: the environment variable HEPTARM_TARGET.
+            ends with the arm; "sim://HOST:PORT" for a running one; the name of a saved target (`heptarm targets`), with
+            its key, tool and ceiling of the speed. None: the environment variable HEPTARM_TARGET.
         name: name of this client, shown to other clients, up to 64 bytes; None: user, host and process, and
             a number from the second client of a process on.
         key: pre-shared key of the cabinet; "": none. None: it is looked up in `key_file`, the environment variable
@@ -71,6 +75,10 @@ def connect(
         groups: groups that a state contains: "joints", "torques", "pose", "wrench", "motion", "safety", "mode".
         on_disconnect: what the cabinet does with accepted motions when this client is lost: "stop" or "finish" them.
         watchdog: silence after which the cabinet counts this client as lost, [0.1, 10] s.
+        datagrams: send servo targets and receive states by UDP beside the TCP connection, for networks that lose
+            packets; what does not get through by UDP goes over TCP. `arm.connection.datagrams` reports how it fares.
+        black_box: write the last 30 s to a file after an abort, a safety stop or a lost connection; the error has its
+            path. The environment variable HEPTARM_BLACK_BOX chooses the folder, or is "off".
 
     Returns:
         The arm; use it in a `with` block, which leaves the arm at rest.
@@ -83,6 +91,8 @@ def connect(
     """
     word(on_disconnect, "on_disconnect", ("stop", "finish"))
     flag(control, "control")
+    flag(datagrams, "datagrams")
+    flag(black_box, "black_box")
     for given, what in ((target, "target"), (name, "name"), (key, "key")):
         if given is not None:
             instance(given, str, what)
@@ -100,6 +110,8 @@ def connect(
             f"name must have printable characters only, got {name!a}", code=3, parameter="name", value=name
         )
     chosen = parse_target(target_from_env() if target is None else target)
+    if key is None and key_file is None:
+        key_file = chosen.key_file
     found = find_key(key=key, key_file=key_file, host=chosen.host, port=chosen.port)
     options = Options(
         name=name or _default_name(),
@@ -109,6 +121,8 @@ def connect(
         groups=groups,
         finishes=on_disconnect == "finish",
         watchdog=CONNECTION.time(finite(watchdog, "watchdog", unit="s")),
+        datagrams=datagrams,
+        black_box=black_box,
     )
     private = PrivateCabinet.start(chosen, key=found) if chosen.is_private else None
     host, port = (chosen.host, chosen.port) if private is None else (private.host, private.port)
@@ -120,6 +134,8 @@ def connect(
         arm = Arm(Connection(dial, options, clock=RealClock(), cabinet=private))
         try:
             arm.open(control=control)
+            if chosen.saved is not None:
+                _set_up(arm, chosen.saved, control=control)
         except BaseException:
             arm.close()
             raise
@@ -129,3 +145,17 @@ def connect(
         raise
     _log.info("connected to %s (%s), %s", chosen, arm.robot.title, "in control" if control else "observing")
     return arm
+
+
+def _set_up(arm: Arm, saved: SavedTarget, *, control: bool) -> None:
+    """Give an arm the ceiling of the speed and the tool of its saved target.
+
+    Raises:
+        CommandRejected: the cabinet does not know the tool; the text lists those that it knows.
+    """
+    saved.mark_used()
+    arm.speed = saved.speed
+    newest = arm.connection.newest()
+    mode = None if newest is None else newest.groups.mode
+    if control and saved.tool and (mode is None or mode.tool != saved.tool):
+        arm.attach_tool(saved.tool)

@@ -83,7 +83,12 @@ def bench(
     target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
-    """Measure how fast and how reliably FRI messages are answered, and name the main disturbance."""
+    """Measure how fast and how reliably FRI messages are answered, and name the main disturbance.
+
+    For example:
+
+        heptarm bench --fri --duration 30 --plot bench.png --target lab1
+    """
     if not fri:
         raise CommandRejected("--fri is required: this command measures FRI", hint="heptarm bench --fri")
     seconds = within(duration, "duration", 0.1, 86400.0, unit="s")

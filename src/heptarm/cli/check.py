@@ -42,6 +42,10 @@ def check(
         float | None,
         Parameter(help="Without a target: simulated seconds per second. Default: 2, with --commission 1."),
     ] = None,
+    noisy: Annotated[
+        bool,
+        Parameter(negative="", help="Without a target: sensors with noise and offset, joints with friction."),
+    ] = False,
     junit: Annotated[Path | None, Parameter(help="Write a report for CI systems, JUnit XML.")] = None,
     commission: Annotated[
         bool,
@@ -62,8 +66,8 @@ def check(
 ) -> int:
     """Show what a robot can do, scenario by scenario, by measurement; exit code 1 if one fails.
 
-    Without a target, a simulator with a table, signals and tools is started. A real robot moves at a tenth of its
-    speed, and every scenario that moves it asks first.
+    Without a target, a simulator with a table, signals and tools is started, by default with ideal sensors. A real
+    robot moves at a tenth of its speed, and every scenario that moves it asks first.
     """
     if commission:
         from heptarm.cli import commissioning
@@ -75,13 +79,20 @@ def check(
             "--report needs --commission", parameter="report", hint="use --junit for a report on scenarios"
         )
     chosen = testing.find(only)
+    if noisy and target.or_else(None).text:
+        raise CommandRejected(
+            "--noisy is for the simulator that is started without a target",
+            parameter="noisy",
+            hint="leave out the target, or name a simulator with noisy sensors: sim://iiwa14?sensors=noisy",
+        )
     if list_only:
         _list(chosen, as_json)
         return 0
     console = Console()
-    with target.or_else(testing.stage(speed=2.0 if sim_speed is None else sim_speed)).connect(
-        watchdog=CHECK.default, timeout=_TIMEOUT
-    ) as arm:
+    stage = testing.stage(
+        speed=2.0 if sim_speed is None else sim_speed, sensors="noisy" if noisy else "ideal"
+    )
+    with target.or_else(stage).connect(watchdog=CHECK.default, timeout=_TIMEOUT) as arm:
         if not as_json:
             console.print(
                 f"{len(chosen)} scenarios on {arm.robot.title}{' (virtual)' if arm.is_virtual else ''}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import logging
 import time
 from collections.abc import Callable
@@ -13,6 +14,7 @@ import numpy as np
 from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from heptarm.arm.arm import Arm
 from heptarm.cli.options import (
@@ -69,12 +71,26 @@ class _Recorder:
 
 def demo(
     *,
-    plot: Annotated[Path, Parameter(help="Where to save the plot.")] = Path("heptarm-demo.png"),
+    plot: Annotated[
+        Path | None,
+        Parameter(help="Where to save the plot. Default: heptarm-demo.png, if Matplotlib is installed."),
+    ] = None,
     target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
-    """Move a virtual arm through the whole stack; a table and a plot show the result."""
+    """Move a virtual arm through the whole stack; a table and a plot show the result.
+
+    For example:
+
+        heptarm demo
+
+        heptarm demo --plot demo.png --target sim://localhost:30001
+    """
     logging.getLogger("heptarm").setLevel(logging.ERROR)
+    if plot is not None:
+        require("matplotlib", extra="viz")
+    elif importlib.util.find_spec("matplotlib") is not None:
+        plot = Path("heptarm-demo.png")
     began = time.monotonic()
     chosen = target if target.text else replace(target, text="sim://iiwa14")  # a robot only if it is named
     with chosen.connect(state_rate=_RATE) as arm:
@@ -84,7 +100,8 @@ def demo(
         recorder.take(arm)
         title = arm.robot.title
         controlled = f"{title}{' (virtual)' if arm.is_virtual else ''}, cabinet application {arm.software}"
-    _draw(recorder, steps, plot, title)
+    if plot is not None:
+        _draw(recorder, steps, plot, title)
     if as_json:
         for one in steps:
             emit(
@@ -100,7 +117,8 @@ def demo(
         console = Console()
         console.print(f"{controlled}, ready after {ready:.1f} s")
         console.print(_table(steps))
-        console.print(f"{len(recorder.q)} states, plotted in {plot}", highlight=False, soft_wrap=True)
+        where = f"plotted in {plot}" if plot else "not plotted: for that, pip install 'heptarm[viz]'"
+        print(f"{len(recorder.q)} states, {where}")
     return 0 if all(one.as_designed for one in steps) else 1
 
 
@@ -180,7 +198,8 @@ def _table(steps: list[DemoStep]) -> Table:
         residual = "" if np.isnan(one.residual) else f"{one.residual:.1e} rad"
         duration = "" if one.cause == "refused" else f"{one.end - one.begin:.2f} s"
         cause = one.cause + (f": {one.text}" if one.text else "")
-        table.add_row(one.name, duration, residual, cause, style=None if one.as_designed else "red")
+        # a text is no markup: its brackets are to be seen
+        table.add_row(one.name, duration, residual, Text(cause), style=None if one.as_designed else "red")
     return table
 
 

@@ -9,13 +9,14 @@ import platform
 import socket
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from heptarm import __version__, _resources
 from heptarm.arm.arm import Arm
@@ -34,7 +35,7 @@ from heptarm.cli.options import (
     Json,
 )
 from heptarm.cli.output import emit
-from heptarm.errors import CommandRejected, ConnectFailed, HeptarmError, Timeout
+from heptarm.errors import EXTRAS, CommandRejected, ConnectFailed, HeptarmError, Timeout
 from heptarm.fri.loop.client import Client
 from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
 from heptarm.fri.session.session import Event, Kind
@@ -44,6 +45,8 @@ from heptarm.wire.messages import MAJOR, MINOR, PORT
 _REQUESTS = 200
 _SLOW_US = 2000.0
 _OLD_MS = 20.0
+#: Fraction of the pings by datagram that a good network answers.
+_ANSWERED = 0.98
 #: A larger fraction of lost messages or answers is reported.
 _LOST_FRACTION = 0.001
 _LONGEST = 3600.0
@@ -101,6 +104,12 @@ def doctor(
 
     With --fri also check FRI: a session of the target, or with --listen the messages of another application on
     the cabinet.
+
+    For example:
+
+        heptarm doctor
+
+        heptarm doctor --fri --target lab1
     """
     target = target.or_else(None)
     listens = listen or target.text is None
@@ -131,7 +140,8 @@ def _table(verdicts: list[CheckResult]) -> Table:
     for name in ("", "what", "found", "what to do"):
         table.add_column(name, overflow="fold")
     for verdict in verdicts:
-        table.add_row(style[verdict.how], verdict.what, verdict.found, verdict.remedy)
+        # found and remedy are no markup: Rich would swallow the extra in 'heptarm[viz]'
+        table.add_row(style[verdict.how], verdict.what, Text(verdict.found), Text(verdict.remedy))
     return table
 
 
@@ -141,11 +151,10 @@ def _python() -> CheckResult:
 
 
 def _extras() -> CheckResult:
-    needed = {"sim": ("mujoco", "ruckig", "jpype"), "viz": ("viser", "matplotlib")}
     missing = [
         extra
-        for extra, modules in needed.items()
-        if any(importlib.util.find_spec(m) is None for m in modules)
+        for extra in ("sim", "viz")
+        if any(importlib.util.find_spec(name) is None for name in EXTRAS[extra])
     ]
     if missing:
         return CheckResult(
@@ -218,7 +227,7 @@ def _target(target: CommandTarget, text: str) -> Iterator[CheckResult]:
             )
             return
     try:
-        arm = target.connect(control=False)
+        arm = replace(target, datagrams=True).connect(control=False)
     except HeptarmError as error:
         yield CheckResult("session", "bad", error.text, error.hint)
         return
@@ -231,6 +240,7 @@ def _target(target: CommandTarget, text: str) -> Iterator[CheckResult]:
         yield _protection(arm, keyed=target.find_key() is not None)
         yield _round_trip(arm)
         yield _age(arm)
+        yield datagram_check(arm)
         yield _safety(arm)
 
 
@@ -287,6 +297,31 @@ def _age(arm: Arm) -> CheckResult:
     found = f"{len(ages)} states in 1 s, {np.median(ages):.2f} ms old, 99 % below {np.percentile(ages, 99):.2f} ms"
     how = "note" if np.median(ages) > _OLD_MS else "ok"
     return CheckResult("state", how, found, "subscribe at a lower rate" if how == "note" else "")
+
+
+def datagram_check(arm: Arm) -> CheckResult:
+    """Check whether datagrams get through in both directions; the arm was connected with them a second ago."""
+    report = arm.connection.datagrams
+    if report is None:
+        return CheckResult(
+            "datagrams",
+            "note",
+            "the cabinet has no UDP port: servo targets and states go over TCP",
+            "only networks that lose packets need them: set the process data heptarm.datagrams to 1",
+        )
+    if not report.gets_through:
+        return CheckResult(
+            "datagrams",
+            "note",
+            f"no answer by UDP to {report.pings} pings: servo targets and states go over TCP",
+            "let the firewalls pass UDP on the port of the application, in both directions",
+        )
+    found = f"{report.answers} of {report.pings} pings answered by UDP, {report.round_trip * 1e3:.2f} ms"
+    if report.answers < _ANSWERED * report.pings - 2:  # the last ones are still under way
+        return CheckResult(
+            "datagrams", "note", found, "the network loses packets: connect(..., datagrams=True)"
+        )
+    return CheckResult("datagrams", "ok", found)
 
 
 def _safety(arm: Arm) -> CheckResult:

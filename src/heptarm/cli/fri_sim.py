@@ -56,6 +56,7 @@ class FriControllerOptions:
         network: faults of the network in both directions, each NAME=VALUE.
         faults: actions of the operator, each NAME@SECONDS.
         payload: on the flange, MASS or MASS,X,Y,Z [kg, m]; "": none.
+        sensors: "ideal", "noisy" or "noisy:SEED".
         speed: simulated seconds per second.
     """
 
@@ -75,6 +76,7 @@ class FriControllerOptions:
     network: tuple[str, ...]
     faults: tuple[str, ...]
     payload: str
+    sensors: str
     speed: float
 
 
@@ -139,6 +141,7 @@ def _made(
     from heptarm.sim.fri.settings import SessionConfiguration
     from heptarm.sim.plant.payload import parse_payload
     from heptarm.sim.plant.plant import Plant
+    from heptarm.sim.plant.sensor_errors import sensor_errors
     from heptarm.sim.runtime.operator import SimulatedOperator
     from heptarm.sim.runtime.standalone_fri import (
         OperatedArm,
@@ -171,7 +174,11 @@ def _made(
     )
     start = deg(*(numbers(options.start, "--fri-start", 7) if options.start else START))
     robot(options.model).check(start, "--fri-start")
-    plant = Plant(options.model, q=tuple(start.tolist()))
+    try:
+        errors = sensor_errors(robot(options.model), options.sensors)
+    except ValueError as error:
+        raise CommandRejected(str(error), parameter="sensors", value=options.sensors) from None
+    plant = Plant(options.model, q=tuple(start.tolist()), errors=errors)
     if options.force:
         x, y, z = numbers(options.force, "--fri-force", 3)
         plant.apply_wrench((x, y, z))

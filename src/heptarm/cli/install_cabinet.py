@@ -44,7 +44,12 @@ def install_cabinet(
     ] = False,
     as_json: Json = False,
 ) -> int:
-    """Write the cabinet application for a Sunrise project, with a key and the steps."""
+    """Write the cabinet application for a Sunrise project, with a key and the steps.
+
+    For example:
+
+        heptarm install-cabinet --out cabinet --target 172.31.1.147
+    """
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise CommandRejected(
             f"--out must be a new or empty folder, got {out}",

@@ -32,7 +32,12 @@ Replace = Annotated[
 
 
 def new(*, target: Address = "", replace: Replace = False, as_json: Json = False) -> int:
-    """Make a random key and print it; with --target, also store it for that cabinet."""
+    """Make a random key and print it; with --target, also store it for that cabinet.
+
+    For example:
+
+        heptarm key new --target 172.31.1.147
+    """
     key = new_key()
     file = ""
     if target:
@@ -53,7 +58,12 @@ def new(*, target: Address = "", replace: Replace = False, as_json: Json = False
 def store(
     *, target: Address, key_file: KeyFile = None, replace: Replace = False, as_json: Json = False
 ) -> int:
-    """Store a key for a cabinet: typed, given on standard input, or taken from a file."""
+    """Store a key for a cabinet: typed, given on standard input, or taken from a file.
+
+    For example:
+
+        heptarm key set --target 172.31.1.147 --key-file ~/keys/lab1
+    """
     place = locate(target)
     key = check_key(_typed(), "standard input") if key_file is None else read_key_file(key_file)
     write_key_file(place.file, key, replace=replace)

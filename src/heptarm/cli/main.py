@@ -10,11 +10,12 @@ import ast
 import os
 import sys
 from pathlib import Path
+from typing import Annotated, NoReturn
 
-from cyclopts import App
+from cyclopts import App, CycloptsError, Parameter
 
 from heptarm import __version__
-from heptarm.errors import HeptarmError
+from heptarm.errors import HeptarmError, missing_extra
 
 #: Commands and where their functions are.
 COMMANDS = {
@@ -26,17 +27,26 @@ COMMANDS = {
     "servo": "motion:servo",
     "teach": "motion:teach",
     "replay": "motion:replay",
+    "record": "record:record",
+    "plot": "plot:plot",
+    "convert": "record:convert",
     "doctor": "doctor:doctor",
     "bench": "bench:bench",
     "check": "check:check",
     "install-cabinet": "install_cabinet:install_cabinet",
+    "completion": "completion:completion",
 }
-MOVES = {"ptp": "motion:move_ptp", "lin": "motion:move_lin", "lin_rel": "motion:move_lin_rel"}
+MOVES = {"ptp": "motion:move_ptp", "lin": "motion:move_lin", "lin-rel": "motion:move_lin_rel"}
 KEYS = {"new": "key:new", "set": "key:store", "list": "key:show", "forget": "key:forget"}
+TARGETS = {"list": "targets:show", "add": "targets:add", "remove": "targets:remove"}
 LEARNING = {"train": "rl:train", "eval": "rl:evaluate", "deploy": "rl:deploy"}
 
 app = App(
-    name="heptarm", help="Control a KUKA LBR iiwa, with or without a robot on the desk.", version=__version__
+    name="heptarm",
+    help="Control a KUKA LBR iiwa, with or without a robot on the desk.",
+    version=__version__,
+    default_parameter=Parameter(negative=()),  # no --no-… and --empty-… beside the options
+    suppress_keyboard_interrupt=False,  # `main` reports what became of the arm
 )
 
 
@@ -61,29 +71,55 @@ _words = [one for one in sys.argv[1:] if not one.startswith("-")]
 _add(app, COMMANDS, listed=not _words)
 _move = App(name="move", help="Move the arm and wait until it is at rest.")
 _keys = App(name="key", help="Make, store and list the pre-shared keys of cabinets.")
+_targets = App(name="targets", help="List, save and remove robots that have a name.")
 _learn = App(name="rl", help="Train, evaluate and deploy a policy that reaches targets.")
 app.command(_add(_move, MOVES, listed=_words == ["move"]))
 app.command(_add(_keys, KEYS, listed=_words == ["key"]))
+app.command(_add(_targets, TARGETS, listed=_words == ["targets"]))
 app.command(_add(_learn, LEARNING, listed=_words == ["rl"]))
 
 
+@_targets.default
+def _list_targets(
+    *, as_json: Annotated[bool, Parameter(name="--json", help="Print one JSON object per line.")] = False
+) -> int:
+    """List, save and remove robots that have a name; without another word: list."""
+    from heptarm.cli.targets import show
+
+    return show(as_json=as_json)
+
+
 def main() -> None:
-    """Run the command line: an error of heptarm is one sentence on standard error and exit code 1."""
+    """Run the command line: an error is one sentence on standard error and exit code 1."""
     try:
-        code = app()
+        code = app(print_error=False, exit_on_error=False)
+    except CycloptsError as error:
+        _fail(f"{' '.join(str(error).split())} (heptarm {' '.join([*_words[:1], '--help'])})")
     except HeptarmError as error:
         from heptarm.arm.translate.text import printable
 
         if os.environ.get("HEPTARM_DEBUG"):
             raise
-        print(f"heptarm: {printable(str(error), lines=True)}", file=sys.stderr)
-        sys.exit(1)
+        _fail(printable(str(error), lines=True))
+    except ModuleNotFoundError as error:
+        missing = missing_extra(error.name or "")
+        if missing is None or os.environ.get("HEPTARM_DEBUG"):
+            raise
+        _fail(str(missing))
     except KeyboardInterrupt:
+        options = sys.modules.get("heptarm.cli.options")
+        if options is not None and (outcome := options.after_interrupt()):
+            print(f"heptarm: Ctrl-C: {outcome}", file=sys.stderr)
         sys.exit(130)
     except BrokenPipeError:  # the reader of our output has gone, as in `heptarm state --watch | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _fail(sentence: str) -> NoReturn:
+    print(f"heptarm: {sentence}", file=sys.stderr)
+    sys.exit(1)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from heptarm.arm.motion.servo import ServoStats
 from heptarm.arm.translate.motions import items
 from heptarm.cli.options import NO_TARGET, Access, CommandTarget, Json, MoveOptions, Speed
 from heptarm.cli.output import confirm, emit, state_data
+from heptarm.cli.progress import progress
 from heptarm.errors import CommandRejected, NotReady
 from heptarm.values.arrays import within
 from heptarm.values.mode.compliance import compliance
@@ -28,50 +29,67 @@ _ACCESS, _MOVE = Access(), MoveOptions()
 
 
 def move_ptp(
-    a1: float,
-    a2: float,
-    a3: float,
-    a4: float,
-    a5: float,
-    a6: float,
-    a7: float,
+    a1: Annotated[float, Parameter(help="Position of A1 [rad], with --deg [deg]; likewise A2 to A7.")],
+    a2: Annotated[float, Parameter(help="A2.")],
+    a3: Annotated[float, Parameter(help="A3.")],
+    a4: Annotated[float, Parameter(help="A4.")],
+    a5: Annotated[float, Parameter(help="A5.")],
+    a6: Annotated[float, Parameter(help="A6.")],
+    a7: Annotated[float, Parameter(help="A7.")],
     /,
     *,
     options: MoveOptions = _MOVE,
 ) -> int:
-    """Point to point, to seven joint positions [rad]."""
+    """Point to point, to seven joint positions [rad].
+
+    For example:
+
+        heptarm move ptp 0 30 0 -90 0 60 0 --deg --target lab1
+
+        heptarm move ptp 0 0.5 0 -1.5 0 1 0 --speed 0.3 --dry-run --target sim://iiwa14
+    """
     motion = ptp(_angles((a1, a2, a3, a4, a5, a6, a7), degrees=options.degrees))
     return _move(motion, options)
 
 
 def move_lin(
-    x: float,
-    y: float,
-    z: float,
-    a: float,
-    b: float,
-    c: float,
+    x: Annotated[float, Parameter(help="Position along x of the base [m].")],
+    y: Annotated[float, Parameter(help="Along y [m].")],
+    z: Annotated[float, Parameter(help="Along z [m].")],
+    a: Annotated[float, Parameter(help="Rotation about z [rad], with --deg [deg].")],
+    b: Annotated[float, Parameter(help="Then about y.")],
+    c: Annotated[float, Parameter(help="Then about x.")],
     /,
     *,
     options: MoveOptions = _MOVE,
 ) -> int:
-    """Straight line to a pose in the base frame: x y z [m], a b c about z y x [rad]."""
+    """Straight line to a pose in the base frame: x y z [m], a b c about z y x [rad].
+
+    For example:
+
+        heptarm move lin 0.5 0 0.4 180 0 180 --deg --target lab1
+    """
     motion = lin(Pose.xyz_abc(x, y, z, *_angles((a, b, c), degrees=options.degrees)))
     return _move(motion, options)
 
 
 def move_lin_rel(
     *,
-    x: float = 0.0,
-    y: float = 0.0,
-    z: float = 0.0,
-    a: float = 0.0,
-    b: float = 0.0,
-    c: float = 0.0,
+    x: Annotated[float, Parameter(help="Offset along x [m].")] = 0.0,
+    y: Annotated[float, Parameter(help="Offset along y [m].")] = 0.0,
+    z: Annotated[float, Parameter(help="Offset along z [m].")] = 0.0,
+    a: Annotated[float, Parameter(help="Rotation about z [rad], with --deg [deg].")] = 0.0,
+    b: Annotated[float, Parameter(help="Then about y.")] = 0.0,
+    c: Annotated[float, Parameter(help="Then about x.")] = 0.0,
     frame: Annotated[str, Parameter(help='Whose axes: "tool" or "base".')] = "tool",
     options: MoveOptions = _MOVE,
 ) -> int:
-    """Straight line by an offset [m], [rad]."""
+    """Straight line by an offset [m], [rad].
+
+    For example:
+
+        heptarm move lin-rel --z -0.05 --frame base --target lab1
+    """
     motion = lin_rel(x, y, z, *_angles((a, b, c), degrees=options.degrees), frame=frame)
     return _move(motion, options)
 
@@ -91,12 +109,13 @@ def _move(motion: Motion, options: MoveOptions) -> int:
         items((motion,), arm.robot, options.speed)
         title, percent = arm.robot.title, f"{options.speed:.0%}"
         if options.dry_run:
-            text = f"{motion} at {percent} speed is within the limits of the {title}; nothing was moved"
+            text = f"{motion!r} at {percent} speed is within the limits of the {title}; nothing was moved"
             emit({"ok": True, "text": text}) if options.as_json else print(text)
             return 0
         if not (arm.is_virtual or options.yes or confirm(f"Move the real {title} at {percent} speed?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
-        result = arm.move(motion, speed=options.speed)
+        with progress(arm):
+            result = arm.move(motion, speed=options.speed)
         state = arm.wait_for_rest()
     if options.as_json:
         emit(
@@ -121,7 +140,12 @@ def servo(
     engine: Annotated[Literal["smart", "direct"], Parameter(help="Servo motion of the cabinet.")] = "smart",
     access: Access = _ACCESS,
 ) -> int:
-    """Swing an axis with a stream of targets and report the stream's quality."""
+    """Swing an axis with a stream of targets and report the stream's quality.
+
+    For example:
+
+        heptarm servo --axis 7 --amplitude 5 --rate 200 --target lab1
+    """
     index = int(within(axis, "axis", 1, 7)) - 1
     turn = radians(within(amplitude, "amplitude", 0.0, 45.0, unit="deg"))
     hertz = within(frequency, "frequency", 0.0, 5.0, above=True, unit="Hz")
@@ -132,7 +156,10 @@ def servo(
         ):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
         direction, lag = np.eye(7)[index], 0.0
-        with arm.servo("joint", rate=rate, engine=engine, speed=speed, acceleration=1.0) as sv:
+        with (
+            progress(arm, seconds=seconds),
+            arm.servo("joint", rate=rate, engine=engine, speed=speed, acceleration=1.0) as sv,
+        ):
             while sv.tick() and sv.t < seconds:
                 fade = min(
                     1.0, sv.t, max(0.0, seconds - sv.t)
@@ -173,7 +200,14 @@ def teach(
     tolerance: Annotated[float, Parameter(help="Largest deviation of the reduced trajectory [rad].")] = 2e-3,
     access: Access = _ACCESS,
 ) -> int:
-    """Record a trajectory while a person guides the arm by hand."""
+    """Record a trajectory while a person guides the arm by hand.
+
+    For example:
+
+        heptarm teach path.npz --target lab1
+
+        heptarm teach path.npz --free xy --seconds 20 --target lab1
+    """
     limit = within(seconds, "seconds", 0.0, 86400.0, above=True, unit="s")
     mode = compliance(free, frame="base") if free else None
     with access.target.connect() as arm:
@@ -186,7 +220,8 @@ def teach(
             how = "it is compliant now" if free else "hold the enabling switch of the hand guiding device"
             print(f"guide the arm: {how}")
         motion = hold(limit) if free else hand_guide()
-        whole = arm.teach(motion, mode=mode, timeout=limit / min(arm.real_time_factor, 1.0) + 1.0)
+        with progress(arm, seconds=limit):
+            whole = arm.teach(motion, mode=mode, timeout=limit / min(arm.real_time_factor, 1.0) + 1.0)
     trajectory = whole.trimmed().thinned(tolerance=tolerance)
     file = trajectory.save(out)
     if access.as_json:
@@ -219,7 +254,12 @@ def replay(
     ] = 0.5,
     access: Access = _ACCESS,
 ) -> int:
-    """Move to the start of a recorded trajectory and replay it."""
+    """Move to the start of a recorded trajectory and replay it.
+
+    For example:
+
+        heptarm replay path.npz --speed-scaling 0.3 --target lab1
+    """
     try:
         trajectory = Trajectory.load(file)
     except OSError as error:
@@ -227,7 +267,8 @@ def replay(
     with access.target.connect() as arm:
         if not (arm.is_virtual or access.yes or confirm(f"Move the real {arm.robot.title} along {file}?")):
             raise NotReady("nothing was moved", hint="confirm the question, or give --yes")
-        done = arm.replay(trajectory, by=by, speed_scaling=speed_scaling)
+        with progress(arm, seconds=trajectory.duration / speed_scaling if by == "servo" else None):
+            done = arm.replay(trajectory, by=by, speed_scaling=speed_scaling)
     if access.as_json:
         emit({"cause": done.result.cause.value, "deviation_rad": done.deviation, "lag_s": done.lag})
     else:
@@ -242,9 +283,15 @@ def recover(
     target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
-    """Make the robot ready again after a stop; exit code 1 if a person has to do the rest, which is printed."""
+    """Make the robot ready again after a stop; exit code 1 if a person has to do the rest, which is printed.
+
+    For example:
+
+        heptarm recover --timeout 60 --target lab1
+    """
+    seconds = within(timeout, "timeout", 0.0, 86400.0, unit="s")
     with target.connect() as arm:
-        recovery = arm.recover(timeout=timeout)
+        recovery = arm.recover(timeout=seconds)
         if as_json:
             emit({"done": recovery.done, "did": list(recovery.did), "remaining": list(recovery.remaining)})
         else:

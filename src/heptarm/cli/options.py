@@ -46,6 +46,7 @@ class CommandTarget:
     Attributes:
         text: as in `heptarm.connect`; None: not given.
         key_file: file with the key; None: the key is looked up elsewhere.
+        datagrams: send servo targets and receive states by UDP as far as it gets through.
     """
 
     text: Annotated[
@@ -53,10 +54,19 @@ class CommandTarget:
         Parameter(
             name="--target",
             group=COMMON,
-            help="What to connect to: ADDRESS[:PORT], sim://HOST:PORT or sim://iiwa14. Default: HEPTARM_TARGET.",
+            help="What to connect to: ADDRESS[:PORT], sim://HOST:PORT, sim://iiwa14, or the name of a saved target "
+            "(heptarm targets). Default: HEPTARM_TARGET.",
         ),
     ] = None
     key_file: KeyFile = None
+    datagrams: Annotated[
+        bool,
+        Parameter(
+            negative="",
+            group=COMMON,
+            help="Servo targets and states go by UDP beside the TCP connection: for networks that lose packets.",
+        ),
+    ] = False
 
     def or_else(self, default: str | None) -> CommandTarget:
         """Complete it: as given, else HEPTARM_TARGET, else this default."""
@@ -77,14 +87,18 @@ class CommandTarget:
         from heptarm.arm.link.connection import STATE_RATE, TIMEOUT
         from heptarm.arm.watchdog import CONNECTION
 
-        return connect(
+        arm = connect(
             self.text,
             key_file=self.key_file,
+            datagrams=self.datagrams,
             control=control,
             state_rate=STATE_RATE if state_rate is None else state_rate,
             watchdog=CONNECTION.default if watchdog is None else watchdog,
             timeout=TIMEOUT if timeout is None else timeout,
         )
+        if control:
+            _controlled.append(arm)
+        return arm
 
     def find_key(self) -> str | None:
         """Find the key that `connect` uses; None: there is none."""
@@ -92,7 +106,21 @@ class CommandTarget:
         from heptarm.io import keys
 
         parsed = parse_target(target_from_env() if self.text is None else self.text)
-        return keys.find_key(key_file=self.key_file, host=parsed.host, port=parsed.port)
+        file = self.key_file or parsed.key_file
+        return keys.find_key(key_file=file, host=parsed.host, port=parsed.port)
+
+
+#: Arms that this process has controlled.
+_controlled: list[Arm] = []
+
+
+def after_interrupt() -> str:
+    """What became of the arms of this process after Ctrl-C; empty: it controlled none."""
+    if not _controlled:
+        return ""
+    if all(arm.connection.left_at_rest for arm in _controlled):
+        return "the arm was stopped and is at rest"
+    return "the arm was not seen at rest: stop it with `heptarm stop`, or with the emergency stop"
 
 
 #: No target was given on the command line.

@@ -9,6 +9,7 @@ import sys
 import threading
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated, Any, Literal
@@ -22,13 +23,15 @@ from heptarm.cli.options import (
     Model,
 )
 from heptarm.cli.output import emit, is_silent, lines
-from heptarm.errors import CommandRejected, ConnectFailed
+from heptarm.errors import CommandRejected, ConnectFailed, refuse_windows, require_extra
 from heptarm.io.keys import environment, find_key
 from heptarm.sim.runtime.operator import WORDS
-from heptarm.values.simulator_options import SimulatorOptions
+from heptarm.values.simulator_options import RealTime, SimulatorOptions
 
 _APP = Group("Your own application")
 
+#: Most cabinets that one command runs.
+_MOST = 64
 #: The error of Java for an address that this machine does not have.
 _NOT_HERE = "Cannot assign requested address"
 _NOT_HERE_HINT = (
@@ -42,7 +45,18 @@ def sim(
     model: Model = "iiwa14",
     host: Annotated[str, Parameter(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, Parameter(help="Port; 0 takes a free one.")] = 30001,
+    count: Annotated[
+        int,
+        Parameter(
+            help="Number of cabinets, on consecutive ports; they end together. Typed words are for all of them, or "
+            "for one after its number, as in `2 emergency_stop`."
+        ),
+    ] = 1,
     speed: Annotated[float, Parameter(help="Simulated seconds per second of real time.")] = 1.0,
+    real_time: Annotated[
+        RealTime,
+        Parameter(help="Real-time priority: while an FRI session is open (fri), always (on), never (off)."),
+    ] = "fri",
     view: Annotated[bool, Parameter(negative="", help="Open a live 3D view in the browser.")] = False,
     view_port: Annotated[int, Parameter(help="Port of the view; 0 takes a free one.")] = 8080,
     key_file: KeyFile = None,
@@ -60,6 +74,20 @@ def sim(
         Parameter(
             help="MASS or MASS,X,Y,Z: the true payload on the flange, whatever load data the controller has [kg, m]. "
             "Default: the controller's load data."
+        ),
+    ] = "",
+    sensors: Annotated[
+        str,
+        Parameter(
+            help="'noisy' or 'noisy:SEED': sensors with noise, offset and resolution, joints with friction. "
+            "Default: ideal ones."
+        ),
+    ] = "ideal",
+    scene: Annotated[
+        str,
+        Parameter(
+            help="NAME or FILE: what is around the arm and on its flange: table, peg-in-hole, bins, or a file in "
+            "MuJoCo's format (MJCF). Its bodies collide and can be grasped; the view shows them."
         ),
     ] = "",
     project: Annotated[
@@ -198,6 +226,7 @@ def sim(
             "--view-port": (view_port, 8080),
             "--host": (host, "127.0.0.1"),
             "--port": (port, 30001),
+            "--count": (count, 1),
             "--key-file": (key_file, None),
             "--fri": (fri, None),
             "--fri-command": (fri_command, "position"),
@@ -222,8 +251,11 @@ def sim(
             addresses=addresses,
             model=model,
             speed=speed,
+            real_time=real_time,
             faults=fault,
             payload=payload,
+            sensors=sensors,
+            scene=scene,
             project=project,
             verbose=verbose,
             as_json=as_json,
@@ -241,7 +273,14 @@ def sim(
     if fri is not None:
         from heptarm.cli import fri_sim
 
-        own = {"--view": view, "--key-file": key_file is not None, "--project": project is not None}
+        own = {
+            "--view": view,
+            "--key-file": key_file is not None,
+            "--project": project is not None,
+            "--scene": bool(scene),
+            "--count": count != 1,
+            "--real-time": real_time != "fri",
+        }
         for name, present in own.items():
             if present:
                 raise CommandRejected(
@@ -266,39 +305,129 @@ def sim(
             network=fri_network,
             faults=fault,
             payload=payload,
+            sensors=sensors,
             speed=speed,
         )
         return fri_sim.run(options, verbose=verbose, as_json=as_json)
-    return _cabinet(
+    _check_count(count, port, has_view=view)
+    cabinet = SimulatorOptions(
         model=model,
         host=host,
         port=port,
         speed=speed,
-        view=view,
-        view_port=view_port,
-        key_file=key_file,
-        faults=fault,
+        real_time=real_time,
+        fault=fault,
         payload=payload,
+        sensors=sensors,
+        scene=scene,
         project=project,
+        parent_pipe=True,
         verbose=verbose,
-        as_json=as_json,
     )
+    if count > 1:
+        return _fleet(cabinet, count, key_file=key_file, as_json=as_json)
+    return _cabinet(cabinet, view=view, view_port=view_port, key_file=key_file, as_json=as_json)
+
+
+def _check_count(count: int, port: int, *, has_view: bool) -> None:
+    """Check the number of cabinets.
+
+    Raises:
+        CommandRejected: it is out of range, or there is a view, which shows one cabinet.
+    """
+    most = _MOST if port == 0 else min(_MOST, 65536 - port)
+    if not 1 <= count <= most:
+        raise CommandRejected(
+            f"--count must be in [1, {most}], got {count}",
+            parameter="count",
+            value=count,
+            allowed=f"[1, {most}]",
+        )
+    if count > 1 and has_view:
+        raise CommandRejected(
+            "--view cannot be used with --count: a view shows one cabinet",
+            parameter="view",
+            hint="run python -m heptarm.sim.runtime.view --target sim://HOST:PORT for each of them",
+        )
+
+
+def _fleet(options: SimulatorOptions, count: int, *, key_file: Path | None, as_json: bool) -> int:
+    """Run several virtual cabinets, each a process, until Ctrl-C, SIGTERM, or the end of one of them.
+
+    Raises:
+        ConnectFailed: one of them does not start; the text gives the reason.
+        CommandRejected: the key cannot be used.
+    """
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    host, first = options.host, options.port
+    ports = [first + number if first else 0 for number in range(count)]
+    with ExitStack() as stack:
+        cabinets: list[subprocess.Popen[str]] = []
+        for port in ports:
+            key = find_key(key_file=key_file, host=host, port=port)
+            cabinets.append(stack.enter_context(_child(_command(replace(options, port=port)), key)))
+        stack.callback(_close_all, cabinets)  # before the first of them is waited for
+        targets = []
+        for number, (cabinet, port) in enumerate(zip(cabinets, ports, strict=True), 1):
+            ready = _ready(cabinet, f"virtual cabinet {number} does not start on {host}:{port}")
+            targets.append(f"sim://{host}:{ready['port']}")
+            if as_json:
+                emit(ready | {"cabinet": number, "target": targets[-1]})
+        if not as_json:
+            print(f"{count} virtual {options.model} are ready; Ctrl-C ends them:")
+            for number, target in enumerate(targets, 1):
+                print(f"{number:3}  {target}")
+            sys.stdout.flush()
+        ended = threading.Event()
+        for number, cabinet in enumerate(cabinets, 1):
+            arguments = (cabinet, as_json, number, ended)
+            threading.Thread(target=_answer_until_end, args=arguments, daemon=True).start()
+        if not is_silent():
+            threading.Thread(target=_type_to_all, args=(cabinets, as_json), daemon=True).start()
+        try:
+            ended.wait()
+        except KeyboardInterrupt:
+            return 0
+    codes: list[int] = [abs(cabinet.returncode) for cabinet in cabinets]
+    return max(codes)
+
+
+def _close_all(cabinets: list[subprocess.Popen[str]]) -> None:
+    """Let all cabinets end at the same time."""
+    for cabinet in cabinets:
+        assert cabinet.stdin is not None
+        with suppress(OSError):
+            cabinet.stdin.close()
+
+
+def _answer_until_end(
+    cabinet: subprocess.Popen[str], as_json: bool, number: int, ended: threading.Event
+) -> None:
+    with suppress(OSError, ValueError):
+        _answer(cabinet, as_json, number=number)
+    ended.set()
+
+
+def _type_to_all(cabinets: list[subprocess.Popen[str]], as_json: bool) -> None:
+    """Pass typed lines to all cabinets, or to the one whose number they begin with."""
+    for said in lines():
+        first, _, rest = said.partition(" ")
+        number = int(first) if first.isdecimal() else 0
+        if said == "help":
+            _print_words(as_json)
+            continue
+        if not 0 <= number <= len(cabinets):
+            text = f"there is no cabinet {number}; there are 1 to {len(cabinets)}"
+            print(json.dumps({"operator": said, "error": text}) if as_json else text, flush=True)
+            continue
+        chosen = [cabinets[number - 1]] if number else cabinets
+        for cabinet in chosen:
+            with suppress(OSError, ValueError):
+                _say(cabinet, rest if number else said)
 
 
 def _cabinet(
-    *,
-    model: str,
-    host: str,
-    port: int,
-    speed: float,
-    view: bool,
-    view_port: int,
-    key_file: Path | None,
-    faults: tuple[str, ...],
-    payload: str,
-    project: Path | None,
-    verbose: bool,
-    as_json: bool,
+    options: SimulatorOptions, *, view: bool, view_port: int, key_file: Path | None, as_json: bool
 ) -> int:
     """Run a virtual cabinet until Ctrl-C or SIGTERM; lines on standard input are the operator's actions.
 
@@ -306,20 +435,14 @@ def _cabinet(
         ConnectFailed: the cabinet or the view does not start; the text gives the reason.
         CommandRejected: the key cannot be used.
     """
+    model, host, port = options.model, options.host, options.port
     key = find_key(key_file=key_file, host=host, port=port)
-    options = SimulatorOptions(
-        model=model,
-        host=host,
-        port=port,
-        speed=speed,
-        fault=faults,
-        payload=payload,
-        project=project,
-        parent_pipe=True,
-        verbose=verbose,
-    )
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with ExitStack() as stack:
+        positions = None
+        if view and options.scene:
+            positions = Path(stack.enter_context(TemporaryDirectory(prefix="heptarm-"))) / "positions"
+            options = replace(options, positions=positions)
         cabinet = stack.enter_context(_child(_command(options), key))
         ready = _ready(cabinet, f"the virtual cabinet does not start on {host}:{port}")
         target = f"sim://{host}:{ready['port']}"
@@ -334,6 +457,11 @@ def _cabinet(
                         target,
                         "--port",
                         str(view_port),
+                        *(
+                            []
+                            if positions is None
+                            else ["--scene", options.scene, "--positions", str(positions)]
+                        ),
                     ],
                     key,
                 )
@@ -411,8 +539,11 @@ def _application(
     addresses: tuple[str, ...],
     model: str,
     speed: float,
+    real_time: RealTime,
     faults: tuple[str, ...],
     payload: str,
+    sensors: str,
+    scene: str,
     project: Path | None,
     verbose: bool,
     as_json: bool,
@@ -450,6 +581,7 @@ def _application(
         options = SimulatorOptions(
             model=model,
             speed=speed,
+            real_time=real_time,
             application=application.main,
             background=application.background,
             classpath=(out, *map(str, application.jars)),
@@ -459,6 +591,8 @@ def _application(
             answer=answers,
             fault=faults,
             payload=payload,
+            sensors=sensors,
+            scene=scene,
             parent_pipe=True,
             verbose=verbose,
         )
@@ -490,20 +624,31 @@ def _application(
 
 
 def _command(options: SimulatorOptions) -> list[str]:
+    refuse_windows("the virtual cabinet")
+    require_extra("sim")
     return [sys.executable, "-m", "heptarm.sim.runtime.cabinet", *options.arguments()]
 
 
 def _type(cabinet: subprocess.Popen[str], as_json: bool) -> None:
     """Pass typed lines to the cabinet; the end of standard input does not end the cabinet."""
-    assert cabinet.stdin is not None
     for said in lines():
         if said == "help":
-            for words, meaning in WORDS.items():
-                about = json.dumps({"say": words, "to": meaning}) if as_json else f"{words:26} {meaning}"
-                print(about, flush=True)
+            _print_words(as_json)
             continue
-        cabinet.stdin.write(f"{said}\n")
-        cabinet.stdin.flush()
+        _say(cabinet, said)
+
+
+def _say(cabinet: subprocess.Popen[str], words: str) -> None:
+    """Pass an action of the operator."""
+    assert cabinet.stdin is not None
+    cabinet.stdin.write(f"{words}\n")
+    cabinet.stdin.flush()
+
+
+def _print_words(as_json: bool) -> None:
+    for words, meaning in WORDS.items():
+        about = json.dumps({"say": words, "to": meaning}) if as_json else f"{words:26} {meaning}"
+        print(about, flush=True)
 
 
 def _converse(cabinet: subprocess.Popen[str], as_json: bool) -> None:
@@ -526,8 +671,12 @@ def _careful(
         work(cabinet, as_json)
 
 
-def _answer(cabinet: subprocess.Popen[str], as_json: bool) -> str:
-    """Print the cabinet's answers until it ends; return the error that ended its application."""
+def _answer(cabinet: subprocess.Popen[str], as_json: bool, *, number: int = 0) -> str:
+    """Print the cabinet's answers until it ends, after its number if it is one of several.
+
+    Returns:
+        The error that ended its application.
+    """
     assert cabinet.stdout is not None
     failure = ""
     for line in cabinet.stdout:
@@ -538,9 +687,10 @@ def _answer(cabinet: subprocess.Popen[str], as_json: bool) -> str:
         if "operator" not in reply:
             failure = str(reply.get("error", ""))
         elif as_json:
-            print(line.strip(), flush=True)
+            print(json.dumps(reply | {"cabinet": number}) if number else line.strip(), flush=True)
         elif reply["operator"]:
-            print(reply["error"] or f"done: {reply['operator']}", flush=True)
+            text = reply["error"] or reply["shown"] or f"done: {reply['operator']}"
+            print(f"{number}: {text}" if number else text, flush=True)
     return failure
 
 

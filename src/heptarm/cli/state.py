@@ -18,6 +18,7 @@ from heptarm.cli.options import (
     Json,
 )
 from heptarm.cli.output import emit, state_data
+from heptarm.values.arrays import within
 from heptarm.values.state import State
 
 
@@ -29,7 +30,17 @@ def state(
     target: CommandTarget = NO_TARGET,
     as_json: Json = False,
 ) -> int:
-    """Show the state of the arm."""
+    """Show the state of the arm.
+
+    For example:
+
+        heptarm state --target lab1
+
+        heptarm state --watch --rate 5 --json --target sim://localhost:30001
+    """
+    within(rate, "rate", 0.0, 1000.0, above=True, unit="Hz")
+    if duration is not None:
+        within(duration, "duration", 0.0, 86400.0, above=True, unit="s")
     with target.connect(control=False, state_rate=max(rate, 10.0)) as arm:
         if not watch and duration is None:
             _show_once(arm, as_json=as_json)

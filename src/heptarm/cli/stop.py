@@ -16,7 +16,12 @@ _PATIENCE = 5.0
 
 
 def stop(*, target: CommandTarget = NO_TARGET, as_json: Json = False) -> int:
-    """Stop the arm; needs no control, no key and no place among the clients."""
+    """Stop the arm; needs no control, no key and no place among the clients.
+
+    For example:
+
+        heptarm stop --target lab1
+    """
     chosen = parse_target(target_from_env() if target.text is None else target.text)
     if chosen.is_private:
         raise ConnectFailed(

@@ -147,12 +147,17 @@ def write_key_file(file: Path, key: str, *, replace: bool = False) -> None:
         ) from None
 
 
-def key_folder() -> Path:
-    """Folder of the stored keys: heptarm/keys in XDG_CONFIG_HOME (~/.config), on Windows in APPDATA."""
+def settings_folder() -> Path:
+    """Folder of the user's settings: heptarm in XDG_CONFIG_HOME (~/.config), on Windows in APPDATA."""
     base = os.environ.get("XDG_CONFIG_HOME", "")
     if not os.path.isabs(base):  # the specification: a relative path is to be ignored
         base = os.environ.get("APPDATA", "") if sys.platform == "win32" else ""
-    return Path(base or Path.home() / ".config") / "heptarm" / "keys"
+    return Path(base or Path.home() / ".config") / "heptarm"
+
+
+def key_folder() -> Path:
+    """Folder of the stored keys."""
+    return settings_folder() / "keys"
 
 
 @dataclass(frozen=True, slots=True)

@@ -120,6 +120,21 @@ class Ring:
         copy: Floats = self.floats[slot].copy()
         return copy if self._marks[mark] == 2 * tick + 2 else None
 
+    def since(self, tick: int) -> tuple[Floats, int, int]:
+        """Copy all slots from a tick on.
+
+        Returns:
+            Those that are complete, shape (n, width); the tick after the last one; how many were overwritten before.
+        """
+        count = self._head[0]
+        first = max(tick, count - self._slots, 0)
+        ticks = np.arange(first, count)
+        places, marks = ticks % self._slots, 2 * ticks + 2
+        before = self.ints[places, 0] == marks
+        copies: Floats = self.floats[places]
+        whole = before & (self.ints[places, 0] == marks)
+        return copies[whole], count, first - tick + int((~whole).sum())
+
     def newest(self) -> Floats | None:
         """Copy the newest slot; None if there is none. Retry while the writer overtakes the reader."""
         for _ in range(16):

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Iterator
 
 from heptarm.errors import ConnectFailed, ConnectionLost
+from heptarm.io.udp import ConnectedUdp
 
 #: The connection is lost if the other side reads nothing for this long [s].
 SEND_TIMEOUT = 2.0
@@ -108,6 +109,13 @@ class TcpTransport:
         """Give up the copy that a fork of the process has; the connection of the original process stays."""
         self._closed = True
         self._sock.close()  # without shutdown, which would end the connection for both processes
+
+    def datagrams(self) -> ConnectedUdp | None:
+        """Open a UDP socket between the addresses of this connection, to the same port; None: that is impossible."""
+        try:
+            return ConnectedUdp(self._sock.getsockname(), self._sock.getpeername(), family=self._sock.family)
+        except (OSError, ConnectFailed):  # the connection has ended, or is no connection of the network
+            return None
 
     def _lost(self, error: OSError | None) -> ConnectionLost:
         if self._closed:

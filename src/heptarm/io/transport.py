@@ -61,6 +61,30 @@ class Transport(Protocol):
         """Give up the copy that a fork of the process has; the connection of the original process stays."""
         ...
 
+    def datagrams(self) -> DatagramSocket | None:
+        """Open a socket for datagrams to the other end; None: this transport has none."""
+        ...
+
+
+class DatagramSocket(Protocol):
+    """Unreliable, unordered datagrams in both directions; `heptarm.io.udp.ConnectedUdp` is one."""
+
+    def send(self, data: bytes) -> bool:
+        """Send a datagram without waiting; False if the system does not take it."""
+        ...
+
+    def receive(self, seconds: float) -> bytes | None:
+        """Wait for a datagram [s]; None: none came.
+
+        Raises:
+            ConnectionLost: the socket is closed.
+        """
+        ...
+
+    def close(self) -> None:
+        """Close the socket. Closing twice is allowed."""
+        ...
+
 
 class _Pipe:
     """One direction of a pair."""
@@ -126,6 +150,10 @@ class MemoryTransport:
     def abandon(self) -> None:
         """Give up the copy that a fork of the process has; its memory is a copy, too."""
         self._closed = True
+
+    def datagrams(self) -> DatagramSocket | None:
+        """None: there are no datagrams in memory."""
+        return None
 
     def _lost(self) -> ConnectionLost:
         if self._closed:

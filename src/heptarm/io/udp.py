@@ -1,4 +1,4 @@
-"""UDP socket with the receive times of the kernel."""
+"""UDP sockets: a bound one with the receive times of the kernel, and one connected to a cabinet."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import socket
 import struct
 import sys
 import time
+from typing import Any
 
 from heptarm.errors import ConnectFailed, ConnectionLost
 
@@ -15,6 +16,7 @@ from heptarm.errors import ConnectFailed, ConnectionLost
 BUFFER = 2048
 Address = tuple[str, int]
 
+_DO_NOT_WAIT: int = getattr(socket, "MSG_DONTWAIT", 0)
 _NO_DATA = (errno.EAGAIN, errno.EWOULDBLOCK, errno.ETIMEDOUT, errno.EINTR)
 _STAMPNS: int = getattr(socket, "SO_TIMESTAMPNS", 35) if sys.platform == "linux" else 0
 _STAMP = struct.Struct("@ll")
@@ -64,12 +66,7 @@ class UdpSocket:
 
     def set_patience(self, seconds: float) -> None:
         """Set how long `receive` waits for a datagram [s]."""
-        if sys.platform == "win32":
-            self.sock.settimeout(max(seconds, 1e-3))
-            return
-        micros = max(1, round(seconds * 1e6))
-        interval = struct.pack("@ll", micros // 1_000_000, micros % 1_000_000)
-        self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, interval)
+        _limit_wait(self.sock, seconds)
 
     def receive(self) -> tuple[bytes, int, Address] | None:
         """Receive a datagram, its receive time [ns, monotonic clock] and its sender; None if none came in time.
@@ -122,6 +119,16 @@ class UdpSocket:
         return ConnectionLost(f"UDP port {self.port} fails: {(error.strerror or str(error)).lower()}")
 
 
+def _limit_wait(sock: socket.socket, seconds: float) -> None:
+    """Limit how long the socket waits for a datagram [s], in the kernel: Python's own limit costs a poll() per call."""
+    if sys.platform == "win32":
+        sock.settimeout(max(seconds, 1e-3))
+        return
+    micros = max(1, round(seconds * 1e6))
+    interval = struct.pack("@ll", micros // 1_000_000, micros % 1_000_000)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, interval)
+
+
 def _advice(error: OSError, port: int) -> str:
     if error.errno == errno.EADDRINUSE:
         return (
@@ -169,3 +176,59 @@ def address_to_bind(host: str) -> str:
         except OSError:
             return ALL_INTERFACES
         return str(probe.getsockname()[0])
+
+
+class ConnectedUdp:
+    """UDP socket from the local address of a connection to the address of its other end; only that end is received.
+
+    Args:
+        local: own address and port of the connection, as `socket.getsockname` returns it.
+        peer: address and port of the other end; datagrams go to the same port.
+        family: address family of the connection.
+
+    Raises:
+        ConnectFailed: the system refuses the socket.
+    """
+
+    __slots__ = ("_closed", "_sock")
+
+    def __init__(self, local: tuple[Any, ...], peer: tuple[Any, ...], *, family: int) -> None:
+        self._closed = False
+        self._sock = socket.socket(family, socket.SOCK_DGRAM)
+        try:
+            self._sock.bind((local[0], 0, *local[2:]))
+            self._sock.connect(peer)
+        except OSError as error:
+            self._sock.close()
+            raise ConnectFailed(
+                f"no UDP socket from {local[0]} to {peer[0]}:{peer[1]}: {(error.strerror or str(error)).lower()}"
+            ) from error
+
+    def send(self, data: bytes) -> bool:
+        """Send a datagram without waiting; False if the system does not take it."""
+        try:
+            self._sock.send(data, _DO_NOT_WAIT)
+        except OSError:  # nobody listens there, no buffer, closed: like a lost datagram
+            return False
+        return True
+
+    def receive(self, seconds: float) -> bytes | None:
+        """Wait for a datagram [s]; None: none came.
+
+        Raises:
+            ConnectionLost: the socket is closed.
+        """
+        try:
+            _limit_wait(self._sock, seconds)
+            return self._sock.recv(BUFFER)
+        except OSError as error:
+            if self._closed:
+                raise ConnectionLost("the UDP socket is closed") from error
+            if error.errno not in _NO_DATA:  # refused, or a network that is down: no reason for a busy loop
+                time.sleep(min(seconds, 0.01))
+            return None
+
+    def close(self) -> None:
+        """Close the socket. Closing twice is allowed; a waiting `receive` ends with its time."""
+        self._closed = True
+        self._sock.close()

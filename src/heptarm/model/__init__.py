@@ -9,8 +9,17 @@
     pose = model.forward(iiwa, q)
     q = model.solve(iiwa, pose, near=q)
     tau = model.gravity(iiwa, q)
+
+Functions whose names end in `_batch` take the joint positions, or the poses, of many arms at once.
 """
 
+from heptarm.model.batch import (
+    RedundancyBatch,
+    forward_batch,
+    jacobian_batch,
+    redundancy_batch,
+    solve_batch,
+)
 from heptarm.model.dynamics import (
     coriolis,
     coriolis_matrix,
@@ -23,19 +32,24 @@ from heptarm.model.inverse_kinematics import intervals, redundancy, solve, solve
 from heptarm.model.kinematics import forward, jacobian, jacobian_derivative, manipulability, nullspace
 
 __all__ = [
+    "RedundancyBatch",
     "coriolis",
     "coriolis_matrix",
     "forward",
+    "forward_batch",
     "forward_dynamics",
     "gravity",
     "intervals",
     "inverse_dynamics",
     "jacobian",
+    "jacobian_batch",
     "jacobian_derivative",
     "manipulability",
     "mass_matrix",
     "nullspace",
     "redundancy",
+    "redundancy_batch",
     "solve",
     "solve_all",
+    "solve_batch",
 ]

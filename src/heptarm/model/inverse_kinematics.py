@@ -26,7 +26,7 @@ from heptarm.values.robot import RobotModel
 Rows: TypeAlias = tuple[Vec, Vec, Vec]
 
 #: Below it sin(b) does not determine the other two angles, and the wrist is neither before nor behind A1.
-_SINGULAR = 1e-10
+SINGULAR = 1e-10
 _NARROW = 1e-9
 #: Largest step of the arm angle [rad] when the best of an interval is looked for.
 _STEP = pi / 36
@@ -95,7 +95,7 @@ def _zyz(r: Rows, negative: bool, near: float) -> Vec:
     """
     s = hypot(r[0][2], r[1][2])
     upright = r[2][2] >= 0
-    if s < _SINGULAR:
+    if s < SINGULAR:
         a, b = near, 0.0 if upright else -pi if negative else pi
     elif negative:
         a, b = atan2(-r[1][2], -r[0][2]), -atan2(s, r[2][2])
@@ -182,7 +182,7 @@ def raw(
         shoulder = _zyz(r03, False, hint[0])
         # bit 0: sign of the wrist's x in the frame of A1
         ahead = w[0] * cos(shoulder[0]) + w[1] * sin(shoulder[0])
-        if abs(ahead) < _SINGULAR:
+        if abs(ahead) < SINGULAR:
             same = cos(shoulder[0] - a1) > 0
         else:
             same = (ahead < 0) == bool(status & 1)
@@ -217,7 +217,7 @@ def status_of(robot: RobotModel, q: Sequence[float]) -> int:
     """Status bits of a joint position."""
     columns, p = flange(robot, q)
     w = _wrist(robot, _rows(columns), p)
-    behind = w[0] * cos(q[0]) + w[1] * sin(q[0]) < -_SINGULAR
+    behind = w[0] * cos(q[0]) + w[1] * sin(q[0]) < -SINGULAR
     return behind | (q[3] < 0) << 1 | (q[5] <= 0) << 2
 
 

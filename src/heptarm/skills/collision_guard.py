@@ -14,6 +14,7 @@ import numpy.typing as npt
 from heptarm.errors import CollisionDetected, HeptarmError, ModeConflict, NotReady, StaleState, Timeout
 from heptarm.values.arrays import callback, instance, within
 from heptarm.values.condition.collision import Collision, CollisionGuard
+from heptarm.values.condition.reaction import Reaction, check_reaction
 from heptarm.values.result import Result
 from heptarm.values.state import State
 
@@ -72,18 +73,20 @@ def guarded(
     guard: CollisionGuard | None = None,
     *,
     on_collision: Callable[[Collision], None] | None = None,
+    then: Reaction = "relax",
 ) -> Iterator[CollisionGuard]:
     """A block whose motions and servo motions end at a collision.
 
-    The cabinet monitors the torques, as a break condition of each motion; the arm brakes on its path. A guard with a
-    margin is monitored by this program, in every pushed state, and stops the arm as hard as possible; it reacts later
-    by the delay of the network.
+    The cabinet monitors the torques, as a break condition of each motion; the arm brakes on its path and relaxes. A
+    guard with a margin is monitored by this program, in every pushed state, and stops the arm as hard as possible; it
+    reacts later by the delay of the network.
 
     Args:
         arm: in control.
         guard: the bands; None: `collision_guard()` at the start of the block.
         on_collision: called with each collision, from another thread, so it must not block. A guard with a margin
             stays in force then and stops each further motion that collides.
+        then: what the arm does after it has braked; see `Arm.move`. A guard with a margin and servo motions only stop.
 
     Raises:
         CollisionDetected: from `move`, `wait` or the end of the block; names the joint and its torque.
@@ -96,8 +99,11 @@ def guarded(
     bands = collision_guard(arm) if guard is None else instance(guard, CollisionGuard, "guard")
     _guarded.add(arm)
     try:
-        block = _watched if bands.is_moving else _broken_off
-        with block(arm, bands, on_collision):
+        with (
+            _watched(arm, bands, on_collision)
+            if bands.is_moving
+            else _broken_off(arm, bands, on_collision, check_reaction(then))
+        ):
             yield bands
     finally:
         _guarded.discard(arm)
@@ -105,7 +111,7 @@ def guarded(
 
 @contextlib.contextmanager
 def _broken_off(
-    arm: Arm, guard: CollisionGuard, on_collision: Callable[[Collision], None] | None
+    arm: Arm, guard: CollisionGuard, on_collision: Callable[[Collision], None] | None, then: Reaction
 ) -> Iterator[None]:
     """A block whose motions the cabinet ends at a collision."""
 
@@ -116,7 +122,7 @@ def _broken_off(
             on_collision(found)
         return _collided(found, result, arm.history())
 
-    with arm.breaking_on(guard.condition, error=error):
+    with arm.breaking_on(guard.condition, error=error, then=then):
         yield
 
 

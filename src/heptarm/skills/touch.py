@@ -14,6 +14,7 @@ from heptarm.values.arrays import Array, integer, optional, within, word
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.contact import Contact, direction_of
 from heptarm.values.condition.force import force as force_signal
+from heptarm.values.condition.reaction import Reaction, check_reaction
 from heptarm.values.frames import TOOL, check_name
 from heptarm.values.mode.mode import Mode, check_mode
 from heptarm.values.motion.line import lin_rel
@@ -42,12 +43,14 @@ def touch(
     retreat_mps: float = 0.1,
     baseline: Literal["rest", "zero"] = "rest",
     mode: Mode | None = None,
+    then: Reaction = "relax",
     timeout: float | None = None,
 ) -> Contact:
     """Move on a straight line until a contact.
 
     The cabinet monitors the force: a contact is a deviation from the baseline by more than the threshold along an axis
-    of the frame. The slower the arm, the shorter its stopping distance behind the contact.
+    of the frame. The slower the arm, the shorter its stopping distance behind the contact. Then the arm relaxes, so
+    that it does not go on pushing by that distance; `Contact.result` has the largest force and the one at rest.
 
     Args:
         arm: in control.
@@ -60,6 +63,7 @@ def touch(
         retreat_mps: speed of the retreat [m/s].
         baseline: "rest": the force before the motion, such as that of a load not quite known; "zero": no force.
         mode: control mode; None: that of `using`, otherwise position. An impedance mode limits the contact force.
+        then: what the arm does at the contact; see `move`.
         timeout: see `move`.
 
     Returns:
@@ -71,6 +75,7 @@ def touch(
     """
     check_name(frame, "frame")
     check_mode(mode)
+    check_reaction(then)
     word(baseline, "baseline", ("rest", "zero"))
     within(speed_mps, "speed_mps", 0.0, _FASTEST, above=True, unit="m/s")
     within(retreat_mps, "retreat_mps", 0.0, _FASTEST, above=True, unit="m/s")
@@ -83,7 +88,7 @@ def touch(
         force=within(force, "force", 0.0, TapWatch.STRONGEST, above=True, unit="N"),
         frame=frame,
     )
-    contact = approach.run(speed_mps, from_rest=baseline == "rest", mode=mode, timeout=timeout)
+    contact = approach.run(speed_mps, from_rest=baseline == "rest", mode=mode, then=then, timeout=timeout)
     if retreat is not None:
         approach.retreat(contact, retreat, retreat_mps)
     return contact
@@ -213,13 +218,15 @@ class _Approach:
     force: float
     frame: str
 
-    def run(self, speed: float, *, from_rest: bool, mode: Mode | None, timeout: float | None) -> Contact:
+    def run(
+        self, speed: float, *, from_rest: bool, mode: Mode | None, then: Reaction, timeout: float | None
+    ) -> Contact:
         """Move until the contact; `from_rest`: relative to the force at rest."""
         start = self.arm.wait_for_rest()
         bias = self._mean_force() if from_rest else np.zeros(3)
         step = lin_rel(*(self.distance * self.direction).tolist(), frame=self.frame, speed_mps=speed)
         result = self.arm.move(
-            step, mode=mode, until=_deviates(bias, self.force, self.frame), timeout=timeout
+            step, mode=mode, until=_deviates(bias, self.force, self.frame), then=then, timeout=timeout
         )
         return self._contact(result, start, bias)
 

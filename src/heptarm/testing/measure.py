@@ -109,7 +109,7 @@ def _text(value: npt.ArrayLike) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class MotionStates:
     """The states pushed during a motion, in their order; in each one joints and pose were sampled again.
 
     Attributes:
@@ -188,7 +188,7 @@ def record(
     mode: Mode | None = None,
     until: Condition | None = None,
     speed: float | None = None,
-) -> Recording:
+) -> MotionStates:
     """Carry out a motion, or several, and keep all states meanwhile. Raises as `Arm.move` does."""
     before = arm.state.stamp
     pushed = arm.states()  # from before the beginning: a slow machine would miss the first of them
@@ -203,7 +203,7 @@ def record(
         if state.stamp >= end if end is not None else state.stamp - before > handle.limit * 1e9:
             break
     pushed.close()
-    return Recording(handle.wait(), tuple(states))
+    return MotionStates(handle.wait(), tuple(states))
 
 
 def fresh(arm: Arm, *, after: float = 0.03) -> State:
@@ -215,6 +215,38 @@ def fresh(arm: Arm, *, after: float = 0.03) -> State:
         return all(group.stamp > due for group in groups if group is not None)
 
     return arm.wait_until(is_fresh)
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline:
+    """What the torque sensors show while nobody touches the arm: their offsets, and what the load data lack.
+
+    Attributes:
+        force: external force at the motion frame, base axes, shape (3,) [N].
+        torque: external torque there, shape (3,) [Nm].
+        tau: torques of the joints, shape (7,) [Nm].
+        tau_ext: external torques of the joints, shape (7,) [Nm].
+    """
+
+    force: Array
+    torque: Array
+    tau: Array
+    tau_ext: Array
+
+
+def baseline(arm: Arm) -> Baseline:
+    """The mean of a tenth of a second in which nothing changes."""
+    states = watch(arm, 0.1)
+
+    def mean(values: Sequence[Array]) -> Array:
+        return np.asarray(np.mean(values, axis=0), dtype=np.float64)
+
+    return Baseline(
+        mean([state.wrench.force for state in states]),
+        mean([state.wrench.torque for state in states]),
+        mean([state.tau for state in states]),
+        mean([state.tau_ext for state in states]),
+    )
 
 
 def watch(arm: Arm, seconds: float) -> tuple[State, ...]:

@@ -199,9 +199,7 @@ def tidy(arm: Arm, *, home: bool) -> None:
     state = arm.state
     if not state.safety.ready_to_move:
         if not arm.is_virtual:  # a person has to find out why it does not move
-            raise NotReady(
-                f"the robot is not ready: {', '.join(state.safety.stops) or 'it gives no reason'}"
-            )
+            raise NotReady(f"the robot is not ready: {', '.join(state.safety.stops) or 'it gives no reason'}")
         arm.recover(timeout=_PATIENCE)
     if state.motion is not None and state.motion.override != 1.0:
         arm.set_override(1.0)

@@ -19,15 +19,17 @@ DEEPEST = 0.3
 VIRTUAL_SPEED, REAL_SPEED = 1.0, 0.1
 
 
-def stage(*, model: str = "iiwa14", speed: float = 1.0) -> str:
+def stage(*, model: str = "iiwa14", speed: float = 1.0, sensors: str = "ideal") -> str:
     """Target of a private simulator on which every scenario can play.
 
     Args:
         model: "iiwa7", "iiwa14", "med7" or "med14".
         speed: simulated seconds per second.
+        sensors: "ideal", "noisy" or "noisy:SEED".
     """
     options = {
         "speed": f"{speed:g}",
+        "sensors": sensors,
         "box": f"0.6,0,{TABLE / 2},0.4,0.8,{TABLE}",
         "project": str(Path(__file__).with_name("stage.xml")),
     }

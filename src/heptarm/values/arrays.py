@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import LimitError, ShapeError
+from heptarm.values.text import as_html
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -36,6 +37,10 @@ class Value:
 
     def __hash__(self) -> int:
         return hash(self._key())
+
+    def _repr_html_(self) -> str:
+        """The text of `str` for a notebook."""
+        return as_html(str(self))
 
     def _key(self) -> tuple[object, ...]:
         return tuple(_key(getattr(self, name)) for name, f in self.__dataclass_fields__.items() if f.compare)
@@ -171,14 +176,35 @@ def within(value: float, name: str, low: float, high: float, *, above: bool = Fa
     if not (low < number if above else low <= number) or not number <= high:
         of_unit = f" {unit}" if unit else ""
         bounds = f"{'(' if above else '['}{low:g}, {high:g}]{of_unit}"
+        meant = other_unit(number, unit)
         raise LimitError(
             f"{name} must be in {bounds}, got {number:g}{of_unit}",
             code=2 if math.isfinite(number) else 1,
             parameter=name,
             value=number,
             allowed=bounds,
+            hint=meant[1] if meant is not None and low <= meant[0] <= high and meant[0] != low else "",
         )
     return number
+
+
+def other_unit(value: float, unit: str) -> tuple[float, str] | None:
+    """What a number would be if millimetres were given for metres, or degrees for radians; None: no such unit.
+
+    Args:
+        value: the number.
+        unit: in which it is expected, such as "m/s".
+
+    Returns:
+        The number in this unit, and a question that asks whether it was meant.
+    """
+    base = unit.partition("/")[0]
+    if base == "m":
+        meant = value / 1000.0
+        return meant, f"units are metres: did you mean {value:g} m{unit}, which is {meant:g} {unit}?"
+    if base == "rad":
+        return math.radians(value), f"angles are in radians: did you mean math.radians({value:g})?"
+    return None
 
 
 def optional(

@@ -11,7 +11,24 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, finite, finite_entries, numbers, scalar, shown, within
+from heptarm.values.arrays import (
+    Array,
+    Value,
+    array,
+    finite,
+    finite_entries,
+    numbers,
+    scalar,
+    shown,
+    within,
+    word,
+)
+from heptarm.values.text import fixed
+
+#: Whose axes an offset of a pose may refer to.
+_FRAMES = ("base", "tool")
+#: Largest angle; more is degrees [rad].
+_TURN = 2.0 * math.pi + 1e-9
 
 #: Largest arm angle that is accepted [rad].
 _LARGEST = 1000.0
@@ -127,8 +144,14 @@ class Pose(Value):
     def xyz_abc(
         cls, x: float = 0.0, y: float = 0.0, z: float = 0.0, a: float = 0.0, b: float = 0.0, c: float = 0.0
     ) -> Pose:
-        """KUKA's notation in SI: translation [m], then R = Rz(a) Ry(b) Rx(c) [rad]."""
-        angles = [finite(value, name, unit="rad") for name, value in (("a", a), ("b", b), ("c", c))]
+        """KUKA's notation in SI: translation [m], then R = Rz(a) Ry(b) Rx(c) [rad], each at most one turn.
+
+        Raises:
+            LimitError: a number is not finite, or an angle is more than a turn, as degrees are.
+        """
+        angles = [
+            within(value, name, -_TURN, _TURN, unit="rad") for name, value in (("a", a), ("b", b), ("c", c))
+        ]
         (sa, ca), (sb, cb), (sc, cc) = ((math.sin(t / 2), math.cos(t / 2)) for t in angles)
         quat = (
             sc * cb * ca - cc * sb * sa,
@@ -221,6 +244,94 @@ class Pose(Value):
         check_pose(other, "other")
         difference = multiply(self.quat * np.array([-1.0, -1.0, -1.0, 1.0]), other.quat)
         return 2.0 * math.atan2(float(np.linalg.norm(difference[:3])), abs(float(difference[3])))
+
+    @property
+    def rpy(self) -> Array:
+        """Roll, pitch, yaw about the fixed x, y, z axes [rad], shape (3,): R = Rz(yaw) Ry(pitch) Rx(roll)."""
+        return np.ascontiguousarray(self.abc[::-1])
+
+    @property
+    def rotvec(self) -> Array:
+        """Rotation vector: its axis times its angle, shape (3,) [rad], at most pi long."""
+        length = float(np.linalg.norm(self.quat[:3]))
+        w = float(self.quat[3])
+        sign = -1.0 if w < 0.0 else 1.0
+        if length < 1e-12:
+            return np.zeros(3)
+        angle = 2.0 * math.atan2(length, abs(w))
+        return np.asarray(sign * angle / length * self.quat[:3]) + 0.0
+
+    @classmethod
+    def from_rotvec(cls, xyz: npt.ArrayLike, rotvec: npt.ArrayLike) -> Pose:
+        """Pose from a translation (3,) [m] and a rotation vector (3,): axis times angle [rad].
+
+        Raises:
+            ShapeError: not three numbers.
+            LimitError: a number that is not finite.
+        """
+        vector = array(rotvec, 3, "rotvec")
+        angle = float(np.linalg.norm(vector))
+        if angle == 0.0:
+            return cls.of(xyz)
+        axis = vector / angle * math.sin(angle / 2)
+        return cls.of(xyz, (*axis.tolist(), math.cos(angle / 2)))
+
+    def shifted(self, x: float = 0.0, y: float = 0.0, z: float = 0.0, *, frame: str = "base") -> Pose:
+        """The pose moved by an offset [m].
+
+        Args:
+            x: along the x axis of the frame.
+            y: along its y axis.
+            z: along its z axis.
+            frame: whose axes: "base", or "tool", the pose's own.
+
+        Raises:
+            LimitError: an offset that is not finite.
+            ShapeError: another frame.
+        """
+        offset = Pose.at(x, y, z).xyz
+        turned = offset if word(frame, "frame", _FRAMES) == "base" else self.rotation @ offset
+        return Pose(self.xyz + turned, self.quat)
+
+    def rotated(self, a: float = 0.0, b: float = 0.0, c: float = 0.0, *, frame: str = "tool") -> Pose:
+        """The pose turned about its own origin by R = Rz(a) Ry(b) Rx(c) [rad].
+
+        Args:
+            a: about the z axis of the frame.
+            b: about the y axis.
+            c: about the x axis.
+            frame: whose axes: "tool", the pose's own, or "base".
+
+        Raises:
+            LimitError: an angle that is not finite.
+            ShapeError: another frame.
+        """
+        turn = Pose.xyz_abc(a=a, b=b, c=c).quat
+        is_own = word(frame, "frame", _FRAMES) == "tool"
+        return Pose(self.xyz, multiply(self.quat, turn) if is_own else multiply(turn, self.quat))
+
+    def interpolate(self, other: Pose, fraction: float) -> Pose:
+        """A pose between two: on the straight line, and on the shortest rotation at constant speed (slerp).
+
+        Args:
+            other: the pose at 1.
+            fraction: 0 is this pose; [0, 1].
+
+        Raises:
+            LimitError: a fraction outside its range.
+        """
+        check_pose(other, "other")
+        s = within(fraction, "fraction", 0.0, 1.0)
+        between = Pose((0.0, 0.0, 0.0), multiply(self.quat * np.array([-1.0, -1.0, -1.0, 1.0]), other.quat))  # type: ignore[arg-type]
+        part = Pose.from_rotvec((0.0, 0.0, 0.0), s * between.rotvec)
+        return Pose(self.xyz + s * (other.xyz - self.xyz), multiply(self.quat, part.quat))
+
+    def __str__(self) -> str:
+        """One line: millimetres and degrees, and the same in SI units."""
+        a, b, c = (fixed(v, 2) for v in np.degrees(self.abc))
+        x, y, z = (fixed(v * 1e3, 1) for v in self.xyz)
+        si, quat = (" ".join(fixed(v, 4) for v in one) for one in (self.xyz, self.quat))
+        return f"x {x}  y {y}  z {z} mm   a {a}  b {b}  c {c} deg   ({si} m, xyzw {quat})"
 
     def __repr__(self) -> str:
         """Short form in KUKA's notation, degrees."""

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from math import nan
+from math import isnan, nan
 
 from heptarm.values.arrays import Value
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.trigger import Notify, Trigger
 from heptarm.values.state import State
+from heptarm.values.text import degrees, lines
 
 
 class Cause(Enum):
@@ -39,6 +40,9 @@ class Result(Value):
         stopped_by: the part of the break condition that fired: of parts combined by | the one that held; None if none
             fired.
         fired_at: the robot when it fired, before it braked.
+        peak_force: largest external force at the motion frame since it fired, while the arm braked and reacted [N]; NaN
+            if no condition ended a motion of `move` or `start`. On a cabinet it is read every few milliseconds.
+        rest_force: external force at the end, after the reaction [N]; NaN likewise.
         item: index of the motion of the program that ran last.
         code: number in the protocol's table of codes; 0: none.
         text: explanation by the cabinet.
@@ -50,9 +54,31 @@ class Result(Value):
     duration: float = 0.0
     stopped_by: Condition | None = None
     fired_at: State | None = None
+    peak_force: float = nan
+    rest_force: float = nan
     item: int = 0
     code: int = 0
     text: str = ""
+
+    def __str__(self) -> str:
+        """A few lines: why it ended, how long it took, where the arm is."""
+        fired = "" if self.stopped_by is None else str(self.stopped_by)
+        cause = (
+            self.cause.value
+            + (f": {self.text}" if self.text else "")
+            + (f" (code {self.code})" if self.code else "")
+        )
+        rows = {
+            "cause": cause,
+            "stopped by": fired,
+            "duration": f"{self.duration:.3f} s",
+            "residual": "" if isnan(self.residual) else f"{degrees(self.residual, 4)}",
+        }
+        if self.state is not None and self.state.joints is not None:
+            rows["joints"] = degrees(self.state.q)
+        if self.state is not None and self.state.groups.pose is not None:
+            rows["pose"] = str(self.state.pose)
+        return lines("Result", rows)
 
     @property
     def arrived(self) -> bool:

@@ -127,8 +127,15 @@ class RobotModel:
                     parameter=f"{name}[{index}]",
                     value=float(q[index]),
                     allowed=f"[{self.q_min[index]:.4f}, {self.q_max[index]:.4f}] rad",
-                    hint="keep the target inside the joint limits",
+                    hint=self._advice(q),
                 )
+
+    def _advice(self, q: Array) -> str:
+        """What to do about joint positions outside the limits: degrees were given, or the target is wrong."""
+        meant = np.radians(q)
+        if np.abs(q).max() > 2.0 * np.pi and (self.q_min <= meant).all() and (meant <= self.q_max).all():
+            return f"angles are in radians: did you mean ha.deg({', '.join(f'{value:g}' for value in q)})?"
+        return "keep the target inside the joint limits"
 
 
 # --------------------------------------------------------------------------------------- the robots, each an entry

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import Field, dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
+
+#: When a virtual cabinet asks for real-time priority: while an FRI client has to answer each tick, always, never.
+RealTime: TypeAlias = Literal["fri", "on", "off"]
 
 
 def _about(
@@ -68,6 +71,14 @@ class SimulatorOptions:
             "fixed box in the world [m]; may be repeated", metavar="X,Y,Z,LENGTH,WIDTH,HEIGHT", in_target=True
         ),
     )
+    scene: str = field(
+        default="",
+        metadata=_about(
+            "what is around the arm and on its flange: table, peg-in-hole, bins, or a file in MuJoCo's format",
+            metavar="NAME|FILE",
+            in_target=True,
+        ),
+    )
     payload: str = field(
         default="",
         metadata=_about(
@@ -93,11 +104,27 @@ class SimulatorOptions:
             '"off": drives never trip, whatever speed, torque or position', metavar="on|off", in_target=True
         ),
     )
+    sensors: str = field(
+        default="ideal",
+        metadata=_about(
+            '"noisy": sensors with noise, offset and resolution, and joints with friction, the same for a seed',
+            metavar="ideal|noisy[:SEED]",
+            in_target=True,
+        ),
+    )
     fault: tuple[str, ...] = field(
         default=(),
         metadata=_about(
             "fault at a simulated time, such as emergency_stop@5; may be repeated",
             metavar="NAME@SECONDS",
+            in_target=True,
+        ),
+    )
+    real_time: str = field(
+        default="fri",
+        metadata=_about(
+            'real-time priority: "fri": while an FRI session is open; "on": always; "off": never',
+            metavar="fri|on|off",
             in_target=True,
         ),
     )
@@ -107,6 +134,9 @@ class SimulatorOptions:
     )
     trace: Path | None = field(
         default=None, metadata=_about("file for the state of the plant after each tick (0.5 MB/s)")
+    )
+    positions: Path | None = field(
+        default=None, metadata=_about("file that always has the positions of arm and scene, for the view")
     )
     parent_pipe: bool = field(
         default=False,

@@ -19,6 +19,7 @@ from heptarm.values.arrays import Array, Value, frozen
 from heptarm.values.io import SignalValues
 from heptarm.values.mode.mode import HandGuiding, Mode
 from heptarm.values.pose import Pose, Redundancy
+from heptarm.values.text import columns, fixed, lines
 
 _T = TypeVar("_T")
 
@@ -171,6 +172,13 @@ class MotionStatus(Value):
     remaining: float = nan
     override: float = 1.0
 
+    def __str__(self) -> str:
+        """One line."""
+        if not self.active:
+            return f"none, {self.queued} waiting, override {self.override:.0%}"
+        progress = "" if self.progress != self.progress else f", {self.progress:.0%}"
+        return f"{self.id}, item {self.item}{progress}, {self.queued} waiting, override {self.override:.0%}"
+
     @property
     def active(self) -> bool:
         """Whether a program runs."""
@@ -214,6 +222,11 @@ class Safety(Value):
     position_referenced: bool = False
     recovery_required: bool = False
     hand_guiding_switch: bool = False
+
+    def __str__(self) -> str:
+        """One line."""
+        ready = "ready to move" if self.ready_to_move else "not ready"
+        return ", ".join((self.mode.value.upper(), ready, *self.stops))
 
     @property
     def stops(self) -> tuple[str, ...]:
@@ -293,6 +306,38 @@ class State(Value):
     groups: Groups = Groups()
     sampled: int = 0
     clock: Callable[[], int] | None = field(default=None, repr=False, compare=False)
+
+    def __str__(self) -> str:
+        """A few aligned lines: degrees and millimetres, with SI units beside them."""
+        groups = self.groups
+        rows: dict[str, str] = {}
+        if groups.joints is not None or groups.torques is not None:
+            rows["joint"] = "".join(f"{f'A{i + 1}':>8}" for i in range(7))
+        if groups.joints is not None:
+            rows["q [deg]"] = columns(np.degrees(self.q), 2)
+            rows["q [rad]"] = columns(self.q, 4)
+            rows["dq [deg/s]"] = columns(np.degrees(self.dq), 2)
+        if groups.torques is not None:
+            rows["tau [Nm]"] = columns(self.tau, 2)
+            rows["tau_ext [Nm]"] = columns(self.tau_ext, 2)
+        if groups.pose is not None:
+            rows["pose"] = str(self.pose)
+        if groups.wrench is not None:
+            force, torque = (
+                " ".join(fixed(v, 2) for v in one) for one in (self.wrench.force, self.wrench.torque)
+            )
+            rows["wrench"] = f"force {force} N   torque {torque} Nm"
+        if groups.motion is not None:
+            rows["motion"] = str(groups.motion)
+        if groups.safety is not None:
+            rows["safety"] = str(groups.safety)
+        if groups.mode is not None:
+            attached = ", ".join(part for part in (self.tool, self.workpiece) if part) or "no tool"
+            rows["control"] = f"{self.mode!r}, {attached}, motion frame {self.frame}"
+        if groups.io is not None:
+            rows["io"] = str(groups.io)
+        age = "" if self.clock is None else f", {fixed(self.age * 1e3, 1)} ms old"
+        return lines(f"State at {self.stamp * 1e-9:.3f} s of the cabinet{age}", rows)
 
     def with_groups(self, **groups: Any) -> State:
         """The same state with other contents of some groups, by their names."""

@@ -23,6 +23,7 @@ from heptarm.values.arrays import Array, Value, array, shown, within
 from heptarm.values.frames import BASE, FLANGE, SEPARATOR, TOOL
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.robot import Body
+from heptarm.values.text import lines
 
 #: Heaviest tool [kg], and how far its centre of mass may be from the flange along each axis [m].
 HEAVIEST = 50.0
@@ -60,6 +61,16 @@ class _Carried(Value):
             within(value, f"com[{index}]", -FARTHEST, FARTHEST, unit="m")
         _set(self, "inertia", Body(self.mass, self.com, inertia=array(inertia, 6, "inertia")).inertia)
         _set(self, "frames", _frames(tcp, {} if frames is None else frames))
+
+    def __str__(self) -> str:
+        """Name, load data and frames, a line each."""
+        rows = {
+            "mass": f"{self.mass:g} kg",
+            "com": " ".join(f"{v * 1e3:.1f}" for v in self.com) + " mm from the flange",
+            "inertia": " ".join(f"{v:.4g}" for v in self.inertia) + " kg m² (xx yy zz xy xz yz)",
+        }
+        frames = {name: str(pose) for name, pose in self.frames}
+        return lines(f"{type(self).__name__} {self.name}", rows | frames)
 
     @property
     def body(self) -> Body:

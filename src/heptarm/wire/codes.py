@@ -87,7 +87,7 @@ MEANINGS: dict[int, Meaning] = {
     60: Meaning('NotReady', 'the robot is not ready to move', 'see the safety state'),
     61: Meaning('NeedsOperator', 'the operator has to act at the smartPAD', 'follow the steps in the message'),
     62: Meaning('SafetyStop', 'a safety function stopped the robot', 'clear its cause, then recover'),
-    63: Meaning('ConnectionLost', 'the controlling client was lost; the arm was stopped', 'connect again and take control'),
+    63: Meaning('ConnectionLost', 'the controlling client was lost; the arm was stopped', 'connect again and take control; a client that is busy for longer needs a longer watchdog: connect(..., watchdog=2.0)'),
     64: Meaning('Starved', 'no servo target arrived within its watchdog time', 'send targets more often, or allow a longer watchdog time'),
     70: Meaning('MotionAborted', 'the cabinet application met an unexpected error', "report it with the cabinet's log"),
 }

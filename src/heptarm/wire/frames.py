@@ -110,13 +110,11 @@ class FrameReader:
         if len(buffer) < body:
             # refuse a wrong magic at once: a peer of another protocol may never send a complete header
             if len(buffer) >= start + 2 and int.from_bytes(buffer[start : start + 2], "big") != MAGIC:
-                raise _bad(
-                    f"a frame must begin with {MAGIC:04x}, got {bytes(buffer[start : start + 2]).hex()}"
-                )
+                raise _stranger(bytes(buffer[start:]))
             return None
         magic, version, flags, type_, length, seq, request, time = HEADER.unpack_from(buffer, start)
         if magic != MAGIC:
-            raise _bad(f"a frame must begin with {MAGIC:04x}, got {magic:04x}")
+            raise _stranger(bytes(buffer[start : start + HEADER.size]))
         if flags > _TAGGED:
             raise _bad(f"the flags of a frame must be 0 or 1, got {flags:#04x}")
         if length > MAX_BODY:
@@ -151,6 +149,18 @@ def forged(text: str) -> RemoteProtocolError:
         code=int(Code.FORGED_FRAME),
         hint="check who else is on the network, then connect again",
     )
+
+
+#: How others begin, and what they are.
+_STRANGERS = {b"HTTP/": "a web server (HTTP)", b"SSH-": "an SSH server", b"GET ": "a web browser (HTTP)"}
+
+
+def _stranger(begin: bytes) -> RemoteProtocolError:
+    """The error of a peer that does not speak heptarm, named where its first bytes show what it is."""
+    for mark, name in _STRANGERS.items():
+        if begin[: len(mark)] == mark[: len(begin)]:
+            return _bad(f"{name} is on this port, not heptarm")
+    return _bad(f"a frame must begin with {MAGIC:04x}, got {begin[:2].hex()}")
 
 
 def _bad(text: str) -> RemoteProtocolError:

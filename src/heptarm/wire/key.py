@@ -13,6 +13,10 @@ from heptarm.wire.messages import NONCE, TAG
 
 _CLIENT, _CABINET = b"heptarm client\0", b"heptarm cabinet\0"
 _UP, _DOWN = b"heptarm client to cabinet\x01", b"heptarm cabinet to client\x01"
+_UP_DATAGRAMS, _DOWN_DATAGRAMS = (
+    b"heptarm client to cabinet datagrams",
+    b"heptarm cabinet to client datagrams",
+)
 _PART = struct.Struct(">HI")
 _ROUND = struct.Struct(">I")
 _NO_MAC = bytes(4)
@@ -51,9 +55,27 @@ class KeyExchange:
 
     def tags(self, client_nonce: bytes, cabinet_nonce: bytes) -> tuple[FrameTag, FrameTag]:
         """Derive the keys of the session; returns the tags of the client's frames and of the cabinet's."""
-        secret = hmac.digest(client_nonce + cabinet_nonce, self._key, "sha256")
+        secret = self.secret(client_nonce, cabinet_nonce)
         up, down = (hmac.digest(secret, label, "sha256") for label in (_UP, _DOWN))
         return FrameTag(up), FrameTag(down)
+
+    def secret(self, client_nonce: bytes, cabinet_nonce: bytes) -> bytes:
+        """The secret of which all keys of the session follow."""
+        return hmac.digest(client_nonce + cabinet_nonce, self._key, "sha256")
+
+
+def datagram_tags(secret: bytes | None, token: bytes) -> tuple[FrameTag, FrameTag]:
+    """Derive the keys of a session's datagrams; returns the tags of the client's and of the cabinet's.
+
+    Args:
+        secret: of the session; None: it has no key, and all depends on the token.
+        token: that the cabinet sent in the session.
+    """
+    base = token if secret is None else secret
+    up, down = (
+        hmac.digest(base, label + token + b"\x01", "sha256") for label in (_UP_DATAGRAMS, _DOWN_DATAGRAMS)
+    )
+    return FrameTag(up), FrameTag(down)
 
 
 def without_mac(welcome: bytes) -> bytes:

@@ -23,6 +23,8 @@ PORT = 30001
 MAGIC = 0x4837
 NONCE = 32
 TAG = 16
+TOKEN = 32
+MAX_DATAGRAM = 1400
 MAX_BODY = 1048576
 HEADER = Struct(">HBBHIIIq")
 _MASK = Struct(">H")
@@ -259,9 +261,9 @@ class Redundancy:
 
     RANGES: ClassVar[dict[str, tuple[float, float]]] = {"e1": (-1000.0, 1000.0)}
 
-    e1: float
-    status: int
-    turn: int
+    e1: float = nan
+    status: int = -1
+    turn: int = -1
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_Redundancy_0.pack(self.e1, self.status, self.turn))
@@ -470,7 +472,7 @@ class PtpPose:
     """Point to point in joint space, to a pose of the motion frame."""
 
     target: Pose
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
     dynamics: JointDynamics = JointDynamics()
     blending: Blending = Blending()
 
@@ -502,7 +504,7 @@ class Lin:
     """Straight line of the motion frame."""
 
     target: Pose
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
     dynamics: CartesianDynamics = CartesianDynamics()
     joints: JointDynamics = JointDynamics()
     blending: Blending = Blending()
@@ -583,7 +585,7 @@ class Circ:
 
     via: Pose
     end: Pose
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
     dynamics: CartesianDynamics = CartesianDynamics()
     joints: JointDynamics = JointDynamics()
     blending: Blending = Blending()
@@ -1567,6 +1569,52 @@ class Condition:
             its_nodes._check(f"{path}nodes[{index}].")
 
 
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Relax:
+    """Is compliant for a moment, then holds the position that it has reached."""
+
+
+    def _write(self, out: list[bytes]) -> None:
+        pass
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Relax, int]:
+        return cls(), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+
+_Retreat_0 = Struct(">dd")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Retreat:
+    """Moves back along the joint positions that it has passed, then holds the position."""
+
+    RANGES: ClassVar[dict[str, tuple[float, float]]] = {"distance": (0.0, 0.5), "speed": (0.0, 1.0)}
+
+    distance: float
+    speed: float = 0.1
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_Retreat_0.pack(self.distance, self.speed))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[Retreat, int]:
+        v = codec.unpack(_Retreat_0, data, pos)
+        pos += _Retreat_0.size
+        distance = v[0]
+        speed = v[1]
+        return cls(distance=distance, speed=speed), pos
+
+    def _check(self, path: str) -> None:
+        codec.check(self.distance, path + "distance", 0.0, 0.5, True, False)
+        codec.check(self.speed, path + "speed", 0.0, 1.0, True, False)
+
+
 _SetSignal_0 = Struct(">d")
 
 
@@ -1737,17 +1785,39 @@ def _read_Mode(data: bytes, pos: int) -> tuple[Mode, int]:
     raise DecodeError(f"Mode has tag {tag}; legal are [1, 2, 3, 4, 5, 6]")
 
 
+Reaction: TypeAlias = Relax | Retreat
+_Reaction_TAGS = {
+    Relax: 1,
+    Retreat: 2,
+}
+
+
+def _write_Reaction(value: Reaction, out: list[bytes]) -> None:
+    out.append(bytes((_Reaction_TAGS[type(value)],)))
+    value._write(out)
+
+
+def _read_Reaction(data: bytes, pos: int) -> tuple[Reaction, int]:
+    tag, pos = codec.read_tag(data, pos)
+    if tag == 1:
+        return Relax._read(data, pos)
+    if tag == 2:
+        return Retreat._read(data, pos)
+    raise DecodeError(f"Reaction has tag {tag}; legal are [1, 2]")
+
+
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Item:
-    """A motion of a program with its control mode, break condition and triggers."""
+    """A motion of a program with its control mode, break condition and reaction to it, and triggers."""
 
     motion: Motion
     frame: str = ""
     mode: Mode | None = None
     until: Condition = Condition()
     triggers: tuple[Trigger, ...] = ()
+    reaction: Reaction | None = None
 
     def _write(self, out: list[bytes]) -> None:
         _write_Motion(self.motion, out)
@@ -1761,6 +1831,11 @@ class Item:
         out.append(codec.put_count(len(self.triggers)))
         for one_triggers in self.triggers:
             one_triggers._write(out)
+        if self.reaction is None:
+            out.append(b"\x00")
+        else:
+            out.append(b"\x01")
+            _write_Reaction(self.reaction, out)
 
     @classmethod
     def _read(cls, data: bytes, pos: int) -> tuple[Item, int]:
@@ -1777,7 +1852,11 @@ class Item:
             one_triggers, pos = Trigger._read(data, pos)
             triggers_list.append(one_triggers)
         triggers = tuple(triggers_list)
-        return cls(motion=motion, frame=frame, mode=mode, until=until, triggers=triggers), pos
+        present, pos = codec.read_flag(data, pos)
+        reaction: Reaction | None = None
+        if present:
+            reaction, pos = _read_Reaction(data, pos)
+        return cls(motion=motion, frame=frame, mode=mode, until=until, triggers=triggers, reaction=reaction), pos
 
     def _check(self, path: str) -> None:
         self.motion._check(path + "motion.")
@@ -1788,6 +1867,8 @@ class Item:
         codec.check_length(len(self.triggers), path + "triggers", 0, 16)
         for index, its_triggers in enumerate(self.triggers):
             its_triggers._check(f"{path}triggers[{index}].")
+        if self.reaction is not None:
+            self.reaction._check(path + "reaction.")
 
 
 _RobotInfo_0 = Struct(">7d7d7d7d")
@@ -2008,7 +2089,7 @@ class PoseState:
     quat: tuple[float, ...]
     xyz_cmd: tuple[float, ...]
     quat_cmd: tuple[float, ...]
-    redundancy: Redundancy
+    redundancy: Redundancy = Redundancy()
 
     def _write(self, out: list[bytes]) -> None:
         out.append(_PoseState_0.pack(self.stamp, *self.xyz, *self.quat, *self.xyz_cmd, *self.quat_cmd))
@@ -2884,6 +2965,48 @@ class Rejected:
         self._check("")
 
 
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DatagramToken:
+    """Answer to OpenDatagrams."""
+
+    TYPE: ClassVar[int] = 18
+    KIND: ClassVar[str] = "answer"
+    SOURCE: ClassVar[str] = "cabinet"
+    ROLE: ClassVar[str] = "any"
+
+    token: bytes
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(codec.put_bytes(self.token))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[DatagramToken, int]:
+        token, pos = codec.read_bytes(data, pos)
+        return cls(token=token), pos
+
+    def _check(self, path: str) -> None:
+        codec.check_length(len(self.token), path + "token", 32, 32)
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> DatagramToken:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "DatagramToken")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
 _TakeControl_0 = Struct(">dB")
 
 
@@ -3286,6 +3409,46 @@ class SetOverride:
         """Read one body, all of it."""
         value, pos = cls._read(data, 0)
         codec.end(data, pos, "SetOverride")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OpenDatagrams:
+    """Opens datagrams beside the session, see [datagrams](#datagrams); answered by DatagramToken. A second request replaces the token."""
+
+    TYPE: ClassVar[int] = 41
+    KIND: ClassVar[str] = "request"
+    SOURCE: ClassVar[str] = "client"
+    ROLE: ClassVar[str] = "any"
+
+
+    def _write(self, out: list[bytes]) -> None:
+        pass
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[OpenDatagrams, int]:
+        return cls(), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> OpenDatagrams:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "OpenDatagrams")
         return value
 
     def validate(self) -> None:
@@ -3751,6 +3914,103 @@ class ProcessData:
         """Read one body, all of it."""
         value, pos = cls._read(data, 0)
         codec.end(data, pos, "ProcessData")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GetDatagramStatistics:
+    """Reads what the cabinet has counted of this session's datagrams; answered by DatagramStatistics."""
+
+    TYPE: ClassVar[int] = 57
+    KIND: ClassVar[str] = "request"
+    SOURCE: ClassVar[str] = "client"
+    ROLE: ClassVar[str] = "any"
+
+
+    def _write(self, out: list[bytes]) -> None:
+        pass
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[GetDatagramStatistics, int]:
+        return cls(), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> GetDatagramStatistics:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "GetDatagramStatistics")
+        return value
+
+    def validate(self) -> None:
+        """Raise Violation for a field outside its range."""
+        self._check("")
+
+
+_DatagramStatistics_0 = Struct(">IIIIIII")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DatagramStatistics:
+    """The datagrams of this session since its last OpenDatagrams."""
+
+    TYPE: ClassVar[int] = 58
+    KIND: ClassVar[str] = "answer"
+    SOURCE: ClassVar[str] = "cabinet"
+    ROLE: ClassVar[str] = "any"
+
+    accepted: int
+    old: int
+    late: int
+    forged: int
+    damaged: int
+    strange: int
+    sent: int
+
+    def _write(self, out: list[bytes]) -> None:
+        out.append(_DatagramStatistics_0.pack(self.accepted, self.old, self.late, self.forged, self.damaged, self.strange, self.sent))
+
+    @classmethod
+    def _read(cls, data: bytes, pos: int) -> tuple[DatagramStatistics, int]:
+        v = codec.unpack(_DatagramStatistics_0, data, pos)
+        pos += _DatagramStatistics_0.size
+        accepted = v[0]
+        old = v[1]
+        late = v[2]
+        forged = v[3]
+        damaged = v[4]
+        strange = v[5]
+        sent = v[6]
+        return cls(accepted=accepted, old=old, late=late, forged=forged, damaged=damaged, strange=strange, sent=sent), pos
+
+    def _check(self, path: str) -> None:
+        pass
+
+    def encode(self) -> bytes:
+        """The body."""
+        out: list[bytes] = []
+        self._write(out)
+        return b"".join(out)
+
+    @classmethod
+    def decode(cls, data: bytes) -> DatagramStatistics:
+        """Read one body, all of it."""
+        value, pos = cls._read(data, 0)
+        codec.end(data, pos, "DatagramStatistics")
         return value
 
     def validate(self) -> None:
@@ -4527,7 +4787,7 @@ class TriggerFired:
         self._check("")
 
 
-_MotionFinished_0 = Struct(">IHBidd7dH")
+_MotionFinished_0 = Struct(">IHBidd7dddH")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -4546,11 +4806,13 @@ class MotionFinished:
     residual: float
     duration: float
     q: tuple[float, ...]
+    peak_force: float = nan
+    rest_force: float = nan
     code: int
     text: str = ""
 
     def _write(self, out: list[bytes]) -> None:
-        out.append(_MotionFinished_0.pack(self.id, self.item, self.cause, self.fired, self.residual, self.duration, *self.q, self.code))
+        out.append(_MotionFinished_0.pack(self.id, self.item, self.cause, self.fired, self.residual, self.duration, *self.q, self.peak_force, self.rest_force, self.code))
         out.append(codec.put_str(self.text))
 
     @classmethod
@@ -4564,14 +4826,18 @@ class MotionFinished:
         residual = v[4]
         duration = v[5]
         q = v[6:13]
-        code = v[13]
+        peak_force = v[13]
+        rest_force = v[14]
+        code = v[15]
         text, pos = codec.read_str(data, pos)
-        return cls(id=id, item=item, cause=cause, fired=fired, residual=residual, duration=duration, q=q, code=code, text=text), pos
+        return cls(id=id, item=item, cause=cause, fired=fired, residual=residual, duration=duration, q=q, peak_force=peak_force, rest_force=rest_force, code=code, text=text), pos
 
     def _check(self, path: str) -> None:
         codec.check(self.residual, path + "residual", -inf, inf, False, True)
         codec.check(self.duration, path + "duration", -inf, inf, False, False)
         codec.check_array(self.q, path + "q", -inf, inf, False, False)
+        codec.check(self.peak_force, path + "peak_force", -inf, inf, False, True)
+        codec.check(self.rest_force, path + "rest_force", -inf, inf, False, True)
 
     def encode(self) -> bytes:
         """The body."""
@@ -5026,7 +5292,7 @@ class State:
         self._check("")
 
 
-Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
+Message: TypeAlias = Hello | Challenge | Proof | Welcome | Refusal | Ping | Pong | Goodbye | Halt | Halted | Accepted | Rejected | DatagramToken | TakeControl | ReleaseControl | Subscribe | Run | Cancel | Stop | Pause | Resume | SetOverride | OpenDatagrams | Recover | DefineTool | AttachTool | AttachLoad | SetSignals | ShowMessage | SetKey | GetProcessData | SetProcessData | ProcessData | GetDatagramStatistics | DatagramStatistics | ServoOpen | ServoJoints | ServoJointsVelocity | ServoPose | ServoSettings | ServoClose | ServoStatus | FriOpen | FriClose | FriChanged | MotionStarted | ItemReached | TriggerFired | MotionFinished | ControlChanged | SafetyChanged | KeyPressed | Notice | ConditionFired | SegmentReached | State
 OneWay: TypeAlias = ServoJoints | ServoJointsVelocity | ServoPose
 
 #: Message classes by id.
@@ -5043,6 +5309,7 @@ MESSAGES: dict[int, type[Message]] = {
     10: Halted,
     16: Accepted,
     17: Rejected,
+    18: DatagramToken,
     32: TakeControl,
     33: ReleaseControl,
     34: Subscribe,
@@ -5052,6 +5319,7 @@ MESSAGES: dict[int, type[Message]] = {
     38: Pause,
     39: Resume,
     40: SetOverride,
+    41: OpenDatagrams,
     42: Recover,
     48: DefineTool,
     49: AttachTool,
@@ -5062,6 +5330,8 @@ MESSAGES: dict[int, type[Message]] = {
     54: GetProcessData,
     55: SetProcessData,
     56: ProcessData,
+    57: GetDatagramStatistics,
+    58: DatagramStatistics,
     64: ServoOpen,
     65: ServoJoints,
     66: ServoJointsVelocity,
@@ -5085,3 +5355,53 @@ MESSAGES: dict[int, type[Message]] = {
     112: State,
 }
 ONE_WAY: tuple[type[OneWay], ...] = (ServoJoints, ServoJointsVelocity, ServoPose,)
+#: Messages that a datagram may contain.
+DATAGRAMS: tuple[type[Message], ...] = (Ping, Pong, Cancel, Stop, ServoJoints, ServoJointsVelocity, ServoPose, State,)
+
+#: The first groups of a state's body, those of fixed size: name, bit of the mask, and its fields in order, each
+#: with its name, its type in numpy's notation and its number of entries. The mask, two bytes, is before them.
+STATE_LAYOUT: tuple[tuple[str, int, tuple[tuple[str, str, int], ...]], ...] = (
+    ("joints", 1, (
+        ("stamp", ">i8", 1),
+        ("q", ">f8", 7),
+        ("q_cmd", ">f8", 7),
+        ("dq", ">f8", 7),
+    )),
+    ("torques", 2, (
+        ("stamp", ">i8", 1),
+        ("tau", ">f8", 7),
+        ("tau_ext", ">f8", 7),
+        ("tau_cmd", ">f8", 7),
+    )),
+    ("pose", 4, (
+        ("stamp", ">i8", 1),
+        ("xyz", ">f8", 3),
+        ("quat", ">f8", 4),
+        ("xyz_cmd", ">f8", 3),
+        ("quat_cmd", ">f8", 4),
+        ("e1", ">f8", 1),
+        ("status", ">i4", 1),
+        ("turn", ">i4", 1),
+    )),
+    ("wrench", 8, (
+        ("stamp", ">i8", 1),
+        ("force", ">f8", 3),
+        ("torque", ">f8", 3),
+        ("force_inaccuracy", ">f8", 3),
+        ("torque_inaccuracy", ">f8", 3),
+    )),
+    ("motion", 16, (
+        ("stamp", ">i8", 1),
+        ("motion", ">u4", 1),
+        ("item", ">u2", 1),
+        ("queued", ">u2", 1),
+        ("progress", ">f8", 1),
+        ("remaining", ">f8", 1),
+        ("override", ">f8", 1),
+    )),
+    ("safety", 32, (
+        ("stamp", ">i8", 1),
+        ("bits", ">u2", 1),
+        ("mode", ">u1", 1),
+    )),
+)

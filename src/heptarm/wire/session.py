@@ -21,8 +21,9 @@ from typing import NamedTuple
 from heptarm.errors import LocalProtocolError, RemoteProtocolError
 from heptarm.wire.codec import DecodeError
 from heptarm.wire.codes import Code
+from heptarm.wire.datagrams import Datagrams
 from heptarm.wire.frames import Frame, FrameReader, forged, pack, packer
-from heptarm.wire.key import FrameTag, KeyExchange, without_mac
+from heptarm.wire.key import FrameTag, KeyExchange, datagram_tags, without_mac
 from heptarm.wire.messages import (
     MAJOR,
     MESSAGES,
@@ -170,7 +171,9 @@ class Session:
         self._after(kind, after, request, body)
         return data
 
-    def send_numbers(self, kind: type[OneWay], numbers: Iterable[float], *, time: int) -> bytes:
+    def send_numbers(
+        self, kind: type[OneWay], numbers: Iterable[float], *, time: int, number: int = 0
+    ) -> bytes:
         """Pack a oneway message to send, directly from the numbers of its fields; same bytes as `send`.
 
         For streams: between two messages of a stream the caches get cold, so every step costs time.
@@ -179,20 +182,37 @@ class Session:
             kind: class of the message.
             numbers: its fields, in order.
             time: this side's clock [ns].
+            number: of the target in the session, if it is also sent as datagram; otherwise 0.
 
         Raises:
             LocalProtocolError: the message is illegal in this state; nothing has changed.
         """
-        data = self.pack_numbers(kind, numbers, time=time)
+        data = self.pack_numbers(kind, numbers, time=time, number=number)
         self._count_sent()
         return data
 
-    def pack_numbers(self, kind: type[OneWay], numbers: Iterable[float], *, time: int) -> bytes:
+    def pack_numbers(
+        self, kind: type[OneWay], numbers: Iterable[float], *, time: int, number: int = 0
+    ) -> bytes:
         """Pack as `send_numbers` does, without counting the message as sent."""
         pack = self._packers.get(kind)
         if pack is None:
             raise self._illegal(kind)
-        return pack(self._sent, 0, time, *numbers)
+        return pack(self._sent, number, time, *numbers)
+
+    def datagrams(self, session: int, token: bytes) -> Datagrams:
+        """This side's end of the datagrams beside the session.
+
+        Args:
+            session: number of the session, of Welcome.
+            token: of DatagramToken.
+        """
+        secret = None
+        if self._exchange is not None:
+            nonces = self._nonce, self._other_nonce
+            secret = self._exchange.secret(*(nonces if self._side is Side.CLIENT else nonces[::-1]))
+        tags = datagram_tags(secret, token)
+        return Datagrams(session, self._source, *(tags if self._side is Side.CLIENT else tags[::-1]))
 
     def hello(self, *, name: str, version: str = "") -> Hello:
         """Make the client's first message; cut its name at 64 bytes."""
@@ -268,7 +288,7 @@ class Session:
             raise _broken(Code.UNEXPECTED_MESSAGE, f"a {kind.__name__} came in state {self._state.value!r}")
         # a Rejected for a message that is no request has no id
         is_numbered = kind.KIND in ("request", "answer") and (kind is not Rejected or frame.request != 0)
-        if is_numbered != (frame.request != 0):
+        if is_numbered != (frame.request != 0) and kind.KIND != "oneway":  # a target may have a number
             raise _broken(Code.UNEXPECTED_MESSAGE, f"a {kind.__name__} with request id {frame.request}")
         if kind.KIND == "answer" and is_numbered and frame.request not in self._waiting:
             raise _broken(

@@ -118,8 +118,8 @@ public class Alone extends RoboticsAPIApplication {
     }
 
     private void modes() throws Exception {
-        Impedance soft = Impedance.cartesian(1000, 100).damping(0.9).nullSpace(20, 0.7).along("base");
-        MotionHandle hold = arm.start(Move.hold(Double.NaN).mode(soft.mode()));
+        Impedance compliant = Impedance.cartesian(1000, 100).damping(0.9).nullSpace(20, 0.7).along("base");
+        MotionHandle hold = arm.start(Move.hold(Double.NaN).mode(compliant.mode()));
         while (!(arm.mode() instanceof CartesianImpedance)) {
             Thread.sleep(5);
         }
@@ -129,7 +129,7 @@ public class Alone extends RoboticsAPIApplication {
         say("joints as springs", arm.move(Move.linRel(0, 0, -0.02).mode(Impedance.joints(800))).cause == Cause.FINISHED);
         double[] none = new double[6];
         double[] along = {5, 0, 0, 0, 0, 0};
-        say("a pattern", arm.move(Move.hold(0.2).mode(soft.sine(along, along, none))).cause == Cause.FINISHED);
+        say("a pattern", arm.move(Move.hold(0.2).mode(compliant.sine(along, along, none))).cause == Cause.FINISHED);
         say("a stiffness that is none", code(() -> arm.move(HOME.mode(Impedance.cartesian(9000, 100).mode()))) == Code.OUT_OF_RANGE);
         arm.move(HOME);
     }

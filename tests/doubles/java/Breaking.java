@@ -66,7 +66,7 @@ public class Breaking extends RoboticsAPIApplication {
         double before = height();
         IMotionContainer down = lbr.move(linRel(0, 0, -500, lbr.getRootFrame()).setCartVelocity(25).breakWhen(never).breakWhen(touch));
         say("a line down stops on the table and returns", !down.hasError() && height() > 290 && height() < before - 100);
-        say("it says which condition fired", down.getFiredBreakConditionInfo() != null && down.hasFired(touch)
+        say("it reports which condition fired", down.getFiredBreakConditionInfo() != null && down.hasFired(touch)
                 && !down.hasFired(never) && down.getFiredBreakConditionInfo().getFiredCondition() == touch);
         double pressed = lbr.getExternalForceTorque(lbr.getFlange(), lbr.getRootFrame()).getForce().getZ();
         say("the table pushes back", pressed > 8 && pressed < 200);
@@ -82,18 +82,18 @@ public class Breaking extends RoboticsAPIApplication {
         observers.removeConditionObserver(observer);
         say("a removed one hears nothing", !observer.isEnabled() && observers.getRegisteredConditionObservers().isEmpty());
 
-        final IMotionContainer[] told = new IMotionContainer[1];
+        final IMotionContainer[] reported = new IMotionContainer[1];
         final double[] at = new double[1];
         double start = height();
         ICondition half = new MotionPathCondition(ReferenceType.START, 50, 0);
         IMotionContainer triggered = lbr.move(linRel(0, 0, 100, lbr.getRootFrame()).setCartVelocity(100)
                 .triggerWhen(half, new ICallbackAction() {
                     public void onTriggerFired(IFiredTriggerInfo info) {
-                        told[0] = info.getMotionContainer();
+                        reported[0] = info.getMotionContainer();
                         at[0] = height();
                     }
                 }));
-        say("a trigger calls back on the way", told[0] == triggered && at[0] > start + 45 && at[0] < start + 99);
+        say("a trigger calls back on the way", reported[0] == triggered && at[0] > start + 45 && at[0] < start + 99);
         say("and the motion arrives", Math.abs(height() - start - 100) < 1 && triggered.hasFired(half));
         IMotionContainer short_ = lbr.move(linRel(0, 0, -100, lbr.getRootFrame()).setCartVelocity(100)
                 .breakWhen(new MotionPathCondition(ReferenceType.DEST, -30, 0)));
@@ -109,7 +109,7 @@ public class Breaking extends RoboticsAPIApplication {
         for (int i = 0; i < 3000 && rising.get() == 0; i++) { // listeners are called by a thread of their own
             ThreadUtil.milliSleep(10);
         }
-        say("an observer is told of what holds when it is enabled", rising.get() == 1);
+        say("an observer receives what holds when it is enabled", rising.get() == 1);
         int refused = 0;
         for (int i = 0; i < 4; i++) {
             try {

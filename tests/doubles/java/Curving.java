@@ -118,7 +118,7 @@ public class Curving extends RoboticsAPIApplication {
         for (int i = 0; i < 200 && heard.size() < 7; i++) {
             pause(5);
         }
-        say("its motions are told of in order", heard.toString().equals("[+0, -0, +1, -1, +2, -2, end]"));
+        say("its motions are reported in order", heard.toString().equals("[+0, -0, +1, -1, +2, -2, end]"));
 
         IMotionContainer cut = lbr.moveAsync(new MotionBatch(lin(at(0, 100, 0)).setBlendingRel(0.3),
                 lin(at(80, 100, 0)).setBlendingRel(0.3), lin(at(80, 0, 0)).setBlendingRel(0.3), lin(start)));

@@ -87,7 +87,7 @@ public class Gripping extends RoboticsAPIApplication {
         gripper.attachTo(lbr.getFlange());
         hold();
         weight = -lbr.getExternalForceTorque(lbr.getFlange(), World.Current.getRootFrame()).getForce().getZ();
-        say("a tool takes its share", Math.abs(weight - 9.81) < 0.3);
+        say("a tool takes its part", Math.abs(weight - 9.81) < 0.3);
         LoadData rest = new LoadData();
         rest.setMass(1.0);
         rest.setCenterOfMass(0, 0, 100 - 120);

@@ -120,7 +120,7 @@ public class Overlaying extends RoboticsAPIApplication implements IFRISessionLis
         for (int i = 0; i < 3000 && !seen.contains(FRISessionState.IDLE); i++) { // listeners are called by a thread of their own
             ThreadUtil.milliSleep(10);
         }
-        say("all states were told", seen.contains(FRISessionState.COMMANDING_WAIT)
+        say("all states were reported", seen.contains(FRISessionState.COMMANDING_WAIT)
                 && seen.contains(FRISessionState.COMMANDING_ACTIVE) && seen.contains(FRISessionState.IDLE));
         configuration.setPortOnRemote(port + 1);
         boolean late = false;

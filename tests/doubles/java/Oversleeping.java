@@ -11,7 +11,7 @@ import com.kuka.roboticsAPI.deviceModel.LBR;
 
 import heptarm.doubles.plant.PlantClock;
 
-/** Looks at a moving arm every 10 ms and sometimes wakes 0.3 s late; what it sees belongs to the time that it is told. */
+/** Looks at a moving arm every 10 ms and sometimes wakes 0.3 s late; what it sees belongs to the time stamp beside it. */
 public class Oversleeping extends RoboticsAPIApplication {
     private static final long STEP = 10000000L;
 

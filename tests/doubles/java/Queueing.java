@@ -62,8 +62,8 @@ public class Queueing extends RoboticsAPIApplication implements IErrorHandler, I
         lbr.move(ptp(0.0, 0.5, 0.0, -1.2, 0.0, 0.9, 0.0));
         say("nothing is active after a move", service.getActiveMotionContainerCount() == 0);
 
-        IMotionContainer told = lbr.moveAsync(ptp(0.2, 0.5, 0.0, -1.2, 0.0, 0.9, 0.0), this);
-        told.await();
+        IMotionContainer reported = lbr.moveAsync(ptp(0.2, 0.5, 0.0, -1.2, 0.0, 0.9, 0.0), this);
+        reported.await();
         for (int i = 0; i < 100 && !events.contains("containerFinished"); i++) {
             ThreadUtil.milliSleep(10);
         }

@@ -95,11 +95,11 @@ public class Serving extends RoboticsAPIApplication implements IServoOnGoalReach
         runtime.updateWithRealtimeSystem();
         ThreadUtil.milliSleep(50);
         say("SmartServo arrives", isAt(there) && runtime.isDestinationReached());
-        say("the goal is told of", reached == 50);
+        say("the goal is reported", reached == 50);
         say("the destination can be read back", runtime.getCurrentJointDestination().isNearlyEqual(there, 1e-9));
         runtime.setDestination(there, new JointPosition(0, 0, 0, 0, 0, 0, 0.2));
         ThreadUtil.milliSleep(700);
-        say("a velocity leads a little further, then the arm rests", lbr.getCurrentJointPosition().get(6) > there.get(6) + 5e-3);
+        say("a velocity moves it a little further, then the arm rests", lbr.getCurrentJointPosition().get(6) > there.get(6) + 5e-3);
         Frame pose = lbr.getCurrentCartesianPosition(lbr.getFlange());
         pose.setY(pose.getY() + 50);
         runtime.setDestination(pose);
@@ -161,16 +161,16 @@ public class Serving extends RoboticsAPIApplication implements IServoOnGoalReach
         for (int i = 0; i < 150; i++) {
             ThreadUtil.milliSleep(10);
             Frame here = lbr.getCurrentCartesianPosition(lbr.getFlange());
-            double share = (here.getY() - start.getY()) / 60;
-            aside = Math.max(aside, Math.abs(here.getX() - start.getX() + 20 * share));
-            aside = Math.max(aside, Math.abs(here.getZ() - start.getZ() + 40 * share));
+            double fraction = (here.getY() - start.getY()) / 60;
+            aside = Math.max(aside, Math.abs(here.getX() - start.getX() + 20 * fraction));
+            aside = Math.max(aside, Math.abs(here.getZ() - start.getZ() + 40 * fraction));
         }
         runtime.updateWithRealtimeSystem();
         ThreadUtil.milliSleep(50);
         Frame here = lbr.getCurrentCartesianPosition(lbr.getFlange());
         say("SmartServoLIN arrives", here.distanceTo(there) < 0.5 && Math.abs(here.getAlphaRad() - there.getAlphaRad()) < 1e-3);
         say("on a straight line", aside < 1.0);
-        say("its goal is told of, too", runtime.isDestinationReached() && reached == 1);
+        say("its goal is reported, too", runtime.isDestinationReached() && reached == 1);
         say("and can be read back", runtime.getCurrentCartesianDestination(lbr.getFlange()).distanceTo(there) < 1e-3);
         boolean refused = false;
         try {
@@ -203,18 +203,18 @@ public class Serving extends RoboticsAPIApplication implements IServoOnGoalReach
 
     private void impedance() {
         say("impedance control may begin", ServoMotion.validateForImpedanceMode(lbr));
-        JointImpedanceControlMode soft = new JointImpedanceControlMode(300, 300, 300, 300, 300, 300, 300);
-        soft.setDampingForAllJoints(0.7);
+        JointImpedanceControlMode compliant = new JointImpedanceControlMode(300, 300, 300, 300, 300, 300, 300);
+        compliant.setDampingForAllJoints(0.7);
         JointPosition here = lbr.getCurrentJointPosition();
         SmartServo motion = new SmartServo(here);
-        motion.setMode(soft);
+        motion.setMode(compliant);
         lbr.moveAsync(motion);
         IServoRuntime runtime = motion.getRuntime();
         motion.getRuntime().setDestination(beside(here, 0.1));
-        soft.setStiffnessForAllJoints(100);
-        runtime.changeControlModeSettings(soft);
+        compliant.setStiffnessForAllJoints(100);
+        runtime.changeControlModeSettings(compliant);
         ThreadUtil.milliSleep(1500);
-        say("it follows softly", lbr.getCurrentJointPosition().isNearlyEqual(beside(here, 0.1), 5e-3));
+        say("it follows with compliance", lbr.getCurrentJointPosition().isNearlyEqual(beside(here, 0.1), 5e-3));
         boolean kept = false;
         try {
             runtime.changeControlModeSettings(new PositionControlMode());

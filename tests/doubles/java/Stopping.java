@@ -116,7 +116,7 @@ public class Stopping extends RoboticsAPIApplication implements IErrorHandler, I
                 return lbr.getOperationMode() == OperationMode.T2;
             }
         });
-        say("T2 wants the enabling switch", !lbr.isReadyToMove()
+        say("T2 needs the enabling switch", !lbr.isReadyToMove()
                 && lbr.getSafetyState().getEnablingDeviceState() == EnablingDeviceState.NONE);
         until(new Callable<Boolean>() {
             public Boolean call() {

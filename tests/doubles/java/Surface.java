@@ -16,7 +16,7 @@ import java.util.regex.Matcher;
 import java.util.regex.Pattern;
 
 /**
- * Says what of a list of classes and members an application could not use. Its input has a line for each class, "class NAME",
+ * Reports what of a list of classes and members an application could not use. Its input has a line for each class, "class NAME",
  * and below it its super types, "extends NAME", and its members as tests/doubles/surface.toml writes them.
  */
 public final class Surface {

@@ -329,9 +329,9 @@ public class Touring extends RoboticsAPIApplication implements ISunriseControlle
         SPL one = spl(there);
         SplineMotionCP<?>[] curve = {one, spl(here)};
         IMotionOverlay none = null;
-        IMotionControlMode soft = new JointImpedanceControlMode(2000, 2000, 2000, 2000, 2000, 2000, 2000);
+        IMotionControlMode compliant = new JointImpedanceControlMode(2000, 2000, 2000, 2000, 2000, 2000, 2000);
         AbstractMotionControlMode stiff = new PositionControlMode(true);
-        lbr.move(new Spline(curve).setCartVelocity(200).setMode(soft));
+        lbr.move(new Spline(curve).setCartVelocity(200).setMode(compliant));
         CartesianSineImpedanceControlMode shake = new CartesianSineImpedanceControlMode();
         CartSineImpBuilder direction = shake.parametrize(CartDOF.X);
         direction.setAmplitude(5).setFrequency(4).setStiffness(2000);
@@ -424,12 +424,12 @@ public class Touring extends RoboticsAPIApplication implements ISunriseControlle
         String[] begin = rows.get(0);
         String[] end = rows.get(rows.size() - 1);
         say("of every number", names.length == 1 + 4 * 7 + 4 * 3 && begin.length == names.length);
-        double way = 0.0;
+        double travel = 0.0;
         for (int i = names.length - 6; i < names.length - 3; i++) {
             double step = Double.parseDouble(end[i]) - Double.parseDouble(begin[i]);
-            way += step * step;
+            travel += step * step;
         }
-        say("from the trigger on", Math.sqrt(way) > 0.5 && Math.sqrt(way) < 61);
+        say("from the trigger on", Math.sqrt(travel) > 0.5 && Math.sqrt(travel) < 61);
         say("every five milliseconds", Math.abs(Double.parseDouble(rows.get(10)[0]) - 0.05) < 1e-9);
     }
 
@@ -488,7 +488,7 @@ public class Touring extends RoboticsAPIApplication implements ISunriseControlle
         }
     }
 
-    /** The test demands a protective stop while the arm moves, ends it, then answers the dialog. */
+    /** The test requests a protective stop while the arm moves, ends it, then answers the dialog. */
     private void stops() {
         heard.clear();
         IMotionContainer container = lbr.moveAsync(positionHold(null, 3, TimeUnit.SECONDS));
@@ -497,7 +497,7 @@ public class Touring extends RoboticsAPIApplication implements ISunriseControlle
             ThreadUtil.milliSleep(10);
         }
         container.await();
-        say("the stop and its end were told", heard.contains("ready false") && heard.contains("ready true")
+        say("the stop and its end were reported", heard.contains("ready false") && heard.contains("ready true")
                 && heard.contains("safety STOP1") && heard.contains("safety NOSTOP"));
         say("and the motion went on by itself", !container.hasError());
         IUserKeyBar bar = pad.createUserKeyBar("tour");

@@ -31,12 +31,12 @@ import com.kuka.roboticsAPI.motionModel.RobotMotion;
 import com.kuka.roboticsAPI.motionModel.SplineMotionCP;
 import com.kuka.roboticsAPI.motionModel.Spline;
 
-/** Triggers on motions of a batch and segments of a spline as a Sunrise programmer writes them, and who hears of what. */
+/** Triggers on motions of a batch and segments of a spline as a Sunrise programmer writes them, and who receives what. */
 public class Triggering extends RoboticsAPIApplication {
     @Inject
     private LBR lbr;
 
-    private final List<String> told = Collections.synchronizedList(new ArrayList<String>());
+    private final List<String> reported = Collections.synchronizedList(new ArrayList<String>());
     private PrintWriter out;
 
     @Override
@@ -59,13 +59,13 @@ public class Triggering extends RoboticsAPIApplication {
         first.triggerWhen(middle, say("first"));
         second.triggerWhen(late, say("second"));
         IMotionContainer batch = lbr.move(new MotionBatch(first, second).triggerWhen(whole, say("whole")));
-        for (int i = 0; i < 3000 && told.size() < 3; i++) { // listeners are called by a thread of their own
+        for (int i = 0; i < 3000 && reported.size() < 3; i++) { // listeners are called by a thread of their own
             ThreadUtil.milliSleep(10);
         }
-        say("triggers of a batch's motions go off in order", told.toString().equals("[first, second, whole]"));
+        say("triggers of a batch's motions go off in order", reported.toString().equals("[first, second, whole]"));
         say("the container knows", batch.hasFired(middle) && batch.hasFired(late) && batch.hasFired(whole));
 
-        told.clear();
+        reported.clear();
         Frame here = lbr.getCurrentCartesianPosition(lbr.getFlange());
         SplineMotionCP<?> curved = spl(moved(here, 0, -40, -20));
         SplineMotionCP<?> straight = lin(moved(here, 0, -80, -20));
@@ -79,25 +79,25 @@ public class Triggering extends RoboticsAPIApplication {
             }
 
             public void containerFinished(IMotionContainer finished) {
-                told.add("end");
+                reported.add("end");
             }
 
             public void motionFinished(IMotion motion) {
-                told.add("-" + index(motions, motion));
+                reported.add("-" + index(motions, motion));
             }
 
             public void motionStarted(IMotion motion) {
-                told.add("+" + index(motions, motion));
+                reported.add("+" + index(motions, motion));
             }
         });
         while (!block.isFinished()) {
             current[0] |= block.getCurrentMotion() == spline;
             ThreadUtil.milliSleep(20);
         }
-        for (int i = 0; i < 3000 && !told.contains("end"); i++) { // listeners are called by a thread of their own
+        for (int i = 0; i < 3000 && !reported.contains("end"); i++) { // listeners are called by a thread of their own
             ThreadUtil.milliSleep(10);
         }
-        say("a listener hears of segments", told.toString().equals("[+0, +1, curved, -1, +2, straight, -2, -0, end]"));
+        say("a listener receives segments", reported.toString().equals("[+0, +1, curved, -1, +2, straight, -2, -0, end]"));
         say("the motion is the spline", current[0] && block.getLastExecutedMotion() == spline);
         try {
             lbr.move(new MotionBatch(linRel(0, 10, 0).breakWhen(whole)));
@@ -127,13 +127,13 @@ public class Triggering extends RoboticsAPIApplication {
     private ICallbackAction say(final String name) {
         return new ICallbackAction() {
             public void onTriggerFired(IFiredTriggerInfo info) {
-                told.add(name);
+                reported.add(name);
             }
         };
     }
 
     private void say(String what, boolean is) {
-        out.println(what + " = " + is + (is ? "" : " " + told));
+        out.println(what + " = " + is + (is ? "" : " " + reported));
         out.flush();
     }
 }

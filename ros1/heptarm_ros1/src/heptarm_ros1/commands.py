@@ -19,9 +19,9 @@ class Commands:
     """Passes messages and requests to their handlers."""
 
     def __init__(self, context: NodeContext) -> None:
-        names = context.driver.configuration.values["names"]
+        values = context.driver.configuration.values
         topics, requests = TopicDispatcher(context), ServiceDispatcher(context)
-        self._subscribers = [_subscriber(topics, row) for row in topics_of(names)]
+        self._subscribers = [_subscriber(topics, row) for row in topics_of(values)]
         self._services = [_service(requests, row) for row in SERVICES]
 
     def destroy(self) -> None:

@@ -212,6 +212,9 @@ class HeptarmNode:
         for publisher in (*self._publishers, self._events):
             if publisher is not None and not rospy.is_shutdown():
                 publisher.state(state)
+        driver, states = self.driver, self._states
+        if driver is not None and states is not None and not rospy.is_shutdown():
+            states.controller_state(state, driver)
 
     def on_feedback(self, feedback: GoalFeedback) -> None:
         """Publish feedback of a goal."""

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import math
+
 import rospy
+from control_msgs.msg import JointTrajectoryControllerState
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, TransformStamped, WrenchStamped
 from heptarm_msgs.msg import RobotState, Status
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64
 from tf2_msgs.msg import TFMessage
 
 from heptarm.ros.interface.state_messages import StateMessages, TransformMessages
 from heptarm.ros.node.diagnostics import Diagnosis
+from heptarm.ros.node.driver import Driver
 from heptarm.ros.node.parameters import NodeConfiguration
+from heptarm.ros.trajectory.execution import speed_scaling
 from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
 from heptarm_ros1.convert import ROS
@@ -37,13 +43,27 @@ class StatePublisher:
             "state": publisher(RobotState, "~state"),
         }
         self._status = publisher(Status, "~status", latch=True)
+        self._controller = publisher(JointTrajectoryControllerState, "~controller_state")
+        self._scaling = publisher(Float64, "~speed_scaling", latch=True)
+        self._last_scaling = math.nan
         self._diagnostics = publisher(DiagnosticArray, "/diagnostics")
 
     def state(self, state: State) -> None:
-        """Publish a state."""
+        """Publish a state, and the fraction of its speed at which a trajectory is executed if that has changed."""
         full = self._states["state"].get_num_connections() > 0
         for name, message in self._messages.states(state, full=full):
             self._states[name].publish(message)
+        scaling = speed_scaling(state)
+        if scaling != self._last_scaling:
+            self._last_scaling = scaling
+            self._scaling.publish(Float64(data=scaling))
+
+    def controller_state(self, state: State, driver: Driver) -> None:
+        """Publish where the trajectory is at the time of the state that was published last, and what the arm does."""
+        if self._controller.get_num_connections() > 0:
+            sample = driver.at(1e-9 * state.sampled)
+            kind = JointTrajectoryControllerState
+            self._controller.publish(self._messages.controller_state(kind, state, sample))
 
     def status(self, diagnosis: Diagnosis, state: State | None, *, connected: bool, active: bool) -> None:
         """Publish the status if it has changed."""
@@ -60,7 +80,13 @@ class StatePublisher:
 
     def destroy(self) -> None:
         """Destroy the publishers."""
-        for one in (*self._states.values(), self._status, self._diagnostics):
+        for one in (
+            *self._states.values(),
+            self._status,
+            self._controller,
+            self._scaling,
+            self._diagnostics,
+        ):
             one.unregister()
 
 

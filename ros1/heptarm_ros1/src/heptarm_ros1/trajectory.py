@@ -97,8 +97,9 @@ class TrajectoryAction:
     def _feedback(self, value: GoalFeedback) -> None:
         with self._lock:
             handle = self._handles.get(value.number)
-        if handle is not None:
-            handle.publish_feedback(messages.feedback(ROS, value, self._joints))
+        driver = self._driver
+        if handle is not None and driver is not None:
+            handle.publish_feedback(messages.feedback(ROS, value, self._joints, now=driver.now))
 
     def _end(self, result: GoalResult) -> None:
         with self._lock:
@@ -106,6 +107,8 @@ class TrajectoryAction:
         text = f"goal {result.number} {result.outcome.value}: {result.text}"
         if result.code is ErrorCode.SUCCESSFUL:
             rospy.loginfo(text)
+        elif handle is None and result.outcome is GoalOutcome.PREEMPTED:
+            rospy.logdebug(text)  # replaced by a topic, as its clients intend
         else:
             rospy.logwarn(text)
         if handle is None:  # the trajectory came by topic

@@ -10,6 +10,7 @@ from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.errors import CommandRejected
 from heptarm.values.arrays import array, finite, instance, integer, within, word
 from heptarm.values.frames import check_name
+from heptarm.values.pose import Pose
 
 Fault: TypeAlias = Literal[
     "emergency_stop",
@@ -31,15 +32,28 @@ class Operator:
     def __init__(self, cabinet: PrivateCabinet) -> None:
         self._cabinet = cabinet
 
-    def do(self, words: str) -> None:
+    def do(self, words: str) -> str:
         """Carry out a command such as "push 0 0 -20 1.5".
+
+        Returns:
+            What it shows; "" if it shows nothing.
 
         Raises:
             CommandRejected: there is no such command; the text lists them.
         """
-        reply = self._cabinet.operate(instance(words, str, "words"))
-        if reply:
-            raise CommandRejected(reply, parameter="words", value=words)
+        error, shown = self._cabinet.operate(instance(words, str, "words"))
+        if error:
+            raise CommandRejected(error, parameter="words", value=words)
+        return shown
+
+    def where(self, body: str) -> Pose:
+        """Look where a body of the simulator's scene is: its pose in the base.
+
+        Raises:
+            CommandRejected: the scene has no such body; the text lists them.
+        """
+        x, y, z, *quat = (float(part) for part in self.do(f"where {check_name(body, 'body')}").split())
+        return Pose.of((x, y, z), quat)
 
     def fault(
         self,

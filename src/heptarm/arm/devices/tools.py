@@ -214,6 +214,14 @@ class Tooling:
             raise unknown(name, "frame", (*frames, BASE, *taught))
         return Pose.from_matrix(forward(self._connection.robot, state.q)) @ frames[name]
 
+    def on_flange(self, name: str) -> Pose:
+        """Pose of a frame on the flange in the flange frame; of an unknown one the flange itself."""
+        return (self._flange_frames() or {}).get(name, _ORIGIN)
+
+    def in_base(self, name: str) -> Pose | None:
+        """Pose of a fixed frame in the base: the base itself, or a taught frame; None: it is no fixed one."""
+        return _ORIGIN if name == BASE else self.taught.get(name)
+
     def wrench(self, state: State, name: str, axes: str) -> Wrench:
         """External force and torque at the origin of one frame in the axes of another; raises as `pose` does."""
         lever = self.pose(state, TOOL).xyz - self.pose(state, name).xyz

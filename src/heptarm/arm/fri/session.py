@@ -45,6 +45,7 @@ from heptarm.fri.loop.user_api import State as FriState
 from heptarm.fri.protocol.messages import Quality, SessionState
 from heptarm.fri.session.session import Event, Kind
 from heptarm.io.udp import address_to_bind, own_address
+from heptarm.record.journal import FRI
 from heptarm.values.arrays import within
 from heptarm.values.io import SignalValue
 from heptarm.values.pose import Pose
@@ -107,6 +108,7 @@ class Fri(Block):
         link = self._connection.link
         self._host = self._host or own_address(link.peer.rpartition(":")[0])
         client = self._client = self._request.make(address_to_bind(self._host))
+        self._connection.journal.begin_session(client)
         message = replace(self._request.message, host=self._host, port=client.port)
         try:
             if self.kind == "monitor":
@@ -199,6 +201,7 @@ class Fri(Block):
         finally:
             self._take_events()
             client.close()
+            self._connection.journal.end_session(client)
 
     def _early_end(self, error: MotionAborted | None, hint: str) -> HeptarmError:
         """The error of a session that ended early."""
@@ -389,6 +392,7 @@ class Fri(Block):
     def _take_events(self) -> None:
         for event in self.client.events():
             self._events.append(event)
+            self._connection.journal.add(FRI, event.text, at=event.at)
             if event.kind is Kind.CLIENT and event.text.startswith(LAW_FAILED):
                 self._law_error = self._law_error or event.text
 

@@ -8,17 +8,18 @@ import os
 import threading
 import weakref
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
 from heptarm import __version__
+from heptarm.arm.link.datagrams import DatagramReport
 from heptarm.arm.link.halt import BUSY, PAUSE, halt
 from heptarm.arm.link.link import Link
 from heptarm.arm.link.local_simulator import PrivateCabinet
-from heptarm.arm.link.state_stream import GROUPS, StateFeed, States, StateSample, groups_of
+from heptarm.arm.link.state_stream import GROUPS, Followed, StateFeed, States, groups_of
 from heptarm.arm.translate.state import read_firing, read_result, read_robot, read_signals, read_state
 from heptarm.arm.watchdog import CONNECTION
 from heptarm.errors import (
@@ -28,11 +29,15 @@ from heptarm.errors import (
     HeptarmError,
     LocalProtocolError,
     ModeConflict,
+    SafetyStop,
     StaleState,
     Timeout,
 )
 from heptarm.io.clock import Clock
 from heptarm.io.transport import Transport
+from heptarm.record.black_box import BlackBox, BlackBoxFile
+from heptarm.record.journal import ERROR, EVENT, REFUSAL, REQUEST, Journal
+from heptarm.record.samples import SampleQueue, StateSample
 from heptarm.values.arrays import within
 from heptarm.values.io import Signal
 from heptarm.values.result import Result
@@ -61,6 +66,8 @@ class Options:
         groups: groups of the state that are pushed.
         finishes: after a lost connection accepted motions finish instead of stopping.
         watchdog: silence after which the cabinet counts this client as lost [s].
+        datagrams: send servo targets and receive states by UDP as far as it gets through.
+        black_box: the last 30 s are written to a file after an error.
     """
 
     name: str = "heptarm"
@@ -70,6 +77,8 @@ class Options:
     groups: tuple[str, ...] = GROUPS
     finishes: bool = False
     watchdog: float = CONNECTION.default
+    datagrams: bool = False
+    black_box: bool = True
 
 
 #: FRI sessions whose last change is kept.
@@ -238,6 +247,10 @@ class Events:
 _BACK_OFF, _MAX_BACK_OFF = 0.1, 2.0
 #: Longest wait for a state between two checks of the link [s].
 _CHECK_INTERVAL = 0.2
+#: Reasons of a safety stop that its event reports.
+_STOPPED = (
+    wire.SafetyBits.EMERGENCY_STOP | wire.SafetyBits.PROTECTIVE_STOP | wire.SafetyBits.OPERATOR_SAFETY_OPEN
+)
 #: A state older than this many periods, and than this [s], is stale.
 _STALE_PERIODS, _STALE = 10.0, 1.0
 
@@ -257,7 +270,10 @@ class Connection:
         in_control: this client took control and has not lost it; true also while the link is lost.
         controller: name of the client that controls the robot; empty: none.
         closed: set when the arm is closed.
+        left_at_rest: the arm was at rest when this client, in control, closed it.
         signals: signals of the cabinet.
+        journal: what happened besides pushed states.
+        black_box: writes the last 30 s to a file.
     """
 
     def __init__(
@@ -272,9 +288,12 @@ class Connection:
         self.clock = clock
         self.cabinet = cabinet
         self.feed = StateFeed(clock)
+        self.journal = Journal(clock.nanos)
+        self.black_box = BlackBox(self, is_on=options.black_box)
         self.in_control = False
         self.controller = ""
         self.closed = threading.Event()
+        self.left_at_rest = False
         self._dial = dial
         self._link: Link | None = None
         self._welcome: wire.Welcome | None = None
@@ -284,6 +303,7 @@ class Connection:
         self.signals: tuple[Signal, ...] = ()
         self._blocks: dict[SentProgram, tuple[int, str]] = {}
         self._lock = threading.RLock()
+        self._stops = wire.SafetyBits.NONE
         self._fork_error: ConnectionLost | None = None
         self._process = os.getpid()
         _connections.add(self)
@@ -326,6 +346,11 @@ class Connection:
         return self._link is not None and self._link.error is None
 
     @property
+    def datagrams(self) -> DatagramReport | None:
+        """How the datagrams beside the link fare; None: it has none."""
+        return self.link.datagrams
+
+    @property
     def real_time_factor(self) -> float:
         """Seconds of the cabinet's clock per second of this computer's."""
         return max(self.link.offset.rate, 0.001)
@@ -334,7 +359,7 @@ class Connection:
         """Make a link and subscribe to states; a cabinet that is too busy is asked again."""
         deadline = self.clock.nanos() + round(self.options.timeout * 1e9)
         while True:
-            link = self._new_link(self.events.dispatch, self.feed.push, self._on_lost)
+            link = self._new_link(self._on_event, self.feed.push, self._on_lost)
             try:
                 self._welcome = link.open(
                     name=self.options.name, version=__version__, timeout=self.options.timeout
@@ -351,6 +376,10 @@ class Connection:
         try:
             self._robot = read_robot(self._welcome.robot)
             self.signals = read_signals(self._welcome.signals)
+            if self.options.datagrams:
+                missing = link.open_datagrams(timeout=self.options.timeout)
+                if missing:
+                    _log.warning("no datagrams, everything goes over TCP: %s", missing)
             self.subscribe(self.options.rate, self.options.groups)
         except BaseException:
             link.close()
@@ -371,6 +400,7 @@ class Connection:
         """End the link, everything that waits for it, and a private cabinet."""
         if self._link is not None:
             self._link.close()
+        self.black_box.hurry()
         self.events.lose(_closed())
         self.feed.wake()
         if self.cabinet is not None:
@@ -400,6 +430,7 @@ class Connection:
         self._blocks = {}
         self._built = None
         self.feed.abandon()
+        self.black_box.abandon()
         self.events.abandon(error)
         if self._link is not None:
             self._link.abandon(error)
@@ -420,11 +451,12 @@ class Connection:
             return self._closed_error()
         if not self.in_control:
             return None
-        return ConnectionLost(
+        lost = ConnectionLost(
             f"the connection is lost: {error.text}",
             code=error.code,
             hint="arm.reconnect() connects again",
         )
+        return lost.with_black_box(self.black_box.last)
 
     def _new_link(
         self,
@@ -439,13 +471,15 @@ class Connection:
             on_event=on_event,
             on_state=on_state,
             on_lost=on_lost,
+            on_answer=self._on_answer,
         )
 
     # ---------------------------------------------------------------------------------- requests
 
     def request(self, message: Message) -> None:
         """Send a request that is only accepted or refused; raises as `Link.request` does."""
-        self.link.submit(message, timeout=self.options.timeout)
+        with self._with_black_box():
+            self.link.submit(message, timeout=self.options.timeout)
 
     def take_control(self) -> None:
         """Take control."""
@@ -475,7 +509,17 @@ class Connection:
             if isinstance(answer, wire.Accepted):
                 self.events.claim(program, answer.id)
 
-        self.link.submit(message, timeout=self.options.timeout, on_answer=claim)
+        with self._with_black_box():
+            self.link.submit(message, timeout=self.options.timeout, on_answer=claim)
+
+    @contextlib.contextmanager
+    def _with_black_box(self) -> Iterator[None]:
+        """A block whose errors have the black box of the incident that caused them."""
+        try:
+            yield
+        except (SafetyStop, ConnectionLost) as error:
+            error.with_black_box(self.black_box.last)
+            raise
 
     def check_may_wait(self, call: str) -> None:
         """Check that this thread may wait for the cabinet.
@@ -577,7 +621,9 @@ class Connection:
             hint="check the connection and the load of this machine",
         )
 
-    def stream(self, *, rate: float | None, duration: float | None, size: int) -> States:
+    def stream(
+        self, *, rate: float | None, duration: float | None, size: int, until: Followed | None = None
+    ) -> States:
         """A stream of states; see `Arm.states`."""
         self.check_open()
         return States(
@@ -588,6 +634,7 @@ class Connection:
             rate=rate,
             duration=duration,
             size=size,
+            until=until,
         )
 
     def _stream_error(self) -> HeptarmError | None:
@@ -652,7 +699,88 @@ class Connection:
             state = state.with_groups(joints=replace(state.joints, q=np.array(message.q)))
         return read_result(message, state)
 
+    # --------------------------------------------------------------------------------- recording
+
+    @property
+    def facts(self) -> Mapping[str, str]:
+        """Texts about robot and connection, for a recording."""
+        welcome = self.welcome
+        return {
+            "robot": self.robot.name,
+            "title": self.robot.title,
+            "cabinet": welcome.cabinet,
+            "software": welcome.software,
+            "virtual": str(welcome.virtual).lower(),
+            "heptarm": __version__,
+            "rate": f"{self.options.rate:g}",
+            "groups": ",".join(self.options.groups),
+            "clock_rate": f"{self.real_time_factor:.6g}",
+        }
+
+    @property
+    def signal_names(self) -> tuple[str, ...]:
+        """Names of the cabinet's signals by their indices."""
+        return tuple(one.name for one in self.signals)
+
+    @property
+    def state_rate(self) -> float:
+        """Pushed states per second [Hz]."""
+        return self.options.rate
+
+    def raise_rate(self, rate: float) -> Callable[[], None]:
+        """Have at least so many states pushed per second [Hz]; returns what restores the rate before."""
+        before = self.options.rate
+        if rate <= before:
+            return lambda: None
+        self.subscribe(rate, self.options.groups)
+
+        def restore() -> None:
+            if self.options.rate == rate and self.is_connected:
+                self.subscribe(before, self.options.groups)
+
+        return restore
+
+    def nanos(self) -> int:
+        """Our clock [ns]."""
+        return self.clock.nanos()
+
+    def to_ours(self, stamp: int) -> int:
+        """Our clock at a time of the cabinet's [ns]."""
+        return self.link.offset.to_ours(stamp)
+
+    def open_samples(self, size: int) -> SampleQueue:
+        """A queue that receives every pushed state from now on."""
+        return self.feed.open(size)
+
+    def close_samples(self, queue: SampleQueue) -> None:
+        """End such a queue."""
+        self.feed.close(queue)
+
+    def kept_samples(self) -> list[StateSample]:
+        """The pushed states of the last 30 s."""
+        return self.feed.kept()
+
+    def capture(self, reason: str) -> BlackBoxFile | None:
+        """Begin to write the black box; returns at once."""
+        return self.black_box.capture(reason)
+
     # ---------------------------------------------------------------------------- from the link
+
+    def _on_answer(self, message: Message, answer: Message) -> None:
+        """Note a request and its answer in the journal."""
+        if isinstance(answer, wire.Rejected):
+            self.journal.add(REFUSAL, answer)
+        else:
+            self.journal.add(REQUEST, message, answer.id if isinstance(answer, wire.Accepted) else 0)
+
+    def _on_event(self, message: Message) -> None:
+        """Note an event in the journal and pass it on."""
+        self.journal.add(EVENT, message)
+        if isinstance(message, wire.SafetyChanged):
+            before, self._stops = self._stops, message.bits & _STOPPED
+            if self._stops & ~before:
+                self.capture("safety stop")
+        self.events.dispatch(message)
 
     def _on_control(self, message: wire.ControlChanged) -> None:
         self.controller = message.controller
@@ -662,6 +790,9 @@ class Connection:
 
     def _on_lost(self, error: HeptarmError) -> None:
         """End all programs with the error; an observer then reconnects by itself, a controller does not."""
+        lost_at = self.clock.nanos()
+        self.journal.add(ERROR, f"connection lost: {error.text}")
+        error.with_black_box(self.capture("connection lost"))
         self.events.lose(error)
         self.feed.wake()
         if self.in_control:
@@ -675,6 +806,7 @@ class Connection:
                     if self.closed.is_set() or self.is_connected:
                         return
                     self.open()
+                self.feed.note_gap(round((self.clock.nanos() - lost_at) * 1e-9 * self.options.rate))
                 _log.info("reconnected")
                 return
             except HeptarmError as failure:

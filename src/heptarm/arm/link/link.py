@@ -10,13 +10,21 @@ import logging
 import signal
 import threading
 from _thread import allocate_lock, get_ident
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from types import FrameType
 from typing import Any
 
+from heptarm.arm.link.datagrams import DatagramLine, DatagramReport
 from heptarm.arm.translate.errors import farewell, refusal, rejection
 from heptarm.arm.translate.text import printable_message
-from heptarm.errors import ConnectFailed, ConnectionLost, HeptarmError, RemoteProtocolError, Timeout
+from heptarm.errors import (
+    CommandRejected,
+    ConnectFailed,
+    ConnectionLost,
+    HeptarmError,
+    RemoteProtocolError,
+    Timeout,
+)
 from heptarm.io.clock import Clock
 from heptarm.io.transport import Transport
 from heptarm.wire.clock_sync import ClockOffset
@@ -25,14 +33,20 @@ from heptarm.wire.messages import (
     MAJOR,
     MINOR,
     Accepted,
+    Cancel,
     Challenge,
+    DatagramStatistics,
+    DatagramToken,
+    GetDatagramStatistics,
     Goodbye,
     Message,
     OneWay,
+    OpenDatagrams,
     Ping,
     Pong,
     Refusal,
     Rejected,
+    Stop,
     Welcome,
 )
 from heptarm.wire.session import Received, Session, Side, StateReceived
@@ -116,6 +130,8 @@ class PendingRequest:
 
 #: Shortest silence after which a link counts as lost [s].
 _MIN_SILENCE = 1.0
+#: Longest silence of TCP while datagrams arrive [s]: it is slow on a bad network, but answers and events need it.
+_MAX_TCP_SILENCE = 10.0
 
 
 class Heartbeat:
@@ -124,15 +140,16 @@ class Heartbeat:
     Attributes:
         timeout: silence after which the cabinet ends the session [s].
         watchdog: silence after which the cabinet counts a controller as lost [s]; infinite: not in control.
-        received: our clock when a frame last arrived [ns].
+        received: our clock when a frame last arrived over TCP [ns].
+        datagram: our clock when a datagram last arrived [ns].
     """
 
-    __slots__ = ("received", "timeout", "watchdog")
+    __slots__ = ("datagram", "received", "timeout", "watchdog")
 
     def __init__(self, now: int) -> None:
         self.timeout = 1.0
         self.watchdog = float("inf")
-        self.received = now
+        self.received = self.datagram = now
 
     @property
     def interval(self) -> int:
@@ -143,10 +160,14 @@ class Heartbeat:
         """Check the silence so far.
 
         Raises:
-            ConnectionLost: the cabinet has been silent for two timeouts, and for at least a second.
+            ConnectionLost: the cabinet has been silent for two timeouts, and for at least a second; or TCP has been
+                silent for much longer while datagrams arrive.
         """
-        silence = (now - self.received) * 1e-9
         allowed = max(2 * self.timeout, _MIN_SILENCE)
+        silence = (now - max(self.received, self.datagram)) * 1e-9
+        over_tcp = (now - self.received) * 1e-9
+        if silence <= allowed < over_tcp:
+            silence, allowed = over_tcp, max(allowed, _MAX_TCP_SILENCE)
         if silence > allowed:
             raise ConnectionLost(
                 f"nothing received from {peer} for {silence:.1f} s, allowed are {allowed:g} s",
@@ -168,6 +189,8 @@ _POLLING, _STEP = 30_000_000, 0.0005
 _FAST_STATES = 250.0
 #: Pings at the start, and the pause between them [s]: enough to measure the rate of a virtual clock.
 _PROBES, _PROBE_PAUSE = 6, 0.003
+#: Largest number of a target; they begin again at 0, which counts as newer than all.
+_NUMBERS = 0xFFFFFFFF
 
 
 class Link:
@@ -180,6 +203,7 @@ class Link:
         on_event: called with each event, in the order received; must not block.
         on_state: called with (body, our clock at its receipt [ns]) of each pushed state; must not block.
         on_lost: called once, from the link thread, with the error that ended the link; not after `close`.
+        on_answer: called with each request and its answer, by the thread that has sent it; must not block.
 
     Attributes:
         offset: estimate of the cabinet's clock.
@@ -195,6 +219,7 @@ class Link:
         on_event: Callable[[Message], None],
         on_state: Callable[[bytes, int], None],
         on_lost: Callable[[HeptarmError], None],
+        on_answer: Callable[[Message, Message], None] | None = None,
     ) -> None:
         self.offset = ClockOffset()
         self.peer = transport.peer
@@ -205,6 +230,7 @@ class Link:
         self._on_event = on_event
         self._on_state = on_state
         self._on_lost = on_lost
+        self._on_answer = on_answer
         self._view = memoryview(bytearray(_BUFFER))
         self._sending = threading.Lock()
         self._reading = threading.Lock()  # held by the one thread that reads the socket
@@ -217,6 +243,10 @@ class Link:
         self._requested = clock.nanos()
         self._heartbeat = Heartbeat(self._requested)
         self._polling = _POLLING
+        self._datagrams: DatagramLine | None = None
+        self._targets = 0
+        self._pushing = threading.Lock()  # states and pings arrive over TCP and by datagram
+        self._newest_state = -(1 << 63)
         self._thread = threading.Thread(target=self._run, name="heptarm-link", daemon=True)
 
     # ------------------------------------------------------------------------------------ opening
@@ -250,6 +280,58 @@ class Link:
         self._heartbeat.timeout = self._welcome.heartbeat
         self._thread.start()
         return self._welcome
+
+    def open_datagrams(self, *, timeout: float) -> str:
+        """Open datagrams beside the open session; returns why there are none, "" if there are.
+
+        Raises:
+            ConnectionLost: the link has ended.
+            Timeout: no answer in time.
+        """
+        socket = self._transport.datagrams()
+        if socket is None:
+            return f"no UDP socket can be opened to {self.peer}"
+        try:
+            answer = self.request(OpenDatagrams(), timeout=timeout)
+        except (
+            CommandRejected,
+            RemoteProtocolError,
+        ) as error:  # the latter from a cabinet that does not know the request
+            socket.close()
+            return error.text
+        except BaseException:
+            socket.close()
+            raise
+        if self._welcome is None or not isinstance(answer, DatagramToken):
+            socket.close()
+            raise RemoteProtocolError(
+                f"the cabinet answered OpenDatagrams with {type(answer).__name__}, not with DatagramToken"
+            )
+        self._datagrams = DatagramLine(
+            socket,
+            self._session.datagrams(self._welcome.session, answer.token),
+            self._clock,
+            self.offset,
+            on_pong=self._on_pong,
+            on_state=self._take_state,
+            on_life=self._on_datagram,
+        )
+        self._datagrams.start()
+        return ""
+
+    @property
+    def datagrams(self) -> DatagramReport | None:
+        """How the datagrams fare; None: they are not open."""
+        return None if self._datagrams is None else self._datagrams.report
+
+    def datagram_counts(self, *, timeout: float) -> DatagramStatistics:
+        """What the cabinet has counted of this session's datagrams; raises as `request` does."""
+        answer = self.request(GetDatagramStatistics(), timeout=timeout)
+        if not isinstance(answer, DatagramStatistics):
+            raise RemoteProtocolError(
+                f"the cabinet answered GetDatagramStatistics with {type(answer).__name__}, not with DatagramStatistics"
+            )
+        return answer
 
     def _step(self, deadline: int, late: str) -> None:
         with self._reading:
@@ -315,9 +397,12 @@ class Link:
         """
         pending = PendingRequest(on_answer)
         deadline = self._clock.nanos() + round(timeout * 1e9)
+        line, number = self._datagrams, 0
         shield = InterruptShield()
         try:
-            self._send(message, pending)
+            number = self._send(message, pending)
+            if line is not None and isinstance(message, Stop | Cancel):
+                line.repeat(message, number)
             if self._reader == get_ident():  # called from a callback: this thread is the one that reads
                 self._read_until(pending, deadline, shield)
             elif self._reading.acquire(timeout=_TURN):
@@ -335,6 +420,8 @@ class Link:
         if pending.answer is None and self._error is None:
             pending.wait((deadline - self._clock.nanos()) * 1e-9)
         answer = pending.answer
+        if line is not None:
+            line.answered(number)
         if answer is None:
             if self._error is not None:
                 raise self._lost()
@@ -342,6 +429,8 @@ class Link:
                 f"the cabinet did not answer {type(message).__name__} within {timeout:g} s",
                 hint="check the network and the load of both machines, or use connect(..., timeout=...)",
             )
+        if self._on_answer is not None:
+            self._on_answer(message, answer)
         if isinstance(answer, Rejected):
             raise rejection(answer)
         return answer
@@ -357,29 +446,51 @@ class Link:
             )
         return answer.id
 
-    def send_one_way(self, kind: type[OneWay], numbers: Iterable[float], *, now: int) -> None:
-        """Send a message that has no answer, stamped with the estimated time of the cabinet.
+    def send_target(self, kind: type[OneWay], numbers: Sequence[float], *, now: int, watchdog: float) -> None:
+        """Send a servo target, stamped with the estimated time of the cabinet: by datagram while datagrams get through.
 
         Args:
             kind: type of the message.
             numbers: its fields in order.
             now: our clock [ns].
+            watchdog: longest gap between two targets [s]. If no datagram was answered for half of it, the target goes
+                over TCP as well.
         """
-        with self._sending:
-            if self._error is not None:
-                raise self._lost()
-            data = self._session.send_numbers(kind, numbers, time=self.offset.to_cabinet(now))
-            self._transmit(data)
+        line = self._datagrams
+        if line is None:
+            with self._sending:
+                if self._error is not None:
+                    raise self._lost()
+                data = self._session.send_numbers(kind, numbers, time=self.offset.to_cabinet(now))
+                self._transmit(data)
+            return
+        if self._error is not None:
+            raise self._lost()
+        self._targets += 1
+        number = self._targets & _NUMBERS
+        line.send_target(kind, numbers, number=number, now=now)
+        if line.needs_copy(now, 0.5 * watchdog):
+            with self._sending:
+                if self._error is not None:
+                    raise self._lost()
+                data = self._session.send_numbers(
+                    kind, numbers, time=self.offset.to_cabinet(now), number=number
+                )
+                self._transmit(data)
 
-    def pack_one_way(self, kind: type[OneWay], numbers: Iterable[float], *, now: int) -> bytes:
-        """Encode what `send_one_way` would send, without sending it."""
+    def pack_target(self, kind: type[OneWay], numbers: Iterable[float], *, now: int) -> bytes:
+        """Encode much as `send_target` does, without sending it."""
+        line = self._datagrams
+        if line is not None:
+            return line.pack(kind, numbers, number=0, now=now)
         return self._session.pack_numbers(kind, numbers, time=self.offset.to_cabinet(now))
 
     def ping(self) -> None:
         """Probe the cabinet's clock; the answer updates `offset`."""
         self._send(Ping(sent=self._clock.nanos()))
 
-    def _send(self, message: Message, pending: PendingRequest | None = None) -> None:
+    def _send(self, message: Message, pending: PendingRequest | None = None) -> int:
+        """Send a message over TCP; returns the id of the request, 0 if it is none."""
         with self._sending:
             if self._error is not None:
                 raise self._lost()
@@ -389,6 +500,7 @@ class Link:
                 self._pending[request] = pending
             data = self._session.send(message, request=request, time=self._clock.nanos())
             self._transmit(data)
+        return request
 
     def _transmit(self, data: bytes) -> None:
         """Send bytes; the caller holds `_sending`."""
@@ -436,7 +548,7 @@ class Link:
             for event in session.events():
                 self._heartbeat.received = now  # only a whole frame is a sign of life
                 if type(event) is StateReceived:
-                    self._on_state(event.body, now)
+                    self._take_state(event.body, event.time, now)
                 elif type(event) is Received:
                     self._dispatch(event, now)
         except HeptarmError as error:
@@ -456,13 +568,28 @@ class Link:
         elif isinstance(message, Ping):
             self._send(Pong(sent=message.sent, received=now))
         elif isinstance(message, Pong):
-            self.offset.feed(message.sent, message.received, now)
+            self._on_pong(message.sent, message.received, now)
         elif isinstance(message, Goodbye):
             self._fail(farewell(message, self.peer))
         elif kind == "handshake":
             self._handshake(message)
         else:
             self._on_event(message)
+
+    def _take_state(self, body: bytes, time: int, now: int) -> None:
+        """Pass a state on, unless a newer one came by another path: over TCP or by datagram."""
+        with self._pushing:
+            if time < self._newest_state:
+                return
+            self._newest_state = time
+            self._on_state(body, now)
+
+    def _on_pong(self, sent: int, received: int, now: int) -> None:
+        with self._pushing:
+            self.offset.feed(sent, received, now)
+
+    def _on_datagram(self, now: int) -> None:
+        self._heartbeat.datagram = now
 
     def _run(self) -> None:
         clock, transport = self._clock, self._transport
@@ -509,9 +636,13 @@ class Link:
         self._fail(ConnectionLost(f"the connection to {self.peer} is closed"))
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join(5.0)
+        if self._datagrams is not None:
+            self._datagrams.join()
 
     def cut(self) -> None:
         """End the connection at once and without a Goodbye, as a broken cable does."""
+        if self._datagrams is not None:
+            self._datagrams.close()
         self._transport.close()
 
     def abandon(self, error: HeptarmError) -> None:
@@ -523,6 +654,8 @@ class Link:
         self._sending, self._reading = threading.Lock(), threading.Lock()
         self._caller_reads, self._reader = False, 0
         self._pending.clear()
+        if self._datagrams is not None:
+            self._datagrams.abandon()
         self._transport.abandon()
 
     def _fail(self, error: HeptarmError) -> None:
@@ -530,6 +663,8 @@ class Link:
         if self._error is None:
             self._error = error
         self._transport.close()
+        if self._datagrams is not None:
+            self._datagrams.close()
         for request in list(self._pending):
             pending = self._pending.pop(request, None)
             if pending is not None:

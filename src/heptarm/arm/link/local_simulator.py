@@ -19,7 +19,7 @@ import weakref
 from collections import deque
 
 from heptarm.arm.link.target import Target
-from heptarm.errors import ConnectFailed, ConnectionLost
+from heptarm.errors import ConnectFailed, ConnectionLost, refuse_windows, require_extra
 from heptarm.io.keys import environment
 from heptarm.values.simulator_options import flag
 
@@ -47,7 +47,7 @@ class PrivateCabinet:
         process: subprocess.Popen[str],
         port: int,
         readers: list[threading.Thread],
-        replies: queue.SimpleQueue[str],
+        replies: queue.SimpleQueue[tuple[str, str]],
     ) -> None:
         self._replies = replies
         self._command_lock = threading.Lock()
@@ -85,7 +85,11 @@ class PrivateCabinet:
 
         Raises:
             ConnectFailed: it does not start; the text has its last output.
+            MissingExtra: the packages of the simulator are not installed.
+            CommandRejected: this is Windows.
         """
+        refuse_windows("the virtual cabinet")
+        require_extra("sim")
         command = [
             sys.executable,
             "-m",
@@ -112,7 +116,7 @@ class PrivateCabinet:
         )
         output: deque[str] = deque(maxlen=20)
         ready: queue.SimpleQueue[int | None] = queue.SimpleQueue()
-        replies: queue.SimpleQueue[str] = queue.SimpleQueue()
+        replies: queue.SimpleQueue[tuple[str, str]] = queue.SimpleQueue()
         readers = [
             threading.Thread(
                 target=_read_output,
@@ -124,15 +128,21 @@ class PrivateCabinet:
         ]
         for reader in readers:
             reader.start()
+        is_slow = False
         try:
             port = ready.get(timeout=timeout)
         except queue.Empty:
-            port = None
+            port, is_slow = None, True
         except BaseException:
             _end(process, readers)
             raise
         if port is None:
             _end(process, readers)
+            if is_slow:
+                raise ConnectFailed(
+                    f"the virtual cabinet did not start within {timeout:g} s",
+                    hint="check the load and the free memory of this machine",
+                )
             raise ConnectFailed(
                 f"the virtual cabinet did not start: {' | '.join(output) or 'no output'}",
                 hint="run `python -m heptarm.sim.runtime.cabinet`; it needs pip install 'heptarm[sim]'",
@@ -144,8 +154,8 @@ class PrivateCabinet:
         """Whether the process runs."""
         return self._process.poll() is None
 
-    def operate(self, words: str) -> str:
-        """Carry out an operator command and return the error text, "" if it succeeded.
+    def operate(self, words: str) -> tuple[str, str]:
+        """Carry out an operator command; returns the error text, "" if it succeeded, and what it shows.
 
         Raises:
             ConnectionLost: the process has ended, or does not answer.
@@ -188,7 +198,7 @@ if hasattr(os, "register_at_fork"):  # not on Windows, where no process forks
 def _read_output(
     process: subprocess.Popen[str],
     ready: queue.SimpleQueue[int | None],
-    replies: queue.SimpleQueue[str],
+    replies: queue.SimpleQueue[tuple[str, str]],
     output: deque[str],
 ) -> None:
     """Read the READY line, then the replies to operator commands."""
@@ -197,7 +207,7 @@ def _read_output(
         try:
             message = json.loads(line)
             if "operator" in message:
-                replies.put(str(message["error"]))
+                replies.put((str(message["error"]), str(message["shown"])))
             elif message["ready"]:
                 ready.put(int(message["port"]))
             else:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, Protocol
 
-from heptarm.errors import CommandRejected, HeptarmError, ShapeError
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected, HeptarmError, ShapeError, require
 from heptarm.io.clock import Clock
+from heptarm.record.samples import SampleQueue, StateSample, states_to_numpy, to_frame
 from heptarm.values.arrays import shown
 from heptarm.values.state import GROUP_NAMES, State
 from heptarm.wire import messages as wire
@@ -48,22 +51,12 @@ def groups_of(names: Sequence[str], offered: wire.Groups) -> wire.Groups:
 
 #: States that are kept, and that an error carries.
 HISTORY = 50
+#: States that are kept for the black box and for streams of a motion that begin late: their age [ns] and their number.
+_KEPT_TIME, _KEPT = 30_000_000_000, 60_000
 #: Longest wait of a stream between two checks of the link [s].
 _CHECK_INTERVAL = 0.2
-
-
-class StateSample(NamedTuple):
-    """A pushed state, still encoded.
-
-    Attributes:
-        number: counts the states of the arm from 1.
-        body: its bytes.
-        received: our clock at its receipt [ns].
-    """
-
-    number: int
-    body: bytes
-    received: int
+#: Longest wait, after the end of a motion, for the state that shows its end [s].
+_CLOSING = 1.0
 
 
 class StateFeed:
@@ -80,16 +73,25 @@ class StateFeed:
         self._clock = clock
         self.newest: StateSample | None = None
         self._history: deque[StateSample] = deque(maxlen=HISTORY)
+        self._kept: deque[StateSample] = deque(maxlen=_KEPT)
         self._changed = threading.Condition()
         self._waiting = 0
         self._queues: tuple[SampleQueue, ...] = ()
 
+    @property
+    def count(self) -> int:
+        """Number of the newest sample; 0 before the first."""
+        return 0 if self.newest is None else self.newest.number
+
     def push(self, body: bytes, received: int) -> None:
         """Take a new state; called by the link."""
-        newest = self.newest
-        sample = StateSample(1 if newest is None else newest.number + 1, body, received)
+        sample = StateSample(self.count + 1, body, received)
         self.newest = sample
         self._history.append(sample)
+        kept = self._kept
+        kept.append(sample)
+        while kept[0].received < received - _KEPT_TIME:
+            kept.popleft()
         for one in self._queues:
             one.put(sample)
         if self._waiting:
@@ -104,11 +106,21 @@ class StateFeed:
         """Drop all states in a fork of the process, and the lock, which another thread may hold."""
         self.newest, self._queues = None, ()
         self._history.clear()
+        self._kept.clear()
         self._changed, self._waiting = threading.Condition(), 0
 
     def history(self) -> list[StateSample]:
         """The last samples, oldest first."""
         return list(self._history)
+
+    def kept(self) -> list[StateSample]:
+        """The samples of the last 30 s, oldest first."""
+        return list(self._kept)
+
+    def note_gap(self, count: int) -> None:
+        """Count states that were missed while there was no link as lost by all open streams."""
+        for one in self._queues:
+            one.skip(count)
 
     def after(self, number: int, seconds: float) -> StateSample | None:
         """Wait for a sample newer than `number` and return the newest; None if none arrived in time."""
@@ -126,11 +138,20 @@ class StateFeed:
             finally:
                 self._waiting -= 1
 
-    def open(self, size: int) -> SampleQueue:
-        """Open a queue that receives every sample from now on."""
+    def open(self, size: int, *, after: int | None = None) -> SampleQueue:
+        """Open a queue that receives every sample from now on.
+
+        Args:
+            size: samples that it keeps for a slow reader.
+            after: number of a sample behind which it begins, as far as samples are kept; None: now.
+        """
         queue = SampleQueue(size)
         with self._changed:
             self._queues = (*self._queues, queue)
+        if after is not None:
+            queue.put_before(
+                self.kept(), after=after
+            )  # after the registration, so that none is missed between
         return queue
 
     def close(self, queue: SampleQueue) -> None:
@@ -139,41 +160,36 @@ class StateFeed:
             self._queues = tuple(one for one in self._queues if one is not queue)
 
 
-class SampleQueue:
-    """A bounded queue of samples; when it is full the oldest are dropped and counted.
+class Followed(Protocol):
+    """A program whose states a stream returns; `MotionHandle` is one."""
 
-    Attributes:
-        lost: number of dropped samples.
-    """
+    @property
+    def id(self) -> int:
+        """The cabinet's number of the program."""
+        ...
 
-    __slots__ = ("_available", "_lock", "_samples", "lost")
+    @property
+    def done(self) -> bool:
+        """Whether it has ended."""
+        ...
 
-    def __init__(self, size: int) -> None:
-        self._samples: deque[StateSample] = deque(maxlen=size)
-        self._available = threading.Semaphore(0)
-        self._lock = threading.Lock()
-        self.lost = 0
+    @property
+    def first_sample(self) -> int:
+        """Number of the newest sample before it began, or was sent if it has not begun."""
+        ...
 
-    def put(self, sample: StateSample) -> None:
-        """Append a sample."""
-        with self._lock:
-            is_full = len(self._samples) == self._samples.maxlen
-            self._samples.append(sample)
-        if is_full:
-            self.lost += 1  # the oldest fell out, its permit stays for this one
-        else:
-            self._available.release()
-
-    def get(self, seconds: float) -> StateSample | None:
-        """Take the oldest sample; None if none arrived in time."""
-        if not self._available.acquire(timeout=max(seconds, 0.0)):
-            return None
-        with self._lock:
-            return self._samples.popleft()
+    @property
+    def last_sample(self) -> int:
+        """Number of the newest sample at its end."""
+        ...
 
 
 class States(Iterator[State]):
-    """An iterator over pushed states that returns each at most once; made by `Arm.states`."""
+    """An iterator over pushed states that returns each at most once; made by `Arm.states` and `MotionHandle.states`.
+
+    Every state that was received before the stream's end is returned, however late the loop takes it, unless more wait
+    than the stream keeps: then the oldest are dropped, and `lost` counts them.
+    """
 
     def __init__(
         self,
@@ -185,6 +201,7 @@ class States(Iterator[State]):
         rate: float | None,
         duration: float | None,
         size: int,
+        until: Followed | None = None,
     ) -> None:
         self._queue: SampleQueue | None = None
         self._feed = feed
@@ -195,30 +212,103 @@ class States(Iterator[State]):
         now = clock.nanos()
         self._end = None if duration is None else now + round(duration * 1e9)
         self._due = now
-        self._seen = 0 if feed.newest is None else feed.newest.number - 1
-        self._queue = feed.open(size) if rate is None else None
+        self._seen = max(0, feed.count - 1)
+        self._until = until
+        self._is_inside = False
+        self._is_over = False
+        self._closing_due: int | None = None
+        if rate is None:
+            self._queue = feed.open(size, after=None if until is None else until.first_sample)
 
     @property
     def lost(self) -> int:
-        """States dropped because the loop was too slow; 0 for a stream with a rate."""
+        """States that this stream did not return though it should have: the loop was too slow for too long.
+
+        States that were missed while an observer's link was interrupted are included, by their rate. A stream with a
+        rate leaves states out by design and does not count them.
+        """
         return 0 if self._queue is None else self._queue.lost
 
     def __next__(self) -> State:
         """The next state.
 
         Raises:
-            ConnectionLost: the link has ended.
+            ConnectionLost: the link has ended, unless the stream ends with a motion.
         """
-        while self._end is None or self._clock.nanos() < self._end:
-            sample = self._next_queued() if self._queue is not None else self._next_paced()
-            if sample is not None:
-                return self._build(sample)
-            error = self._check()
+        sample = self._take()
+        if sample is None:
+            raise StopIteration
+        return self._build(sample)
+
+    def _take(self) -> StateSample | None:
+        """Wait for the next sample of the stream; None: it has ended. Raises as `__next__` does."""
+        while not self._is_over:
+            sample = self._received()
+            if sample is not None and (
+                self._until is None or self._belongs(self._build(sample), sample.number, self._until)
+            ):
+                return sample
+        self.close()
+        return None
+
+    def _received(self) -> StateSample | None:
+        """The next sample that was received; None: there is none yet, or the stream is over."""
+        now = self._clock.nanos()
+        if self._queue is None and self._end is not None and now >= self._end:
+            self._is_over = True
+            return None
+        sample = self._next_paced() if self._queue is None else self._next_queued()
+        if sample is not None and (self._end is None or sample.received <= self._end):
+            return sample
+        now = self._clock.nanos()
+        if sample is not None or (self._end is not None and now >= self._end):
+            self._is_over = True  # all that were received in time have been returned
+            return None
+        error = self._check()
+        if self._until is None:
             if error is not None:
                 self.close()
                 raise error
-        self.close()
-        raise StopIteration
+        elif self._until.done:
+            self._closing_due = self._closing_due or now + round(_CLOSING * 1e9)
+            self._is_over = error is not None or now >= self._closing_due
+        return None
+
+    def _belongs(self, state: State, number: int, program: Followed) -> bool:
+        """Whether a state is one of a program's: from its first to the first one sampled after its end."""
+        motion = state.motion
+        is_after = program.done and number > program.last_sample
+        if motion is not None and motion.id == program.id:
+            self._is_inside = True
+            return True
+        if motion is None:  # the group is not subscribed
+            self._is_over = is_after
+            return number > program.first_sample
+        self._is_over = self._is_inside or is_after
+        return self._is_inside
+
+    def to_numpy(self) -> dict[str, npt.NDArray[Any]]:
+        """Take all states to the end of the stream; return arrays by signal name.
+
+        `t` is the cabinet's time since the first state [s], shape (n,); the others are the fields of the groups, such
+        as `q` with shape (n, 7) [rad], `pose` (n, 7): x y z [m] and quaternion x y z w, `wrench` (n, 6) [N, Nm]. What
+        a group lacks is NaN.
+
+        Raises:
+            ConnectionLost: the link has ended, unless the stream ends with a motion.
+        """
+        taken = []
+        while (sample := self._take()) is not None:
+            taken.append(sample)
+        return states_to_numpy(taken)
+
+    def to_pandas(self) -> Any:
+        """As `to_numpy`, as a `pandas.DataFrame` with a column per number, such as "q.A1", over `t`.
+
+        Raises:
+            MissingExtra: pandas is not installed.
+        """
+        return to_frame(self.to_numpy(), require("pandas", extra="record").DataFrame)
 
     def close(self) -> None:
         """Stop receiving states; the end of the iteration does this by itself."""

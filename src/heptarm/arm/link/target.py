@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from urllib.parse import parse_qsl, urlsplit
 
 from heptarm.errors import ConnectFailed
+from heptarm.io.targets import SavedTarget, saved_target
 from heptarm.values.robot import ROBOTS
 from heptarm.values.simulator_options import check_target_option
 from heptarm.wire.messages import PORT
@@ -29,12 +30,24 @@ class Target:
         port: TCP port.
         model: robot of the private virtual cabinet; empty otherwise.
         options: (name, value) pairs of the private virtual cabinet.
+        saved: the saved target that was named; None: an address was given.
     """
 
     host: str = ""
     port: int = PORT
     model: str = ""
     options: tuple[tuple[str, str], ...] = ()
+    saved: SavedTarget | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the saved target; empty: an address was given."""
+        return "" if self.saved is None else self.saved.name
+
+    @property
+    def key_file(self) -> str | None:
+        """File with the key of the saved target; None: it has none of its own."""
+        return None if self.saved is None else self.saved.key_file or None
 
     @property
     def is_private(self) -> bool:
@@ -68,11 +81,17 @@ def parse_target(text: str) -> Target:
     """Parse a target.
 
     Args:
-        text: "ADDRESS[:PORT]", "sim://MODEL[?OPTION=VALUE&...]" or "sim://HOST:PORT".
+        text: "ADDRESS[:PORT]", "sim://MODEL[?OPTION=VALUE&...]", "sim://HOST:PORT", or the name of a saved target.
 
     Raises:
         ConnectFailed: it has none of these forms; the text shows examples.
+        CommandRejected: the file of saved targets cannot be read.
     """
+    saved = saved_target(text)
+    return _parsed(text) if saved is None else replace(_parsed(saved.address), saved=saved)
+
+
+def _parsed(text: str) -> Target:
     try:
         if not text.startswith("sim://"):
             return _address(text)

@@ -20,6 +20,7 @@ import numpy as np
 
 from heptarm import errors
 from heptarm.arm.link.connection import Connection
+from heptarm.arm.link.state_stream import States
 from heptarm.arm.translate.errors import error_of
 from heptarm.errors import (
     ArrivalError,
@@ -27,13 +28,17 @@ from heptarm.errors import (
     ConnectionLost,
     HeptarmError,
     MotionAborted,
+    MotionError,
     NotReady,
     Starved,
+    StreamError,
     Timeout,
+    without_java,
 )
 from heptarm.values.arrays import callback as check_callback
-from heptarm.values.arrays import scalar, within
+from heptarm.values.arrays import integer, scalar, within
 from heptarm.values.condition.condition import Condition, condition_nodes
+from heptarm.values.condition.reaction import Reaction
 from heptarm.values.condition.trigger import Trigger
 from heptarm.values.result import Cause, MotionEvent, Result
 from heptarm.wire import messages as wire
@@ -100,10 +105,12 @@ class BreakRule:
     Attributes:
         condition: ends the motion when it holds.
         error: makes the error of a motion that it ended; None: the motion ends with a result.
+        then: reaction of motions that name none.
     """
 
     condition: Condition
     error: Callable[[Result], HeptarmError] | None
+    then: Reaction = "stay"
 
     def ended(self, result: Result) -> bool:
         """Whether this condition ended a motion."""
@@ -112,6 +119,11 @@ class BreakRule:
 
 #: Ends that are results; all others are errors.
 _GOOD = (Cause.FINISHED, Cause.CANCELLED, Cause.CONDITION, Cause.REPLACED)
+#: States that a stream of a motion keeps for a slow loop: 100 s of them at 1 kHz.
+STREAM_SIZE = 100_000
+LONGEST_STREAM = 1_000_000
+#: States that may overtake the event that a motion has begun.
+_OVERTAKING = 20
 #: In position control a motion that ends farther from its target than this has not arrived [rad].
 ARRIVAL_TOLERANCE = 0.02
 
@@ -158,6 +170,8 @@ class MotionHandle:
         self._id = 0
         self._begun = threading.Event()
         self._future: Future[Result] = Future()
+        self._first_sample = connection.feed.count
+        self._last_sample = 0
 
     @classmethod
     def send(
@@ -275,6 +289,29 @@ class MotionHandle:
         motion = None if state is None else state.motion
         return motion.remaining if motion is not None and motion.id == self._id else nan
 
+    @property
+    def first_sample(self) -> int:
+        """Number of the newest pushed state before it began, or was sent if it has not begun; see `states`."""
+        return self._first_sample
+
+    @property
+    def last_sample(self) -> int:
+        """Number of the newest pushed state when it ended; 0 before."""
+        return self._last_sample
+
+    def states(self, *, size: int = STREAM_SIZE) -> States:
+        """Iterate over every pushed state from its first to the first one after its end, at the loop's own pace.
+
+        The loop may begin late: states of the last 30 s are kept. The iteration ends with the program, by whatever
+        cause; `wait` then returns or raises it. The rate is that of `Arm.subscribe`.
+
+        Args:
+            size: states kept for a slow loop; if more wait, the oldest are dropped and `States.lost` counts them.
+        """
+        return self._connection.stream(
+            rate=None, duration=None, size=integer(size, "size", 1, LONGEST_STREAM), until=self
+        )
+
     def events(self, *, timeout: float | None = None) -> Iterator[MotionEvent]:
         """Iterate over its events from the start: motions and segments that begin and end, triggers that fire.
 
@@ -378,6 +415,8 @@ class MotionHandle:
     def on_event(self, message: Message) -> None:
         """Take an event of this program."""
         if isinstance(message, MotionStarted):
+            if not self.started:
+                self._first_sample = max(self._first_sample, self._connection.feed.count - _OVERTAKING)
             self._note(MotionEvent("begun", message.item), item=message.item, segment=-1)
             self._begun.set()
         elif isinstance(message, SegmentReached):
@@ -395,13 +434,13 @@ class MotionHandle:
 
     def on_lost(self, error: HeptarmError) -> None:
         """End with the error of a lost connection."""
-        self._set_error(
-            ConnectionLost(
-                f"the connection was lost during motion {self._id}: {error.text}",
-                code=error.code,
-                hint="arm.reconnect(), then check where the arm is",
-            )
+        self._last_sample = self._connection.feed.count
+        lost = ConnectionLost(
+            f"the connection was lost during motion {self._id}: {error.text}",
+            code=error.code,
+            hint="arm.reconnect(), then check where the arm is",
         )
+        self._set_error(lost.with_black_box(error))
 
     def on_fork(self, error: HeptarmError) -> None:
         """End the copy in a fork of the process; what waits in the original process is not touched."""
@@ -431,6 +470,7 @@ class MotionHandle:
             self._changed.notify_all()
 
     def _finish(self, message: MotionFinished) -> None:
+        self._last_sample = self._connection.feed.count
         result = self._connection.result_of(message)
         if 0 <= message.fired < len(self._until):
             fired = None if self._fired_at is None else self._connection.state_of(self._fired_at)
@@ -443,6 +483,8 @@ class MotionHandle:
         if error is None:
             self._set_result(result)
         else:
+            if isinstance(error, (MotionError, StreamError, ConnectionLost)):
+                error.with_black_box(self._connection.capture(f"motion {message.id} {result.cause.value}"))
             self._set_error(error)
 
     def _break_error(self, result: Result) -> HeptarmError | None:
@@ -482,7 +524,7 @@ class MotionHandle:
         if result.cause in _GOOD:
             return None
         meaning = MEANINGS.get(message.code)
-        what = message.text or ("" if meaning is None else meaning.title)
+        what = without_java(message.text) or ("" if meaning is None else meaning.title)
         text = f"motion {message.id} {_ABORTED[result.cause]}{': ' + what if what else ''}"
         hint = "" if meaning is None else meaning.advice
         if result.cause is Cause.LOST:

@@ -10,12 +10,13 @@ from math import isinf
 from heptarm.arm.devices.tools import Tooling
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.handle import BreakRule, MotionHandle
-from heptarm.arm.translate.conditions import condition_message
+from heptarm.arm.translate.conditions import condition_message, reaction_message
 from heptarm.arm.translate.modes import mode_message
 from heptarm.arm.translate.motions import items
 from heptarm.arm.translate.triggers import trigger_messages
 from heptarm.errors import HeptarmError, ShapeError
 from heptarm.values.condition.condition import Condition, condition_nodes
+from heptarm.values.condition.reaction import Reaction
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion, triggers_of
 from heptarm.values.robot import RobotModel
@@ -67,6 +68,7 @@ def send(
     mode: Mode | None,
     until: Condition | None,
     when: str,
+    then: Reaction = "stay",
     breaks: tuple[BreakRule, ...] = (),
 ) -> MotionHandle:
     """Check motions and send them as one program; see `Arm.start`.
@@ -79,6 +81,7 @@ def send(
         mode: control mode of all of them; None: position.
         until: condition that ends them.
         when: while another program runs: "queue", "replace" or "reject".
+        then: reaction when `until` has ended one of them.
         breaks: rules whose conditions are part of `until`.
     """
     if when not in _WHEN:
@@ -90,7 +93,10 @@ def send(
     tooling.check(motions, mode)
     break_condition, parts = condition_message(until, connection.signals)
     tooling.check_until(parts)
-    made = items(motions, connection.robot, ceiling, mode=message_of_mode, until=break_condition)
+    reaction = None if until is None else reaction_message(then)
+    made = items(
+        motions, connection.robot, ceiling, mode=message_of_mode, until=break_condition, reaction=reaction
+    )
     made = tuple(
         replace(item, triggers=_triggers(index, motion, connection, tooling))
         for index, (item, motion) in enumerate(zip(made, motions, strict=True))

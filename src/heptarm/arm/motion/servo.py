@@ -429,16 +429,14 @@ class Servo(Block):
         """Encode and send the last target to nowhere: between two ticks the code falls out of the caches."""
         if self._last_target is not None and self._warm_up_socket is not None:
             with suppress(HeptarmError):  # the link has ended: sending the next target raises
-                self._warm_up_socket.send(
-                    self._link.pack_one_way(*self._last_target, now=self._clock.nanos())
-                )
+                self._warm_up_socket.send(self._link.pack_target(*self._last_target, now=self._clock.nanos()))
 
     def _send(self, began: int, kind: type[wire.OneWay], target: list[float]) -> None:
         if not self._active:
             _ = self.start  # raises unless it has begun
             return
         self._last_target = kind, (self._number, self.watchdog, *target)
-        self._link.send_one_way(*self._last_target, now=began)
+        self._link.send_target(*self._last_target, now=began, watchdog=self.watchdog)
         self._sent += 1
         self._last_sent = now = self._clock.nanos()
         self._costs.append(now - began)

@@ -7,6 +7,7 @@ from typing import Any
 
 from heptarm.arm.translate.fields import NAMES, message_of
 from heptarm.values.condition.condition import AllOf, AnyOf, Condition, check_condition, condition_nodes
+from heptarm.values.condition.reaction import Reaction, Retreat, check_reaction
 from heptarm.values.io import Signal, find_signal
 from heptarm.wire import messages as wire
 
@@ -28,6 +29,17 @@ def condition_message(
         return wire.Condition(), ()
     pairs = list(condition_nodes(check_condition(condition)))
     return wire.Condition(nodes=tuple(_node(node, signals) for node, _ in pairs)), tuple(p for _, p in pairs)
+
+
+def reaction_message(reaction: Reaction) -> wire.Reaction | None:
+    """The message of a reaction to a break condition; None: stay.
+
+    Raises:
+        ShapeError: it is no reaction.
+    """
+    if isinstance(check_reaction(reaction), Retreat):
+        return message_of(wire.Retreat, reaction)
+    return wire.Relax() if reaction == "relax" else None
 
 
 def _node(node: Condition, signals: Sequence[Signal]) -> Any:

@@ -17,6 +17,7 @@ import numpy as np
 from heptarm.arm.translate.fields import NAMES, frame_message, hints, message_of
 from heptarm.errors import HeptarmError
 from heptarm.model.inverse_kinematics import redundancy
+from heptarm.values.arrays import Array, within
 from heptarm.values.motion.dynamics import DynamicMotion, Dynamics
 from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.motion.line import LinRel
@@ -34,6 +35,7 @@ def items(
     *,
     mode: wire.Mode | None = None,
     until: wire.Condition | None = None,
+    reaction: wire.Reaction | None = None,
 ) -> tuple[wire.Item, ...]:
     """The items of a program.
 
@@ -43,12 +45,16 @@ def items(
         speed: no joint is faster than this fraction of its maximum, (0, 1].
         mode: control mode of all of them; None: position.
         until: break condition of all of them.
+        reaction: to that condition; None: stay.
 
     Raises:
         LimitError: a target is outside the robot's limits; the text names motion, joint, value and range.
     """
     return tuple(
-        _item(motion, index if len(motions) > 1 else None, robot, speed, mode, until or wire.Condition())
+        replace(
+            _item(motion, index if len(motions) > 1 else None, robot, speed, mode, until or wire.Condition()),
+            reaction=reaction,
+        )
         for index, motion in enumerate(motions)
     )
 
@@ -73,8 +79,23 @@ def _item(
     return wire.Item(motion=message, frame=frame, mode=mode, until=until)
 
 
+#: Attributes of motions and segments that are poses.
+_POSES = ("target", "offset", "via", "end")
+#: No arm with its tool reaches as far; nearer poses are left to the cabinet's planner [m].
+_FARTHEST = 4.0
+
+
+def _check_distance(xyz: Array, name: str) -> None:
+    """Refuse a position that no arm reaches, and ask whether it was meant in millimetres."""
+    for axis, value in zip("xyz", xyz.tolist()):
+        within(value, f"{name}.{axis}", -_FARTHEST, _FARTHEST, unit="m")
+
+
 def _message(name: str, motion: Motion | Segment, robot: RobotModel) -> Any:
     kind = NAMES[name]
+    for field in _POSES:
+        if (pose := getattr(motion, field, None)) is not None:
+            _check_distance(pose.xyz, field)
     given = _fields(motion, robot)
     if isinstance(motion, DynamicMotion | Spl):
         given |= dynamics_fields(kind, motion.dynamics)

@@ -17,6 +17,7 @@ from heptarm.errors import (
     CommandRejected,
     ConnectFailed,
     ConnectionLost,
+    refuse_windows,
 )
 from heptarm.fri.guard.fallback import Policy
 from heptarm.fri.guard.joint_guard import Limits
@@ -132,6 +133,7 @@ class Client(Reader):
         cpu: int | None = None,
         timeout: float = 30.0,
     ) -> None:
+        refuse_windows("FRI")
         check_settings(
             version=version,
             limits=limits,

@@ -22,6 +22,7 @@ from heptarm.fri.protocol import messages as m
 from heptarm.fri.protocol.fast_codec import Sample
 from heptarm.fri.protocol.messages import Quality, SessionState
 from heptarm.fri.session.session import Event, Kind, Session
+from heptarm.io.shared import Floats as Words
 from heptarm.values.arrays import instance, integer, within, word
 from heptarm.values.io import SignalValue
 
@@ -171,6 +172,8 @@ class Record:
             self._layout.trouble.write(self._trouble)
 
 
+#: Largest count of states.
+_LARGEST_COUNT = 1 << 62
 #: Polling period for a state that is due [s].
 _POLL = 1e-4
 #: Longest time limit [s].
@@ -232,6 +235,19 @@ class Reader:
     def is_native(self) -> bool:
         """Whether the native part does the frequent cycles of the loop."""
         return bool(self._header[at.NATIVE])
+
+    @property
+    def count(self) -> int:
+        """Number of states so far."""
+        return self._layout.states.count
+
+    def since(self, count: int) -> tuple[Words, int, int]:
+        """Get the words of all states from a count on, for those who process many at once; see shared_memory.
+
+        Returns:
+            The words, shape (n, 122); the count for the next call; how many states were overwritten before.
+        """
+        return self._layout.states.since(integer(count, "count", 0, _LARGEST_COUNT))
 
     def history(self, size: int | None = None) -> list[State]:
         """Get the last states, oldest first, without those that were overwritten in the meantime."""

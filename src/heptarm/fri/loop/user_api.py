@@ -33,6 +33,7 @@ from heptarm.values.arrays import finite_entries, instance, numbers, scalar, sho
 from heptarm.values.frames import check_name
 from heptarm.values.io import Signal, SignalValue, SignalValues, find_name
 from heptarm.values.pose import Pose
+from heptarm.values.text import as_html, lines
 
 Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
@@ -628,6 +629,25 @@ class Stats:
     quality: dict[str, int]
     latency: tuple[float, ...]
     jitter: tuple[float, ...]
+
+    def __str__(self) -> str:
+        """A few aligned lines with units."""
+        times = (" / ".join(f"{t * 1e6:.0f}" for t in one) for one in (self.latency, self.jitter))
+        spread = [f"{text} us (median / 99 % / 99.9 % / longest)" for text in times]
+        rows = {
+            "messages": f"{self.received} received, {self.lost} lost, {self.duplicated} twice, "
+            f"{self.reordered} late, {self.malformed} malformed, {self.restarts} restarts",
+            "answers": f"{self.answered} sent, {self.missed} missed; {self.commanded} commanded, "
+            f"{self.filled} filled by the policy, {self.limited} limited by the guard",
+            "quality": ", ".join(f"{name} {count}" for name, count in self.quality.items() if count),
+            "latency": spread[0],
+            "jitter": spread[1],
+        }
+        return lines("FRI", rows)
+
+    def _repr_html_(self) -> str:
+        """The same for a notebook."""
+        return as_html(str(self))
 
     @classmethod
     def of(cls, layout: at.Layout) -> Stats:

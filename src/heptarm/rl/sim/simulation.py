@@ -1,6 +1,6 @@
 """The simulated arm of training: the included model with full dynamics and the plant's servo.
 
-The plant closes its loop every millisecond in Python; for training the same gains become MuJoCo actuators, so
+The plant closes its loop every millisecond in Python; for training its servos become MuJoCo actuators, so
 that a decision of 1/30 s is eight steps inside the engine. Each has a low-pass filter that
 models the servo's interpolation. Gravity counts as compensated, so it is switched off; what the controller
 does not know (a payload) acts as an external force.
@@ -15,7 +15,6 @@ import mujoco
 import numpy as np
 
 from heptarm.rl.task import ReachTask
-from heptarm.sim.control.laws import BANDWIDTH, DAMPING
 from heptarm.sim.plant.world import specification
 from heptarm.values.arrays import Array
 
@@ -48,6 +47,12 @@ def build(task: ReachTask) -> Any:
     return spec.compile()
 
 
+#: Position control while training: bandwidth [rad/s] and damping ratio of each joint. Without contacts the elastic
+#: joints of the virtual cabinet follow their set-points as closely.
+BANDWIDTH = 90.0
+DAMPING = 1.0
+
+
 def mass(task: ReachTask) -> Array:
     """Inertia that each joint moves at the task's home, shape (7,) [kg m²]."""
     model = specification(task.robot).compile()
@@ -64,7 +69,7 @@ def gains(inertia: Array, stiffness: Array | None = None) -> tuple[Array, Array]
 
     Args:
         inertia: of the joints, shape (7,) [kg m²].
-        stiffness: of joint impedance, shape (...,) [Nm/rad]; None or inf: the plant's position control.
+        stiffness: of joint impedance, shape (...,) [Nm/rad]; None or inf: position control.
     """
     stiff, damp = BANDWIDTH**2 * inertia, 2 * DAMPING * BANDWIDTH * inertia
     if stiffness is None:

@@ -141,6 +141,8 @@ def result_of_motion(handle: MotionHandle, *, cancelled: bool) -> ActionResult:
         "residual": 0.0 if isnan(result.residual) else result.residual,
         "item": result.item,
         "stopped_by": "",
+        "peak_force": result.peak_force,
+        "rest_force": result.rest_force,
     }
     if result.cause is Cause.FINISHED:
         return ActionResult(GoalOutcome.SUCCEEDED, "goal reached", fields)

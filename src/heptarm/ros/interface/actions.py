@@ -26,7 +26,7 @@ from heptarm.ros.interface.action import (
     result_of_motion,
     wait_for_task,
 )
-from heptarm.ros.interface.conditions import condition_of
+from heptarm.ros.interface.conditions import condition_of, reaction_of
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.events import event_message, with_triggers
 from heptarm.ros.interface.messages import pose_message
@@ -117,7 +117,8 @@ def _move(context: NodeContext, goal: Any, motion: Motion) -> GoalWork:
 def _start(context: NodeContext, goal: Any, program: Sequence[Motion]) -> GoalWork:
     when: Any = getattr(goal, "when", "") or "replace"
     speed = None if goal.speed == 0.0 else goal.speed
-    handle = context.driver.start(program, speed=speed, until=condition_of(goal.until), when=when)
+    until, then = condition_of(goal.until), reaction_of(goal.then)
+    handle = context.driver.start(program, speed=speed, until=until, then=then, when=when)
     return _ProgramGoal(context, handle).run
 
 

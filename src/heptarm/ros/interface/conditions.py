@@ -13,6 +13,7 @@ from typing import Any
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.force import Component, Force, Torque, force, torque
+from heptarm.values.condition.reaction import Reaction, Retreat, check_reaction
 from heptarm.values.condition.signals import IoSignals, Path, SignalIs, io, path
 
 #: Most characters of a text.
@@ -61,6 +62,34 @@ def condition_of(text: str, parameter: str = "until") -> Condition | None:
             value=text,
             hint="for example (force.along('z') > 15) | (abs(torque[3]) > 8) | io.user_button",
         ) from error
+
+
+def reaction_of(text: str) -> Reaction | None:
+    """Parse a reaction to a condition; None: the text is empty.
+
+    Args:
+        text: "stay", "relax", or "retreat" with a distance [m], as in "retreat 0.005".
+
+    Raises:
+        CommandRejected: something else; a distance out of range raises as `Retreat` does.
+    """
+    kind, _, distance = text.strip().partition(" ")
+    if not kind:
+        return None
+    if kind in ("stay", "relax") and not distance:
+        return check_reaction(kind)
+    try:
+        if kind != "retreat":
+            raise ValueError
+        metres = float(distance)
+    except ValueError:
+        raise CommandRejected(
+            f"then must be 'stay', 'relax' or 'retreat DISTANCE', got {text[:80]!r}",
+            parameter="then",
+            value=text,
+            hint="for example then: 'retreat 0.005' [m]",
+        ) from None
+    return Retreat(metres)
 
 
 def _value(node: ast.expr) -> Any:

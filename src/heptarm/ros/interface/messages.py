@@ -16,9 +16,10 @@ from typing import Any, Literal
 import numpy as np
 
 from heptarm.ros.node.diagnostics import Diagnosis
+from heptarm.ros.trajectory.execution import speed_scaling
 from heptarm.ros.trajectory.goal import Tolerance, TrajectoryGoal, TrajectoryPoint
 from heptarm.ros.trajectory.runner import GoalFeedback
-from heptarm.ros.trajectory.trajectory import KinematicState
+from heptarm.ros.trajectory.trajectory import KinematicState, TrajectorySample
 from heptarm.values.pose import Pose
 from heptarm.values.state import State
 
@@ -43,6 +44,8 @@ class RosAdapter:
         seconds: converts a time or a duration of a message to [s].
         duration: makes a duration of a message from [s].
         level: makes a level of a diagnostic message.
+        empty_stops: whether an empty trajectory on the topic stops the arm, as upstream's controller of ROS 1
+            does; that of ROS 2 refuses it.
     """
 
     joint_state: Any
@@ -57,6 +60,7 @@ class RosAdapter:
     seconds: Callable[[Any], float]
     duration: Callable[[float], Any]
     level: Callable[[int], Any]
+    empty_stops: bool
 
 
 def class_of(kind: str, part: Literal["msg", "srv", "action"]) -> Any:
@@ -128,10 +132,17 @@ def _tolerances(messages: Sequence[Any]) -> tuple[Tolerance, ...]:
     return tuple(Tolerance(one.name, one.position, one.velocity, one.acceleration) for one in messages)
 
 
-def feedback(ros: RosAdapter, value: GoalFeedback, names: Sequence[str]) -> Any:
-    """Make feedback of control_msgs/FollowJointTrajectory."""
+def feedback(ros: RosAdapter, value: GoalFeedback, names: Sequence[str], *, now: float) -> Any:
+    """Make feedback of control_msgs/FollowJointTrajectory, stamped with the time of the measurement.
+
+    Args:
+        ros: types and time of the ROS.
+        value: the feedback.
+        names: of the joints.
+        now: current time on the clock of the execution [s].
+    """
     message = ros.feedback()
-    message.header.stamp = ros.time(ros.now())
+    message.header.stamp = ros.time(max(0, ros.now() - max(0, round((now - value.stamp) * 1e9))))
     message.joint_names = list(names)
     message.desired = _point(ros, value.desired, value.time)
     message.actual = _point(ros, value.actual, value.elapsed)
@@ -142,6 +153,47 @@ def feedback(ros: RosAdapter, value: GoalFeedback, names: Sequence[str]) -> Any:
     )
     if hasattr(message, "index"):  # since control_msgs 6.3
         message.index = value.index
+    return message
+
+
+def controller_state(
+    ros: RosAdapter, kind: Any, state: State, sample: TrajectorySample | None, names: Sequence[str]
+) -> Any:
+    """Make a control_msgs/JointTrajectoryControllerState without its time stamp.
+
+    ROS 2 has reference, feedback, error and output; ROS 1, and Humble besides, desired, actual and error.
+
+    Args:
+        ros: types and time of the ROS.
+        kind: type of the message.
+        state: a measurement.
+        sample: of the active trajectory at the time of the measurement; None: there is none, and the arm holds.
+        names: of the joints.
+    """
+    if sample is None:
+        sample = TrajectorySample(KinematicState.at_rest(state.q_cmd), 0.0, 0.0)
+    measured = KinematicState(state.q, np.nan_to_num(state.dq), np.zeros(7))
+    wanted, actual = _point(ros, sample.desired, sample.time), _point(ros, measured, sample.elapsed)
+    error = ros.point(
+        positions=(sample.desired.q - measured.q).tolist(),
+        velocities=(sample.desired.dq - measured.dq).tolist(),
+        time_from_start=ros.duration(sample.time - sample.elapsed),
+    )
+    output = ros.point(positions=state.q_cmd.tolist(), time_from_start=ros.duration(sample.time))
+    message = kind()
+    message.joint_names = list(names)
+    for name, value in (
+        ("reference", wanted),
+        ("desired", wanted),
+        ("feedback", actual),
+        ("actual", actual),
+        ("error", error),
+        ("output", output),
+    ):
+        if hasattr(message, name):
+            setattr(message, name, value)
+    if hasattr(message, "speed_scaling_factor"):  # since control_msgs 5.3
+        message.speed_scaling_factor = speed_scaling(state)
     return message
 
 

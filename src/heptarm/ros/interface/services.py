@@ -126,14 +126,14 @@ def query_state(context: NodeContext, request: Any) -> ServiceResponse:
     """Evaluate the active trajectory at a ROS time; 0: now."""
     seconds = context.ros.seconds(request.time)
     ahead = seconds - 1e-9 * context.ros.now() if seconds else 0.0
-    desired = context.driver.at(context.driver.now + ahead)
-    if desired is None:
+    sample = context.driver.at(context.driver.now + ahead)
+    if sample is None:
         return ServiceResponse(False, "no trajectory is active at that time")
     fields = {
         "name": context.joints,
-        "position": desired.q.tolist(),
-        "velocity": desired.dq.tolist(),
-        "acceleration": desired.ddq.tolist(),
+        "position": sample.desired.q.tolist(),
+        "velocity": sample.desired.dq.tolist(),
+        "acceleration": sample.desired.ddq.tolist(),
     }
     return ServiceResponse(True, "desired state of the trajectory", fields)
 

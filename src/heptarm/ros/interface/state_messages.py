@@ -11,6 +11,7 @@ from heptarm.ros.interface.messages import RosAdapter
 from heptarm.ros.interface.names import NameRole, PresetName
 from heptarm.ros.node.diagnostics import Diagnosis
 from heptarm.ros.node.parameters import NodeConfiguration
+from heptarm.ros.trajectory.trajectory import TrajectorySample
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 from heptarm.values.state import State
@@ -63,6 +64,8 @@ _SAFETY = (
 )
 #: Least step between stamps [ns]: they never go back when the estimate of the cabinet's clock is corrected.
 _STAMP_STEP = 1000
+#: A stamp that is this much older than the last one [ns]: the ROS clock was set back, as by a simulation that restarts.
+_CLOCK_JUMP = 10**9
 
 
 class _Sampled(Protocol):
@@ -107,7 +110,10 @@ class StateMessages:
             full: also the topic with the full state.
         """
         ros, groups = self._ros, state.groups
-        self._stamp = max(self._stamp + _STAMP_STEP, _measured(ros, state, groups.joints))
+        measured = _measured(ros, state, groups.joints)
+        if measured > self._stamp - _CLOCK_JUMP:
+            measured = max(self._stamp + _STAMP_STEP, measured)
+        self._stamp = measured
         stamp = ros.time(self._stamp)
         yield "joint_states", _stamped(messages.joint_state(ros, state, self._joints), stamp)
         if state.torques is not None:
@@ -121,6 +127,11 @@ class StateMessages:
             yield "wrench", _stamped(wrench, self._time_of(groups.wrench, state), self._base)
         if full:
             yield "state", _stamped(self._robot_state(state), stamp, self._base)
+
+    def controller_state(self, kind: Any, state: State, sample: TrajectorySample | None) -> Any:
+        """Make the state of the controller for the last one of `states`; see `messages.controller_state`."""
+        message = messages.controller_state(self._ros, kind, state, sample, self._joints)
+        return _stamped(message, self._ros.time(self._stamp))
 
     def _time_of(self, group: _Sampled | None, state: State) -> Any:
         """Stamp of a group, by the stamp of the joints that are sent with it."""

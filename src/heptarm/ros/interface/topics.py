@@ -3,7 +3,7 @@
 A new topic is a function and a row of the table. A node subscribes to every row of `topics_of`::
 
     topics = TopicDispatcher(context)
-    for row in topics_of(names):
+    for row in topics_of(values):
         ...                       # under row.name with row.type: topics.handle(row, message); log a refusal
 """
 
@@ -14,10 +14,11 @@ import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from heptarm.errors import CommandRejected, ShapeError
 from heptarm.ros.interface.context import NodeContext
 from heptarm.ros.interface.messages import trajectory_goal
 from heptarm.ros.interface.motions import (
@@ -29,9 +30,12 @@ from heptarm.ros.interface.motions import (
     velocities,
 )
 from heptarm.ros.interface.names import PRESETS, NameRole
+from heptarm.values.arrays import Array, array
 from heptarm.values.motion.line import lin
 from heptarm.values.motion.ptp import ptp
 
+#: Frames of a twist.
+_FRAMES: tuple[Literal["base", "flange", "tool"], ...] = ("base", "flange", "tool")
 #: Handles a message of a topic.
 Handler = Callable[[NodeContext, Any], None]
 
@@ -102,9 +106,9 @@ def command_lin(context: NodeContext, message: Any) -> None:
 
 
 def joint_trajectory(context: NodeContext, message: Any) -> None:
-    """Execute a trajectory_msgs/JointTrajectory, or follow a stream of single points; an empty one stops the arm."""
-    if not message.points and not message.joint_names:
-        context.driver.stop()
+    """Execute a trajectory_msgs/JointTrajectory, or follow a stream; in ROS 1 one without points stops the arm."""
+    if not message.points and context.ros.empty_stops:
+        context.driver.end_trajectory()
         return
     goal = trajectory_goal(context.ros, message, now=context.driver.now)
     context.driver.accept(replace(goal, from_topic=True))
@@ -147,6 +151,55 @@ def servo_lin(context: NodeContext, message: Any) -> None:
     context.driver.follow(stamped_pose(message, context.base), straight=True)
 
 
+def servo_twist(context: NodeContext, message: Any) -> None:
+    """Move with a geometry_msgs/TwistStamped, in axes of the base, the flange or the tool."""
+    name = message.header.frame_id.lstrip("/")
+    frames = {context.driver.configuration.frame(one): one for one in _FRAMES}
+    if name and name not in frames:
+        raise CommandRejected(
+            f"frame_id must be one of {', '.join(frames)}, got {name!r}", parameter="frame_id", value=name
+        )
+    context.driver.follow_twist(_twist(message.twist), frames.get(name, "base"))
+
+
+def servo_twist_unstamped(context: NodeContext, message: Any) -> None:
+    """Move with a geometry_msgs/Twist, in axes of the base."""
+    context.driver.follow_twist(_twist(message))
+
+
+def _twist(message: Any) -> Array:
+    v, w = message.linear, message.angular
+    return np.array([v.x, v.y, v.z, w.x, w.y, w.z])
+
+
+def servo_jog(context: NodeContext, message: Any) -> None:
+    """Move with the velocities of a control_msgs/JointJog; joints that are not named rest."""
+    if not len(message.velocities):
+        raise ShapeError(
+            "a JointJog must have velocities; displacements are not supported",
+            parameter="velocities",
+            hint="send positions to servo/joint",
+        )
+    context.driver.follow_velocity(velocities(context.driver, message.joint_names, message.velocities))
+
+
+# --------------------------------------------------------------------- controllers of ros2_control
+
+
+def forward_position(context: NodeContext, message: Any) -> None:
+    """Follow seven positions [rad], a std_msgs/Float64MultiArray as for position_controllers."""
+    context.driver.follow_stream(_seven(message, "rad"))
+
+
+def forward_velocity(context: NodeContext, message: Any) -> None:
+    """Move with seven velocities [rad/s], a std_msgs/Float64MultiArray as for velocity_controllers."""
+    context.driver.follow_velocity(_seven(message, "rad/s"))
+
+
+def _seven(message: Any, unit: str) -> Array:
+    return array(list(message.data), 7, f"data [{unit}]")
+
+
 # ------------------------------------------------------------------------------------- FRI
 
 
@@ -171,6 +224,10 @@ def fri_pose(context: NodeContext, message: Any) -> None:
 
 
 _JOINTS, _POSE = "sensor_msgs/JointState", "geometry_msgs/PoseStamped"
+_FORWARD_POSITION, _FORWARD_VELOCITY = (
+    "forward_position_controller/commands",
+    "forward_velocity_controller/commands",
+)
 
 #: All topics with heptarm's own names.
 TOPICS = (
@@ -183,6 +240,11 @@ TOPICS = (
     Topic("~/servo/velocity", _JOINTS, servo_velocity),
     Topic("~/servo/pose", _POSE, servo_pose),
     Topic("~/servo/lin", _POSE, servo_lin),
+    Topic("~/servo/twist", "geometry_msgs/TwistStamped", servo_twist),
+    Topic("~/servo/twist_unstamped", "geometry_msgs/Twist", servo_twist_unstamped),
+    Topic("~/servo/jog", "control_msgs/JointJog", servo_jog),
+    Topic(_FORWARD_POSITION, "std_msgs/Float64MultiArray", forward_position),
+    Topic(_FORWARD_VELOCITY, "std_msgs/Float64MultiArray", forward_velocity),
     Topic("~/fri/joint", _JOINTS, fri_joint),
     Topic("~/fri/wrench", "geometry_msgs/WrenchStamped", fri_wrench),
     Topic("~/fri/pose", _POSE, fri_pose),
@@ -198,10 +260,16 @@ _PRESET_HANDLERS: Mapping[NameRole, Handler] = MappingProxyType(
 )
 
 
-def topics_of(names: str) -> tuple[Topic, ...]:
-    """List heptarm's own topics, and those that the parameter `names` adds."""
-    return TOPICS + tuple(
+def topics_of(values: Mapping[str, Any]) -> tuple[Topic, ...]:
+    """List the topics that a node subscribes to.
+
+    Args:
+        values: of the node's parameters: `names` adds some, `forward_controllers` leaves some out.
+    """
+    forward = values["forward_controllers"]
+    ours = tuple(row for row in TOPICS if forward or row.name not in (_FORWARD_POSITION, _FORWARD_VELOCITY))
+    return ours + tuple(
         Topic(entry.name, entry.type, _PRESET_HANDLERS[entry.role], at_once=entry.role is NameRole.STOP)
-        for entry in PRESETS[names].entries
+        for entry in PRESETS[values["names"]].entries
         if entry.role in _PRESET_HANDLERS
     )

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib.util
 import logging
 import os
 import socket
+import sys
 from collections.abc import Callable, Sequence
 from typing import Literal, Protocol
 
@@ -13,8 +15,9 @@ import numpy as np
 from heptarm.arm.arm import Arm
 from heptarm.arm.connect import connect
 from heptarm.arm.link.state_stream import GROUPS
+from heptarm.arm.link.target import parse_target
 from heptarm.arm.motion.handle import MotionHandle
-from heptarm.errors import HeptarmError, NotReady
+from heptarm.errors import ConnectFailed, HeptarmError, NotReady
 from heptarm.ros.node.collision_guard import CollisionReaction
 from heptarm.ros.node.diagnostics import Diagnosis, diagnose
 from heptarm.ros.node.fri_session import NodeFriSession
@@ -22,16 +25,18 @@ from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.ros.node.state_feed import ReconnectingStates
 from heptarm.ros.node.target_stream import TargetStream
 from heptarm.ros.node.task import ArmTask
+from heptarm.ros.trajectory.check import check_form
 from heptarm.ros.trajectory.execution import Execution, GoalListener
 from heptarm.ros.trajectory.fri_execution import FriExecution
-from heptarm.ros.trajectory.goal import GoalRefused, GoalResult, TrajectoryGoal
+from heptarm.ros.trajectory.goal import GoalRefused, GoalResult, TrajectoryGoal, TrajectoryPoint
 from heptarm.ros.trajectory.runner import GoalFeedback
 from heptarm.ros.trajectory.servo_execution import ServoExecution
 from heptarm.ros.trajectory.spline_execution import SplineExecution
-from heptarm.ros.trajectory.trajectory import KinematicState
+from heptarm.ros.trajectory.trajectory import TrajectorySample
 from heptarm.values.arrays import Array
 from heptarm.values.condition.collision import Collision
 from heptarm.values.condition.condition import Condition
+from heptarm.values.condition.reaction import Reaction
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion
 from heptarm.values.pose import Pose
@@ -67,6 +72,8 @@ _log = logging.getLogger("heptarm.ros")
 
 #: How long a motion may take to come to rest before a goal [s].
 _REST_TIMEOUT = 5.0
+#: When the arm is to be at a streamed position that has no time [s].
+_STREAM_AHEAD = 0.01
 
 
 class Driver:
@@ -93,6 +100,7 @@ class Driver:
         self._active = False
         self._handle: MotionHandle | None = None
         self._task: ArmTask | None = None
+        _check_simulator(values["target"])
         self._arm = connect(
             values["target"] or None,
             key_file=values["key_file"] or None,
@@ -111,6 +119,7 @@ class Driver:
             timeout=values["command_timeout"],
             options=configuration.servo,
             line_speed=values["servo.line_speed"],
+            turn_speed=values["servo.turn_speed"],
         )
         self._feed = ReconnectingStates(self._arm, on_state=self._on_state, on_link=listener.on_link)
 
@@ -220,6 +229,8 @@ class Driver:
             raise GoalRefused("the node is not active", hint="activate it")
         if self.link_error:
             raise GoalRefused(f"no connection: {self.link_error}")
+        # what is malformed must not end another motion
+        check_form(goal, self.configuration.joints, self._execution.settings.rules)
         try:
             self._check_ready()
             self._regain_control()
@@ -258,13 +269,18 @@ class Driver:
         if self._task is not None:
             self._task.end(reason)
 
-    def at(self, time: float) -> KinematicState | None:
+    def at(self, time: float) -> TrajectorySample | None:
         """Evaluate the active goal at a time on the clock of `now` [s]; None: there is none at that time."""
         return self._execution.at(time)
 
     def cancel(self, number: int) -> bool:
         """Cancel a goal; the arm brakes. False: it is not active."""
         return self._execution.cancel(number)
+
+    def end_trajectory(self) -> None:
+        """Cancel the active goal, whoever sent it; without one stop what moves the arm."""
+        if not self._execution.cancel(self._execution.goal):
+            self.stop()
 
     def on_feedback(self, feedback: GoalFeedback) -> None:
         """Forward feedback of the execution at the rate of the parameter `action_monitor_rate`."""
@@ -298,6 +314,7 @@ class Driver:
         mode: Mode | None = None,
         speed: float | None = None,
         until: Condition | None = None,
+        then: Reaction | None = None,
         when: Literal["queue", "replace", "reject"] = "replace",
     ) -> MotionHandle:
         """Start a motion, or several as one program.
@@ -307,6 +324,7 @@ class Driver:
             mode: control mode; None: the one that the services have set.
             speed: speed limit for this one, (0, 1]; None: that of the parameter `speed`.
             until: condition that ends it; None: that of `guard`.
+            then: reaction to it; None: stay.
             when: while another motion runs: "replace" it, "queue" behind it, or "reject" this one.
 
         Raises:
@@ -320,7 +338,9 @@ class Driver:
         self._check_no_task()
         limit = self.configuration.values["speed"] if speed is None else speed
         condition = self.guard if until is None else until
-        handle = self._handle = self._arm.start(motion, mode=mode, speed=limit, until=condition, when=when)
+        handle = self._handle = self._arm.start(
+            motion, mode=mode, speed=limit, until=condition, then=then, when=when
+        )
         handle.add_event_callback(lambda event: self._listener.on_event(handle.id, event))
         return handle
 
@@ -349,6 +369,35 @@ class Driver:
         """
         self._prepare_stream()
         self._stream.velocity(np.asarray(dq, dtype=np.float64))
+
+    def follow_twist(self, twist: Array, frame: Literal["base", "flange", "tool"] = "base") -> None:
+        """Move with a Cartesian velocity until none arrives for `command_timeout`.
+
+        Args:
+            twist: velocity and angular velocity of the origin of the flange, of the tool if that is the frame, shape
+                (6,) [m/s, rad/s].
+            frame: its axes.
+
+        Raises:
+            HeptarmError: refused; the text gives the reason.
+        """
+        self._prepare_stream()
+        self._stream.twist(np.asarray(twist, dtype=np.float64), frame)
+
+    def follow_stream(self, q: Array) -> None:
+        """Follow a stream of joint positions as the trajectory topic does, or as a servo topic where it cannot.
+
+        Args:
+            q: shape (7,) [rad].
+
+        Raises:
+            HeptarmError: refused; the text gives the reason.
+        """
+        if self.configuration.values["execution"] == "spline":
+            self.follow(q)
+            return
+        point = TrajectoryPoint(_STREAM_AHEAD, tuple(q.tolist()))
+        self.accept(TrajectoryGoal(self.configuration.joints, (point,), from_topic=True))
 
     def _prepare_stream(self) -> None:
         self._check_active()
@@ -391,6 +440,20 @@ class Driver:
     def _on_collision(self, found: Collision) -> None:
         self._stream.block(str(found))
         self._listener.on_collision(found)
+
+
+def _check_simulator(target: str) -> None:
+    """Refuse to start a simulator where its libraries are missing: a Python with ROS often is not that of heptarm.
+
+    Raises:
+        ConnectFailed: they are missing; the text has what to do instead.
+    """
+    if target and parse_target(target).is_private and importlib.util.find_spec("mujoco") is None:
+        raise ConnectFailed(
+            f"{target} needs a simulator, which {sys.executable} lacks",
+            hint="run `heptarm sim --port 30001` with another Python and set target to sim://127.0.0.1:30001, "
+            "or install heptarm[sim] for this one",
+        )
 
 
 def _name() -> str:

@@ -105,6 +105,12 @@ PARAMETERS = (
         "whose names of topics and actions to offer besides heptarm's own",
         choices=("heptarm", "libiiwa", "iiwa_stack"),
     ),
+    Parameter(
+        "forward_controllers",
+        True,
+        "follow forward_position_controller/commands and forward_velocity_controller/commands; false: ros2_control "
+        "has controllers of these names",
+    ),
     Parameter("state_rate", 100.0, "rate of published states [Hz]", 1.0, 500.0),
     Parameter("publish_signals", False, "publish the signals of the cabinet"),
     Parameter("publish_tf", False, "publish flange and tool on /tf; not needed with robot_state_publisher"),
@@ -142,8 +148,13 @@ PARAMETERS = (
         1.0,
     ),
     Parameter(
-        "servo.line_speed", 0.25, "speed limit of servo/lin along each axis of the base [m/s]", 0.001, 10.0
+        "servo.line_speed",
+        0.25,
+        "speed limit of servo/lin along each axis of the base, and of servo/twist [m/s]",
+        0.001,
+        10.0,
     ),
+    Parameter("servo.turn_speed", 0.5, "angular speed limit of servo/twist [rad/s]", 0.001, 20.0),
     Parameter("servo.linger", 0.5, "how long the servo motion stays open after a goal [s]", 0.0, 60.0),
     Parameter(
         "servo.lookahead", 0.004, "delay from a target to its motion, which is compensated [s]", 0.0, 0.5
@@ -170,6 +181,19 @@ PARAMETERS = (
     Parameter("speed", 0.2, "speed limit of commanded motions, a fraction of each axis' maximum", 0.01, 1.0),
     _live("allow_partial_joints_goal", False, "accept goals that lack joints; these hold their positions"),
     _live("allow_nonzero_velocity_at_trajectory_end", False, "accept goals whose last point has a velocity"),
+    _live(
+        "allow_integration_in_goal_trajectories",
+        False,
+        "accept points without positions, which are integrated from velocities or accelerations",
+    ),
+    _live(
+        "cmd_timeout",
+        0.0,
+        "how long after its end any trajectory may take to reach the goal [s]; it counts if longer than "
+        "constraints.goal_time; 0: no limit",
+        0.0,
+        1e6,
+    ),
     _live(
         "start_tolerance",
         0.05,
@@ -254,6 +278,7 @@ class NodeConfiguration:
             rules=GoalRules(
                 partial=v["allow_partial_joints_goal"],
                 moving_end=v["allow_nonzero_velocity_at_trajectory_end"],
+                integrate=v["allow_integration_in_goal_trajectories"],
                 jump=v["start_tolerance"],
                 speed=v["servo.speed"],
             ),
@@ -261,6 +286,7 @@ class NodeConfiguration:
                 StateTolerances(position=path),
                 StateTolerances(position=goal, velocity=still),
                 v["constraints.goal_time"],
+                v["cmd_timeout"] if v["cmd_timeout"] > v["constraints.goal_time"] else 0.0,
             ),
             deceleration=frozen(np.full(7, v["max_deceleration_on_cancel"])),
             lookahead=v["fri.lookahead" if v["execution"] == "fri" else "servo.lookahead"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
+from collections.abc import Callable
 from typing import Any, Literal
 
 import numpy as np
@@ -12,6 +13,8 @@ from heptarm.arm.arm import Arm
 from heptarm.arm.motion.servo import JointServo, PoseServo
 from heptarm.errors import HeptarmError, NotReady
 from heptarm.io.clock import RealClock
+from heptarm.model.kinematics import forward
+from heptarm.ros.node.cartesian_velocity import joint_velocity, limited_twist, limited_velocity
 from heptarm.ros.trajectory.servo_execution import ServoOptions
 from heptarm.values.arrays import Array, array
 from heptarm.values.condition.condition import Condition
@@ -31,14 +34,23 @@ class TargetStream:
         arm: in control.
         timeout: the arm brakes if no target arrives for this time [s].
         options: speed and acceleration limits.
-        line_speed: along each axis of the base, on straight lines [m/s].
+        line_speed: along each axis of the base on straight lines, and of twists [m/s].
+        turn_speed: of twists [rad/s].
     """
 
-    def __init__(self, arm: Arm, *, timeout: float, options: ServoOptions, line_speed: float = 0.25) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        *,
+        timeout: float,
+        options: ServoOptions,
+        line_speed: float = 0.25,
+        turn_speed: float = 0.5,
+    ) -> None:
         self._arm = arm
         self._timeout = timeout
         self._options = options
-        self._line_speed = line_speed
+        self._line_speed, self._turn_speed = line_speed, turn_speed
         self._clock = RealClock()
         self._lock = threading.RLock()
         self._servo: JointServo | PoseServo | None = None
@@ -76,14 +88,47 @@ class TargetStream:
 
     def velocity(self, dq: Array) -> None:
         """Move with joint velocities, shape (7,) [rad/s], clamped to the limits of the robot."""
+        robot = self._arm.robot
+        command = np.clip(array(dq, 7, "velocity"), -robot.dq_max, robot.dq_max)
+        self._move(lambda _: command)
+
+    def twist(self, twist: Array, frame: Literal["base", "flange", "tool"] = "base") -> None:
+        """Move with a Cartesian velocity, scaled down to the limits; it slows down near singularities and joint limits.
+
+        Args:
+            twist: velocity and angular velocity of the origin of the flange, of the tool if that is the frame, shape
+                (6,) [m/s, rad/s].
+            frame: its axes.
+        """
+        robot = self._arm.robot
+        wanted = limited_twist(array(twist, 6, "twist"), self._line_speed, self._turn_speed)
+
+        def command(q: Array) -> Array:
+            flange = forward(robot, q)
+            turn, point = np.eye(3), None
+            if frame == "flange":
+                turn = flange[:3, :3]
+            elif frame == "tool":
+                state = self._arm.state
+                offset = np.linalg.inv(forward(robot, state.q)) @ state.pose.matrix
+                tool = flange @ offset
+                turn, point = tool[:3, :3], tool[:3, 3]
+            axes = np.concatenate([turn @ wanted[:3], turn @ wanted[3:]])
+            dq = joint_velocity(robot, q, axes, point)
+            return limited_velocity(robot, q, dq, self._options.speed)
+
+        self._move(command)
+
+    def _move(self, command_at: Callable[[Array], Array]) -> None:
+        """Move with the joint velocities [rad/s] that a function returns for the commanded positions [rad]."""
         with self._lock:
             robot = self._arm.robot
-            command = np.clip(array(dq, 7, "velocity"), -robot.dq_max, robot.dq_max)
             was_active = self.active
             servo = self._joint_servo()
             now = self._clock.nanos()
             if not was_active:
                 self._q, self._last = servo.start.q.copy(), now
+            command = command_at(self._q)
             passed = min((now - self._last) * 1e-9, self._timeout)
             self._last = now
             self._q = np.clip(self._q + command * passed, robot.q_min, robot.q_max)

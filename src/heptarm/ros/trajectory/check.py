@@ -13,8 +13,10 @@ from heptarm.ros.trajectory.trajectory import JointTrajectory, KinematicState
 from heptarm.values.arrays import Array
 from heptarm.values.robot import RobotModel
 
-#: Largest velocity that counts as rest [rad/s]: the last digit of a float32.
-_REST = float(np.finfo(np.float32).eps)
+#: Largest velocity that counts as rest [rad/s]: the last digit of a float32. Integrated ones add up rounding errors.
+_REST, _INTEGRATED_REST = float(np.finfo(np.float32).eps), 1e-6
+#: Longest trajectory, and longest wait for its start [s]; longer ones are mistakes, such as milliseconds for seconds.
+_LONGEST_TRAJECTORY, _LONGEST_WAIT = 86400.0, 3600.0
 #: Planners round: values may exceed a limit by this fraction of it.
 _MARGIN = 1e-3
 #: Fields of a point and their names in a message.
@@ -28,12 +30,14 @@ class GoalRules:
     Attributes:
         partial: joints may be missing; they hold their positions.
         moving_end: the last point may have a velocity.
+        integrate: points may lack positions; they are integrated from velocities, or from accelerations.
         jump: largest distance from the arm to a first point at time 0 [rad].
         speed: speed limit, a fraction of each axis' maximum in (0, 1].
     """
 
     partial: bool = False
     moving_end: bool = False
+    integrate: bool = False
     jump: float = 0.05
     speed: float = 1.0
 
@@ -71,6 +75,11 @@ def check_goal(
             f"the trajectory ended {now - goal.start - goal.points[-1].time:.3f} s ago; it must end in the future",
             hint="synchronise the clocks of both machines, or send a zero time stamp",
         )
+    if goal.start is not None and goal.start - now > _LONGEST_WAIT:
+        raise GoalRefused(
+            f"the trajectory must start within {_LONGEST_WAIT:g} s, got {goal.start - now:g} s from now",
+            hint="synchronise the clocks of both machines, or send a zero time stamp",
+        )
     times = np.array([point.time for point in goal.points]) - late
     q, dq, ddq = (_matrix(goal.points, name, columns) for name, _ in _FIELDS)
     held = [joint for joint in range(7) if joint not in columns]
@@ -78,6 +87,14 @@ def check_goal(
         given = ~np.isnan(values).all(axis=1)
         for joint in held:
             values[given, joint] = rest[joint]
+    if np.isnan(q).any():
+        _integrate(times, q, dq, ddq, here)
+        if not rules.moving_end and np.abs(np.nan_to_num(dq[-1])).max() > _INTEGRATED_REST:
+            joint = int(np.argmax(np.abs(dq[-1])))
+            raise GoalRefused(
+                f"the last point must be at rest, got {dq[-1, joint]:g} rad/s for {names[joint]} by integration",
+                hint="end with zero velocities, or set allow_nonzero_velocity_at_trajectory_end",
+            )
     _check_limits(q, dq, ddq, names, robot)
     times, q, dq, ddq = _from_here(times, q, dq, ddq, here, late > 0.0, names, rules)
     trajectory = JointTrajectory(times, q, dq, ddq)
@@ -85,30 +102,45 @@ def check_goal(
     return trajectory
 
 
-def check_point(
-    goal: TrajectoryGoal, names: Sequence[str], robot: RobotModel, *, here: KinematicState, rules: GoalRules
-) -> tuple[Array, Array | None]:
-    """Check a goal that is a point of a stream.
+def check_form(goal: TrajectoryGoal, names: Sequence[str], rules: GoalRules) -> None:
+    """Check what does not depend on the arm: names, sizes, numbers and times.
 
     Args:
-        goal: of a single point.
+        goal: as received.
+        names: of the arm's joints, seven.
+        rules: which goals are accepted; the last point may have a velocity in any case.
+
+    Raises:
+        GoalRefused: with the code for the client.
+    """
+    _columns(goal, names, rules)
+    _check_points(goal, replace(rules, moving_end=True))
+
+
+def check_points(
+    goal: TrajectoryGoal, names: Sequence[str], robot: RobotModel, *, here: KinematicState, rules: GoalRules
+) -> tuple[Array, Array | None]:
+    """Check a goal that belongs to a stream.
+
+    Args:
+        goal: as received.
         names: of the arm's joints, seven.
         robot: its limits.
         here: state of the arm; missing joints keep its positions.
-        rules: which goals are accepted; the point may have a velocity in any case.
+        rules: which goals are accepted; the last point may have a velocity in any case.
 
     Returns:
-        Positions [rad], and velocities [rad/s] if it has some, shape (7,).
+        Positions [rad], and velocities [rad/s] if all points have some, shape (n, 7).
 
     Raises:
         GoalRefused: with the code for the client.
     """
     columns = _columns(goal, names, rules)
-    _check_points(goal, replace(rules, moving_end=True))
+    _check_points(goal, replace(rules, moving_end=True, integrate=False))
     q, dq, ddq = (_matrix(goal.points, name, columns) for name, _ in _FIELDS)
     _check_limits(q, dq, ddq, names, robot)
-    moves = not np.isnan(dq).all()
-    return np.where(np.isnan(q[0]), here.q, q[0]), np.nan_to_num(dq[0]) if moves else None
+    moves = not np.isnan(dq).all(axis=1).any()
+    return np.where(np.isnan(q), here.q, q), np.nan_to_num(dq) if moves else None
 
 
 def _columns(goal: TrajectoryGoal, names: Sequence[str], rules: GoalRules) -> list[int]:
@@ -141,16 +173,23 @@ def _check_points(goal: TrajectoryGoal, rules: GoalRules) -> None:
         raise GoalRefused(f"the time stamp must be finite, got {goal.start} s")
     count, before = len(goal.joints), -math.inf
     for number, point in enumerate(goal.points):
-        if not math.isfinite(point.time) or point.time < 0.0:
-            raise GoalRefused(f"point {number}: time_from_start must be 0 or more, got {point.time:g} s")
+        if not 0.0 <= point.time <= _LONGEST_TRAJECTORY:
+            raise GoalRefused(
+                f"point {number}: time_from_start must be in [0, {_LONGEST_TRAJECTORY:g}] s, got {point.time:g} s"
+            )
         if point.time <= before:
             raise GoalRefused(
                 f"point {number}: time_from_start must be later than that of the point before, {before:g} s, "
                 f"got {point.time:g} s"
             )
         before = point.time
-        if not point.q:
-            raise GoalRefused(f"point {number} has no positions")
+        if not point.q and not rules.integrate:
+            raise GoalRefused(
+                f"point {number} has no positions",
+                hint="add them, or set allow_integration_in_goal_trajectories",
+            )
+        if not (point.q or point.dq or point.ddq):
+            raise GoalRefused(f"point {number} has neither positions nor velocities nor accelerations")
         if point.effort:
             raise GoalRefused(
                 f"point {number} has effort; trajectories command positions only", hint="leave it empty"
@@ -179,6 +218,31 @@ def _matrix(points: Sequence[TrajectoryPoint], name: str, columns: list[int]) ->
         if values:
             out[row, columns] = values
     return out
+
+
+def _integrate(times: Array, q: Array, dq: Array, ddq: Array, here: KinematicState) -> None:
+    """Fill in positions, and velocities where there are only accelerations, by the trapezoidal rule.
+
+    joint_trajectory_controller integrates in the same way. A point of the past is where the arm is.
+
+    Args:
+        times: of the points from now on, shape (n,) [s].
+        q: positions, shape (n, 7) [rad]; NaN: to fill in.
+        dq: velocities, likewise [rad/s].
+        ddq: accelerations, likewise [rad/s²].
+        here: state of the arm at time 0.
+    """
+    before, q0, v0, a0 = 0.0, here.q, here.dq, here.ddq
+    for row, time in enumerate(times):
+        span = max(0.0, float(time) - before)
+        missing = np.isnan(q[row])
+        if missing.any():
+            a1 = np.nan_to_num(ddq[row])
+            speed = np.where(np.isnan(dq[row]), v0 + span * (a0 + a1) / 2.0, dq[row])
+            q[row] = np.where(missing, q0 + span * (v0 + speed) / 2.0, q[row])
+            dq[row] = speed
+        before, q0 = max(0.0, float(time)), q[row]
+        v0, a0 = np.nan_to_num(dq[row]), np.nan_to_num(ddq[row])
 
 
 def _check_limits(q: Array, dq: Array, ddq: Array, names: Sequence[str], robot: RobotModel) -> None:

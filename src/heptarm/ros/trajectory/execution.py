@@ -13,7 +13,7 @@ from heptarm.errors import HeptarmError
 from heptarm.io.clock import Clock, RealClock
 from heptarm.ros.trajectory.goal import GoalResult, TrajectoryGoal
 from heptarm.ros.trajectory.runner import ExecutionSettings, GoalFeedback, MeasuredJoints
-from heptarm.ros.trajectory.trajectory import KinematicState
+from heptarm.ros.trajectory.trajectory import TrajectorySample
 from heptarm.values.state import State
 
 
@@ -64,7 +64,7 @@ class Execution(Protocol):
         """
         ...
 
-    def at(self, time: float) -> KinematicState | None:
+    def at(self, time: float) -> TrajectorySample | None:
         """Evaluate the active goal at a time [s]; None: there is none, or the time is outside its trajectory."""
         ...
 
@@ -89,16 +89,20 @@ class Execution(Protocol):
         ...
 
 
+def speed_scaling(state: State) -> float:
+    """Extract the fraction of its speed at which the cabinet executes a trajectory: its override, 0 while it pauses."""
+    if state.groups.safety is not None and state.groups.safety.paused:
+        return 0.0
+    return 1.0 if state.motion is None else state.motion.override
+
+
 def measured_state(state: State) -> MeasuredJoints:
     """Extract from a state of the arm what a trajectory is compared with.
 
     Raises:
         StaleState: the state has no joint positions.
     """
-    scaling = 1.0 if state.motion is None else state.motion.override
-    if state.groups.safety is not None and state.groups.safety.paused:
-        scaling = 0.0
-    return MeasuredJoints(state.sampled * 1e-9, state.q, state.dq, scaling)
+    return MeasuredJoints(state.sampled * 1e-9, state.q, state.dq, speed_scaling(state))
 
 
 _log = logging.getLogger("heptarm.ros")

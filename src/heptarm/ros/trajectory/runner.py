@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from heptarm.errors import LimitError
-from heptarm.ros.trajectory.check import GoalRules, check_between_points, check_goal, check_point
+from heptarm.ros.trajectory.check import GoalRules, check_between_points, check_goal, check_points
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, GoalResult, TrajectoryGoal
 from heptarm.ros.trajectory.stream import PointStream, is_streamed
 from heptarm.ros.trajectory.tolerances import StateTolerances, ToleranceMonitor, TrajectoryTolerances
@@ -25,9 +25,13 @@ from heptarm.ros.trajectory.trajectory import (
     KinematicState,
     Preview,
     PreviewSegment,
+    TrajectorySample,
 )
 from heptarm.values.arrays import Array, Value, frozen
 from heptarm.values.robot import RobotModel
+
+#: Largest acceleration to join a stream and to settle after it, a fraction of each axis' maximum.
+_STREAM_ACCELERATION = 0.5
 
 
 def _default_tolerances() -> TrajectoryTolerances:
@@ -75,18 +79,20 @@ class MeasuredJoints(Value):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GoalFeedback(Value):
-    """Progress of a goal.
+    """Progress of a goal at one instant, that of the measurement.
 
     Attributes:
         number: of the goal.
+        stamp: the instant, on the clock of the execution [s].
         desired: where the arm should be.
         actual: where it is; its acceleration is not known and given as 0.
         time: on the trajectory, scaled by the override [s].
         elapsed: since its start [s].
-        index: of the point that is approached.
+        index: how many of its points are before `time`, so the one that is approached.
     """
 
     number: int
+    stamp: float
     desired: KinematicState
     actual: KinematicState
     time: float
@@ -122,6 +128,7 @@ class _ActiveGoal:
     offset: int = 0  # points that were dropped or put before the goal's own
     late: float = 0.0  # how long ago the goal's start was when it was received
     streamed: bool = False  # further points extend it
+    reported: float = 0.0  # time on the trajectory of the last feedback
 
 
 class TrajectoryRunner:
@@ -151,7 +158,7 @@ class TrajectoryRunner:
         self._scaling = 1.0
         self._results: list[GoalResult] = []
         self._number = 0
-        self._stream = PointStream()
+        self._stream = PointStream(robot)
         self._revision = 0  # of the active trajectory, counted over all goals
 
     @property
@@ -165,7 +172,7 @@ class TrajectoryRunner:
         return 0 if self._active is None else self._active.number
 
     def accept(self, goal: TrajectoryGoal, *, now: float, state: MeasuredJoints) -> int:
-        """Accept a goal; it preempts the active one. A point of a stream extends the active goal of the stream.
+        """Accept a goal; it preempts the active one. What belongs to a stream extends its goal.
 
         Returns:
             The goal's number.
@@ -202,11 +209,20 @@ class TrajectoryRunner:
         return self._number
 
     def _extend(self, goal: TrajectoryGoal, now: float, state: MeasuredJoints) -> int:
-        """Continue the trajectory of a stream through another point."""
+        """Continue the trajectory of a stream."""
         effective = self._takes_effect(now)
         here, settings = self._start_state(effective, state), self.settings
-        q, dq = check_point(goal, self.names, self._robot, here=here, rules=settings.rules)
-        trajectory = self._stream.extend(now, here, goal.points[0].time, q, dq, settings.deceleration)
+        q, dq = check_points(goal, self.names, self._robot, here=here, rules=settings.rules)
+        times = np.array([point.time for point in goal.points])
+        acceleration = np.maximum(settings.deceleration, _STREAM_ACCELERATION * self._robot.ddq_max)
+        if len(times) == 1:
+            speed = None if dq is None else dq[0]
+            trajectory = self._stream.add_point(
+                now, effective, here, float(times[0]), q[0], speed, acceleration
+            )
+        else:
+            late = 0.0 if goal.start is None else effective - goal.start
+            trajectory = self._stream.add_window(here, times - late, q, dq, acceleration)
         check_between_points(trajectory, self.names, self._robot, settings.rules)
         if self._active is None or not self._active.streamed:
             self._end(GoalOutcome.PREEMPTED, ErrorCode.INVALID_GOAL, "preempted by a stream of points")
@@ -222,14 +238,17 @@ class TrajectoryRunner:
         )
         return self._number
 
-    def at(self, time: float) -> KinematicState | None:
+    def at(self, time: float) -> TrajectorySample | None:
         """Evaluate the active goal at a time [s]; None: there is none, or the time is outside its trajectory."""
         active = self._active
         if active is None or active.begin is None or time < active.begin:
             return None
         last = active.begin if self._now is None else max(self._now, active.begin)
-        tau = active.tau + time - last
-        return active.trajectory.sample(tau) if 0.0 <= tau <= active.trajectory.duration else None
+        tau = active.tau + self._scaling * (time - last)
+        if not 0.0 <= tau <= active.trajectory.duration:
+            return None
+        desired = active.trajectory.sample(tau)
+        return TrajectorySample(desired, tau + active.late, time - active.begin + active.late)
 
     def cancel(self, number: int, now: float) -> bool:
         """Cancel a goal; the arm brakes. False: it is not active."""
@@ -328,14 +347,16 @@ class TrajectoryRunner:
         self._command = trajectory.sample(active.tau + state.scaling * self.settings.lookahead)
         # the measurement is older than now: compare it with the trajectory at its own time
         age = min(max(0.0, now - state.time), now - active.begin)
-        desired = trajectory.sample(max(0.0, active.tau - state.scaling * age))
+        tau = active.reported = max(active.reported, active.tau - state.scaling * age)
+        desired = trajectory.sample(tau)
         feedback = GoalFeedback(
             active.number,
+            now - age,
             desired,
             KinematicState(state.q, state.dq, np.zeros(7)),
-            time=active.tau + active.late,
-            elapsed=now - active.begin + active.late,
-            index=max(trajectory.index(active.tau), min(1, len(trajectory.times) - 1)) - active.offset,
+            time=tau + active.late,
+            elapsed=now - age - active.begin + active.late,
+            index=max(trajectory.index(tau), min(1, len(trajectory.times) - 1)) - active.offset,
         )
         self._judge(active, now, desired, state)
         return feedback

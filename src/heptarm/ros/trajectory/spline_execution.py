@@ -24,7 +24,7 @@ from heptarm.ros.trajectory.execution import ExecutionThread, GoalListener, meas
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, GoalRefused, GoalResult, TrajectoryGoal
 from heptarm.ros.trajectory.runner import ExecutionSettings, GoalFeedback
 from heptarm.ros.trajectory.tolerances import ToleranceMonitor
-from heptarm.ros.trajectory.trajectory import JointTrajectory, KinematicState
+from heptarm.ros.trajectory.trajectory import JointTrajectory, KinematicState, TrajectorySample
 from heptarm.values.arrays import Array
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.motion.spline import JointSpline, spline_joints
@@ -124,6 +124,7 @@ class SplineExecution(ExecutionThread):
         self._moving: _SplineGoal | None = None  # the goal whose motion moves the arm
         self._results: list[GoalResult] = []
         self._number = 0
+        self._scaling = 1.0
         self._thread.start()
 
     @property
@@ -168,13 +169,15 @@ class SplineExecution(ExecutionThread):
             self._changed.notify_all()
             return self._number
 
-    def at(self, time: float) -> KinematicState | None:
+    def at(self, time: float) -> TrajectorySample | None:
         """Evaluate the active goal at a time [s]; see `Execution`."""
         active = self._active
         if active is None or active.handle is None or time < active.begin:
             return None
-        tau = active.tau + time - self.now
-        return active.trajectory.sample(tau) if 0.0 <= tau <= active.trajectory.duration else None
+        tau = active.tau + self._scaling * (time - self.now)
+        if not 0.0 <= tau <= active.trajectory.duration:
+            return None
+        return TrajectorySample(active.trajectory.sample(tau), tau, time - active.begin)
 
     def cancel(self, number: int) -> bool:
         """Cancel a goal; the arm brakes. False: it is not active."""
@@ -266,12 +269,14 @@ class SplineExecution(ExecutionThread):
         self._judge(active, commanded, state, moving=True)
         count = len(active.trajectory.times)
         index = max(active.trajectory.index(active.tau), min(1, count - 1))
+        stamp = state.sampled * 1e-9
         feedback = GoalFeedback(
             active.number,
+            stamp,
             desired,
             KinematicState(state.q, state.dq, np.zeros(7)),
             time=active.tau,
-            elapsed=self.now - active.begin,
+            elapsed=max(0.0, stamp - active.begin),
             index=index - (count - len(active.goal.points)),
         )
         self._notify(feedback, ())
@@ -279,6 +284,7 @@ class SplineExecution(ExecutionThread):
     def _judge(self, active: _SplineGoal, desired: KinematicState, state: State, *, moving: bool) -> None:
         """End the goal if the tolerances say so."""
         measured = measured_state(state)
+        self._scaling = measured.scaling
         overdue = self.now - active.begin - active.trajectory.duration
         if not moving:  # a spline may take less time than its trajectory
             overdue = max(overdue, 0.0)

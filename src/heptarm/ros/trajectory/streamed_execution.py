@@ -14,7 +14,7 @@ from heptarm.io.clock import Clock
 from heptarm.ros.trajectory.execution import ExecutionThread, GoalListener, measured_state
 from heptarm.ros.trajectory.goal import GoalRefused, GoalResult, TrajectoryGoal
 from heptarm.ros.trajectory.runner import ControlStep, ExecutionSettings, TrajectoryRunner
-from heptarm.ros.trajectory.trajectory import KinematicState
+from heptarm.ros.trajectory.trajectory import TrajectorySample
 
 _log = logging.getLogger("heptarm.ros")
 
@@ -102,7 +102,7 @@ class StreamedExecution(ExecutionThread):
             self._changed.notify_all()
             return number
 
-    def at(self, time: float) -> KinematicState | None:
+    def at(self, time: float) -> TrajectorySample | None:
         """Evaluate the active goal at a time; see `Execution`."""
         with self._changed:
             return self._runner.at(time)

@@ -56,11 +56,13 @@ class TrajectoryTolerances(Value):
         path: while the trajectory is executed.
         goal: at its end.
         goal_time: how long after its end the arm may take to meet `goal` [s]; 0: no limit.
+        cmd_timeout: likewise, independent of the goal's own `goal_time` [s]; 0: no limit.
     """
 
     path: StateTolerances = field(default_factory=StateTolerances)
     goal: StateTolerances = field(default_factory=StateTolerances)
     goal_time: float = 0.0
+    cmd_timeout: float = 0.0
 
     def of(self, goal: TrajectoryGoal, names: Sequence[str]) -> tuple[TrajectoryTolerances, str]:
         """Override these defaults with the tolerances of a goal.
@@ -158,11 +160,20 @@ class ToleranceMonitor:
         if overdue < 0.0:
             return None
         violation = self._tolerances.goal.violation(self._names, self._end, q, dq)
+        if self._end.dq.any() and violation:
+            # the arm passes such an end, so it is compared with the trajectory at the time of the measurement; or it
+            # is late and rests there
+            ends = desired, KinematicState.at_rest(self._end.q)
+            if not all(self._tolerances.goal.violation(self._names, end, q, dq) for end in ends):
+                violation = ""
         if not violation:
             if moving:
                 return None
             return ToleranceVerdict(GoalOutcome.SUCCEEDED, ErrorCode.SUCCESSFUL, "goal reached")
         if 0.0 < self._tolerances.goal_time < overdue:
             text = f"goal tolerance violated {overdue:.3f} s after the end of the trajectory: {violation}"
+            return ToleranceVerdict(GoalOutcome.ABORTED, ErrorCode.GOAL_TOLERANCE_VIOLATED, text)
+        if 0.0 < self._tolerances.cmd_timeout < overdue:
+            text = f"cmd_timeout of {self._tolerances.cmd_timeout:g} s after the end of the trajectory: {violation}"
             return ToleranceVerdict(GoalOutcome.ABORTED, ErrorCode.GOAL_TOLERANCE_VIOLATED, text)
         return None

@@ -31,6 +31,21 @@ class KinematicState(Value):
         return KinematicState(q, zeros, zeros)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class TrajectorySample(Value):
+    """A trajectory that is executed, at one instant.
+
+    Attributes:
+        desired: where the arm should be.
+        time: on the trajectory, scaled by the override [s].
+        elapsed: since its start [s].
+    """
+
+    desired: KinematicState
+    time: float
+    elapsed: float
+
+
 class JointTrajectory:
     """Piecewise polynomial through points in time.
 

@@ -103,7 +103,7 @@ class ActiveLaw:
         return True
 
     def take_over(self, law: PositionLaw) -> None:
-        """Continue with the position control that has held the arm."""
+        """Continue with position control where the brakes have held the arm."""
         self._law, self._frames = law, None
 
     def retune(self, mode: Mode) -> bool:

@@ -16,7 +16,14 @@ from heptarm.sim.controller.condition_monitor import ConditionMonitor, LoadEstim
 from heptarm.sim.controller.hand_guiding import GuidedMotion
 from heptarm.sim.controller.queue import Cancellation, MotionQueue
 from heptarm.sim.controller.safety import SafetyController
-from heptarm.sim.controller.servo import Follower, SmartFollower, follower
+from heptarm.sim.controller.servo import (
+    AxisStop,
+    DirectFollower,
+    Follower,
+    SmartFollower,
+    StraightFollower,
+    follower,
+)
 from heptarm.sim.controller.setpoints import SetPoints
 from heptarm.sim.controller.speed_override import SpeedOverride
 from heptarm.sim.planning.command import TICK, Order
@@ -54,6 +61,8 @@ class RunningMotion:
         "serial",
         "settling",
         "started",
+        "still",
+        "stop",
         "time",
         "watches",
     )
@@ -71,8 +80,10 @@ class RunningMotion:
         self.cancelled = False
         self.ended = False
         self.settling = 0
+        self.still = 0
         self.started = False
         self.follower: Follower | None = None
+        self.stop: AxisStop | None = None
         self.guided: GuidedMotion | None = None
         self.broken = False
 
@@ -102,7 +113,7 @@ class RunningMotion:
             speed: its velocity, shape (7,) [rad/s].
             hardest: acceleration [rad/s²] and jerk [rad/s³] of the fastest axis.
         """
-        self.braking, self.follower, self.guided = True, None, None
+        self.braking, self.follower, self.stop, self.guided = True, None, None, None
         full = float(np.abs(speed).max())
         self.ended = full < 1e-9
         if self.ended:
@@ -116,7 +127,8 @@ class RunningMotion:
 #: A motion is done when every measured joint is within this distance of its command [rad] and this slow [rad/s] ...
 SETTLED = 5e-5
 SETTLED_SPEED = 1e-3
-#: ... or after this many ticks.
+#: ... or has been this slow for this many ticks, since a load deflects it; or at the latest after this many ticks.
+STILL_TICKS = 60
 SETTLE_TICKS = 500
 
 #: Highest speed of the tool frame in T1 [m/s], slightly below the standard's 250 mm/s.
@@ -216,6 +228,15 @@ class Interpolator:
         """Whether the set-points rest."""
         return self.command.rests
 
+    @property
+    def is_quiet(self) -> bool:
+        """Whether nothing runs, nothing waits for the next tick, and no condition is observed."""
+        return (
+            self.run is None
+            and self.queue.is_quiet
+            and not (self._aborts or self._changes or self.condition_monitor.is_busy)
+        )
+
     def _rest(self) -> Array:
         return self.command.after.copy()
 
@@ -235,7 +256,7 @@ class Interpolator:
         if run is not None:
             run.failure = run.failure or text
             run.braking = run.ended = True
-            run.path = run.follower = run.guided = None
+            run.path = run.follower = run.stop = run.guided = None
 
     def advance(self) -> tuple[float, float]:
         """Shift the set-points and compute the next one; returns progress and remaining time."""
@@ -317,9 +338,11 @@ class Interpolator:
     def _follow(self, run: RunningMotion) -> tuple[float, float]:
         planned = run.plan
         if run.cancelled and not (run.ended or run.braking or self.is_overlaid):
-            if self._speed_override.rests:
+            if self._speed_override.rests and run.stop is None:
                 run.ended = True
-            elif not self._safety.latched:  # the stop ended before the motion was at rest
+            elif (
+                not self._safety.latched and run.stop is None
+            ):  # the stop ended before the motion was at rest
                 self._brake_on_path(run)
         if run.ended:
             return self._settle(run)
@@ -384,8 +407,12 @@ class Interpolator:
         if self._control.stays and not run.cancelled and not run.failure:
             return 1.0, 0.0
         run.settling += 1
-        at_rest = not self._control.is_stiff or float(np.abs(self._q - self.command.after).max()) <= SETTLED
-        at_rest = at_rest and float(np.abs(self._dq).max()) <= SETTLED_SPEED
+        run.still = run.still + 1 if float(np.abs(self._dq).max()) <= SETTLED_SPEED else 0
+        at_rest = run.still > 0 and (
+            not self._control.is_stiff
+            or run.still > STILL_TICKS
+            or float(np.abs(self._q - self.command.after).max()) <= SETTLED
+        )
         if at_rest or run.settling >= SETTLE_TICKS:
             cause = "condition" if run.broken else "cancelled" if run.cancelled else "done"
             self.run = None
@@ -416,7 +443,7 @@ class Interpolator:
             return
         run.cancelled = True
         # a stop in force brings a motion to rest sooner, but it does not act on hand guiding
-        if run.guided is not None or not self._safety.latched:
+        if run.guided is not None or (not self._safety.latched and run.stop is None):
             self._brake_on_path(run)
 
     def _brake_on_path(self, run: RunningMotion) -> None:
@@ -472,6 +499,8 @@ class Interpolator:
         order = run.plan.order
         if target is not None and target.order == order.id and not run.cancelled:
             follower.aim(target.q, target.dq)
+        if not isinstance(follower, StraightFollower) and self._stops_axes(run, follower):
+            return nan, follower.remaining
         try:
             there = follower.advance(TICK if run.braking else TICK * self._speed_override.factor)
         except Unreachable as error:
@@ -484,6 +513,20 @@ class Interpolator:
         else:
             self._set(run, there)
         return nan, follower.remaining
+
+    def _stops_axes(self, run: RunningMotion, follower: SmartFollower | DirectFollower) -> bool:
+        """Whether a safety stop brakes the axes of a servo motion; moves the set-point if it does."""
+        if run.stop is None:
+            if run.braking or not self._safety.latched:
+                return False
+            run.stop = AxisStop(self._robot, self.command.after, self.command.speed, jerk=FAST_JERK)
+            self._speed_override.rest()
+        elif run.stop.is_over and (run.cancelled or not self._safety.latched):
+            run.stop, run.ended = None, run.cancelled
+            follower.restart(self.command.after)
+            return run.ended
+        self._set(run, run.stop.advance())
+        return True
 
     def _stop_at_limit(self, run: RunningMotion, text: str) -> None:
         """A limit of the control mode is exceeded: switch to position control and brake from the measured velocity."""

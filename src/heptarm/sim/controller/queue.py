@@ -72,6 +72,11 @@ class MotionQueue:
         """Whether no command is running or waiting."""
         return self._open == 0
 
+    @property
+    def is_quiet(self) -> bool:
+        """Whether it is idle and the next tick has no cancellation to execute."""
+        return self._open == 0 and not self._cancels
+
     def submit(self, order: Order) -> None:
         """Plan a command from the end of the queue and append it.
 

@@ -13,7 +13,7 @@ import numpy as np
 from ruckig import ControlInterface, InputParameter, Result, Ruckig, RuckigError, Synchronization, Trajectory
 
 from heptarm.model.kinematics import forward
-from heptarm.sim.planning.command import DEFAULT_TIMING, Order
+from heptarm.sim.planning.command import DEFAULT_TIMING, TICK, Order
 from heptarm.sim.planning.path import TcpInverseKinematics
 from heptarm.sim.planning.targets import CARTESIAN_DEFAULT, ORIENTATION_DEFAULT
 from heptarm.sim.seam import ServoTiming, StraightLimits
@@ -373,12 +373,19 @@ class SmartFollower:
 
     def __init__(self, limits: ServoLimits, here: Array) -> None:
         self._limits = limits
-        self._otg = OnlineTrajectory(7, synchronization=Synchronization.Time, halting=Synchronization.No)
-        self._otg.limit(limits.acceleration, limits.jerk, velocity=limits.velocity)
+        self._otg = self._new_trajectory()
         self._still = here.copy()
+        self._goal: tuple[Array, Array | None] | None = None
         self._passes = False
         self._stopping = False
         self.resting = 0.0
+
+    def restart(self, here: Array) -> None:
+        """Go on from a set-point at rest, shape (7,) [rad], to the target."""
+        self._still = here.copy()
+        self._otg = self._new_trajectory()
+        if self._goal is not None:
+            self.aim(*self._goal)
 
     @property
     def remaining(self) -> float:
@@ -389,6 +396,7 @@ class SmartFollower:
         """Set the target, shape (7,) [rad], and the velocity at it [rad/s]."""
         if self._stopping:
             return
+        self._goal = q, dq
         pass_at = (
             np.zeros(7)
             if dq is None
@@ -434,6 +442,11 @@ class SmartFollower:
         """Whether a braked motion has come to rest."""
         return self._stopping and self._otg.over >= 0.0
 
+    def _new_trajectory(self) -> OnlineTrajectory:
+        otg = OnlineTrajectory(7, synchronization=Synchronization.Time, halting=Synchronization.No)
+        otg.limit(self._limits.acceleration, self._limits.jerk, velocity=self._limits.velocity)
+        return otg
+
     def _halt(self, state: OtgState) -> None:
         self._passes = False
         self._otg.halt(state)
@@ -455,6 +468,11 @@ class DirectFollower:
         self._left = 0.0
         self._brake: SmartFollower | None = None
         self.resting = 0.0
+
+    def restart(self, here: Array) -> None:
+        """Go on from a set-point at rest, shape (7,) [rad], to the target."""
+        self._q, self._dq = here.copy(), np.zeros(7)
+        self.aim(self._target)
 
     @property
     def remaining(self) -> float:
@@ -499,6 +517,31 @@ class DirectFollower:
 
 
 Follower = SmartFollower | DirectFollower | StraightFollower
+
+
+class AxisStop:
+    """Brakes every axis by itself: how a safety stop acts on a servo motion, which has no path to keep.
+
+    Args:
+        robot: the robot, whose highest accelerations it uses.
+        here: present set-point, shape (7,) [rad].
+        speed: its velocity, shape (7,) [rad/s].
+        jerk: as a multiple of that of motions.
+    """
+
+    def __init__(self, robot: RobotModel, here: Array, speed: Array, *, jerk: float) -> None:
+        limits = ServoLimits(robot.dq_max, robot.ddq_max, jerk * robot.dddq_max, DEFAULT_TIMING)
+        self._stop = SmartFollower(limits, here)
+        self._stop.brake(scale=1.0, rate=0.0, speed=np.clip(speed, -robot.dq_max, robot.dq_max))
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the axes are at rest."""
+        return self._stop.is_still
+
+    def advance(self) -> Array:
+        """The next set-point, shape (7,) [rad]."""
+        return self._stop.advance(TICK)
 
 
 def follower(robot: RobotModel, order: Order, here: Array) -> Follower:

@@ -88,6 +88,11 @@ class SpeedOverride:
         self.scale *= cap
         self.rate *= cap
 
+    def rest(self) -> None:
+        """Motion time does not advance from now on; the motion begins again from rest."""
+        self.factor = self.scale = self.rate = self._free = self._goal = self._before = 0.0
+        self._slew = None
+
     def _halt(self, command: SetPoints) -> None:
         speed, ahead = (command.after - command.now) / TICK, self._ahead(command)
         factor = 0.0

@@ -54,15 +54,18 @@ class ExternalLoad:
         mujoco.mj_jacSite(self._model, self._data, self._jp, self._jr, self._site)
         self._applied[:] = self._jp[:, :7].T @ self._push[:3] + self._jr[:, :7].T @ self._push[3:]
 
-    def measure(self, inertial: Array) -> None:
+    def measure(self, inertial: Array, *, error: Array | None = None) -> None:
         """After the dynamics of a tick: torques and wrench; zero without any load.
 
         Args:
             inertial: M q̈ + h - τ, the residual of the controller's model, shape (7,) [Nm].
+            error: of the torque sensors, shape (7,) [Nm]; what they show too much, no load explains.
         """
         # forces on bodies and unknown payloads appear in no vector of MuJoCo, only in the residual
         explained = not self.is_misjudged and not self._pulled.any()
         self.torque = self._applied + self._constraint if explained else inertial
+        if error is not None:
+            self.torque = self.torque - error
         if not self.torque.any():
             self.wrench[:] = 0.0
             return

@@ -14,10 +14,13 @@ class IoImage:
 
     Args:
         values: of the signals by index, shape (n,).
+
+    Attributes:
+        values: the same array.
     """
 
     def __init__(self, values: Array) -> None:
-        self._values = values
+        self.values = values
         self._places: dict[tuple[str, bool], int] = {}
         self._lock = threading.Lock()
 
@@ -34,9 +37,9 @@ class IoImage:
         """
         with self._lock:
             place = self._places.setdefault((name, is_output), len(self._places))
-            if place >= len(self._values):
+            if place >= len(self.values):
                 del self._places[name, is_output]
-                raise ValueError(f"the IO image is full: at most {len(self._values)} signals")
+                raise ValueError(f"the IO image is full: at most {len(self.values)} signals")
             return place
 
     def find(self, name: str) -> int:
@@ -59,8 +62,8 @@ class IoImage:
 
     def get(self, name: str) -> float:
         """Value of a signal. Raises as `find` does."""
-        return float(self._values[self.find(name)])
+        return float(self.values[self.find(name)])
 
     def set(self, name: str, value: float) -> None:
         """Set the value of a signal; 0 or 1 of a boolean. Raises as `find` does."""
-        self._values[self.find(name)] = value
+        self.values[self.find(name)] = value

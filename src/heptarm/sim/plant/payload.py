@@ -3,7 +3,8 @@
 Where both agree, only the torques change. Where they differ, the controller's model is wrong by the difference: it
 takes the unknown weight for an external force, as a robot does.
 
-The true payload is the declared one, unless it was set separately.
+The true payload is the declared one, unless it was set separately. A tool of the scene is a true load, too, whose
+weight and inertia MuJoCo knows and the controller does not: load data have to be declared for it, as on a robot.
 """
 
 from __future__ import annotations
@@ -73,6 +74,7 @@ class PayloadModel:
         model: MuJoCo's model of the world; its first seven joints are the arm's.
         data: its state.
         mass: inertia matrix of the world, shape (nv, nv), which the plant keeps up to date [kg m²].
+        bare: model of the arm alone, if a tool of the scene is on its flange; None: the flange is empty.
 
     Attributes:
         mass: inertia matrix of the controller's model, shape (7, 7) [kg m²].
@@ -80,17 +82,24 @@ class PayloadModel:
         differs: whether the controller's load data differ from the true payload.
     """
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, mass: Array) -> None:
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        mass: Array,
+        bare: mujoco.MjModel | None = None,
+    ) -> None:
         self._model, self._data, self._world_mass = model, data, mass
         self._link = _LastLink(model)
-        self._believed = copy(model)
+        self._has_tool = bare is not None
+        self._believed = copy(model) if bare is None else bare
         # the controller's model has no contacts
         self._believed.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
         self._scratch: mujoco.MjData | None = None
-        self._full = np.zeros_like(mass)
+        self._full = np.zeros((self._believed.nv, self._believed.nv))
         self._declared = self._hanging = NOTHING
         self._pinned: Body | None = None
-        self._agree()
+        self._settle()
 
     def _agree(self) -> None:
         self.differs = False
@@ -107,11 +116,13 @@ class PayloadModel:
         self._settle()
 
     def _settle(self) -> None:
-        hanging = self._declared if self._pinned is None else self._pinned
+        hanging = self._pinned
+        if hanging is None:
+            hanging = NOTHING if self._has_tool else self._declared
         if hanging != self._hanging:
             self._hanging = hanging
             self._link.carry(self._model, hanging)
-        if hanging == self._declared:
+        if hanging == self._declared and not self._has_tool:
             self._agree()
             return
         self._link.carry(self._believed, self._declared)
@@ -124,8 +135,8 @@ class PayloadModel:
         """Update the controller's model for the present posture; needed in each tick in which it differs."""
         model, data = self._believed, self._scratch
         assert data is not None
-        data.qpos[:] = self._data.qpos
-        data.qvel[:] = self._data.qvel
+        data.qpos[:] = self._data.qpos[: model.nq]
+        data.qvel[:] = self._data.qvel[: model.nv]
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
         mujoco.mj_fullM(model, data, self._full)

@@ -20,8 +20,11 @@ from heptarm.sim.controller.safety import SafetyController, StopRequest
 from heptarm.sim.planning.command import TICK
 from heptarm.sim.plant.drive_monitor import LAG, DriveMonitor
 from heptarm.sim.plant.external_load import ExternalLoad
+from heptarm.sim.plant.gripper import SimulatedGripper, has_gripper
 from heptarm.sim.plant.io_image import IoImage
 from heptarm.sim.plant.payload import PayloadModel
+from heptarm.sim.plant.scene import Scene, find_body, is_mounted
+from heptarm.sim.plant.sensor_errors import SensorErrors
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.plant.world import Box, compiled
 from heptarm.sim.seam import SLOTS, TICK_NS, HeaderWords, SafetyFlags, StateWords
@@ -128,7 +131,9 @@ class Plant:
         model: "iiwa7", "iiwa14", "med7" or "med14".
         q: joint positions at the start, shape (7,) [rad].
         boxes: fixed boxes around it.
+        scene: what else is around it and on its flange; None: nothing.
         monitored: whether drives trip; see `heptarm.sim.plant.drive_monitor`.
+        errors: of the sensors, and friction of the joints; None: ideal ones.
 
     Attributes:
         submit: plans a command and queues it; see `heptarm.sim.controller.queue.MotionQueue.submit`.
@@ -140,10 +145,13 @@ class Plant:
         *,
         q: tuple[float, ...] = HOME,
         boxes: Sequence[Box] = (),
+        scene: Scene | None = None,
         monitored: bool = True,
+        errors: SensorErrors | None = None,
     ) -> None:
         self.robot: RobotModel = robot(model)
-        self.model = compiled(model, boxes)
+        self._errors = errors
+        self.model = compiled(model, boxes, scene)
         self.data = mujoco.MjData(self.model)
         self.data.qpos[:7] = q
         mujoco.mj_forward(self.model, self.data)
@@ -152,12 +160,16 @@ class Plant:
         self.on_wake: Callable[[int], None] | None = None
         self._views()
         self._load = ExternalLoad(self.model, self.data)
-        self._payload = PayloadModel(self.model, self.data, self._mass)
+        bare = compiled(model) if is_mounted(self.model) else None
+        self._payload = PayloadModel(self.model, self.data, self._mass, bare)
         self._payloads: deque[tuple[Callable[[Body], None], Body]] = (
             deque()
         )  # to take effect in the next tick
         self._control = ActiveLaw(self.robot, self.model, self.data)
         self.signals = IoImage(self.shared.signals)
+        self._gripper: SimulatedGripper | None = None
+        if scene is not None and has_gripper(self.model):
+            self._gripper = SimulatedGripper(self.model, self.data, self.signals, scene.wiring)
         self._sensed = MeasuredState(
             self._q, self._dq, self._mass[:7, :7], self._bias, self._passive, self._q, self._q, self._q
         )
@@ -174,6 +186,7 @@ class Plant:
         )
         self.condition_monitor = self.interpolator.condition_monitor
         self.submit = self.interpolator.queue.submit
+        self._take_loads()
         self._write(0, 0.0, nan)
 
     def _views(self) -> None:
@@ -185,6 +198,7 @@ class Plant:
         self._limit, self._least = self.robot.tau_max, -self.robot.tau_max
         self._mass = np.zeros((self.model.nv, self.model.nv))
         mujoco.mj_fullM(self.model, d, self._mass)
+        self._measured = self._q  # positions that the sensors show
         self._tau = np.zeros(7)
         self._tau_cmd = np.zeros(7)
 
@@ -276,6 +290,15 @@ class Plant:
         """Set-point of the next tick without an overlay, shape (7,) [rad]; of a hold: its start."""
         return self.interpolator.interpolated
 
+    def body_pose(self, name: str) -> Array:
+        """Pose of a body of the scene in the base: x y z [m] and quaternion x y z w, shape (7,).
+
+        Raises:
+            ValueError: the scene has no such body.
+        """
+        index = find_body(self.model, name)
+        return np.concatenate([self.data.xpos[index], np.roll(self.data.xquat[index], -1)])
+
     def overlay(self, action: Superposition | None) -> None:
         """Overlay the running hold in the next tick; None after an overlay: brake, and end the hold."""
         self.interpolator.action = action
@@ -291,6 +314,8 @@ class Plant:
         if self._payloads:
             self._take_loads()
         progress, remaining = self._advance()
+        if self._gripper is not None:
+            self._gripper.tick()
         mujoco.mj_step1(m, d)
         self._load.apply(self.tick_count * TICK)
         mujoco.mj_fullM(m, d, self._mass)
@@ -304,12 +329,20 @@ class Plant:
             self._control.superpose(torque, interpolator.action)
         np.minimum(torque, self._limit, out=torque)
         np.maximum(torque, self._least, out=torque)
+        self._tau_cmd = torque if self._brakes is None else np.zeros(7)
+        if self._errors is not None:
+            torque = torque - self._errors.friction(self._dq)
         self._ctrl[:] = torque
         mujoco.mj_step2(m, d)
-        self._tau_cmd = torque if self._brakes is None else np.zeros(7)
         # the torque sensors are on the link side of the gear: they do not measure rotor inertia and gear friction
         self._tau = torque - self._armature * self._acc + self._passive
-        self._load.measure(sensed.mass @ self._acc + sensed.bias - self._passive - torque)
+        inertial = sensed.mass @ self._acc + sensed.bias - self._passive - torque
+        if self._errors is None:
+            self._load.measure(inertial)
+        else:
+            reading = self._errors.read(self._q, self._tau)
+            self._measured, self._tau = reading.q, reading.tau
+            self._load.measure(inertial, error=reading.tau_error)
         if self._monitor is not None and not self._tripped:
             self._supervise(self._monitor)
         self.tick_count += 1
@@ -337,8 +370,8 @@ class Plant:
         """Close the brakes when a stop has brought the arm to rest; open them when execution may continue."""
         if not self.safety.latched:
             if self._tripped and self._brakes is not None:  # the arm is where the brakes have stopped it
-                self._control.take_over(self._brakes)
-                self.interpolator.command.stay(self._braked.now)
+                self._control.take_over(self._brakes.released(self._braked))
+                self.interpolator.command.stay(self._q)
             if self._tripped and self._monitor is not None:
                 self._monitor.acknowledge(self._q)
             self._brakes, self._halted, self._tripped = None, 0, False
@@ -355,7 +388,7 @@ class Plant:
     def _close_brakes(self) -> None:
         here = self._q.copy()
         self._braked = replace(self._sensed, before=here, now=here, after=here, is_overlaid=False)
-        self._brakes = PositionLaw.continuing(self._tau_cmd, self._braked)
+        self._brakes = PositionLaw.locked(self._tau_cmd, self._braked)
 
     def _write(self, order: int, progress: float, remaining: float) -> None:
         k, r = self.tick_count, self.shared
@@ -363,7 +396,7 @@ class Plant:
         words, reals = r.ints[slot], r.floats[slot]
         words[StateWords.SEQ] = 2 * k + 1
         words[StateWords.TIME] = k * TICK_NS
-        q = self._q
+        q = self._measured
         reals[StateWords.Q] = q
         reals[StateWords.Q_CMD] = self.interpolator.command.after
         reals[StateWords.DQ] = self._dq
@@ -417,7 +450,7 @@ class Plant:
         slot = self.shared.floats[self.tick_count % SLOTS]
         return Snapshot(
             self.tick_count * TICK,
-            self._q.copy(),
+            self._measured.copy(),
             self.interpolator.command.after.copy(),
             self._dq.copy(),
             self._tau.copy(),

@@ -98,6 +98,33 @@ class SharedState:
         return NewestTarget(order, q, dq if kind == TargetKind.POSITION_WITH_VELOCITY else None)
 
 
+class PositionsFile:
+    """A file with the newest positions of the whole world, which another process maps: the view.
+
+    Args:
+        path: of the file.
+        size: number of positions.
+    """
+
+    def __init__(self, path: Path, size: int) -> None:
+        if not path.exists() or path.stat().st_size != 8 * (size + 2):
+            path.write_bytes(bytes(8 * (size + 2)))
+        self._values = np.memmap(path, dtype=np.float64, shape=(size + 2,))
+
+    def write(self, positions: np.ndarray) -> None:
+        """Replace them; shape (size,)."""
+        count = self._values[0] + 1.0
+        self._values[0] = count
+        self._values[2:] = positions
+        self._values[1] = count
+
+    def read(self) -> np.ndarray | None:
+        """The newest positions, shape (size,); None if there are none yet or they are being written."""
+        end = float(self._values[1])
+        copy = np.array(self._values[2:])
+        return copy if end > 0.0 and self._values[0] == end else None
+
+
 class Trace:
     """Writes the state after each tick to a file, with which readings of the state can be compared.
 

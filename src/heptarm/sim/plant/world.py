@@ -1,4 +1,4 @@
-"""The simulated world: the arm's model among boxes."""
+"""The simulated world: the arm's model among boxes and in a scene."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 
 import mujoco
 
+from heptarm.sim.plant.scene import Scene
 from heptarm.values.robot import robot
 
 MODELS = Path(__file__).parents[1] / "models"
@@ -65,9 +66,15 @@ def specification(model: str) -> mujoco.MjSpec:
     return spec
 
 
-def compiled(model: str, boxes: Sequence[Box] = ()) -> mujoco.MjModel:
-    """MuJoCo's model of a robot among boxes, see `specification`."""
+def compiled(model: str, boxes: Sequence[Box] = (), scene: Scene | None = None) -> mujoco.MjModel:
+    """MuJoCo's model of a robot among boxes and in a scene, see `specification`; its first seven joints are the arm's.
+
+    Raises:
+        ValueError: the file of the scene is not in MuJoCo's format.
+    """
     spec = specification(model)
+    if scene is not None:
+        scene.attach_to(spec)
     for number, box in enumerate(boxes):
         spec.worldbody.add_geom(
             name=f"box {number}",

@@ -9,6 +9,7 @@ standard input is closed, which also happens when its parent is killed.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import gc
 import json
 import logging
@@ -20,21 +21,25 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, fields
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any, cast, get_args, get_type_hints
 
-from heptarm.errors import HeptarmError
+from heptarm.errors import HeptarmError, without_java
 from heptarm.fri.protocol.version import Version
 from heptarm.io.keys import find_key
 from heptarm.sim.fri.sessions import Sessions
 from heptarm.sim.plant.payload import parse_payload
 from heptarm.sim.plant.plant import Plant
-from heptarm.sim.plant.shared_state import Trace
-from heptarm.sim.plant.world import Box
+from heptarm.sim.plant.scene import Scene
+from heptarm.sim.plant.sensor_errors import parse_sensors, sensor_errors
+from heptarm.sim.plant.shared_state import PositionsFile, Trace
+from heptarm.sim.plant.world import Box, compiled
 from heptarm.sim.runtime import project
 from heptarm.sim.runtime.addresses import AddressMap
 from heptarm.sim.runtime.operator import SimulatedOperator, timed
 from heptarm.sim.runtime.realtime_loop import ANSWER_GAP, RealtimeLoop, batch_scheduled
-from heptarm.values.simulator_options import SimulatorOptions, flag
+from heptarm.sim.runtime.rest import Rest
+from heptarm.values.robot import robot
+from heptarm.values.simulator_options import RealTime, SimulatorOptions, flag
 
 log = logging.getLogger("heptarm.sim")
 
@@ -45,6 +50,8 @@ REAL_TIME_PRIORITY = 10
 _PORT_PROPERTY = "heptarm.port.bound"
 _START_TIMEOUT = 20.0
 _HOUSEKEEPING = 0.1
+#: Ticks between two updates of the file of positions.
+_POSITIONS_EVERY = 30
 
 
 def arguments(argv: list[str] | None = None) -> SimulatorOptions:
@@ -105,7 +112,9 @@ class VirtualCabinet:
         self.plant = Plant(
             options.model,
             boxes=[Box.of(text) for text in options.box],
+            scene=Scene.of(options.scene) if options.scene else None,
             monitored=options.drive_monitoring == "on",
+            errors=sensor_errors(robot(options.model), options.sensors),
         )
         self.sessions = Sessions(
             self.plant,
@@ -116,7 +125,6 @@ class VirtualCabinet:
         self.operator = SimulatedOperator(self.plant)
         for fault in options.fault:
             self.operator.schedule(fault)
-        self.loop = RealtimeLoop(self.plant.shared, self.tick, speed=options.speed)
         jvm.start(options.classpath, foreign=self.is_foreign)
         import jpype
 
@@ -125,7 +133,18 @@ class VirtualCabinet:
             jpype.JClass("java.util.logging.LogManager").getLogManager().reset()
         self._java_memory = java_plant.java_memory
         self._trace = None if options.trace is None else Trace(self.plant.shared, options.trace)
+        self._positions = (
+            None if options.positions is None else PositionsFile(options.positions, len(self.plant.data.qpos))
+        )
         self._station = java_plant.open_station(self.plant, self.sessions)
+        rest = Rest(self.plant, self.sessions, self.operator, self._station.timers)
+        self.loop = RealtimeLoop(
+            self.plant.shared,
+            self.tick,
+            speed=options.speed,
+            real_time=real_time_of(options),
+            rest=None if self._trace is not None else rest,  # a trace has the state of each tick
+        )
         for name, value in data.items():
             self._station.setProcessData(name, java_plant.boxed(value))
         if options.project is not None:
@@ -158,6 +177,8 @@ class VirtualCabinet:
         self.plant.tick()
         if self._trace is not None:
             self._trace.append()
+        if self._positions is not None and self.plant.tick_count % _POSITIONS_EVERY == 0:
+            self._positions.write(self.plant.data.qpos)
 
     @property
     def is_foreign(self) -> bool:
@@ -178,8 +199,11 @@ class VirtualCabinet:
             if not self.host.isAlive():
                 break
             time.sleep(0.002)
+        failure = str(self.host.failure() or "no reason given")
+        if "Address already in use" in failure:
+            failure = f"port {self.options.port} is in use by another program"
         raise RuntimeError(
-            f"the cabinet application did not start: {self.host.failure() or 'no reason given'}"
+            f"the cabinet application did not start: {without_java(failure) or 'no reason given'}"
         )
 
     def close(self) -> None:
@@ -199,21 +223,48 @@ class VirtualCabinet:
             partial.replace(self.options.stats)
 
 
-def _promote() -> None:
-    """Set the priority of the application's threads; every client adds new ones."""
-    for task in Path("/proc/self/task").iterdir():
-        try:
-            if (task / "comm").read_text().startswith(REAL_TIME_THREADS):
-                number = int(task.name)
-                if os.sched_getscheduler(number) == os.SCHED_OTHER:
-                    os.sched_setscheduler(number, os.SCHED_FIFO, os.sched_param(REAL_TIME_PRIORITY))
-        except (OSError, ProcessLookupError):
-            continue  # the thread has ended, or the priority is refused; the statistics report the latter
+def real_time_of(options: SimulatorOptions) -> RealTime:
+    """When the loop asks for real-time priority.
+
+    Raises:
+        ValueError: the option has another value.
+    """
+    for known in get_args(RealTime):
+        if options.real_time == known:
+            return cast(RealTime, known)
+    raise ValueError(f"real_time must be one of {', '.join(get_args(RealTime))}, got {options.real_time!r}")
 
 
-def _housekeeping(stop: threading.Event) -> None:
+class _Priorities:
+    """Priorities of the application's threads: real-time ones while the loop has one."""
+
+    def __init__(self, loop: RealtimeLoop) -> None:
+        self._loop = loop
+        self._promoted: set[int] = set()
+
+    def update(self) -> None:
+        """Promote new threads, every client adds some; or demote those that were promoted."""
+        if sys.platform == "linux" and self._loop.is_real_time:
+            for task in Path("/proc/self/task").iterdir():
+                with contextlib.suppress(OSError):  # it has ended, or is refused, which the statistics report
+                    if (task / "comm").read_text().startswith(REAL_TIME_THREADS):
+                        self._promote(int(task.name))
+        elif self._promoted:
+            for number in self._promoted:
+                with contextlib.suppress(OSError):  # it has ended
+                    os.sched_setscheduler(number, os.SCHED_OTHER, os.sched_param(0))
+            self._promoted = set()
+
+    def _promote(self, number: int) -> None:
+        if os.sched_getscheduler(number) == os.SCHED_OTHER:
+            os.sched_setscheduler(number, os.SCHED_FIFO, os.sched_param(REAL_TIME_PRIORITY))
+            self._promoted.add(number)
+
+
+def _housekeeping(loop: RealtimeLoop, stop: threading.Event) -> None:
+    priorities = _Priorities(loop)
     while not stop.wait(_HOUSEKEEPING):
-        _promote()
+        priorities.update()
 
 
 def _read_standard_input(operator: SimulatedOperator, end: Callable[[], None]) -> None:
@@ -233,14 +284,14 @@ def _read_standard_input(operator: SimulatedOperator, end: Callable[[], None]) -
 
 
 def _operate(operator: SimulatedOperator, words: str) -> None:
-    """Execute an operator action and report on standard output whether it was accepted."""
+    """Execute an operator action and report on standard output whether it was accepted, and what it shows."""
+    shown = error = ""
     try:
         if words:
-            operator.do(words)
-        error = ""
+            shown = operator.do(words)
     except ValueError as refused:
         error = str(refused)
-    print(json.dumps({"operator": words, "error": error}), flush=True)
+    print(json.dumps({"operator": words, "error": error, "shown": shown}), flush=True)
 
 
 def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
@@ -256,7 +307,7 @@ def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[s
     options = cabinet.options
     ready = {"ready": True, "host": options.host, "port": port, "pid": os.getpid(), "model": options.model}
     print(json.dumps(ready), flush=True)
-    _housekeeping(stopping)
+    _housekeeping(cabinet.loop, stopping)
 
 
 def _wait_for_application(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:
@@ -281,10 +332,14 @@ def main(argv: list[str] | None = None) -> int:
             timed(fault)
         for text in options.box:
             Box.of(text)
+        if options.scene:
+            compiled(options.model, (), Scene.of(options.scene))
         if options.payload:
             parse_payload(options.payload)
         if options.drive_monitoring not in ("on", "off"):
             raise ValueError(f"drive_monitoring must be on or off, got {options.drive_monitoring!r}")
+        parse_sensors(options.sensors)
+        real_time_of(options)
         if options.project is not None:
             project.read_project(options.project)
     except (ValueError, OSError) as error:  # a CommandRejected is a ValueError

@@ -354,7 +354,7 @@ def open_station(plant: Plant, sessions: Sessions) -> Any:
     for number in range(_CALLS_AT_ONCE):
         name = f"plant-calls-{number}"
         threading.Thread(target=_carry_out, args=(calls, given), name=name, daemon=True).start()
-    station = jpype.JClass("heptarm.doubles.runtime.Station").open(memory, calls.plant())
+    station = jpype.JClass("heptarm.doubles.runtime.Station").open(memory, calls)
     plant.on_wake = station.timers.tick
     plant.on_safety = station.safetyChanged
     return station

@@ -16,6 +16,7 @@ from itertools import count
 from typing import TYPE_CHECKING
 
 from heptarm.sim.controller.safety import StopRequest
+from heptarm.sim.plant.shared_state import NEVER
 from heptarm.sim.seam import OperationMode
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ WORDS = {
     "pause": "press Stop: motions pause on their path",
     "start": "press Start: execution continues",
     "push FX FY FZ [SECONDS]": "push the flange, base axes [N]",
+    "where BODY": "show the pose of a body of the scene in the base: x y z [m] and quaternion x y z w",
     "set SIGNAL VALUE": "set a signal of the cabinet: a number, true or false",
     "answer BUTTON": "press a button of the dialog that is shown, from 0",
     "press SLOT [BAR [second]]": "press and release a user key, 0 to 3, or its second half; optionally of another bar",
@@ -74,6 +76,7 @@ _COUNTS = {
     **dict.fromkeys(("drive_error", "joint_limit", "clear"), (0, 1)),
     "override": (1, 1),
     "push": (3, 4),
+    "where": (1, 1),
     "set": (2, 2),
     "press": (1, 3),
     "answer": (1, 1),
@@ -110,6 +113,8 @@ def understood(words: str) -> tuple[str, list[float | str]]:
     least, most = _COUNTS[name]
     if not least <= len(rest) <= most:
         raise ValueError(f"{words!r}: {name} takes {least} to {most} values, got {len(rest)}")
+    if name == "where":
+        return name, [words.split()[1]]
     if name in ("set", "press"):
         return name, _named(words, name)
     if name == "clear":
@@ -159,7 +164,7 @@ class SimulatedOperator:
         self._plant = plant
         self._due: list[tuple[int, int, str]] = []
         self._numbers = count()
-        self._verbs: dict[str, Callable[..., None]] = {
+        self._verbs: dict[str, Callable[..., str | None]] = {
             **{request.value: self._requesting(request) for request in StopRequest},
             **{mode.name.lower(): self._choosing(mode) for mode in OperationMode},
             "drive_error": self._drive_error,
@@ -174,6 +179,7 @@ class SimulatedOperator:
             "pause": plant.pause,
             "start": plant.resume,
             "push": self._push,
+            "where": self._where,
             "set": plant.signals.set,
             "press": self._press,
             "answer": self._answer,
@@ -182,6 +188,8 @@ class SimulatedOperator:
         self.press: Callable[[str, int], bool] = lambda bar, slot: False
         #: Presses a button of the open dialog; returns whether there is one.
         self.answer: Callable[[int], bool] = lambda button: False
+        #: Called after each action, in its thread.
+        self.on_action: Callable[[], None] = lambda: None
 
     def schedule(self, text: str) -> None:
         """Schedule an action at a plant time: "NAME@SECONDS".
@@ -191,6 +199,11 @@ class SimulatedOperator:
         """
         words, seconds = timed(text)
         heapq.heappush(self._due, (round(seconds * 1000), next(self._numbers), words))
+
+    @property
+    def next_due(self) -> int:
+        """Tick before which the next scheduled action is executed; `NEVER` if there is none."""
+        return self._due[0][0] if self._due else NEVER
 
     def tick(self) -> None:
         """Execute the actions that are due; called before each tick of the plant."""
@@ -202,14 +215,19 @@ class SimulatedOperator:
             except ValueError as error:  # no such signal or key: the simulation continues
                 log.warning("%s: %s", words, error)
 
-    def do(self, words: str) -> None:
+    def do(self, words: str) -> str:
         """Execute an action now.
+
+        Returns:
+            What it shows; "" if it shows nothing.
 
         Raises:
             ValueError: there is no such action, or its values are illegal; nothing has changed.
         """
         name, values = understood(words)
-        self._verbs[name](*values)
+        shown = self._verbs[name](*values) or ""
+        self.on_action()
+        return shown
 
     def _requesting(self, request: StopRequest) -> Callable[[], None]:
         return lambda: self._plant.safety.request_stop(request)
@@ -232,6 +250,9 @@ class SimulatedOperator:
     def _answer(self, button: float) -> None:
         if not self.answer(int(button)):
             raise ValueError(f"no open dialog has a button {int(button)}")
+
+    def _where(self, body: str) -> str:
+        return " ".join(f"{value:.6f}" for value in self._plant.body_pose(body))
 
     def _press(self, slot: float, bar: str = "client", half: str = "") -> None:
         if not self.press(bar, int(slot) + (SLOTS if half else 0)):

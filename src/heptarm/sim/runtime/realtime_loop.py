@@ -1,14 +1,15 @@
 """The realtime loop: ticks in real time, or N times faster, and measures its own lateness.
 
-The loop sleeps to shortly before a tick is due and spins for the rest. After a late wake-up it catches up, since a
-tick costs a tenth of a millisecond; after more than 20 missed ticks it re-bases its schedule and counts that. With an
-FRI session open it leaves `answer_gap` between two ticks, however late they are, and re-bases after one missed tick:
-no client could answer ticks that follow each other without a pause, and a machine that was suspended kept its client
-from answering as well.
+The loop sleeps until a tick is due. After a late wake-up it catches up, since a tick costs a tenth of a millisecond;
+after more than 20 missed ticks it re-bases its schedule and counts that. With an FRI session open it leaves
+`answer_gap` between two ticks, however late they are, and re-bases after one missed tick: no client could answer ticks
+that follow each other without a pause, and a machine that was suspended kept its client from answering as well.
+While the robot rests, nothing is simulated and the loop wakes only for readers of the state: see `RestingPlant`.
 Python's garbage collector does not run by itself: what exists at the start is frozen, and the loop collects the rest
 every few seconds, in the pause between two ticks.
-Real-time priority and a short timer slack are requested; a refusal is named in the statistics. Memory is not locked:
-that would commit all the memory that the JVM has only reserved.
+Real-time priority is requested while an FRI client has to answer each tick, or always, by the option; a refusal is
+named in the statistics. Only then the loop wakes shortly before a tick and spins for the rest: several cabinets that
+do so starve a machine. Memory is not locked: that would commit all the memory that the JVM has only reserved.
 """
 
 from __future__ import annotations
@@ -21,11 +22,13 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
 from heptarm.sim.plant.shared_state import SharedState
 from heptarm.sim.seam import TICK_NS, HeaderWords
+from heptarm.values.simulator_options import RealTime
 
 #: Missed ticks that are caught up at once; after more the schedule is re-based.
 CATCH_UP = 20
@@ -52,30 +55,60 @@ _PR_SET_TIMERSLACK = 29
 _HISTORY = 1 << 17
 
 
+class RestingPlant(Protocol):
+    """A plant whose ticks need no simulation while it rests: `heptarm.sim.runtime.rest.Rest`."""
+
+    def begins(self) -> bool:
+        """Whether it rests; asked after each tick."""
+
+    def pass_time(self) -> bool:
+        """Let time pass, publishing the ticks that become due; returns whether the rest is over."""
+
+
 @dataclass(slots=True)
 class LoopStatistics:
-    """Counts and percentiles of the loop, and what the operating system refused."""
+    """Counts and percentiles of the loop, and what the operating system refused.
+
+    Attributes:
+        ticks: simulated ticks.
+        rested: ticks that have passed at rest, without simulation.
+        rebased: how often missed ticks were given up.
+        refused: what the operating system refused.
+        lateness_us: of simulated ticks [us].
+        tick_us: their durations [us].
+    """
 
     ticks: int = 0
+    rested: int = 0
     rebased: int = 0
     refused: list[str] = field(default_factory=list)
     lateness_us: dict[str, float] = field(default_factory=dict)
     tick_us: dict[str, float] = field(default_factory=dict)
 
 
-def request_real_time() -> list[str]:
-    """Request SCHED_FIFO and 1 ns timer slack; returns one text for each refusal."""
-    refused = []
+def request_real_time() -> str:
+    """Request SCHED_FIFO for the calling thread; returns the text of a refusal, or ""."""
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
     except (OSError, AttributeError) as error:
-        refused.append(f"real-time priority refused ({error}); the loop may be late under load")
+        return f"real-time priority refused ({error}); the loop may be late under load"
+    return ""
+
+
+def give_up_real_time() -> None:
+    """Return the calling thread to the ordinary scheduler."""
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
+def shorten_timer_slack() -> str:
+    """Request a timer slack of 1 ns for the calling thread; returns the text of a refusal, or ""."""
     try:
         libc = ctypes.CDLL(None, use_errno=True)
         libc.prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
     except (OSError, AttributeError) as error:
-        refused.append(f"timer slack not set ({error})")
-    return refused
+        return f"timer slack not set ({error})"
+    return ""
 
 
 @contextlib.contextmanager
@@ -99,14 +132,27 @@ class RealtimeLoop:
         shared: shared state; its anchor word is the wall time of plant time zero, for Java.
         tick: one tick.
         speed: plant seconds per second; 0: as fast as possible.
+        real_time: when to have real-time priority.
+        rest: the plant while it rests; None: each tick is simulated.
 
     Attributes:
         answer_gap: least time between two ticks, as a fraction of a period: `ANSWER_GAP` while an FRI client has to
             answer each of them, else 0; may be set at any time.
+        is_real_time: whether real-time priority is wanted now.
     """
 
-    def __init__(self, shared: SharedState, tick: Callable[[], None], *, speed: float = 1.0) -> None:
-        self._shared = shared
+    def __init__(
+        self,
+        shared: SharedState,
+        tick: Callable[[], None],
+        *,
+        speed: float = 1.0,
+        real_time: RealTime = "fri",
+        rest: RestingPlant | None = None,
+    ) -> None:
+        self._shared, self._rest, self._real_time = shared, rest, real_time
+        self.is_real_time = False
+        self._rested = 0
         self._tick = tick
         self._period = int(TICK_NS / speed) if speed > 0 else 0
         self._speed = speed
@@ -124,17 +170,12 @@ class RealtimeLoop:
 
     def reset(self) -> None:
         """Reset the statistics."""
-        self._count = self._rebased = 0
+        self._count = self._rebased = self._rested = 0
 
     def run(self) -> None:
         """Tick until stopped."""
         sys.setswitchinterval(2e-4)
-        if 0.0 < self._speed <= REAL_TIME_SPEED:
-            self._refused = request_real_time()
-        else:
-            self._refused = [
-                f"real-time priority not requested: speed must be in (0, {REAL_TIME_SPEED:g}], got {self._speed:g}"
-            ]
+        self._refuse(shorten_timer_slack())
         gc.collect()
         gc.freeze()
         gc.disable()
@@ -145,10 +186,41 @@ class RealtimeLoop:
             gc.enable()
             gc.unfreeze()
 
+    def _refuse(self, text: str) -> None:
+        if text and text not in self._refused:
+            self._refused.append(text)
+
+    def _prioritise(self) -> None:
+        """Request real-time priority, or give it up."""
+        self.is_real_time = not self.is_real_time
+        if not self.is_real_time:
+            give_up_real_time()
+        elif 0.0 < self._speed <= REAL_TIME_SPEED:
+            self._refuse(request_real_time())
+        else:
+            self._refuse(
+                f"real-time priority not requested: speed must be in (0, {REAL_TIME_SPEED:g}], got {self._speed:g}"
+            )
+
+    def _pass_rest(self, rest: RestingPlant) -> None:
+        """Let the time pass while the plant rests."""
+        header, collected, over = self._shared.header, time.monotonic_ns(), False
+        while not (over or self._stop):
+            newest, anchor = int(header[HeaderWords.NEWEST]), int(header[HeaderWords.ANCHOR])
+            over = rest.pass_time()
+            self._rested += int(header[HeaderWords.NEWEST]) - newest
+            self._rebased += int(header[HeaderWords.ANCHOR]) != anchor
+            now = time.monotonic_ns()
+            if now - collected > COLLECT_EVERY:
+                gc.collect()
+                collected = now
+
     def _loop(self) -> None:
         self._shared.reals[HeaderWords.RATE] = self._speed
         now_ns, period, header = time.monotonic_ns, self._period, self._shared.header
-        spin = min(SPIN_NS, int(SPIN_FRACTION * period))
+        spun, spin = min(SPIN_NS, int(SPIN_FRACTION * period)), 0
+        always, never = self._real_time == "on", self._real_time == "off"
+        rest = None if period == 0 else self._rest
         done = int(header[HeaderWords.NEWEST])  # ticks of plant time that have passed before the loop
         due = now_ns() + period
         header[HeaderWords.ANCHOR] = due - (done + 1) * period
@@ -156,6 +228,9 @@ class RealtimeLoop:
         collected = end
         while not self._stop:
             now, gap = now_ns(), int(self.answer_gap * period)
+            if self.is_real_time is not (always or (gap > 0 and not never)):
+                self._prioritise()
+                spin = spun if self.is_real_time else 0
             if period == 0:
                 due = now
             elif now - due > (CATCH_UP_ANSWERED if gap else CATCH_UP) * period:
@@ -182,6 +257,10 @@ class RealtimeLoop:
             self._cost[at] = end - begin
             self._count += 1
             due += period
+            if rest is not None and rest.begins():
+                self._pass_rest(rest)
+                end = now_ns()
+                due = int(header[HeaderWords.ANCHOR]) + (int(header[HeaderWords.NEWEST]) + 1) * period
             waited = end - collected
             if waited > COLLECT_EVERY and (due - end >= COLLECT_PAUSE * period or waited > COLLECT_LATEST):
                 gc.collect()
@@ -193,6 +272,7 @@ class RealtimeLoop:
         size = min(self._count, _HISTORY)
         return LoopStatistics(
             self._count,
+            self._rested,
             self._rebased,
             list(self._refused),
             _percentiles(self._late[:size]),

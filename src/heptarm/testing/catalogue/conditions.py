@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from heptarm.arm.arm import Arm
-from heptarm.testing.measure import above, below, fresh, holds, near, note, record
+from heptarm.testing.measure import above, baseline, below, fresh, holds, near, note, record
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
 from heptarm.values.condition.condition import Condition
@@ -21,27 +21,27 @@ from heptarm.values.result import Cause
 @scenario(line=4, rows="H3 H5 B14", risk=Risk.CONTACT, operator=True, space=0.05, needs=("conditions",))
 def forces(arm: Arm) -> None:
     """Force: magnitude, along an axis, across an axis, component; each condition fires only at its push."""
-    base = Force(frame="base")
+    base, rest = Force(frame="base"), baseline(arm)
     leaves: tuple[tuple[Condition, tuple[float, float, float]], ...] = (
-        (force > 15, (0.0, 11.0, 14.0)),
-        (base.normal("z") > 12, (0.0, 0.0, -16.0)),
-        (base.shear("z") > 12, (0.0, 16.0, 0.0)),
-        (base.along("y").outside(-5, 12), (0.0, 16.0, 0.0)),
+        (force > 15, (0.0, 14.0, 18.0)),
+        (base.normal("z") > 12, (0.0, 0.0, -20.0)),
+        (base.shear("z") > 12, (0.0, 20.0, 0.0)),
+        (base.along("y").outside(-5, 12), (0.0, 20.0, 0.0)),
     )
     for condition, push in leaves:
         handle = arm.start(hold(30.0), until=condition)
-        arm.operator.push(np.multiply(push, 0.5), duration=30.0)
-        half = 0.45 * float(np.linalg.norm(push))
-        while float(np.linalg.norm(arm.state.wrench.force)) < half and not handle.done:
+        arm.operator.push(np.multiply(push, 1 / 3), duration=30.0)
+        third = 0.25 * float(np.linalg.norm(push))
+        while float(np.linalg.norm(arm.state.wrench.force - rest.force)) < third and not handle.done:
             fresh(arm)
-        holds(not handle.done, f"half of it is not enough for {condition}")
+        holds(not handle.done, f"a third of it is not enough for {condition}")
         arm.operator.push(push, duration=30.0)
         result = handle.wait(timeout=30.0)
         holds(
             result.cause is Cause.CONDITION and result.stopped_by == condition, f"fired: {result.stopped_by}"
         )
         arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
-        arm.wait_until(lambda s: np.linalg.norm(s.wrench.force) < 1.0, timeout=20.0)
+        arm.wait_until(lambda s: np.linalg.norm(s.wrench.force - rest.force) < 2.0, timeout=20.0)
     holds(arm.move(ptp(HOME + deg(0, 0, 0, 0, 0, 0, 5))).arrived, "the next motion has no condition")
 
 

@@ -6,10 +6,11 @@ import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.testing.catalogue.modes import held, let_go
-from heptarm.testing.measure import Unfit, above, below, fresh, holds, near, watch
+from heptarm.testing.measure import Unfit, above, baseline, below, fresh, holds, near, watch
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import DEEPEST, HOME
 from heptarm.values.condition.force import Force, force
+from heptarm.values.condition.reaction import Retreat
 from heptarm.values.condition.signals import io
 from heptarm.values.mode.impedance import CartesianImpedance, JointImpedance
 from heptarm.values.motion.line import lin, lin_rel
@@ -65,13 +66,36 @@ def plane(arm: Arm) -> None:
     near(arm.wait_for_rest().q, HOME, 2e-3, "home", unit="rad")
 
 
+@scenario(
+    line=8, rows="H7 H3", risk=Risk.CONTACT, space=0.3, needs=("conditions", "lin_rel", "joint_impedance")
+)
+def relaxing(arm: Arm) -> None:
+    """At a contact the cabinet lets the arm relax, or move back along its path; the result has the forces."""
+    contact = force > 15
+    arm.move(lin_rel(z=-0.05, frame="base", speed_mps=0.1), until=contact)
+    down = lin_rel(z=-DEEPEST + 0.05, frame="base", speed_mps=0.03)
+    relaxed = arm.move(down, until=contact, then="relax")
+    if relaxed.stopped_by is None:
+        raise Unfit(f"there is no table within {DEEPEST - 0.05:g} m below the flange")
+    above(relaxed.peak_force, 13.0, "largest force", unit="N")
+    below(relaxed.rest_force, 0.7 * relaxed.peak_force, "force after relaxing", unit="N")
+    arm.move(lin_rel(z=0.02, frame="base", speed_mps=0.1))
+    retreated = arm.move(down, until=contact, then=Retreat(0.01))
+    holds(retreated.stopped_by == contact and retreated.fired_at is not None, "it touched again")
+    assert retreated.fired_at is not None
+    back = float(arm.wait_for_rest().pose.xyz[2] - retreated.fired_at.pose.xyz[2])
+    near(back, 0.01, 0.004, "it moved back by", unit="m")
+    below(retreated.rest_force, 8.0, "force then", unit="N")
+
+
 @scenario(line=8, rows="H14 H18", risk=Risk.CONTACT, operator=True, space=0.02)
 def waits(arm: Arm) -> None:
     """The arm waits for a contact in the pushed states."""
+    rest = baseline(arm).force
     arm.operator.push((0.0, 0.0, -12.0), duration=0.5)
-    state = arm.wait_until(lambda s: s.wrench.force[2] < -8.0, timeout=20.0)
-    near(state.wrench.force[:2], (0.0, 0.0), 2.0, "it came from above: force across", unit="N")
-    arm.wait_until(lambda s: abs(s.wrench.force[2]) < 2.0, timeout=20.0)
+    state = arm.wait_until(lambda s: s.wrench.force[2] - rest[2] < -8.0, timeout=20.0)
+    near(state.wrench.force[:2], rest[:2], 3.0, "it came from above: force across", unit="N")
+    arm.wait_until(lambda s: abs(s.wrench.force[2] - rest[2]) < 2.0, timeout=20.0)
 
 
 @scenario(line=8, rows="H15 H13 I5", risk=Risk.CONTACT, operator=True, space=0.3,

@@ -29,7 +29,7 @@ def _guide(arm: Arm, push: tuple[float, float, float], offset: float) -> None:
     arm.operator.push(push, duration=_LONG)
     arm.wait_until(lambda s: np.abs(s.q - before).max() > offset, timeout=60.0)
     arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
-    arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 1.0, timeout=20.0)
+    arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 5.0, timeout=20.0)
 
 
 @scenario(line=8, rows="H9", risk=Risk.CONTACT, operator=True, space=0.6, needs=("hand_guide",))
@@ -88,7 +88,7 @@ def taps(arm: Arm) -> None:
     arm.wait_until(lambda s: s.q[6] > 0.1 or handle.done, timeout=20.0)
     arm.operator.push((0.0, 0.0, 30.0), duration=0.15)
     holds(handle.wait().stopped_by == (force > 15), "the first tap ends the motion")
-    arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 1.0, timeout=20.0)
+    arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 5.0, timeout=20.0)
     done = Event()
 
     def tap() -> None:
@@ -104,7 +104,7 @@ def taps(arm: Arm) -> None:
         hand.join()
     note("two taps were detected")
     arm.operator.push((0.0, 0.0, 0.0), duration=0.0)
-    arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 1.0, timeout=20.0)
+    arm.wait_until(lambda s: np.abs(s.wrench.force).max() < 5.0, timeout=20.0)
     holds(arm.move(target).arrived, "then it continues to its end")
 
 

@@ -36,7 +36,9 @@ def clock(arm: Arm) -> None:
     """The age of a state is known without synchronised clocks: the session compares the two clocks."""
     ages = [state.age for state in arm.states(duration=0.3)]
     # a busy machine makes states older; a wrong difference of the clocks shows in all of them
-    below(float(np.abs(ages).min()), 0.05 * max(arm.real_time_factor, 1.0), "smallest age of a state", unit="s")
+    below(
+        float(np.abs(ages).min()), 0.05 * max(arm.real_time_factor, 1.0), "smallest age of a state", unit="s"
+    )
 
 
 @scenario(line=10, rows="O6 O7 O8 O10", risk=Risk.FAULT, virtual=True, space=0.5, needs=("ptp",))

@@ -6,7 +6,7 @@ import numpy as np
 
 from heptarm import model
 from heptarm.arm.arm import Arm
-from heptarm.testing.measure import above, below, holds, near, note, record
+from heptarm.testing.measure import above, baseline, below, holds, near, note, record
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
 from heptarm.values.arrays import Array
@@ -66,6 +66,27 @@ def inverse(arm: Arm) -> None:
     near(model.solve(arm.robot, pose, near=bent.tolist()), bent, 1e-9, "the one next to a hint", unit="rad")
 
 
+@scenario(line=11, rows="K1 K2 K5", risk=Risk.STILL)
+def in_bulk(arm: Arm) -> None:
+    """Kinematics of a thousand poses at once equal those of one pose, and keep arm angle and Status."""
+    here = arm.wait_for_rest().q
+    q = here + np.random.default_rng(1).uniform(-0.1, 0.1, (1000, 7))
+    q[0] = here
+    poses, jacobians = model.forward_batch(arm.robot, q), model.jacobian_batch(arm.robot, q)
+    near(poses[0][:3, 3], arm.pose("flange").xyz, 2e-4, "place of the flange, of the first pose", unit="m")
+    for row in (0, 1, 999):
+        near(poses[row], model.forward(arm.robot, q[row]), 1e-12, f"pose {row}")
+        near(jacobians[row], model.jacobian(arm.robot, q[row]), 1e-12, f"Jacobian {row}")
+    own = model.redundancy_batch(arm.robot, q)
+    found = model.solve_batch(arm.robot, poses, e1=own.e1, status=own.status)
+    inside = ((q >= arm.robot.q_min) & (q <= arm.robot.q_max)).all(axis=1)
+    above(float(inside.sum()), 500.0, "poses within the joint limits")
+    near(found[inside], q[inside], 1e-6, "joints from poses, E1 and Status", unit="rad")
+    again = model.redundancy_batch(arm.robot, found[inside])
+    near(np.angle(np.exp(1j * (again.e1 - own.e1[inside]))), 0.0, 1e-6, "E1 changes by", unit="rad")
+    holds(bool((again.status == own.status[inside]).all()), "and Status does not")
+
+
 @scenario(line=11, rows="K2 K3 K6 G2", space=0.15, needs=("ptp",))
 def jacobian(arm: Arm) -> None:
     """The Jacobian maps measured joint velocities to the measured velocity of the flange and of a point on it."""
@@ -98,7 +119,8 @@ def jacobian(arm: Arm) -> None:
 def gravity(arm: Arm) -> None:
     """At rest the measured torques equal the gravity torques of the model."""
     state = arm.wait_for_rest()
-    near(state.tau, model.gravity(arm.robot, state.q), 0.5, "measured torques", unit="Nm")
+    off = (baseline(arm).tau - model.gravity(arm.robot, state.q)) / arm.robot.tau_max
+    near(off, np.zeros(7), 0.01, "measured torques are off by this fraction of the highest")
 
 
 @scenario(line=11, rows="K7 K8 K9 K11 K12", space=0.5, virtual=True, needs=("ptp",))
@@ -120,7 +142,7 @@ def dynamics(arm: Arm) -> None:
         parts = model.mass_matrix(arm.robot, here.q) @ ddq + model.coriolis_matrix(arm.robot, here.q, dq) @ dq
         near(parts, moved, 1e-9, "M ddq + C dq")
     note(f"movement takes up to {largest:.1f} Nm")
-    below(worst, 0.15 * largest + 1.5, "measured torque is off by up to", unit="Nm")
+    below(worst, 0.15 * largest + 3.0, "measured torque is off by up to", unit="Nm")
 
 
 @scenario(line=11, rows="K15 F13 B15", risk=Risk.STILL, needs=("ptp", "lin_rel"))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 
 from heptarm import model
 from heptarm.arm.arm import Arm
-from heptarm.testing.measure import below, fresh, holds, near, record, watch
+from heptarm.testing.measure import baseline, below, fresh, holds, near, record, watch
 from heptarm.testing.scenario import Risk, scenario
 from heptarm.testing.stage import HOME
 from heptarm.values.motion.motion import hold
@@ -53,17 +55,22 @@ def velocity(arm: Arm) -> None:
 @scenario(line=9, rows="G10 G11 G18 H18", risk=Risk.CONTACT, operator=True, space=0.02)
 def push(arm: Arm) -> None:
     """The wrench shows a push, and the external joint torques are J^T f."""
-    force = np.array([12.0, -8.0, -15.0])
-    arm.operator.push(force, duration=2.0)
-    state = arm.wait_until(lambda s: np.linalg.norm(s.wrench.force - force) < 1.0, timeout=10.0)
-    near(state.wrench.force, force, 1.0, "force at the flange, base axes", unit="N")
+    rest, force = baseline(arm), np.array([12.0, -8.0, -15.0])
+    arm.operator.push(force, duration=60.0)
+    arm.wait_until(lambda s: np.linalg.norm(s.wrench.force - rest.force - force) < 2.0, timeout=20.0)
+    watch(arm, 0.3)
+    seen, state = baseline(arm), arm.state
+    near(seen.force - rest.force, force, 1.0, "force at the flange, base axes", unit="N")
     matrix = model.jacobian(arm.robot, state.q)
-    near(state.tau_ext, matrix[:3].T @ force, 1.0, "external torques", unit="Nm")
-    made = np.linalg.lstsq(matrix.T, state.tau_ext, rcond=None)[0]
+    tau_ext = seen.tau_ext - rest.tau_ext
+    near(tau_ext, matrix[:3].T @ force, 1.0, "external torques", unit="Nm")
+    made = np.linalg.lstsq(matrix.T, tau_ext, rcond=None)[0]
     near(made[:3], force, 1.0, "the force estimated from the torques here", unit="N")
-    turned = arm.wrench("flange", axes="flange").force
-    near(turned, arm.pose("flange").rotation.T @ force, 1.0, "in the flange's axes", unit="N")
-    arm.wait_until(lambda s: np.linalg.norm(s.wrench.force) < 2.0, timeout=10.0)
+    turned = arm.wrench("flange", axes="flange", state=state).force
+    own = arm.pose("flange", state=state).rotation.T @ state.wrench.force
+    near(turned, own, 1.0, "in the flange's axes", unit="N")
+    arm.operator.push(0.0 * force, duration=0.0)
+    arm.wait_until(lambda s: np.linalg.norm(s.wrench.force - rest.force) < 2.0, timeout=20.0)
 
 
 @scenario(line=9, rows="G15 G21 E16", space=0.1, needs=("ptp",))
@@ -81,6 +88,25 @@ def stream(arm: Arm) -> None:
     handle.wait()
     rested = arm.wait_for_rest().motion
     holds(rested is not None and not rested.active, "and that nothing runs any more")
+
+
+@scenario(line=9, rows="G15 E16", space=0.1, needs=("ptp",))
+def every(arm: Arm) -> None:
+    """A loop that is slower than the states, and begins late, has every state of a motion to its end."""
+    handle = arm.start(ptp(HOME + deg(0, 0, 0, 0, 0, 0, 15), speed=0.2))
+    live = arm.states(until=handle).to_numpy()
+    late = handle.states()
+    slow = []
+    for state in late:
+        slow.append(state.q)
+        time.sleep(0.004)
+    result = handle.wait()
+    holds(len(slow) == len(live["q"]) > 10, f"{len(slow)} states, as many as were received")
+    near(np.array(slow), live["q"], 0.0, "the same states", unit="rad")
+    holds(late.lost == 0, "none was dropped")
+    holds((live["motion"][:-1] == handle.id).all(), "none is of another motion")
+    spans = live["stamp"][live["motion"] == handle.id]
+    near((spans[-1] - spans[0]) * 1e-9, result.duration, 0.2, "they reach from begin to end", unit="s")
 
 
 @scenario(line=9, rows="D26 G19", space=0.05, needs=("hold",))

@@ -5,7 +5,7 @@ move, compares what it measures with what the virtual cabinet has, and ends as "
 `heptarm check --commission` runs the steps and writes the report; `commission` does the same in a program.
 """
 
-from heptarm.testing.commissioning.person import AskedPerson, Person, PersonAction, SimulatedPerson
+from heptarm.testing.commissioning.person import AskedPerson, Person, PersonTask, SimulatedPerson
 from heptarm.testing.commissioning.report import Agreement, CommissioningReport, StepOutcome
 from heptarm.testing.commissioning.run import commission, find_steps, steps
 from heptarm.testing.commissioning.step import CommissioningStep, Comparison, Movement
@@ -18,7 +18,7 @@ __all__ = [
     "Comparison",
     "Movement",
     "Person",
-    "PersonAction",
+    "PersonTask",
     "SimulatedPerson",
     "StepOutcome",
     "commission",

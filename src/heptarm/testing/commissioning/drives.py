@@ -6,7 +6,7 @@ import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.sim.plant.drive_monitor import BEYOND, LAG, SPEED, TORQUE, TORQUE_TICKS
-from heptarm.testing.commissioning.person import Person, PersonAction, number
+from heptarm.testing.commissioning.person import Person, PersonTask, number
 from heptarm.testing.commissioning.step import Comparison, Movement, at_most, largest, near, same, step
 from heptarm.testing.measure import Unfit, record
 from heptarm.testing.stage import HOME
@@ -59,10 +59,10 @@ def message(arm: Arm, person: Person) -> tuple[Comparison, ...]:
 @step()
 def acknowledging(arm: Arm, person: Person) -> tuple[Comparison, ...]:
     """Does the cabinet's application acknowledge an error of a drive by software?"""
-    if not person.finds(PersonAction.FIND_DRIVE_ERROR):
+    if not person.finds(PersonTask.FIND_DRIVE_ERROR):
         raise Unfit("no drive has tripped; run this step again when one has")
     arm.wait_until(lambda s: not s.safety.ready_to_move, timeout=20.0)
-    person.does(PersonAction.HOLD)
+    person.does(PersonTask.HOLD)
     recovery = arm.recover(timeout=20.0)
     return (same("after arm.recover() the arm is", "ready" if recovery.done else "not ready", "ready"),)
 

@@ -8,13 +8,13 @@ from heptarm import model
 from heptarm.arm.arm import Arm
 from heptarm.testing.commissioning.person import Person
 from heptarm.testing.commissioning.step import Comparison, Movement, at_most, largest, near, same, step
-from heptarm.testing.measure import Recording, fresh, record
+from heptarm.testing.measure import MotionStates, fresh, record
 from heptarm.testing.stage import HOME
 from heptarm.values.arrays import Array
-from heptarm.values.motion.line import lin
+from heptarm.values.motion.line import Lin, lin
 from heptarm.values.motion.motion import hold
 from heptarm.values.motion.ptp import ptp
-from heptarm.values.motion.spline import spl, spline
+from heptarm.values.motion.spline import Spl, spl, spline
 from heptarm.values.pose import Pose, deg
 from heptarm.values.result import Cause, Result
 from heptarm.values.robot import ACCELERATION, JERK
@@ -71,7 +71,7 @@ def _slopes(times: Array, values: Array, window: float = _WINDOW) -> tuple[Array
     return np.array(middles), np.array(found)
 
 
-def _peak(recording: Recording) -> float:
+def _peak(recording: MotionStates) -> float:
     """Largest acceleration of A7's set-point [rad/s²]."""
     times, velocities = _slopes(recording.t, recording.q_cmd[:, _A7])
     return largest(_slopes(times, velocities)[1])
@@ -121,7 +121,7 @@ def braking(arm: Arm, person: Person) -> tuple[Comparison, ...]:
         if handle.done and largest(state.dq) < _AT_REST:
             break
     pushed.close()
-    seen = Recording(Result(Cause.STOPPED), tuple(states))
+    seen = MotionStates(Result(Cause.STOPPED), tuple(states))
     speed = arm.speed * float(arm.robot.dq_max[_A7])
     time = _braking_time(seen.t, seen.q_cmd[:, _A7], speed)
     # so slow a motion brakes in two halves of the highest jerk before it reaches the highest acceleration
@@ -139,7 +139,12 @@ def spline_segments(arm: Arm, person: Person) -> tuple[Comparison, ...]:
     def at(y: float, z: float) -> Pose:
         return Pose.of(start.xyz + (0.0, y, z), start.quat)
 
-    points = [spl(at(0.02, -0.02)), spl(at(0.04, -0.04)), lin(at(0.04, -0.02)), spl(at(0.02, 0.0))]
+    points: list[Spl | Lin] = [
+        spl(at(0.02, -0.02)),
+        spl(at(0.04, -0.04)),
+        lin(at(0.04, -0.02)),
+        spl(at(0.02, 0.0)),
+    ]
     handle = arm.start(spline(points, speed_mps=0.02))
     handle.wait()
     seen = sum(event.kind == "segment" for event in handle.events())

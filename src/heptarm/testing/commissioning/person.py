@@ -19,7 +19,7 @@ PATIENCE = 180.0
 PROVES = "simulated: proves the run, not the robot"
 
 
-class PersonAction(Enum):
+class PersonTask(Enum):
     """What a person is asked to do: in words, and as the command of a simulated operator."""
 
     HOLD = ("Hold the enabling switch; press Start if the smartPAD asks for it.", "enable")
@@ -48,14 +48,14 @@ class Person(Protocol):
     def agrees(self, question: str) -> bool:
         """Whether the robot may do what the question describes."""
 
-    def does(self, action: PersonAction) -> None:
+    def does(self, action: PersonTask) -> None:
         """Ask for an action; returns at once or when it is done, so wait for its effect.
 
         Raises:
             Unfit: nobody here can do it.
         """
 
-    def finds(self, action: PersonAction) -> bool:
+    def finds(self, action: PersonTask) -> bool:
         """Whether something is the case; a simulated person makes it so."""
 
     def reads(self, question: str) -> str:
@@ -76,7 +76,7 @@ class SimulatedPerson:
         """Yes."""
         return True
 
-    def does(self, action: PersonAction) -> None:
+    def does(self, action: PersonTask) -> None:
         """Operate the simulator.
 
         Raises:
@@ -86,7 +86,7 @@ class SimulatedPerson:
             raise Unfit(f"only a person beside this simulator can do that: {action.words}")
         self.arm.operator.do(action.command)
 
-    def finds(self, action: PersonAction) -> bool:
+    def finds(self, action: PersonTask) -> bool:
         """Make it so."""
         self.does(action)
         return True
@@ -112,11 +112,11 @@ class AskedPerson:
         """Whether the answer is yes."""
         return self.ask(f"{question} [y/N] ").strip().lower() in ("y", "yes")
 
-    def does(self, action: PersonAction) -> None:
+    def does(self, action: PersonTask) -> None:
         """Show what to do."""
         self.show(f">>> {action.words}")
 
-    def finds(self, action: PersonAction) -> bool:
+    def finds(self, action: PersonTask) -> bool:
         """Whether the answer is yes."""
         return self.agrees(action.words)
 
@@ -139,7 +139,7 @@ def number(person: Person, question: str, unit: str) -> float | None:
 
 
 def expect(
-    arm: Arm, person: Person, action: PersonAction, condition: Callable[[State], object], what: str
+    arm: Arm, person: Person, action: PersonTask, condition: Callable[[State], object], what: str
 ) -> State:
     """Ask for an action and wait for its effect on the state.
 

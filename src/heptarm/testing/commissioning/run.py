@@ -11,7 +11,7 @@ import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.errors import CommandRejected, ConnectionLost, HeptarmError, ModeConflict, NotReady
-from heptarm.testing.commissioning.person import PATIENCE, PROVES, Person, PersonAction
+from heptarm.testing.commissioning.person import PATIENCE, PROVES, Person, PersonTask
 from heptarm.testing.commissioning.report import Agreement, CommissioningReport, StepOutcome
 from heptarm.testing.commissioning.step import STEPS, CommissioningStep
 from heptarm.testing.measure import Unfit
@@ -179,7 +179,7 @@ def prepare(arm: Arm, person: Person) -> None:
     arm.wait_for_rest(timeout=20.0)
     arm.speed = REAL_SPEED
     if not arm.state.safety.ready_to_move:
-        person.does(PersonAction.HOLD)
+        person.does(PersonTask.HOLD)
         recovery = arm.recover(timeout=PATIENCE)
         if not recovery.done:
             raise NotReady(f"the robot does not get ready: {'; '.join(recovery.remaining)}")

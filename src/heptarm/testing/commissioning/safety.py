@@ -6,7 +6,7 @@ import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.errors import HeptarmError
-from heptarm.testing.commissioning.person import Person, PersonAction, expect
+from heptarm.testing.commissioning.person import Person, PersonTask, expect
 from heptarm.testing.commissioning.step import Comparison, Movement, at_least, at_most, same, step
 from heptarm.testing.measure import record
 from heptarm.testing.stage import HOME
@@ -54,10 +54,10 @@ def enabling_switch(arm: Arm, person: Person) -> tuple[Comparison, ...]:
     """Does a released enabling switch pause a motion that software may continue once it is held again?"""
     handle = arm.start(ptp(HOME + deg(0, 0, 0, 0, 0, 0, 90)))
     arm.wait_until(lambda s: s.q[_A7] > np.radians(5), timeout=30.0)
-    expect(arm, person, PersonAction.RELEASE, lambda s: not s.safety.enabling_switch, "the released switch")
+    expect(arm, person, PersonTask.RELEASE, lambda s: not s.safety.enabling_switch, "the released switch")
     arm.wait_until(lambda s: np.abs(s.dq).max() < 1e-2, timeout=10.0)
     ended = handle.done
-    expect(arm, person, PersonAction.HOLD, lambda s: s.safety.enabling_switch, "the held switch")
+    expect(arm, person, PersonTask.HOLD, lambda s: s.safety.enabling_switch, "the held switch")
     recovery = arm.recover(timeout=30.0)
     arrives = recovery.done and not ended and handle.wait().arrived
     return (
@@ -76,7 +76,7 @@ def enabling_switch(arm: Arm, person: Person) -> tuple[Comparison, ...]:
 )
 def emergency_stop(arm: Arm, person: Person) -> tuple[Comparison, ...]:
     """Does the state show an emergency stop, are outputs refused meanwhile, and may software resume afterwards?"""
-    expect(arm, person, PersonAction.PRESS_STOP, lambda s: s.safety.emergency_stop, "the emergency stop")
+    expect(arm, person, PersonTask.PRESS_STOP, lambda s: s.safety.emergency_stop, "the emergency stop")
     lamps = [name for name, signal in arm.io.signals.items() if signal.is_output and signal.kind == "boolean"]
     refused = "no output here"
     if lamps:
@@ -88,7 +88,7 @@ def emergency_stop(arm: Arm, person: Person) -> tuple[Comparison, ...]:
     expect(
         arm,
         person,
-        PersonAction.RELEASE_STOP,
+        PersonTask.RELEASE_STOP,
         lambda s: not s.safety.emergency_stop,
         "the released emergency stop",
     )

@@ -43,6 +43,21 @@ def direction_of(value: str | npt.ArrayLike) -> Array:
     return frozen(vector / length)
 
 
+def axis_of(name: str) -> Array:
+    """A unit vector along an axis, shape (3,), from its name such as "z" or "-x".
+
+    Raises:
+        ShapeError: it is no such name.
+    """
+    if not isinstance(name, str):
+        raise ShapeError(
+            f"direction must be the name of an axis such as 'z' or '-x', got {shown(name)}",
+            parameter="direction",
+            value=name,
+        )
+    return direction_of(name)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact(Value):
     """A contact of the arm with something.

@@ -1,17 +1,20 @@
-"""The mode for guiding along chosen directions: compliant along them, stiff along all others."""
+"""Cartesian impedances for a purpose: guiding along chosen directions, pressing along one."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from heptarm.errors import ShapeError
-from heptarm.values.arrays import shown
+from heptarm.values.arrays import shown, within
+from heptarm.values.condition.contact import axis_of
 from heptarm.values.frames import TOOL
 from heptarm.values.mode.directions import DIRECTIONS, one
-from heptarm.values.mode.impedance import STIFFEST, CartesianImpedance
+from heptarm.values.mode.impedance import STIFFEST, STRONGEST, CartesianImpedance
 
 #: Stiffness of the directions that are held, along [N/m] and about an axis [Nm/rad].
 HOLDING = (4000.0, 300.0)
+#: Stiffness of a press: across its direction, along it [N/m], and about any axis [Nm/rad].
+PRESSING = (3000.0, 200.0, 300.0)
 
 
 def compliance(
@@ -56,3 +59,41 @@ def compliance(
     )
     held[[DIRECTIONS[name] for name in free]] = 0.0
     return CartesianImpedance(held, damping=damping, nullspace_stiffness=nullspace_stiffness, frame=frame)
+
+
+def pressing(
+    direction: str,
+    force: float,
+    *,
+    frame: str = TOOL,
+    stiffness: float = PRESSING[0],
+    along: float = PRESSING[1],
+    turning: float = PRESSING[2],
+    damping: float = 0.9,
+) -> CartesianImpedance:
+    """Cartesian impedance that presses with a force along one axis, and holds the arm in all other directions.
+
+    Along the axis the arm exerts the force and a spring to its set-point: where the path is a distance d above or below
+    the surface, the force differs by `along` times d. Without a surface the arm moves on until the spring balances the
+    force.
+
+    Args:
+        direction: an axis of the frame, such as "z" or "-x", along which the arm presses.
+        force: [N], up to 500.
+        frame: whose axes: "tool" (the motion frame at the start), "base", or the name of a frame.
+        stiffness: across the direction [N/m], up to 5000.
+        along: of the spring along the direction [N/m], up to 5000.
+        turning: about all axes [Nm/rad], up to 300.
+        damping: damping ratio, 0.1 to 1.
+
+    Raises:
+        ShapeError: no axis.
+        LimitError: a value outside its range.
+    """
+    axis = axis_of(direction)
+    springs = np.full(6, one(stiffness, "stiffness", 0.0, STIFFEST[0], "N/m"))
+    springs[3:] = one(turning, "turning", 0.0, STIFFEST[1], "Nm/rad")
+    springs[:3][axis != 0.0] = one(along, "along", 0.0, STIFFEST[0], "N/m")
+    push = np.zeros(6)
+    push[:3] = within(force, "force", 0.0, STRONGEST, unit="N") * axis
+    return CartesianImpedance(springs, damping=damping, additional_force=push, frame=frame)

@@ -16,6 +16,7 @@ from heptarm.values.arrays import Value, within
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.trigger import Action, Trigger
 from heptarm.values.robot import RobotModel
+from heptarm.values.text import described
 
 _Motion = TypeVar("_Motion", bound="Motion")
 _Triggered = TypeVar("_Triggered", bound="Triggered")
@@ -29,6 +30,10 @@ class Motion(Value):
     """Base of motions: what `arm.move` and `arm.start` accept."""
 
     __slots__ = ()
+
+    def __str__(self) -> str:
+        """What is not the default, a line each."""
+        return described(self, type(self).__name__)
 
     def limited_to(self: _Motion, speed: float) -> _Motion:
         """The same motion, no joint faster than a fraction of its maximum in (0, 1].

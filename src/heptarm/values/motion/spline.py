@@ -31,6 +31,7 @@ from heptarm.values.motion.orientation import VARIABLE, Orientation, orientation
 from heptarm.values.motion.ptp import Ptp
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.robot import RobotModel
+from heptarm.values.text import described
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -59,6 +60,10 @@ class Spl(Value):
 
     def __post_init__(self) -> None:
         check_pose(self.target)
+
+    def __str__(self) -> str:
+        """What is not the default, a line each."""
+        return described(self, type(self).__name__)
 
 
 Segment: TypeAlias = Spl | Lin | Circ

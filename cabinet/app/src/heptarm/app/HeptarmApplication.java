@@ -30,7 +30,7 @@ public class HeptarmApplication extends RoboticsAPIApplication {
         ServerSettings config = new ServerSettings(settings.text("heptarm.bind", "0.0.0.0"),
                 (int) settings.number("heptarm.port", Protocol.PORT), settings.text("heptarm.key", ""),
                 settings.text("heptarm.allow", ""), settings.number("heptarm.heartbeat", 0.5),
-                settings.number("heptarm.max_rate", 200.0));
+                settings.number("heptarm.max_rate", 200.0), settings.number("heptarm.datagrams", 1) != 0);
         keyWeakness = config.keyWeakness();
         SunrisePanel panel = new SunrisePanel(getApplicationData(), log);
         server = new CabinetServer(SunriseRobot.of(lbr, this, panel, settings, log), config, Clocks.find(), log);

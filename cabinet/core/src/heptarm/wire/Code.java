@@ -67,7 +67,7 @@ public final class Code {
     public static final int NEEDS_OPERATOR = 61;
     /** a safety function stopped the robot: clear its cause, then recover. */
     public static final int SAFETY_STOP = 62;
-    /** the controlling client was lost; the arm was stopped: connect again and take control. */
+    /** the controlling client was lost; the arm was stopped: connect again and take control; a client that is busy for longer needs a longer watchdog: connect(..., watchdog=2.0). */
     public static final int CONTROLLER_LOST = 63;
     /** no servo target arrived within its watchdog time: send targets more often, or allow a longer watchdog time. */
     public static final int STARVED = 64;

@@ -47,6 +47,9 @@ public final class Messages {
             case 17:
                 message = Rejected.read(in);
                 break;
+            case 18:
+                message = DatagramToken.read(in);
+                break;
             case 32:
                 message = TakeControl.read(in);
                 break;
@@ -73,6 +76,9 @@ public final class Messages {
                 break;
             case 40:
                 message = SetOverride.read(in);
+                break;
+            case 41:
+                message = OpenDatagrams.read(in);
                 break;
             case 42:
                 message = Recover.read(in);
@@ -103,6 +109,12 @@ public final class Messages {
                 break;
             case 56:
                 message = ProcessData.read(in);
+                break;
+            case 57:
+                message = GetDatagramStatistics.read(in);
+                break;
+            case 58:
+                message = DatagramStatistics.read(in);
                 break;
             case 64:
                 message = ServoOpen.read(in);
@@ -217,6 +229,7 @@ public final class Messages {
             case 38:
             case 39:
             case 40:
+            case 41:
             case 42:
             case 48:
             case 49:
@@ -226,6 +239,7 @@ public final class Messages {
             case 53:
             case 54:
             case 55:
+            case 57:
             case 64:
             case 68:
             case 69:
@@ -255,6 +269,7 @@ public final class Messages {
             case 38:
             case 39:
             case 40:
+            case 41:
             case 42:
             case 48:
             case 49:
@@ -264,6 +279,7 @@ public final class Messages {
             case 53:
             case 54:
             case 55:
+            case 57:
             case 64:
             case 65:
             case 66:
@@ -272,6 +288,23 @@ public final class Messages {
             case 69:
             case 80:
             case 81:
+                return true;
+            default:
+                return false;
+        }
+    }
+
+    /** Whether a datagram may contain the message. */
+    public static boolean byDatagram(int type) {
+        switch (type) {
+            case 6:
+            case 7:
+            case 36:
+            case 37:
+            case 65:
+            case 66:
+            case 67:
+            case 112:
                 return true;
             default:
                 return false;

@@ -15,11 +15,15 @@ public final class MotionFinished extends Message {
     public final double duration;
     /** measured at the end [rad] */
     public final double[] q;
+    /** largest external force at the motion frame since a break condition fired; NaN if none did, also in the next field [N] */
+    public final double peak_force;
+    /** external force at the end, after the reaction [N] */
+    public final double rest_force;
     /** 0: none */
     public final int code;
     public final String text;
 
-    public MotionFinished(long id, int item, Cause cause, int fired, double residual, double duration, double[] q, int code, String text) {
+    public MotionFinished(long id, int item, Cause cause, int fired, double residual, double duration, double[] q, double peak_force, double rest_force, int code, String text) {
         this.id = id;
         this.item = item;
         this.cause = cause;
@@ -27,6 +31,8 @@ public final class MotionFinished extends Message {
         this.residual = residual;
         this.duration = duration;
         this.q = q;
+        this.peak_force = peak_force;
+        this.rest_force = rest_force;
         this.code = code;
         this.text = text;
     }
@@ -45,6 +51,8 @@ public final class MotionFinished extends Message {
         out.putF64(residual);
         out.putF64(duration);
         out.putF64s(q, 7);
+        out.putF64(peak_force);
+        out.putF64(rest_force);
         out.putU16(code);
         out.putStr(text);
     }
@@ -57,14 +65,18 @@ public final class MotionFinished extends Message {
         double residual = in.getF64();
         double duration = in.getF64();
         double[] q = in.getF64s(7);
+        double peak_force = in.getF64();
+        double rest_force = in.getF64();
         int code = in.getU16();
         String text = in.getStr();
-        return new MotionFinished(id, item, cause, fired, residual, duration, q, code, text);
+        return new MotionFinished(id, item, cause, fired, residual, duration, q, peak_force, rest_force, code, text);
     }
 
     public void validate(String path) throws Violation {
         Check.number(residual, path + "residual", Double.NEGATIVE_INFINITY, Double.POSITIVE_INFINITY, false, true);
         Check.number(duration, path + "duration", Double.NEGATIVE_INFINITY, Double.POSITIVE_INFINITY, false, false);
         Check.array(q, path + "q", Double.NEGATIVE_INFINITY, Double.POSITIVE_INFINITY, false, false);
+        Check.number(peak_force, path + "peak_force", Double.NEGATIVE_INFINITY, Double.POSITIVE_INFINITY, false, true);
+        Check.number(rest_force, path + "rest_force", Double.NEGATIVE_INFINITY, Double.POSITIVE_INFINITY, false, true);
     }
 }

@@ -10,6 +10,8 @@ public final class Protocol {
     public static final int MAX_BODY = 1048576;
     public static final int NONCE = 32;
     public static final int TAG = 16;
+    public static final int TOKEN = 32;
+    public static final int MAX_DATAGRAM = 1400;
     public static final int HEADER = 26;
 
     private Protocol() {

@@ -68,6 +68,7 @@ public final class SessionTransitions {
                     case 7:
                     case 16:
                     case 17:
+                    case 18:
                     case 32:
                     case 33:
                     case 34:
@@ -77,6 +78,7 @@ public final class SessionTransitions {
                     case 38:
                     case 39:
                     case 40:
+                    case 41:
                     case 42:
                     case 48:
                     case 49:
@@ -87,6 +89,8 @@ public final class SessionTransitions {
                     case 54:
                     case 55:
                     case 56:
+                    case 57:
+                    case 58:
                     case 64:
                     case 65:
                     case 66:

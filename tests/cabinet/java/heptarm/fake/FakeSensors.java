@@ -60,7 +60,7 @@ final class FakeSensors implements Sensors {
     @Override
     public WrenchState readWrench(long stamp) {
         faults.read(1);
-        return new WrenchState(stamp, new double[3], new double[3], new double[3], new double[3]);
+        return readWrench("base", stamp);
     }
 
     /** The same spring pushes along the axis of the flange, which is x of the base. */

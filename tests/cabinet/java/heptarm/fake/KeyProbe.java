@@ -12,7 +12,8 @@ import heptarm.wire.Welcome;
 
 /**
  * What the cabinet computes with a key, from: key, bodies of Hello, Challenge, Proof and of a Welcome without mac, both nonces, a
- * client's frame and a cabinet's frame without tags.
+ * client's frame and a cabinet's frame without tags; then the token, and a client's and a cabinet's datagram with their tags, first
+ * those with the key, then those without.
  */
 public final class KeyProbe {
     private KeyProbe() {
@@ -32,6 +33,13 @@ public final class KeyProbe {
         print(exchange.cabinetMac(Welcome.TYPE, bytes(args[4])));
         tag(exchange.clientTag(clientNonce, cabinetNonce), bytes(args[7]));
         tag(exchange.cabinetTag(clientNonce, cabinetNonce), bytes(args[8]));
+        byte[] token = bytes(args[9]);
+        byte[] secret = exchange.secret(clientNonce, cabinetNonce);
+        for (int i = 10; i < args.length; i += 2) {
+            byte[] base = i == 10 ? secret : token;
+            fits(KeyExchange.clientDatagramTag(base, token), bytes(args[i]));
+            fits(KeyExchange.cabinetDatagramTag(base, token), bytes(args[i + 1]));
+        }
     }
 
     private static void tag(FrameTag tag, byte[] frame) {
@@ -41,6 +49,14 @@ public final class KeyProbe {
             throw new IllegalStateException("a tag does not fit its own frame");
         }
         print(Arrays.copyOfRange(data, frame.length, data.length));
+    }
+
+    /** Prints the number of the session if the tag of a datagram is right. */
+    private static void fits(FrameTag tag, byte[] datagram) {
+        if (!tag.fits(datagram, 4, datagram.length - Protocol.TAG)) {
+            throw new IllegalStateException("a datagram has a wrong tag");
+        }
+        print(Arrays.copyOf(datagram, 4));
     }
 
     private static byte[] bytes(String hex) {

@@ -7,7 +7,7 @@ import java.nio.file.Path;
 import heptarm.app.HeptarmApplication;
 import heptarm.doubles.runtime.ApplicationServices;
 
-/** The application with a person beside the robot, who presses the keys that a file tells, one slot a line. */
+/** The application with a person beside the robot, who presses the keys that a file names, one slot a line. */
 public final class Operator extends HeptarmApplication {
     @Override
     public void initialize() {

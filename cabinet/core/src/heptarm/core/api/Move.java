@@ -25,7 +25,10 @@ import heptarm.wire.Pose;
 import heptarm.wire.Ptp;
 import heptarm.wire.PtpHome;
 import heptarm.wire.PtpPose;
+import heptarm.wire.Reaction;
 import heptarm.wire.Redundancy;
+import heptarm.wire.Relax;
+import heptarm.wire.Retreat;
 import heptarm.wire.SplSegment;
 import heptarm.wire.Spline;
 import heptarm.wire.SplineSegment;
@@ -35,6 +38,7 @@ import heptarm.wire.Trigger;
 public final class Move implements Cloneable {
     private static final int JOINTS = 7;
     private static final double NAN = Double.NaN;
+    private static final double RETREAT_SPEED = 0.1;
     private static final double[] KEEP = {NAN, NAN, NAN, NAN, NAN, NAN, NAN};
 
     private enum Kind { PTP, PTP_HOME, PTP_POSE, LIN, LIN_REL, CIRC, SPL, SPLINE, SPLINE_JOINTS, HOLD, HAND_GUIDE }
@@ -55,6 +59,7 @@ public final class Move implements Cloneable {
     private Mode mode;
     private Condition until = new Condition(new ConditionNode[0]);
     private Trigger[] triggers = new Trigger[0];
+    private Reaction reaction;
 
     private Move(Kind kind, double[] q, Pose target, Pose via, double duration, Move... parts) {
         this.parts = parts;
@@ -248,6 +253,23 @@ public final class Move implements Cloneable {
         return until(condition.condition());
     }
 
+    /** Be compliant for a moment when the break condition has ended the motion, then hold the position reached. */
+    public Move thenRelax() {
+        return then(new Relax());
+    }
+
+    /** Move back by a distance [m], at a tenth of the axes' speed, when the break condition has ended the motion. */
+    public Move thenRetreat(double metres) {
+        return then(new Retreat(metres, RETREAT_SPEED));
+    }
+
+    /** React to the end by the break condition; null: stay where the arm has braked. */
+    public Move then(Reaction newReaction) {
+        Move copy = copy();
+        copy.reaction = newReaction;
+        return copy;
+    }
+
     /** Set an output or send an event when a condition becomes true, without stopping. */
     public Move trigger(StopCondition condition, Action action) {
         Move copy = copy();
@@ -265,7 +287,7 @@ public final class Move implements Cloneable {
     }
 
     Item item() {
-        return new Item(motion(), frame, mode, until, triggers);
+        return new Item(motion(), frame, mode, until, triggers, reaction);
     }
 
     private Motion motion() {

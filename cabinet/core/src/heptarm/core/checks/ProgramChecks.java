@@ -65,6 +65,7 @@ public final class ProgramChecks {
         }
         checkMode(item.mode, path + "mode.");
         checkCondition(item.until, path + "until");
+        checkReaction(item, path);
         checkTriggers(item, path);
         if (item.motion instanceof Hold) {
             checkNoPath(item.until, path + "until", "a hold has no path; use another condition");
@@ -103,6 +104,17 @@ public final class ProgramChecks {
                                 + Math.round(Math.toDegrees(info.q_max[i])) + "] deg on the " + info.title + ", got "
                                 + Math.round(Math.toDegrees(q[i]) * 100) / 100.0 + " deg");
             }
+        }
+    }
+
+    private static void checkReaction(Item item, String path) throws CommandRejected {
+        if (item.reaction != null && item.until.nodes.length == 0) {
+            throw new CommandRejected(Code.BAD_CONDITION, path + "reaction", item.reaction.getClass().getSimpleName(), "none",
+                    "a reaction needs a break condition, got none");
+        }
+        if (item.reaction != null && item.motion instanceof HandGuide) {
+            throw new CommandRejected(Code.UNSUPPORTED, path + "reaction", item.reaction.getClass().getSimpleName(), "none",
+                    "hand guiding has no reaction to its break condition; the person holds the arm");
         }
     }
 

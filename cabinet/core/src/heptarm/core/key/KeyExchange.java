@@ -51,8 +51,23 @@ public final class KeyExchange {
         return new FrameTag(hmac(secret(clientNonce, cabinetNonce), label("heptarm cabinet to client", 1)));
     }
 
-    private byte[] secret(byte[] clientNonce, byte[] cabinetNonce) {
+    /** The secret of which the keys of the session follow. */
+    public byte[] secret(byte[] clientNonce, byte[] cabinetNonce) {
         return hmac(join(clientNonce, cabinetNonce, cabinetNonce, 0, 0), key);
+    }
+
+    /** Tags of the client's datagrams; secret: of the session, or the token if there is no key. */
+    public static FrameTag clientDatagramTag(byte[] secret, byte[] token) {
+        return datagramTag(secret, "heptarm client to cabinet datagrams", token);
+    }
+
+    /** Tags of the cabinet's datagrams; secret: of the session, or the token if there is no key. */
+    public static FrameTag cabinetDatagramTag(byte[] secret, byte[] token) {
+        return datagramTag(secret, "heptarm cabinet to client datagrams", token);
+    }
+
+    private static FrameTag datagramTag(byte[] secret, String label, byte[] token) {
+        return new FrameTag(hmac(secret, join(Encoder.utf8(label), token, new byte[] {1}, 0, 1)));
     }
 
     private static byte[] part(int type, int length) {

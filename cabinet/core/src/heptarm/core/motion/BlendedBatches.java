@@ -11,6 +11,7 @@ import heptarm.wire.Mode;
 import heptarm.wire.Motion;
 import heptarm.wire.PathReached;
 import heptarm.wire.PositionMode;
+import heptarm.wire.Reaction;
 
 /** Decides which items of a program go to the robot as one batch, because each is blended into the next. */
 final class BlendedBatches {
@@ -31,10 +32,10 @@ final class BlendedBatches {
         return blending != null && (blending.relative > 0 || blending.distance > 0 || blending.orientation > 0);
     }
 
-    /** A motion with another break condition, motion frame or control mode starts and ends at rest. */
+    /** A motion with another break condition, reaction, motion frame or control mode starts and ends at rest. */
     private static boolean canBlend(Item one, Item next) {
         return next.motion.blending() != null && one.frame.equals(next.frame) && canEndTogether(one.until, next.until)
-                && Arrays.equals(bytes(one.mode), bytes(next.mode));
+                && Arrays.equals(bytes(one.mode), bytes(next.mode)) && Arrays.equals(bytes(one.reaction), bytes(next.reaction));
     }
 
     /** A point on the path belongs to a single motion. */
@@ -44,6 +45,15 @@ final class BlendedBatches {
         one.write(first);
         next.write(second);
         return Arrays.equals(first.toBytes(), second.toBytes()) && !Conditions.contains(one, PathReached.class);
+    }
+
+    private static byte[] bytes(Reaction reaction) {
+        Encoder out = new Encoder();
+        if (reaction != null) {
+            out.putU8(reaction.tag());
+            reaction.write(out);
+        }
+        return out.toBytes();
     }
 
     private static byte[] bytes(Mode mode) {

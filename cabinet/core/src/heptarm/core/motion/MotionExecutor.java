@@ -11,6 +11,7 @@ import heptarm.core.Log;
 import heptarm.core.Threads;
 import heptarm.core.robot.MotionJob;
 import heptarm.core.robot.MotionPort;
+import heptarm.core.robot.Sensors;
 import heptarm.core.safety.SafetyMonitor;
 import heptarm.core.state.MotionStatus;
 import heptarm.wire.Cause;
@@ -34,6 +35,7 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
 
     private final MotionPort port;
     private final ConditionWatcher watcher;
+    private final BreakReactions reactions;
     private final MotionReporter reporter;
     private final TriggerActions triggers;
     private final SafetyMonitor safety;
@@ -45,10 +47,11 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
     private boolean closed;
     private Thread thread;
 
-    public MotionExecutor(MotionPort port, ConditionWatcher watcher, MotionReporter reporter, TriggerActions triggers,
+    public MotionExecutor(MotionPort port, Sensors sensors, ConditionWatcher watcher, MotionReporter reporter, TriggerActions triggers,
             SafetyMonitor safety, Clock clock, Log log) {
         this.port = port;
         this.watcher = watcher;
+        this.reactions = new BreakReactions(port, sensors, clock, log);
         this.reporter = reporter;
         this.triggers = triggers;
         this.safety = safety;
@@ -110,7 +113,7 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
     }
 
     private Program queue(Run run, Activity activity) {
-        Program program = new Program(number(), run, activity, reporter, triggers, safety, log);
+        Program program = new Program(number(), run, activity, reporter, triggers, safety, clock, log);
         queue.add(program);
         notifyAll();
         return program;
@@ -343,6 +346,8 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
                 continue;
             }
             int together = BlendedBatches.length(program.run.items, i);
+            Item last = program.run.items[i + together - 1];
+            program.contact = last.until.nodes.length > 0 ? reactions.record(i, last) : null;
             if (together > 1) {
                 start(program, i, together);
                 i += together - 1;
@@ -390,8 +395,14 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
         return mode == null ? new PositionMode() : mode;
     }
 
-    /** Waits for the end of a motion with a break condition; monitors the condition if the robot does not. */
+    /** Waits for the end of a motion with a break condition, and for the reaction to it. */
     private void watch(Program program, int item) throws InterruptedException {
+        awaitEnd(program, item);
+        reactions.react(program, program.run.items[item]);
+    }
+
+    /** Waits for the end of a motion with a break condition; monitors the condition if the robot does not. */
+    private void awaitEnd(Program program, int item) throws InterruptedException {
         Condition until = program.run.items[item].until;
         // the robot's API documents no break conditions for hand guiding
         if (!(program.run.items[item].motion instanceof HandGuide) && port.monitors(until)) {

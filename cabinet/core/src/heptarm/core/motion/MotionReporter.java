@@ -83,7 +83,11 @@ public final class MotionReporter {
             text = program.text.length() > 0 ? program.text : program.why;
         }
         double duration = program.began == 0 ? 0.0 : (clock.nanos() - program.began) * 1e-9;
-        int fired = cause == Cause.CONDITION ? program.fired : -1;
-        events.publish(new MotionFinished(program.id, program.item, cause, fired, residual, duration, q, program.code, text));
+        ContactLog contact = program.contact;
+        boolean isTouch = cause == Cause.CONDITION || program.isReactionFailed();
+        double peak = isTouch && contact != null ? contact.peak() : Double.NaN;
+        double rest = isTouch && contact != null ? contact.rest() : Double.NaN;
+        events.publish(new MotionFinished(program.id, program.item, cause, isTouch ? program.fired : -1, residual, duration, q, peak, rest,
+                program.code, text));
     }
 }

@@ -3,6 +3,8 @@ package heptarm.core.motion;
 import java.util.ArrayList;
 import java.util.List;
 
+import heptarm.core.Clock;
+import heptarm.core.Clocks;
 import heptarm.core.Log;
 import heptarm.core.robot.MotionJob;
 import heptarm.core.safety.SafetyMonitor;
@@ -27,22 +29,33 @@ final class Program {
     long began;
     volatile boolean moved;
     int fired = -1;
+    /** Record of the running item; null if no condition may end it. */
+    volatile ContactLog contact;
     private int firedItem;
     private boolean isFiringReported;
+    /** Whether a break condition is the final cause of the end; while the arm reacts to it, something else may end the program. */
+    private boolean isSettled = true;
+    private MotionJob.Outcome reacted;
     private final MotionReporter reporter;
     private final TriggerActions triggers;
     private final SafetyMonitor safety;
+    private final Clock clock;
     private final Log log;
     private final List<MotionJob> jobs = new ArrayList<MotionJob>();
 
-    Program(long id, Run run, Activity activity, MotionReporter reporter, TriggerActions triggers, SafetyMonitor safety, Log log) {
+    Program(long id, Run run, Activity activity, MotionReporter reporter, TriggerActions triggers, SafetyMonitor safety, Clock clock,
+            Log log) {
         this.id = id;
         this.run = run;
         this.activity = activity;
         this.reporter = reporter;
         this.triggers = triggers;
         this.safety = safety;
+        this.clock = clock;
         this.log = log;
+        for (int i = 0; run != null && i < run.items.length; i++) {
+            isSettled = isSettled && run.items[i].reaction == null;
+        }
         this.outcomes = new MotionJob.Outcome[size()];
     }
 
@@ -58,7 +71,7 @@ final class Program {
     void end(Cause newCause, int newCode, String newWhy) {
         List<MotionJob> all;
         synchronized (this) {
-            if (cause == null) {
+            if (cause == null || isReacting()) {
                 cause = newCause;
                 code = newCode;
                 why = newWhy;
@@ -76,6 +89,10 @@ final class Program {
                 log.error("cancelling item " + i + " of motion " + id, e);
             }
         }
+    }
+
+    private boolean isReacting() {
+        return cause == Cause.CONDITION && !isSettled;
     }
 
     /** An item has failed; an earlier cause of the program's end counts. */
@@ -127,26 +144,132 @@ final class Program {
         }
     }
 
-    /** Wait for the end of an item; meanwhile report the robot's state when a break condition fires. */
+    /** Wait for the end of an item; meanwhile keep its record, and report the robot's state when a break condition fires. */
     MotionJob.Outcome await(int index) throws InterruptedException {
         while (true) {
+            boolean isNews;
             synchronized (this) {
-                while (outcomes[index] == null && (fired < 0 || isFiringReported)) {
-                    wait();
+                while (outcomes[index] == null && (fired < 0 || isFiringReported) && !isRecordDue()) {
+                    rest();
                 }
-                if (fired < 0 || isFiringReported) {
+                isNews = fired >= 0 && !isFiringReported;
+                if (outcomes[index] != null && !isNews) {
                     return outcomes[index];
                 }
-                isFiringReported = true;
+                isFiringReported = isFiringReported || isNews;
             }
-            reporter.conditionFired(id, firedItem, fired);
+            if (isNews) {
+                reporter.conditionFired(id, firedItem, fired);
+            }
+            record(isNews);
         }
+    }
+
+    /** Wait for the end of the reaction; meanwhile keep the record. */
+    void awaitReaction() throws InterruptedException {
+        while (true) {
+            synchronized (this) {
+                while (reacted == null && !isRecordDue()) {
+                    rest();
+                }
+                if (reacted != null) {
+                    return;
+                }
+            }
+            record(false);
+        }
+    }
+
+    private boolean isRecordDue() {
+        return contact != null && contact.isActive() && clock.nanos() >= contact.due();
+    }
+
+    /** Under the lock: wait for news, or until a record is due. */
+    private void rest() throws InterruptedException {
+        if (contact != null && contact.isActive()) {
+            Clocks.await(this, clock, contact.due());
+        } else {
+            wait();
+        }
+    }
+
+    private void record(boolean isTouch) {
+        if (contact != null && isTouch) {
+            contact.touched();
+        } else if (contact != null) {
+            contact.record();
+        }
+    }
+
+    /** Add the job of the reaction; cancels it if something else than the condition has ended the program. */
+    void adoptReaction(MotionJob job) {
+        boolean late;
+        synchronized (this) {
+            jobs.add(job);
+            late = cause != Cause.CONDITION;
+        }
+        if (late) {
+            job.cancel();
+        }
+    }
+
+    /** The reaction has failed; the program has, too, but what fired is still reported. */
+    synchronized void failReaction(int failureCode, String failure) {
+        if (isReacting()) {
+            boolean stopped = failureCode == Code.SAFETY_STOP || safety.isStopped();
+            cause = stopped ? Cause.SAFETY : Cause.FAILED;
+            code = stopped ? Code.SAFETY_STOP : failureCode;
+            text = "the reaction to its break condition failed: " + failure;
+        }
+        reacted = MotionJob.Outcome.FAILED;
+        notifyAll();
+    }
+
+    /** Whether a break condition has ended it, but the reaction failed. */
+    synchronized boolean isReactionFailed() {
+        return reacted == MotionJob.Outcome.FAILED;
+    }
+
+    /** No reaction is running or follows. */
+    synchronized void settle() {
+        isSettled = true;
+    }
+
+    MotionJob.Listener reactionListener() {
+        return new MotionJob.Listener() {
+            public void started() {
+            }
+
+            public void reached(int segment) {
+            }
+
+            public void triggered(int trigger) {
+            }
+
+            public void fired(int node) {
+            }
+
+            public void finished(MotionJob.Outcome outcome, int failureCode, String failure) {
+                if (outcome == MotionJob.Outcome.FAILED) {
+                    failReaction(failureCode, failure);
+                    return;
+                }
+                synchronized (Program.this) {
+                    reacted = outcome;
+                    Program.this.notifyAll();
+                }
+            }
+        };
     }
 
     MotionJob.Listener listener(final int index) {
         return new MotionJob.Listener() {
             public void started() {
                 moved = true;
+                ContactLog record = contact;
+                if (record != null) {
+                    record.started(index);
+                }
                 boolean isOver; // it was handed over while the program ended, and is cancelled at once
                 synchronized (Program.this) {
                     isOver = cause != null;

@@ -69,6 +69,8 @@ public final class ServoStream implements Activity {
     private boolean isStarted;
     private MotionJob.Outcome outcome;
     private boolean closed;
+    private boolean isNumbered;
+    private long newest;
     private long targets;
     private long applied;
     private long rejected;
@@ -96,6 +98,19 @@ public final class ServoStream implements Activity {
     }
 
     // ------------------------------------------------------------------------------------------- any thread
+
+    /** Whether a target is newer than all so far, which it then is; one without a number (0) always is. */
+    public synchronized boolean isNewer(long number) {
+        if (number == 0) {
+            return true;
+        }
+        if (isNumbered && (int) (number - newest) <= 0) { // the numbers wrap
+            return false;
+        }
+        isNumbered = true;
+        newest = number;
+        return true;
+    }
 
     /** Check a target and queue it; it replaces one that has not been applied yet. */
     public void offer(Target target) throws CommandRejected {

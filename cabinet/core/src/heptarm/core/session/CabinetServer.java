@@ -27,6 +27,7 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
     private final RequestDispatcher dispatcher;
     private final Reception reception;
     private final Places places;
+    private final DatagramPort datagrams;
     private final AtomicInteger sessions = new AtomicInteger();
     private boolean closed;
 
@@ -39,6 +40,7 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
         this.dispatcher = new RequestDispatcher(service.authority, service.commands, service.sampler, settings.maxRate, log);
         this.reception = new Reception(settings, frames, this, log);
         this.places = new Places(service.authority);
+        this.datagrams = new DatagramPort(log);
         service.events.add(this);
         service.watchdog.add("the places of the clients", 5, places);
         service.watchdog.add("the connections", 1, new LinkWatchdog(places.clients, service.authority, settings.heartbeat, clock));
@@ -48,13 +50,32 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
     public int start() throws IOException {
         int port = reception.open();
         service.start();
+        openDatagrams(port);
         reception.start();
-        log.info("heptarm " + ServerSettings.VERSION + " listens on " + settings.bind + ":" + port + ", protocol " + Protocol.MAJOR
-                + "." + Protocol.MINOR);
+        log.info("heptarm " + ServerSettings.VERSION + " listens on " + settings.bind + ":" + port + ", TCP "
+                + (datagrams.isOpen() ? "and UDP" : "only") + ", protocol " + Protocol.MAJOR + "." + Protocol.MINOR);
         if (settings.isOpenToAll()) {
             log.warn("any program in the network can move this robot: set the process data heptarm.key or heptarm.allow");
         }
         return port;
+    }
+
+    /** Open the UDP port of the same number; everything works without it. */
+    private void openDatagrams(int port) {
+        if (!settings.datagrams) {
+            return;
+        }
+        try {
+            datagrams.open(settings.bind, port);
+        } catch (IOException e) {
+            log.warn(withoutUdp(port, e));
+        } catch (RuntimeException e) { // forbidden on this cabinet
+            log.warn(withoutUdp(port, e));
+        }
+    }
+
+    private static String withoutUdp(int port, Exception why) {
+        return "UDP port " + port + " cannot be opened (" + why.getMessage() + "): servo targets and states go over TCP";
     }
 
     /** Stop motion, say goodbye to all clients, close the port, end all threads. */
@@ -69,6 +90,7 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
             client.goodbye(Code.SHUTTING_DOWN, "the cabinet application is closing");
         }
         service.endThreads();
+        datagrams.close();
         for (ClientConnection client : places.clients) {
             client.join();
         }
@@ -91,7 +113,7 @@ public final class CabinetServer implements EventBus.Listener, ClientConnection.
 
     public void admit(Newcomer newcomer) throws IOException {
         ClientConnection client = new ClientConnection(newcomer, sessions.incrementAndGet(), identity, dispatcher, this, frames,
-                service.clock, log);
+                datagrams, service.clock, log);
         places.add(client);
         client.start();
     }

@@ -7,13 +7,18 @@ import java.net.Socket;
 import java.util.ArrayDeque;
 
 import heptarm.core.Clock;
+import heptarm.core.CommandRejected;
 import heptarm.core.Log;
 import heptarm.core.Threads;
 import heptarm.core.key.FrameTag;
+import heptarm.core.key.KeyExchange;
 import heptarm.core.state.StateSampler;
 import heptarm.wire.Code;
+import heptarm.wire.DatagramStatistics;
+import heptarm.wire.DatagramToken;
 import heptarm.wire.Goodbye;
 import heptarm.wire.Message;
+import heptarm.wire.Messages;
 import heptarm.wire.Protocol;
 import heptarm.wire.State;
 import heptarm.wire.Welcome;
@@ -24,7 +29,7 @@ import heptarm.wire.Welcome;
  * <p>Events and states go into the outbox without waiting, so a client that does not read delays nobody. When states pile up,
  * the oldest are dropped; a connection whose events pile up is closed.
  */
-final class ClientConnection implements ControlAuthority.Controller, StateSampler.Subscriber {
+final class ClientConnection implements ControlAuthority.Controller, StateSampler.Subscriber, DatagramPeer.Receiver {
     private static final int BUFFER = 16384;
     private static final int MAX_EVENTS = 4096;
     private static final int MAX_STATES = 64;
@@ -39,6 +44,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     private final RequestDispatcher dispatcher;
     private final Owner owner;
     private final FrameEncoder frames;
+    private final DatagramPort port;
     private final Clock clock;
     private final Log log;
     private final InputStream in;
@@ -65,6 +71,11 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     private volatile boolean gone;
     private volatile long lastReceived;
     private long silenceBefore;
+    private volatile DatagramPeer datagrams;
+    private final Object requests = new Object();
+    /** Newest request over TCP, and newest one that a datagram anticipated. */
+    private long lastRequest;
+    private long anticipated;
     private volatile long lastSent;
     private volatile long writeBegan;
 
@@ -78,11 +89,12 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     }
 
     ClientConnection(Newcomer newcomer, int session, CabinetIdentity identity, RequestDispatcher dispatcher, Owner owner,
-            FrameEncoder frames, Clock clock, Log log) throws IOException {
+            FrameEncoder frames, DatagramPort port, Clock clock, Log log) throws IOException {
         this.identity = identity;
         this.dispatcher = dispatcher;
         this.owner = owner;
         this.frames = frames;
+        this.port = port;
         this.clock = clock;
         this.log = log;
         this.socket = newcomer.socket;
@@ -130,9 +142,14 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         return open && !ending && !gone;
     }
 
-    /** Cabinet time of the last bytes from the client. */
+    /** Cabinet time of the last bytes from the client over TCP. */
     long lastReceived() {
         return lastReceived;
+    }
+
+    /** Silence of the client over TCP [ns], whatever its datagrams say. */
+    long silenceOverTcp() {
+        return clock.nanos() - lastReceived;
     }
 
     /** Silence of the client [ns], confirmed by two calls: a busy machine may not have read its bytes yet. */
@@ -143,7 +160,9 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         } catch (IOException e) { // the reader reports it
         }
         long before = silenceBefore;
-        silenceBefore = clock.nanos() - lastReceived - (long) excused;
+        DatagramPeer peer = datagrams;
+        long heard = peer == null ? lastReceived : Math.max(lastReceived, peer.heard());
+        silenceBefore = clock.nanos() - heard - (long) excused;
         return Math.min(silenceBefore, before);
     }
 
@@ -249,6 +268,9 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
                 return filled;
             }
             long stamp = (long) FrameEncoder.getInt(data, pos + 18) << 32 | FrameEncoder.getInt(data, pos + 22) & 0xFFFFFFFFL;
+            synchronized (requests) { // a datagram that anticipates this request is done first, or never
+                lastRequest = Messages.isRequest(type) ? request : lastRequest;
+            }
             dispatcher.handle(this, type, request, stamp, data, pos + Protocol.HEADER, length);
             pos = end;
         }
@@ -258,6 +280,62 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     /** End a session in which a frame is not the next one of the client. */
     private void forged(String what) {
         goodbye(Code.FORGED_FRAME, what + ": it was forged, changed, repeated, reordered or lost in transit");
+    }
+
+    // ------------------------------------------------------------------------------------------- datagrams
+
+    /** Open datagrams, or open them again with another token. */
+    DatagramToken openDatagrams() throws CommandRejected {
+        if (!port.isOpen()) {
+            throw new CommandRejected(Code.UNSUPPORTED, "this cabinet has no UDP port: the process data heptarm.datagrams is 0, or another"
+                    + " program has taken the port; the smartPAD shows which");
+        }
+        byte[] token = Handshake.token();
+        byte[] secret = handshake.datagramSecret(token);
+        DatagramPeer peer = new DatagramPeer(session, socket.getInetAddress(), port, KeyExchange.clientDatagramTag(secret, token),
+                KeyExchange.cabinetDatagramTag(secret, token), frames, clock, this);
+        synchronized (outbox) {
+            if (gone) {
+                throw new CommandRejected(Code.UNSUPPORTED, "the connection has ended; connect again");
+            }
+            datagrams = peer;
+            port.add(peer);
+        }
+        return new DatagramToken(token);
+    }
+
+    /** What was counted of the datagrams; all 0 if they are not open. */
+    DatagramStatistics datagramCounts() {
+        DatagramPeer peer = datagrams;
+        return peer == null ? new DatagramStatistics(0, 0, 0, 0, 0, port.strange(), 0) : peer.counts();
+    }
+
+    /** Ping the client by datagram when it is time. */
+    void pingByDatagram() {
+        DatagramPeer peer = datagrams;
+        if (peer != null) {
+            peer.ping();
+        }
+    }
+
+    public double oldest() {
+        return dispatcher.patience(this);
+    }
+
+    public void datagram(int type, long request, long sent, byte[] data, int offset, int length) {
+        if (!isOpen()) {
+            return;
+        }
+        if (!Messages.isRequest(type)) {
+            dispatcher.handleDatagram(this, type, request, sent, data, offset, length);
+            return;
+        }
+        synchronized (requests) {
+            if ((int) (request - lastRequest) > 0 && (int) (request - anticipated) > 0) {
+                anticipated = request;
+                dispatcher.handleDatagram(this, type, request, sent, data, offset, length);
+            }
+        }
     }
 
     // ------------------------------------------------------------------------------------------- writing
@@ -334,8 +412,12 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
         }
     }
 
-    /** Queue a state; drops the oldest when too many wait. */
+    /** Send a state by datagram, or queue it; drops the oldest when too many wait. */
     public void receive(State state) {
+        DatagramPeer peer = datagrams;
+        if (peer != null && isOpen() && peer.offer(state)) {
+            return;
+        }
         byte[] frame = frames.frame(state, 0);
         synchronized (outbox) {
             if (states.size() >= MAX_STATES) {
@@ -444,6 +526,7 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
                 return;
             }
             gone = true;
+            port.remove(session);
             outbox.notifyAll();
         }
         try {

@@ -147,15 +147,19 @@ public final class CommandHandler {
         if (target instanceof ServoJoints) {
             checks.checkJoints(((ServoJoints) target).q, "q");
         }
-        stream(target, now);
+        stream(target, now, 0);
     }
 
     static boolean isTarget(int type) {
         return type == ServoJoints.TYPE || type == ServoJointsVelocity.TYPE || type == ServoPose.TYPE;
     }
 
-    /** Hand over a servo target. There is no answer: the status of the stream reports a rejected one. */
-    void stream(Message message, long sent) {
+    /**
+     * Hand over a servo target. There is no answer: the status of the stream reports a rejected one.
+     *
+     * @param number of the target in the session, 0: it has none; one that is not newer than all before is a copy
+     */
+    void stream(Message message, long sent, long number) {
         ServoStream stream;
         ServoStream.Target target;
         if (message instanceof ServoJoints) {
@@ -171,8 +175,8 @@ public final class CommandHandler {
             stream = executor.servo(one.servo);
             target = new ServoStream.Target(null, null, one.xyz, one.quat, one.watchdog, sent);
         }
-        if (stream == null) {
-            return; // it has just ended; its client receives that event
+        if (stream == null || !stream.isNewer(number)) {
+            return; // it has just ended, and its client receives that event; or a newer target came by another path
         }
         try {
             validate(message);

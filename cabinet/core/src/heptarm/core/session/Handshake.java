@@ -135,6 +135,18 @@ final class Handshake {
         return whole;
     }
 
+    /** What the keys of the session's datagrams follow from, besides the token; with no key only the token is secret. */
+    byte[] datagramSecret(byte[] token) {
+        return exchange == null ? token : exchange.secret(hello.nonce, nonce);
+    }
+
+    /** A random token of datagrams. */
+    static byte[] token() {
+        byte[] token = new byte[Protocol.TOKEN];
+        RANDOM.nextBytes(token);
+        return token;
+    }
+
     /** Tags of the client's frames after the Welcome; null: they have none. */
     FrameTag clientTag() {
         return exchange == null ? null : exchange.clientTag(hello.nonce, nonce);

@@ -12,6 +12,8 @@ final class LinkWatchdog implements Watchdog.Check {
     /** Longest write to a client [s]. */
     private static final double MAX_WRITE = 2.0;
     private static final int SILENT_HEARTBEATS = 5;
+    /** Longest silence over TCP while datagrams arrive [s]. */
+    private static final double MAX_TCP_SILENCE = 10.0;
 
     private final List<ClientConnection> clients;
     private final ControlAuthority authority;
@@ -29,6 +31,7 @@ final class LinkWatchdog implements Watchdog.Check {
         long now = clock.nanos();
         double scale = 1e-9 / clock.rate(); // time-outs of the link are in the client's seconds
         for (ClientConnection client : clients) {
+            client.pingByDatagram();
             double silence = client.silence() * scale;
             long writing = client.writeBegan();
             if (writing != 0 && (now - writing) * scale > MAX_WRITE) {
@@ -36,6 +39,8 @@ final class LinkWatchdog implements Watchdog.Check {
             } else if (silence > SILENT_HEARTBEATS * heartbeat) {
                 client.goodbye(Code.SILENT, "silent for " + Math.round(silence * 1000) + " ms, at most "
                         + Math.round(SILENT_HEARTBEATS * heartbeat * 1000) + " ms are allowed");
+            } else if (client.silenceOverTcp() * scale > Math.max(MAX_TCP_SILENCE, 2 * SILENT_HEARTBEATS * heartbeat)) {
+                client.goodbye(Code.SILENT, "only datagrams came for " + Math.round(client.silenceOverTcp() * scale) + " s");
             } else if (authority.isController(client) && silence > authority.watchdog()) {
                 authority.lost(client, "silent for " + Math.round(silence * 1000) + " ms, its watchdog time is "
                         + Math.round(authority.watchdog() * 1000) + " ms");

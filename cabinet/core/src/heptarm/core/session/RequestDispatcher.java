@@ -5,8 +5,10 @@ import heptarm.core.Log;
 import heptarm.core.state.StateSampler;
 import heptarm.wire.Accepted;
 import heptarm.wire.Code;
+import heptarm.wire.GetDatagramStatistics;
 import heptarm.wire.Message;
 import heptarm.wire.Messages;
+import heptarm.wire.OpenDatagrams;
 import heptarm.wire.Ping;
 import heptarm.wire.Pong;
 import heptarm.wire.Rejected;
@@ -19,6 +21,9 @@ import heptarm.wire.WireException;
 
 /** Dispatches the messages of open sessions, and answers every refused request with the reason. */
 final class RequestDispatcher {
+    /** Longest age of a datagram of an observer [s]. */
+    private static final double OBSERVER = 0.5;
+
     private final ControlAuthority authority;
     private final CommandHandler commands;
     private final StateSampler sampler;
@@ -64,20 +69,49 @@ final class RequestDispatcher {
                                 : controller + " controls the robot, not " + client.name() + "; take control first");
             }
             if (CommandHandler.isTarget(type)) {
-                commands.stream(message, sent);
+                commands.stream(message, sent, request);
                 return;
             }
             CommandHandler.validate(message);
             client.answer(answer(client, message), request);
         } catch (WireException e) {
-            reject(client, request, new CommandRejected(Code.BAD_BODY, "message " + type + ": " + e.getMessage()));
+            reject(client, type, request, new CommandRejected(Code.BAD_BODY, "message " + type + ": " + e.getMessage()));
         } catch (CommandRejected e) {
-            reject(client, request, e);
+            reject(client, type, request, e);
         } catch (RuntimeException e) {
             fail(client, type, request, e);
         } catch (LinkageError e) { // a class that this cabinet lacks
             fail(client, type, request, e);
         }
+    }
+
+    /**
+     * Handle a servo target, a Stop or a Cancel that came as datagram. It is never answered: what is wrong with a Stop or a
+     * Cancel is the answer over TCP, and a target is refused in the status of its stream.
+     */
+    void handleDatagram(ClientConnection client, int type, long request, long sent, byte[] data, int offset, int length) {
+        try {
+            Message message = Messages.read(type, data, offset, length);
+            if (Messages.needsControl(type) && !authority.isController(client)) {
+                return;
+            }
+            if (CommandHandler.isTarget(type)) {
+                commands.stream(message, sent, request);
+                return;
+            }
+            CommandHandler.validate(message);
+            commands.answer(message);
+        } catch (WireException e) { // its tag is right: a client with a defect
+            log.warn("a datagram of " + client.name() + " with message " + type + ": " + e.getMessage());
+        } catch (CommandRejected e) { // the same request over TCP is answered
+        } catch (RuntimeException e) {
+            log.error("a datagram of " + client.name() + " with message " + type, e);
+        }
+    }
+
+    /** Longest age of a datagram of the client [s]: of the controller its watchdog time. */
+    double patience(ClientConnection client) {
+        return authority.isController(client) ? authority.watchdog() : OBSERVER;
     }
 
     private Message answer(ClientConnection client, Message message) throws CommandRejected {
@@ -94,6 +128,10 @@ final class RequestDispatcher {
             authority.take(client, request.watchdog, request.on_lost);
         } else if (message instanceof ReleaseControl) {
             authority.release(client, client.name() + " released control");
+        } else if (message instanceof OpenDatagrams) {
+            return client.openDatagrams();
+        } else if (message instanceof GetDatagramStatistics) {
+            return client.datagramCounts();
         } else {
             return commands.answer(message);
         }
@@ -102,10 +140,11 @@ final class RequestDispatcher {
 
     private void fail(ClientConnection client, int type, long request, Throwable e) {
         log.error("message " + type + " of " + client.name(), e);
-        reject(client, request, new CommandRejected(Code.INTERNAL, String.valueOf(e)));
+        reject(client, type, request, new CommandRejected(Code.INTERNAL, String.valueOf(e)));
     }
 
-    private static void reject(ClientConnection client, long request, CommandRejected why) {
-        client.answer(new Rejected(why.code, why.parameter, why.value, why.allowed, why.getMessage()), request);
+    private static void reject(ClientConnection client, int type, long request, CommandRejected why) {
+        long id = Messages.isRequest(type) ? request : 0; // a target has a number there
+        client.answer(new Rejected(why.code, why.parameter, why.value, why.allowed, why.getMessage()), id);
     }
 }

@@ -45,7 +45,7 @@ public final class RobotService {
         tools = new ToolTable(robot.tools);
         reader = new StateReader(robot.sensors, clock);
         MotionReporter reporter = new MotionReporter(events, reader, clock, log);
-        executor = new MotionExecutor(robot.motion, new ConditionWatcher(robot.sensors, robot.signals, clock, log), reporter,
+        executor = new MotionExecutor(robot.motion, robot.sensors, new ConditionWatcher(robot.sensors, robot.signals, clock, log), reporter,
                 new TriggerActions(signals, reporter, clock), safety, clock, log);
         safety.add(executor);
         monitors = new FriMonitors(robot.motion, reporter, clock, log);

@@ -24,14 +24,17 @@ public final class ServerSettings {
     public final double heartbeat;
     /** Highest state rate [Hz]. */
     public final double maxRate;
+    /** Open the UDP port of the same number. */
+    public final boolean datagrams;
 
-    public ServerSettings(String bind, int port, String key, String allow, double heartbeat, double maxRate) {
+    public ServerSettings(String bind, int port, String key, String allow, double heartbeat, double maxRate, boolean datagrams) {
         this.bind = bind;
         this.port = port;
         this.key = key;
         this.allow = allow;
         this.heartbeat = heartbeat;
         this.maxRate = maxRate;
+        this.datagrams = datagrams;
     }
 
     /** Why the key is too weak; empty: it is strong enough, or there is none. The Python side has the same rule. */

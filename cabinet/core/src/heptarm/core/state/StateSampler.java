@@ -129,7 +129,10 @@ public final class StateSampler {
         }
         long period = Math.round(1e9 / rate);
         long now = clock.nanos();
-        subscriptions.put(subscriber, new Subscription(groups, period, now - now % period + period));
+        synchronized (subscriptions) {
+            subscriptions.put(subscriber, new Subscription(groups, period, now - now % period + period));
+            subscriptions.notifyAll();
+        }
     }
 
     public void unsubscribe(Subscriber subscriber) {
@@ -140,6 +143,7 @@ public final class StateSampler {
         boolean failing = false;
         try {
             while (!closed) {
+                awaitSubscriber();
                 long now = clock.sleepUntil(next());
                 try {
                     serve(now);
@@ -154,6 +158,14 @@ public final class StateSampler {
             }
         } catch (InterruptedException e) {
             Thread.currentThread().interrupt();
+        }
+    }
+
+    private void awaitSubscriber() throws InterruptedException {
+        synchronized (subscriptions) {
+            while (subscriptions.isEmpty() && !closed) {
+                subscriptions.wait();
+            }
         }
     }
 

@@ -31,7 +31,7 @@ public final class PeriodicSampler {
 
     private void run() {
         PlantClock clock = new PlantClock();
-        long first = station.sharedState.newest() * Seam.TICK_NS;
+        long first = clock.nanos() / Seam.TICK_NS * Seam.TICK_NS;
         long next = first;
         try {
             while (!stopped) {

@@ -3,6 +3,7 @@ package heptarm.doubles.plant;
 import java.lang.reflect.InvocationHandler;
 import java.lang.reflect.Method;
 import java.lang.reflect.Proxy;
+import java.util.Set;
 import java.util.concurrent.BlockingQueue;
 import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.LinkedBlockingQueue;
@@ -62,7 +63,16 @@ public final class PlantCalls implements InvocationHandler {
         }
     }
 
+    /** Methods that change nothing. */
+    private static final Set<String> QUERIES = Set.of("describe", "signal", "inverse");
+
     private final BlockingQueue<Call> waiting = new LinkedBlockingQueue<>();
+    private volatile Runnable onChange = () -> { };
+
+    /** Calls a runnable after each call that may have changed the plant, before its caller continues. */
+    public void onChange(Runnable runnable) {
+        onChange = runnable;
+    }
 
     /** The plant as the doubles call it. */
     public Plant plant() {
@@ -81,6 +91,12 @@ public final class PlantCalls implements InvocationHandler {
         }
         Call call = new Call(method, arguments);
         waiting.add(call);
-        return call.await();
+        try {
+            return call.await();
+        } finally {
+            if (!QUERIES.contains(call.method)) {
+                onChange.run();
+            }
+        }
     }
 }

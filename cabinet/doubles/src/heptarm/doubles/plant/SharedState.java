@@ -30,6 +30,7 @@ public final class SharedState {
             MethodHandles.byteBufferViewVarHandle(long[].class, ByteOrder.nativeOrder());
 
     private final ByteBuffer memory;
+    private volatile Runnable onWrite = () -> { };
     private final ThreadLocal<View> views = ThreadLocal.withInitial(View::new);
 
     /** A copy of the state that a thread reads. */
@@ -66,6 +67,56 @@ public final class SharedState {
         return word(HeaderWords.START + HeaderWords.ANCHOR);
     }
 
+    /** Length of a tick by the machine's clock [ns]. */
+    private long period() {
+        return (long) (Seam.TICK_NS / rate());
+    }
+
+    /** The machine's time, see {@link System#nanoTime}, at which a tick is due. */
+    long wallTime(long tick) {
+        return anchor() + tick * period();
+    }
+
+    /**
+     * Publishes the newest state again as that of each tick that is due: the robot rests. Only on the plant's realtime thread.
+     *
+     * @param last tick after which none is published
+     * @param late a tick that cannot be due, unless the machine was suspended: then that time is given up
+     */
+    void repeat(long last, long late) {
+        long tick = newest();
+        long now = System.nanoTime();
+        long due = (now - anchor()) / period();
+        if (due > late) {
+            due = tick + 1;
+            setWord(HeaderWords.START + HeaderWords.ANCHOR, now - due * period());
+        }
+        int from = base(tick);
+        for (long next = tick + 1; next <= Math.min(due, last); next++) {
+            int to = base(next);
+            setWord(to + StateWords.SEQ, 2 * next + 1);
+            VarHandle.storeStoreFence();
+            for (int i = 0; i < StateWords.SIZE; i++) {
+                if (i != StateWords.SEQ && i != StateWords.TIME) {
+                    memory.putLong(WORD * (to + i), memory.getLong(WORD * (from + i)));
+                }
+            }
+            memory.putLong(WORD * (to + StateWords.TIME), next * Seam.TICK_NS);
+            setWord(to + StateWords.SEQ, 2 * next + 2);
+            setWord(HeaderWords.START + HeaderWords.NEWEST, next);
+        }
+    }
+
+    /** First word of the state of a tick. */
+    private static int base(long tick) {
+        return StateWords.START + (int) (tick % Seam.SLOTS) * StateWords.SIZE;
+    }
+
+    /** Calls a runnable whenever the override or an output has been written; it must not block. */
+    void onWrite(Runnable runnable) {
+        onWrite = runnable;
+    }
+
     double rate() {
         return Double.longBitsToDouble(word(HeaderWords.START + HeaderWords.RATE));
     }
@@ -77,6 +128,7 @@ public final class SharedState {
     /** Factor on every programmed speed. */
     public void setOverride(double value) {
         setWord(HeaderWords.START + HeaderWords.OVERRIDE, Double.doubleToRawLongBits(value));
+        onWrite.run();
     }
 
     /** Writes a servo target, which replaces the previous one at the plant's next tick. For straight lines q is a pose. */
@@ -125,7 +177,7 @@ public final class SharedState {
     private void copy(View view, long wanted) {
         long tick = Math.min(wanted, newest());
         while (view.tick != tick) {
-            int base = StateWords.START + (int) (tick % Seam.SLOTS) * StateWords.SIZE;
+            int base = base(tick);
             if (word(base + StateWords.SEQ) == 2 * tick + 2) {
                 view.tick = -1;
                 for (int i = 0; i < StateWords.SIZE; i++) {
@@ -148,6 +200,7 @@ public final class SharedState {
 
     public void setSignal(int place, double value) {
         setWord(ImageWords.START + place, Double.doubleToRawLongBits(value));
+        onWrite.run();
     }
 
     /** Copies the doubles of an array of a state, see {@link StateWords}. */

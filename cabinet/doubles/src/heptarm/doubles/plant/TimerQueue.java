@@ -3,11 +3,17 @@ package heptarm.doubles.plant;
 import java.util.ArrayList;
 import java.util.Iterator;
 import java.util.List;
+import java.util.concurrent.atomic.AtomicBoolean;
 import java.util.concurrent.locks.LockSupport;
 
 import heptarm.doubles.seam.Seam;
 
-/** Threads that sleep in simulation time; the plant calls {@link #tick} only when at least one of them is due. */
+/**
+ * Threads that sleep in simulation time; the plant calls {@link #tick} only when at least one of them is due.
+ *
+ * <p>While the robot rests, the realtime loop of the plant waits here as well, see {@link #rest}. A change that the plant must not
+ * miss ends that by {@link #rouse}.
+ */
 public final class TimerQueue {
     private static final class Sleeper {
         final Thread thread = Thread.currentThread();
@@ -19,11 +25,61 @@ public final class TimerQueue {
         }
     }
 
+    /** A state is at most so many ticks old at rest: the clocks of the threads run ahead of it no further than that. */
+    private static final int STRIDE = 20;
+
     private final SharedState sharedState;
     private final List<Sleeper> sleepers = new ArrayList<>();
+    private final AtomicBoolean roused = new AtomicBoolean();
+    private volatile long earliest = Long.MAX_VALUE;
+    /** The realtime loop while it sleeps; null: it ticks. */
+    private volatile Thread resting;
 
     public TimerQueue(SharedState sharedState) {
         this.sharedState = sharedState;
+        sharedState.onWrite(this::rouse);
+    }
+
+    /**
+     * Lets the time pass while the robot rests: repeats its last state tick by tick, and wakes the sleepers. Called by the realtime
+     * loop; Python takes no part in it, so that a resting robot costs little.
+     *
+     * @param latest simulation time at which this ends [ns]
+     * @return whether it was roused, also if that was before it came here; then the next tick has to be simulated
+     */
+    public boolean rest(long latest) {
+        long last = latest / Seam.TICK_NS;
+        resting = Thread.currentThread();
+        try {
+            while (sharedState.newest() < last) {
+                boolean changed = roused.get();
+                long next = Math.min(sharedState.newest() + STRIDE, Math.min(last, ticks(earliest)));
+                long left = sharedState.wallTime(next) - System.nanoTime();
+                if (left > 0 && !changed) {
+                    LockSupport.parkNanos(this, left);
+                    continue;
+                }
+                sharedState.repeat(last, next + STRIDE);
+                if (changed) {
+                    break; // sleepers wait for the next tick, which shows the change
+                }
+                tick(sharedState.newest() * Seam.TICK_NS);
+            }
+        } finally {
+            resting = null;
+        }
+        return roused.getAndSet(false);
+    }
+
+    /** The first tick at or after a simulation time. */
+    private static long ticks(long nanos) {
+        return nanos / Seam.TICK_NS + (nanos % Seam.TICK_NS == 0 ? 0 : 1);
+    }
+
+    /** Ends {@link #rest}, or the next one if the realtime loop does not rest: something has changed. Any thread. */
+    public void rouse() {
+        roused.set(true);
+        LockSupport.unpark(resting);
     }
 
     /** Called by the realtime thread of the plant after a tick. */
@@ -41,11 +97,16 @@ public final class TimerQueue {
     }
 
     private void publishNextWakeUp() {
-        long earliest = Long.MAX_VALUE;
+        long first = Long.MAX_VALUE;
         for (Sleeper one : sleepers) {
-            earliest = Math.min(earliest, one.until);
+            first = Math.min(first, one.until);
         }
-        sharedState.setWakeTime(earliest);
+        boolean sooner = first < earliest;
+        earliest = first;
+        sharedState.setWakeTime(first);
+        if (sooner) {
+            LockSupport.unpark(resting); // to sleep less long
+        }
     }
 
     /** Sleeps until the simulation time has reached {@code nanos}. */

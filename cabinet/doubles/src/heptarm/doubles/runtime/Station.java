@@ -18,6 +18,7 @@ import com.kuka.roboticsAPI.geometricModel.World;
 import heptarm.core.Clock;
 import heptarm.doubles.pad.SmartPad;
 import heptarm.doubles.plant.Plant;
+import heptarm.doubles.plant.PlantCalls;
 import heptarm.doubles.plant.PlantClock;
 import heptarm.doubles.plant.SharedState;
 import heptarm.doubles.plant.TimerQueue;
@@ -58,8 +59,10 @@ public final class Station {
     }
 
     /** Creates the cabinet; called once, before anything else. */
-    public static Station open(ByteBuffer memory, Plant plant) {
-        current = new Station(memory, plant);
+    public static Station open(ByteBuffer memory, PlantCalls calls) {
+        Station opened = new Station(memory, calls.plant());
+        calls.onChange(opened.timers::rouse);
+        current = opened;
         return current;
     }
 
@@ -75,9 +78,9 @@ public final class Station {
         return new PlantClock();
     }
 
-    /** Sleeps for a duration in simulation time [ns]. */
+    /** Sleeps for a duration in simulation time [ns], from the present: the newest state may be older while the robot rests. */
     public void sleep(long nanos) throws InterruptedException {
-        timers.sleep(sharedState.newest() * Seam.TICK_NS + nanos);
+        timers.sleep(clock().nanos() + nanos);
     }
 
     /** Waits until the last command to the plant shows in its published state. */

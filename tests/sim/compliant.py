@@ -23,7 +23,7 @@ ASKEW = (0.2, 0.6, -0.3, -1.3, 0.4, 0.9, 0.5)
 #: The hand half a metre up, pointing down.
 DOWN = (0.0, 0.5, 0.0, -1.3, 0.0, 1.3416, 0.0)
 
-Way = Callable[[float], Any]
+Travel = Callable[[float], Any]
 
 
 class Arm:
@@ -62,20 +62,20 @@ class Arm:
         self.time = 0.0
         self.torque = np.zeros(7)
 
-    def step(self, seconds: float, way: Way | None = None) -> list[Array]:
+    def step(self, seconds: float, travel: Travel | None = None) -> list[Array]:
         """Run for a time while the set-point follows its path; deviations of every tick."""
         seen = []
         for _ in range(round(seconds * 1000)):
-            self.tick(way)
+            self.tick(travel)
             seen.append(self.law.deviation)
         return seen
 
-    def tick(self, way: Way | None = None) -> None:
+    def tick(self, travel: Travel | None = None) -> None:
         """One millisecond."""
         m, d, sensed = self.model, self.data, self.sensed
-        if way is not None:
+        if travel is not None:
             sensed.before, sensed.now, sensed.after = (
-                np.asarray(way(self.time + shift), dtype=np.float64) for shift in (-1e-3, 0.0, 1e-3)
+                np.asarray(travel(self.time + shift), dtype=np.float64) for shift in (-1e-3, 0.0, 1e-3)
             )
         mujoco.mj_step1(m, d)
         mujoco.mj_fullM(m, d, self.mass)

@@ -25,7 +25,7 @@ import com.kuka.roboticsAPI.motionModel.controlModeModel.CartesianImpedanceContr
 import com.kuka.roboticsAPI.motionModel.controlModeModel.CartesianSineImpedanceControlMode;
 
 /** Cartesian impedance as Sunrise programmers write it; each step leaves a line that the test reads. */
-public class Yielding extends RoboticsAPIApplication {
+public class Compliant extends RoboticsAPIApplication {
     @Inject
     private LBR lbr;
 
@@ -128,25 +128,25 @@ public class Yielding extends RoboticsAPIApplication {
     }
 
     private void forces() {
-        CartesianImpedanceControlMode soft = new CartesianImpedanceControlMode();
-        soft.parametrize(CartDOF.TRANSL).setStiffness(500);
-        soft.parametrize(CartDOF.A).setStiffness(40);
+        CartesianImpedanceControlMode compliant = new CartesianImpedanceControlMode();
+        compliant.parametrize(CartDOF.TRANSL).setStiffness(500);
+        compliant.parametrize(CartDOF.A).setStiffness(40);
         Frame before = home();
-        soft.setAdditionalControlForce(0, 10, 15, 0, 0, 0);
-        lbr.move(positionHold(soft, 1000, TimeUnit.MILLISECONDS));
-        Transformation way = from(before);
+        compliant.setAdditionalControlForce(0, 10, 15, 0, 0, 0);
+        lbr.move(positionHold(compliant, 1000, TimeUnit.MILLISECONDS));
+        Transformation travel = from(before);
         say("a force moves the flange by force over stiffness, along its own axes",
-                near(way.getX(), 0, 0.5) && near(way.getY(), 20, 0.5) && near(way.getZ(), 30, 0.6));
+                near(travel.getX(), 0, 0.5) && near(travel.getY(), 20, 0.5) && near(travel.getZ(), 30, 0.6));
         before = home();
-        soft.setAdditionalControlForce(0, 0, 0, 4, 0, 0);
-        lbr.move(positionHold(soft, 1000, TimeUnit.MILLISECONDS));
-        way = from(before);
-        say("a torque in A turns it about z", near(way.getAlphaRad(), 0.1, 2e-3) && near(way.getGammaRad(), 0, 2e-3));
+        compliant.setAdditionalControlForce(0, 0, 0, 4, 0, 0);
+        lbr.move(positionHold(compliant, 1000, TimeUnit.MILLISECONDS));
+        travel = from(before);
+        say("a torque in A turns it about z", near(travel.getAlphaRad(), 0.1, 2e-3) && near(travel.getGammaRad(), 0, 2e-3));
         before = home();
-        soft.setAdditionalControlForce(0, 0, 0, 0, 0, 0);
-        soft.parametrize(CartDOF.Z).setAdditionalControlForce(-10);
-        soft.setReferenceSystem(lbr.getRootFrame());
-        lbr.move(positionHold(soft, 1000, TimeUnit.MILLISECONDS));
+        compliant.setAdditionalControlForce(0, 0, 0, 0, 0, 0);
+        compliant.parametrize(CartDOF.Z).setAdditionalControlForce(-10);
+        compliant.setReferenceSystem(lbr.getRootFrame());
+        lbr.move(positionHold(compliant, 1000, TimeUnit.MILLISECONDS));
         Frame after = lbr.getCurrentCartesianPosition(lbr.getFlange());
         say("with a reference system along that one's axes",
                 near(after.getX() - before.getX(), 0, 0.5) && near(after.getZ() - before.getZ(), -20, 0.5));
@@ -242,17 +242,17 @@ public class Yielding extends RoboticsAPIApplication {
 
     private void servo() {
         Frame before = home();
-        CartesianImpedanceControlMode soft = new CartesianImpedanceControlMode();
+        CartesianImpedanceControlMode compliant = new CartesianImpedanceControlMode();
         SmartServo motion = new SmartServo(lbr.getCurrentJointPosition());
-        motion.setMode(soft);
+        motion.setMode(compliant);
         lbr.moveAsync(motion);
         ISmartServoRuntime runtime = motion.getRuntime();
-        soft.parametrize(CartDOF.Z).setAdditionalControlForce(20);
-        runtime.changeControlModeSettings(soft);
+        compliant.parametrize(CartDOF.Z).setAdditionalControlForce(20);
+        runtime.changeControlModeSettings(compliant);
         ThreadUtil.milliSleep(1000);
         say("a servo motion takes other settings", near(from(before).getZ(), 10, 0.3));
-        soft.parametrize(CartDOF.Z).setStiffness(1000);
-        runtime.changeControlModeSettings(soft);
+        compliant.parametrize(CartDOF.Z).setStiffness(1000);
+        runtime.changeControlModeSettings(compliant);
         ThreadUtil.milliSleep(1200);
         say("again and again", near(from(before).getZ(), 20, 0.5));
         boolean kept = false;

@@ -1,0 +1,49 @@
+"""`heptarm plot`: a recording as a figure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from heptarm.cli.options import Json
+from heptarm.cli.output import emit
+from heptarm.record import plot as plots
+from heptarm.record.recording import load
+
+
+def plot(
+    file: Annotated[Path, Parameter(help="Recording, MCAP.")],
+    /,
+    *,
+    signals: Annotated[
+        str, Parameter(help="Names with commas between, such as q,wrench,path. Default: the usual ones.")
+    ] = "",
+    out: Annotated[
+        Path | None,
+        Parameter(
+            name=["--out", "-o"],
+            help="File to write: .png, .svg, .pdf or .html. Default: beside the recording.",
+        ),
+    ] = None,
+    compare: Annotated[Path | None, Parameter(help="A second recording, drawn on the first one.")] = None,
+    as_json: Json = False,
+) -> int:
+    """Plot a recording: joints, speeds and torques by their limits, wrench, path; motions and events as bands."""
+    names = tuple(name.strip() for name in signals.split(",") if name.strip())
+    run = load(file)
+    figure = plots.figure_of(run, names) if compare is None else plots.compare(run, load(compare), names)
+    written = plots.save(figure, file.with_suffix(".png") if out is None else out)
+    if as_json:
+        emit(
+            {
+                "file": str(written),
+                "states": len(run),
+                "duration_s": run.duration,
+                "motions": len(run.motions),
+            }
+        )
+    else:
+        print(f"{run}\n{written}")
+    return 0

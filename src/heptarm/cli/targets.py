@@ -1,0 +1,94 @@
+"""`heptarm targets`: list, add and remove robots that have a name."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from heptarm.arm.link.target import parse_target
+from heptarm.cli.options import Json
+from heptarm.cli.output import emit
+from heptarm.errors import CommandRejected
+from heptarm.io.keys import read_key_file, stored_key
+from heptarm.io.targets import SavedTarget, add_target, remove_target, saved_targets, targets_file
+
+Name = Annotated[str, Parameter(help="Name of the target, such as lab1.")]
+
+
+def show(*, as_json: Json = False) -> int:
+    """List the saved targets: address, key, tool, speed, and when each was last used."""
+    found = saved_targets()
+    for one in found.values():
+        used = "never" if one.last_used is None else f"{datetime.fromtimestamp(one.last_used):%Y-%m-%d %H:%M}"
+        if as_json:
+            emit(
+                {"name": one.name, "address": one.address, "key": _key(one), "tool": one.tool}
+                | {"speed": one.speed, "last_used": None if one.last_used is None else used}
+            )
+            continue
+        more = [f"key: {_key(one) or 'none'}"]
+        more += [f"tool: {one.tool}"] if one.tool else []
+        more += [f"speed: {one.speed:g}"] if one.speed < 1.0 else []
+        print(f"{one.name:12} {one.address:24} {', '.join(more)}; last used: {used}")
+    if not found and not as_json:
+        print("no targets are saved; `heptarm targets add lab1 172.31.1.147` saves one")
+    return 0
+
+
+def _key(target: SavedTarget) -> str:
+    """The file of its key; empty: there is none."""
+    if target.key_file:
+        return target.key_file
+    parsed = parse_target(target.address)
+    stored = None if parsed.is_private else stored_key(parsed.host, parsed.port)
+    return str(stored.file) if stored is not None and stored.file.exists() else ""
+
+
+def add(
+    name: Name,
+    address: Annotated[str, Parameter(help="ADDRESS[:PORT], sim://HOST:PORT or sim://iiwa14.")],
+    /,
+    *,
+    key_file: Annotated[
+        Path | None,
+        Parameter(name="--key-file", help="File with its key. Default: the key stored for its address."),
+    ] = None,
+    tool: Annotated[str, Parameter(help="Tool that is attached when a client takes control.")] = "",
+    speed: Annotated[float, Parameter(help="Ceiling of the speed of all motions, (0, 1].")] = 1.0,
+    replace: Annotated[
+        bool, Parameter(name="--replace", negative="", help="Replace the target of this name.")
+    ] = False,
+    as_json: Json = False,
+) -> int:
+    """Save a target under a name: from then on --target NAME, and heptarm.connect("NAME"), mean it.
+
+    For example:
+
+        heptarm targets add lab1 172.31.1.147 --key-file ~/keys/lab1 --speed 0.3
+    """
+    if parse_target(address).name:
+        raise CommandRejected(
+            f"{address} is the name of a saved target",
+            parameter="address",
+            value=address,
+            hint="give its address",
+        )
+    place = ""
+    if key_file is not None:
+        read_key_file(key_file)
+        place = str(key_file.expanduser().resolve())
+    add_target(SavedTarget(name, address, place, tool, speed), replace=replace)
+    emit({"name": name, "file": str(targets_file())}) if as_json else print(
+        f"{name} is {address} from now on"
+    )
+    return 0
+
+
+def remove(name: Name, /, *, as_json: Json = False) -> int:
+    """Remove a saved target; its key stays, see `heptarm key forget`."""
+    remove_target(name)
+    emit({"removed": name}) if as_json else print(f"{name} is removed")
+    return 0

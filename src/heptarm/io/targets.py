@@ -1,0 +1,234 @@
+"""Saved targets: robots by name, in a file that a person can read and edit.
+
+The file is heptarm/targets.toml in the folder of the user's settings, one table per target::
+
+    [lab1]
+    address = "172.31.1.147"
+    key_file = "~/keys/lab1"     # otherwise the key is looked up as for any address
+    tool = "gripper"             # attached when a client takes control
+    speed = 0.3                  # ceiling of the speed
+
+When a target was last used is the time of a file of its name in the folder beside it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from heptarm.errors import CommandRejected
+from heptarm.io.keys import settings_folder
+
+try:
+    import tomllib
+except ModuleNotFoundError:  # Python 3.10
+    import tomli as tomllib  # type: ignore[import-not-found,no-redef]
+
+#: Names of targets: no name of a host that has a dot, and no address.
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+#: Names that mean something else.
+_TAKEN = ("localhost", "sim")
+_KEYS = ("address", "key_file", "tool", "speed")
+
+
+@dataclass(frozen=True, slots=True)
+class SavedTarget:
+    """A target that has a name.
+
+    Attributes:
+        name: by which programs and commands call it.
+        address: what to connect to, as in `heptarm.connect`.
+        key_file: file with the key; "": the key is looked up elsewhere.
+        tool: attached when a client takes control; "": none.
+        speed: ceiling of the speed of all motions, (0, 1].
+    """
+
+    name: str
+    address: str
+    key_file: str = ""
+    tool: str = ""
+    speed: float = 1.0
+
+    @property
+    def last_used(self) -> float | None:
+        """When a client last connected to it, in seconds since 1970; None: never."""
+        try:
+            return _mark(self.name).stat().st_mtime
+        except OSError:
+            return None
+
+    def mark_used(self) -> None:
+        """Note that a client has connected to it; where that cannot be written, nothing is noted."""
+        with contextlib.suppress(OSError):
+            _mark(self.name).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+            _mark(self.name).touch()
+
+
+def targets_file() -> Path:
+    """File of the saved targets."""
+    return settings_folder() / "targets.toml"
+
+
+def _mark(name: str) -> Path:
+    return settings_folder() / "targets.used" / name
+
+
+def saved_targets() -> dict[str, SavedTarget]:
+    """The saved targets by name, in the order of their file.
+
+    Raises:
+        CommandRejected: the file cannot be read, or an entry is not right; the text names it.
+    """
+    file = targets_file()
+    try:
+        tables = tomllib.loads(file.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError) as error:
+        raise CommandRejected(
+            f"the file of saved targets {file} cannot be read: {error}",
+            parameter="target",
+            hint="correct it with an editor",
+        ) from None
+    return {name: _read(name, table) for name, table in tables.items()}
+
+
+def saved_target(name: str) -> SavedTarget | None:
+    """The saved target of this name; None: there is none."""
+    return saved_targets().get(name) if _NAME.fullmatch(name) else None
+
+
+def _read(name: str, table: Any) -> SavedTarget:
+    """An entry of the file."""
+    where = f"[{name}] in {targets_file()}"
+    if not isinstance(table, dict) or not isinstance(table.get("address"), str):
+        raise CommandRejected(
+            f"{where} must have an address",
+            parameter=name,
+            hint='write address = "172.31.1.147" below its name',
+        )
+    if unknown := sorted(set(table) - set(_KEYS)):
+        raise CommandRejected(
+            f"{where} has {', '.join(unknown)}, which no target has",
+            parameter=name,
+            allowed=", ".join(_KEYS),
+            hint=f"it may have {', '.join(_KEYS)}",
+        )
+    return check_target(SavedTarget(name, **{key: table[key] for key in _KEYS if key in table}), where)
+
+
+def check_target(target: SavedTarget, where: str) -> SavedTarget:
+    """Check a target.
+
+    Args:
+        target: the target; returned.
+        where: where it comes from, for the error.
+
+    Raises:
+        CommandRejected: its name or a value is not allowed.
+    """
+    name, speed = target.name, target.speed
+    if not _NAME.fullmatch(name) or name in _TAKEN:
+        raise CommandRejected(
+            f"the name of a target must begin with a letter and have letters, digits, - and _ only, got {name!r}",
+            parameter="name",
+            value=name,
+            hint=f"also {' and '.join(_TAKEN)} mean something else; choose a name such as lab1",
+        )
+    for key in ("address", "key_file", "tool"):
+        if not isinstance(getattr(target, key), str):
+            raise CommandRejected(f"{where}: {key} must be a text", parameter=key)
+    if isinstance(speed, bool) or not isinstance(speed, (int, float)) or not 0.0 < speed <= 1.0:
+        raise CommandRejected(
+            f"{where}: speed must be in (0, 1], got {speed!r}",
+            parameter="speed",
+            value=speed,
+            allowed="(0, 1]",
+            hint="it is a fraction of the full speed",
+        )
+    return target
+
+
+def add_target(target: SavedTarget, *, replace: bool = False) -> None:
+    """Add a target to the file; what else is in the file stays as it is.
+
+    Raises:
+        CommandRejected: the target is not right, or there is one of this name and it is not to be replaced.
+    """
+    check_target(target, "the new target")
+    if target.name in saved_targets():
+        if not replace:
+            raise CommandRejected(
+                f"there is a target {target.name}", parameter="name", hint="replace it with --replace"
+            )
+        remove_target(target.name)
+    lines = [f"[{target.name}]", f"address = {_text(target.address)}"]
+    lines += [
+        f"{key} = {_text(getattr(target, key))}" for key in ("key_file", "tool") if getattr(target, key)
+    ]
+    if not math.isclose(target.speed, 1.0):
+        lines.append(f"speed = {float(target.speed)!r}")
+    before = _content().rstrip("\n")
+    _write((f"{before}\n\n" if before else "") + "\n".join(lines) + "\n")
+
+
+def remove_target(name: str) -> None:
+    """Remove a target from the file.
+
+    Raises:
+        CommandRejected: there is none of this name.
+    """
+    known = saved_targets()
+    if name not in known:
+        raise CommandRejected(
+            f"there is no target {name}",
+            parameter="name",
+            value=name,
+            hint=f"saved are {', '.join(known)}" if known else "none is saved",
+        )
+    kept, inside = [], False
+    for line in _content().splitlines():
+        if line.lstrip().startswith("["):
+            inside = line.split("#")[0].strip().strip("[] \"'") == name
+        if not inside:
+            kept.append(line)
+    _write("\n".join(kept).strip("\n") + "\n" if any(kept) else "")
+    with contextlib.suppress(OSError):
+        _mark(name).unlink()
+
+
+def _text(value: str) -> str:
+    """A string as TOML writes it; JSON writes it in the same form."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _content() -> str:
+    try:
+        return targets_file().read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return ""
+
+
+def _write(text: str) -> None:
+    """Replace the file at once.
+
+    Raises:
+        CommandRejected: it cannot be written.
+    """
+    file = targets_file()
+    part = file.with_name(f".{file.name}.{os.getpid()}")
+    try:
+        file.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+        part.write_text(text, encoding="utf-8")
+        part.replace(file)
+    except OSError as error:
+        raise CommandRejected(
+            f"the file of saved targets {file} cannot be written: {(error.strerror or str(error)).lower()}",
+            parameter="name",
+        ) from None

@@ -1,0 +1,163 @@
+"""What happened on a connection besides pushed states: requests, answers, events, errors, notes, FRI sessions."""
+
+from __future__ import annotations
+
+import enum
+import json
+import math
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
+
+from heptarm.fri.loop.telemetry import Reader
+from heptarm.wire import messages as wire
+
+#: Kinds of entries.
+REQUEST, REFUSAL, EVENT, ERROR, NOTE, FRI = "request", "refusal", "event", "error", "note", "fri"
+#: Entries that are kept for the black box, and those that a slow recorder may leave waiting.
+KEPT, WAITING = 5_000, 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class JournalEntry:
+    """Something that happened.
+
+    Attributes:
+        time: our clock [ns].
+        kind: "request": the cabinet has accepted one; "refusal": it has refused one; "event": from the cabinet;
+            "error": what went wrong on this side; "note": the user's; "fri": a message of an FRI session's loop.
+        content: a message of the protocol, or a text.
+        id: number under which the cabinet accepted a request; 0 elsewhere.
+    """
+
+    time: int
+    kind: str
+    content: Any
+    id: int = 0
+
+    @property
+    def name(self) -> str:
+        """Name of the message; for a text the kind."""
+        return self.kind if isinstance(self.content, str) else type(self.content).__name__
+
+    @property
+    def text(self) -> str:
+        """One line for people."""
+        if isinstance(self.content, str):
+            return self.content
+        data = plain(self.content)
+        if self.name == "Run":
+            return f"motion {self.id}: {describe(self.content)}"
+        if self.kind == REQUEST and self.id:
+            return f"{self.name} {self.id}"
+        text = data.pop("text", "")
+        hidden = ("type", "code", "q") if not data.get("code") else ("type", "q")
+        said = ", ".join(
+            f"{name} {_short(value)}"
+            for name, value in data.items()
+            if name not in hidden and value is not None and not isinstance(value, dict)
+        )
+        return f"{self.name}: {', '.join(part for part in (said, text) if part)}"[:500]
+
+    @property
+    def level(self) -> str:
+        """How serious it is: "info", "warning" or "error"."""
+        severity = getattr(self.content, "severity", None)
+        if isinstance(severity, wire.Severity):
+            return severity.name.lower()
+        if self.kind in (ERROR, REFUSAL):
+            return "error"
+        if isinstance(self.content, wire.MotionFinished):
+            good = (wire.Cause.FINISHED, wire.Cause.CANCELLED, wire.Cause.CONDITION, wire.Cause.REPLACED)
+            return "info" if self.content.cause in good else "error"
+        return "warning" if isinstance(self.content, wire.SafetyChanged) else "info"
+
+    @property
+    def data(self) -> str:
+        """Everything as JSON, for the file."""
+        content = {"text": self.content} if isinstance(self.content, str) else plain(self.content)
+        entry = {"kind": self.kind, "name": self.name, "id": self.id, "text": self.text, "content": content}
+        return json.dumps(entry, ensure_ascii=False, allow_nan=False)
+
+
+def plain(value: Any) -> Any:
+    """A message as plain data: enumerations by name, NaN and infinite numbers as null."""
+    if isinstance(value, enum.Enum):
+        return value.name.lower() if value.name else int(value.value)
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, bytes):
+        return value.hex()
+    if is_dataclass(value) and not isinstance(value, type):
+        found = {one.name: plain(getattr(value, one.name)) for one in fields(value)}
+        return {"type": type(value).__name__, **found}
+    if isinstance(value, (list, tuple)):
+        return [plain(one) for one in value]
+    return value
+
+
+def describe(message: wire.Run) -> str:
+    """The motions of a program in a few words, such as "Ptp, 3 Lin"."""
+    names = [type(item.motion).__name__ for item in message.items]
+    runs: list[list[Any]] = []
+    for name in names:
+        if runs and runs[-1][0] == name:
+            runs[-1][1] += 1
+        else:
+            runs.append([name, 1])
+    return ", ".join(name if count == 1 else f"{count} {name}" for name, count in runs)
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list):
+        return f"[{' '.join(_short(one) for one in value)}]"
+    return str(value)
+
+
+class Journal:
+    """Entries of a connection, the newest kept in memory; and the FRI sessions that are open.
+
+    Args:
+        clock: reads our clock [ns].
+
+    Attributes:
+        sessions: what reads the cycles of the open FRI sessions.
+    """
+
+    def __init__(self, clock: Callable[[], int]) -> None:
+        self._clock = clock
+        self._kept: deque[JournalEntry] = deque(maxlen=KEPT)
+        self._queues: tuple[deque[JournalEntry], ...] = ()
+        self.sessions: tuple[Reader, ...] = ()
+
+    def add(self, kind: str, content: Any, number: int = 0, *, at: int | None = None) -> None:
+        """Add an entry of a time of our clock [ns], None: now; costs a microsecond, blocks never."""
+        entry = JournalEntry(self._clock() if at is None else at, kind, content, number)
+        self._kept.append(entry)
+        for queue in self._queues:
+            queue.append(entry)
+
+    def since(self, time: int) -> list[JournalEntry]:
+        """The kept entries from a time of our clock on [ns], oldest first."""
+        return [one for one in list(self._kept) if one.time >= time]
+
+    def open(self) -> deque[JournalEntry]:
+        """A queue that receives every entry from now on; its reader takes them from the left."""
+        queue: deque[JournalEntry] = deque(maxlen=WAITING)
+        self._queues = (*self._queues, queue)
+        return queue
+
+    def close(self, queue: deque[JournalEntry]) -> None:
+        """End a queue."""
+        self._queues = tuple(one for one in self._queues if one is not queue)
+
+    def begin_session(self, reader: Reader) -> None:
+        """Note an FRI session, whose cycles are recorded from now on."""
+        self.sessions = (*self.sessions, reader)
+
+    def end_session(self, reader: Reader) -> None:
+        """Note the end of an FRI session; a recorder still takes its last cycles."""
+        self.sessions = tuple(one for one in self.sessions if one is not reader)

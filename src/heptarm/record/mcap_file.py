@@ -1,0 +1,211 @@
+"""The file of a recording: MCAP with protobuf and JSON messages, which Foxglove and rerun open without a plugin.
+
+Topics: /state and /fri (one message per pushed state and per FRI cycle), /tcp (the motion frame for a 3D view, at most
+30 per second), /log (what happened, as text), /journal (the same with all its data), /signals (IO and control mode,
+when they change). The log time of a message is its receipt, the publish time of a state the moment of its sampling.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected, require
+from heptarm.record.journal import REFUSAL, REQUEST, JournalEntry, plain
+from heptarm.record.layout import (
+    FRI_CYCLE,
+    LOG,
+    POSE_IN_FRAME,
+    STATE,
+    RowLayout,
+    cycle_rows,
+    encode_log,
+    encode_pose,
+)
+from heptarm.record.samples import StateSample, rest_of, state_rows
+from heptarm.wire import messages as wire
+
+#: Name of the metadata at the beginning of a file, and of those at its end.
+BEGIN, END = "heptarm", "heptarm.end"
+#: States that are written before other threads get their turn.
+_TURN = 4
+#: Shortest time between two poses for a 3D view [ns].
+_POSE_PERIOD = 33_000_000
+#: Requests that are text for people, too; the others are in the journal only.
+_SHOWN = (wire.Run, wire.Stop, wire.ServoOpen, wire.FriOpen, wire.Pause, wire.Resume, wire.AttachTool)
+_JOURNAL_SCHEMA = {
+    "type": "object",
+    "properties": {
+        "kind": {"type": "string"},
+        "name": {"type": "string"},
+        "id": {"type": "integer"},
+        "text": {"type": "string"},
+        "content": {"type": "object"},
+    },
+}
+_SIGNALS_SCHEMA = {"type": "object", "properties": {"io": {"type": "object"}, "mode": {"type": "object"}}}
+
+
+class RecordingFile:
+    """Writer of a recording; not to be used by several threads at once.
+
+    Args:
+        path: the file; it is replaced.
+        facts: texts about robot and connection, by name.
+        epoch: nanoseconds since 1970 at our clock's zero.
+        chunk: size of a chunk [bytes]: what is lost if the process ends at any time.
+
+    Attributes:
+        path: the file.
+
+    Raises:
+        CommandRejected: the file cannot be written.
+        MissingExtra: the package mcap is not installed.
+    """
+
+    def __init__(self, path: Path, facts: Mapping[str, str], *, epoch: int, chunk: int) -> None:
+        writer = require("mcap.writer", extra="record")
+        self.path = path
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = path.open("wb")
+        except OSError as error:
+            raise _unwritable(path, error) from error
+        self._epoch = epoch
+        self._pose_due = 0
+        self._rest = b""
+        self._last_signals = ""
+        self._cycles: int | None = None
+        self._out: Any = writer.Writer(self._file, chunk_size=chunk)
+        try:
+            self._begin(facts)
+        except OSError as error:
+            self.abandon()
+            raise _unwritable(path, error) from error
+
+    def _begin(self, facts: Mapping[str, str]) -> None:
+        """Write the beginning, which a file that is cut off still has."""
+        self._out.start(profile="", library="heptarm")
+        self._out.add_metadata(BEGIN, dict(facts))
+        self._states = self._add_rows("/state", STATE)
+        self._pose = self._add("/tcp", *POSE_IN_FRAME)
+        self._log = self._add("/log", *LOG)
+        self._journal = self._add_json("/journal", "heptarm.JournalEntry", _JOURNAL_SCHEMA)
+        self._signals = self._add_json("/signals", "heptarm.Signals", _SIGNALS_SCHEMA)
+        self.flush()
+
+    def _add(self, topic: str, name: str, descriptor: bytes, **metadata: str) -> int:
+        schema = self._out.register_schema(name=name, encoding="protobuf", data=descriptor)
+        return int(self._out.register_channel(topic, "protobuf", schema, metadata))
+
+    def _add_rows(self, topic: str, layout: RowLayout) -> int:
+        return self._add(topic, layout.full_name, layout.descriptor, layout=layout.text)
+
+    def _add_json(self, topic: str, name: str, content: Mapping[str, Any]) -> int:
+        schema = self._out.register_schema(
+            name=name, encoding="jsonschema", data=json.dumps(content).encode()
+        )
+        return int(self._out.register_channel(topic, "json", schema))
+
+    def states(
+        self, samples: Sequence[StateSample], *, to_ours: Callable[[int], int], signals: Sequence[str] = ()
+    ) -> None:
+        """Write pushed states.
+
+        Args:
+            samples: in order.
+            to_ours: makes a time of our clock of one of the cabinet's [ns].
+            signals: names of the cabinet's signals by their indices.
+        """
+        if not samples:
+            return
+        rows = state_rows([one.body for one in samples])
+        first, last = int(rows["stamp"][0]), int(rows["stamp"][-1])
+        begin, end = to_ours(first), to_ours(last)
+        rate = (end - begin) / (last - first) if last > first else 1.0
+        sampled = (begin + (rows["stamp"] - first) * rate).astype(np.int64) + self._epoch
+        data, size, out, channel = rows.tobytes(), rows.itemsize, self._out, self._states
+        for index, (one, at) in enumerate(zip(samples, sampled.tolist(), strict=True)):
+            if not index % _TURN:
+                time.sleep(0.0)  # the thread that receives states is not held up by the interpreter's lock
+            payload = data[index * size : (index + 1) * size]
+            out.add_message(channel, one.received + self._epoch, payload, at, one.number & 0xFFFFFFFF)
+            if one.received >= self._pose_due:
+                self._write_pose(rows[index], one.received, at)
+            self._write_rest(one, at, signals)
+
+    def _write_pose(self, row: Any, received: int, sampled: int) -> None:
+        if not np.isnan(row["xyz"]).any():
+            self._pose_due = received + _POSE_PERIOD
+            data = encode_pose(sampled, "base", row["xyz"].tolist(), row["quat"].tolist())
+            self._out.add_message(self._pose, received + self._epoch, data, sampled)
+
+    def _write_rest(self, one: StateSample, sampled: int, names: Sequence[str]) -> None:
+        """Write control mode and signals if they have changed; their stamps do not count."""
+        rest = rest_of(one.body)
+        if not rest or rest[:2] + rest[10:] == self._rest:
+            return
+        self._rest = rest[:2] + rest[10:]
+        state = wire.State.decode(rest)
+        content: dict[str, Any] = {}
+        if state.io is not None:
+            content["io"] = {
+                names[signal.index] if signal.index < len(names) else str(signal.index): signal.value
+                for signal in state.io.values
+            }
+        if state.mode is not None:
+            content["mode"] = plain(state.mode) | {"stamp": 0}
+        data = json.dumps(content, allow_nan=False)
+        if data != self._last_signals:
+            self._last_signals = data
+            self._out.add_message(self._signals, one.received + self._epoch, data.encode(), sampled)
+
+    def cycles(self, words: npt.NDArray[np.float64]) -> None:
+        """Write FRI cycles; `words` has shape (n, 122)."""
+        if self._cycles is None:
+            self._cycles = self._add_rows("/fri", FRI_CYCLE)
+        rows = cycle_rows(words)
+        data, size = rows.tobytes(), rows.itemsize
+        for index, received in enumerate(rows["received"].tolist()):
+            at = received + self._epoch
+            self._out.add_message(self._cycles, at, data[index * size : (index + 1) * size], at)
+
+    def entry(self, entry: JournalEntry) -> None:
+        """Write what happened."""
+        at = entry.time + self._epoch
+        self._out.add_message(self._journal, at, entry.data.encode(), at)
+        if entry.kind != REQUEST or isinstance(entry.content, _SHOWN):
+            name = "cabinet" if entry.kind in ("event", REFUSAL) else entry.kind
+            self._out.add_message(self._log, at, encode_log(at, entry.level, entry.text, name), at)
+
+    def flush(self) -> None:
+        """Hand complete chunks to the operating system."""
+        self._file.flush()
+
+    def finish(self, facts: Mapping[str, str]) -> None:
+        """Write the end of the file and close it."""
+        self._out.add_metadata(END, dict(facts))
+        self._out.finish()
+        self._file.close()
+
+    def abandon(self) -> None:
+        """Close the file without an end, after an error; it can be read to its last complete chunk."""
+        try:
+            self._file.close()
+        except OSError:
+            pass  # the disk is full: what was buffered is lost
+
+
+def _unwritable(path: Path, error: OSError) -> CommandRejected:
+    return CommandRejected(
+        f"{path} cannot be written: {error.strerror}",
+        parameter="path",
+        value=str(path),
+        hint="choose a folder in which this user may write, on a disk that has space",
+    )

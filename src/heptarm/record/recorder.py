@@ -1,0 +1,282 @@
+"""The recorder: a thread that writes what arrives to a file, beside the link's thread and never in its place."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Protocol
+
+from heptarm.errors import CommandRejected, HeptarmError, LocalProtocolError
+from heptarm.fri.loop.telemetry import Reader
+from heptarm.record.journal import NOTE, Journal, JournalEntry
+from heptarm.record.layout import STATE
+from heptarm.record.mcap_file import RecordingFile
+from heptarm.record.samples import SampleQueue, StateSample
+from heptarm.values.arrays import instance, within
+
+_log = logging.getLogger("heptarm.record")
+
+#: Time between two looks at what has arrived [s].
+_PERIOD = 0.02
+#: States that are encoded at once.
+_BATCH = 64
+#: States that may wait for a slow disk: a minute of them at 1 kHz.
+_WAITING = 60_000
+#: Size of a chunk in time [s] and in bytes: what a file that is cut off loses at its end.
+_CHUNK_TIME, _CHUNK_LEAST, _CHUNK_MOST = 0.5, 16_384, 524_288
+#: Longest note [characters].
+_LONGEST_NOTE = 1000
+#: Fastest pushed states [Hz].
+_FASTEST = 1000.0
+
+
+class RecordSource(Protocol):
+    """What is recorded; a connection is one."""
+
+    @property
+    def journal(self) -> Journal:
+        """What happened besides pushed states."""
+        ...
+
+    @property
+    def facts(self) -> Mapping[str, str]:
+        """Texts about robot and connection."""
+        ...
+
+    @property
+    def signal_names(self) -> Sequence[str]:
+        """Names of the cabinet's signals."""
+        ...
+
+    @property
+    def state_rate(self) -> float:
+        """Pushed states per second [Hz]."""
+        ...
+
+    def raise_rate(self, rate: float) -> Callable[[], None]:
+        """Have at least so many states pushed per second [Hz]; returns what restores the rate before."""
+        ...
+
+    def nanos(self) -> int:
+        """Our clock [ns]."""
+        ...
+
+    def to_ours(self, stamp: int) -> int:
+        """Our clock at a time of the cabinet's [ns]."""
+        ...
+
+    def open_samples(self, size: int) -> SampleQueue:
+        """A queue that receives every pushed state from now on."""
+        ...
+
+    def close_samples(self, queue: SampleQueue) -> None:
+        """End such a queue."""
+        ...
+
+    def kept_samples(self) -> list[StateSample]:
+        """The pushed states of the last 30 s."""
+        ...
+
+
+def epoch_of(source: RecordSource) -> int:
+    """Nanoseconds since 1970 at our clock's zero."""
+    return time.time_ns() - source.nanos()
+
+
+def chunk_size(rate: float) -> int:
+    """Size of a chunk for so many states per second [bytes]."""
+    return int(min(max(rate * STATE.dtype.itemsize * _CHUNK_TIME, _CHUNK_LEAST), _CHUNK_MOST))
+
+
+class CycleTap:
+    """Takes the cycles of FRI sessions out of their rings, none twice.
+
+    Attributes:
+        lost: cycles that were overwritten before they were taken.
+    """
+
+    def __init__(self) -> None:
+        self._next: dict[Reader, int] = {}
+        self.lost = 0
+
+    def write(self, sessions: Iterable[Reader], file: RecordingFile, *, whole: bool = False) -> None:
+        """Write the new cycles of all sessions, and once more those of sessions that have ended.
+
+        Args:
+            sessions: that are open.
+            file: where to.
+            whole: take also what is in the ring of a session that is new here.
+        """
+        for reader in {*sessions, *self._next}:
+            start = self._next.get(reader)
+            if start is None:
+                start = 0 if whole else max(0, reader.count - 1)
+            words, after, lost = reader.since(start)
+            self._next[reader] = after
+            self.lost += 0 if whole else lost
+            if len(words):
+                file.cycles(words)
+        for reader in set(self._next) - set(sessions):
+            del self._next[reader]
+
+
+class Recorder:
+    """Records a connection to a file while a `with` block runs; made by `Arm.record`.
+
+    Args:
+        source: what is recorded.
+        path: the file, MCAP.
+        rate: have at least so many states pushed per second meanwhile [Hz]; None: as many as are.
+
+    Attributes:
+        path: the file.
+        states: pushed states written so far.
+
+    Raises:
+        LimitError: a rate outside its range.
+    """
+
+    def __init__(self, source: RecordSource, path: Path, *, rate: float | None = None) -> None:
+        self._source = source
+        self._rate = None if rate is None else within(rate, "rate", 0.0, _FASTEST, above=True, unit="Hz")
+        self.path = path
+        self.states = 0
+        self._file: RecordingFile | None = None
+        self._samples: SampleQueue | None = None
+        self._entries: deque[JournalEntry] = deque()
+        self._cycles = CycleTap()
+        self._failure: OSError | None = None
+        self._ended = threading.Event()
+        self._restore: Callable[[], None] = lambda: None
+        self._thread = threading.Thread(target=self._run, name="heptarm-record", daemon=True)
+        self._is_closed = False
+
+    def start(self) -> Recorder:
+        """Begin; a `with` block does this.
+
+        Raises:
+            CommandRejected: the file cannot be written.
+            LimitError: the cabinet does not push so many states.
+            MissingExtra: the package mcap is not installed.
+        """
+        if self._file is not None:
+            raise LocalProtocolError("a recorder is used once", hint="make another one with arm.record(...)")
+        source = self._source
+        if self._rate is not None:
+            self._restore = source.raise_rate(self._rate)
+        try:
+            self._file = RecordingFile(
+                self.path, source.facts, epoch=epoch_of(source), chunk=chunk_size(source.state_rate)
+            )
+        except BaseException:
+            self._restore()
+            raise
+        self._entries = source.journal.open()
+        self._samples = source.open_samples(_WAITING)
+        self._thread.start()
+        return self
+
+    def note(self, text: str) -> None:
+        """Put a mark on the time line; `Recording.between` finds it by its text.
+
+        Raises:
+            ShapeError: not a text.
+            CommandRejected: it is empty or longer than 1000 characters.
+        """
+        if not 1 <= len(instance(text, str, "text")) <= _LONGEST_NOTE:
+            raise CommandRejected(
+                f"text must have 1 to {_LONGEST_NOTE} characters, got {len(text)}",
+                parameter="text",
+                value=text,
+            )
+        self._source.journal.add(NOTE, text)
+
+    @property
+    def lost(self) -> int:
+        """States and FRI cycles that could not be recorded, because the disk was too slow for too long."""
+        return (0 if self._samples is None else self._samples.lost) + self._cycles.lost
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it records; False also after an error of the disk."""
+        return self._file is not None and self._failure is None and not self._is_closed
+
+    def close(self) -> None:
+        """Write what has arrived and end the file; calling it again has no effect.
+
+        Raises:
+            HeptarmError: the file could not be written to its end; what was written before can be read.
+        """
+        if self._is_closed or self._file is None:
+            return
+        self._is_closed = True
+        try:
+            self._restore()
+        except HeptarmError as error:
+            _log.info("the rate of the states stays as it was for the recording: %s", error)
+        self._ended.set()
+        self._thread.join()
+        if self._failure is not None:
+            raise HeptarmError(
+                f"the recording {self.path} ends early: {self._failure.strerror or self._failure}",
+                hint="free some space; heptarm.load reads what was written before",
+            )
+
+    def __enter__(self) -> Recorder:
+        """Begin; see `start`."""
+        return self.start()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        """End the file; its own error is only logged if the block ends with another one."""
+        try:
+            self.close()
+        except HeptarmError as failure:
+            if error is None:
+                raise
+            _log.warning("%s", failure)
+
+    def __repr__(self) -> str:
+        """Short form."""
+        state = "recording" if self.is_running else "closed" if self._is_closed else "not begun"
+        return f"<Recorder {self.path}, {state}, {self.states} states, {self.lost} lost>"
+
+    # -------------------------------------------------------------------------------------- its own thread
+
+    def _run(self) -> None:
+        file, samples = self._file, self._samples
+        assert file is not None and samples is not None
+        try:
+            while True:
+                is_last = self._ended.wait(_PERIOD)
+                self._write(file, samples)
+                if is_last:
+                    break
+            file.finish({"states": str(self.states), "lost": str(self.lost)})
+        except OSError as error:
+            self._failure = error
+            file.abandon()
+            _log.error("the recording %s ends early: %s", file.path, error)
+        except Exception as error:  # a defect here must not pass unnoticed, nor end the program
+            self._failure = OSError(f"{type(error).__name__}: {error}")
+            file.abandon()
+            _log.exception("the recording %s ends early", file.path)
+        finally:
+            self._source.close_samples(samples)
+            self._source.journal.close(self._entries)
+
+    def _write(self, file: RecordingFile, samples: SampleQueue) -> None:
+        source = self._source
+        while batch := samples.take(_BATCH):
+            file.states(batch, to_ours=source.to_ours, signals=source.signal_names)
+            self.states += len(batch)
+        while self._entries:
+            file.entry(self._entries.popleft())
+        self._cycles.write(source.journal.sessions, file)
+        file.flush()

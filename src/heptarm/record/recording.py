@@ -1,0 +1,436 @@
+"""A recording read back: arrays by signal name, motions, events; parts of it, tables and figures of it."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected, require
+from heptarm.record.journal import NOTE
+from heptarm.record.layout import FRI_CYCLE, STATE, RowLayout
+from heptarm.record.mcap_file import BEGIN, END
+from heptarm.record.samples import signals_of, to_frame
+from heptarm.values.arrays import Array, finite, flag, instance, shown
+from heptarm.values.robot import ROBOTS, RobotModel
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Before the names of signals of FRI cycles, which have their own times: "fri.t".
+FRI = "fri."
+_MAGIC = b"\x89MCAP0\r\n"
+#: Fields of rows that are no signals of their own.
+_HIDDEN = ("received",)
+
+
+@dataclass(frozen=True)
+class RecordedEvent:
+    """Something that happened.
+
+    Attributes:
+        t: when, on the time line of the recording [s].
+        kind: "request", "refusal", "event", "error", "note", "fri" or "signals".
+        name: of the message, such as "MotionFinished".
+        text: one line for people.
+        content: everything, as plain data.
+        id: of the program that a request began; 0 elsewhere.
+    """
+
+    t: float
+    kind: str
+    name: str
+    text: str
+    content: Mapping[str, Any] = field(default_factory=dict, compare=False)
+    id: int = 0
+
+    def __str__(self) -> str:
+        """One line."""
+        return f"{self.t:9.3f} s  {self.kind:8}  {self.text}"
+
+
+@dataclass(frozen=True)
+class RecordedMotion:
+    """A program of motions.
+
+    Attributes:
+        id: the cabinet's number of it.
+        text: its motions in a few words; that of another client is described by its number only.
+        begin: when it began [s].
+        end: when it ended [s]; NaN: it did not in this recording.
+        cause: why it ended, such as "finished"; empty: unknown.
+        detail: the cabinet's explanation.
+    """
+
+    id: int
+    text: str
+    begin: float
+    end: float
+    cause: str = ""
+    detail: str = ""
+
+    def __str__(self) -> str:
+        """One line."""
+        why = f"{self.cause}{': ' + self.detail if self.detail else ''}"
+        return f"{self.begin:9.3f} to {self.end:9.3f} s  motion {self.id}: {self.text}  {why}".rstrip()
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A recording in memory; made by `load`.
+
+    `run["q"]` is the array of a signal, `run.names` lists them. Time zero is the first pushed state; times are the
+    cabinet's, so that a simulator that runs faster has its own seconds.
+
+    Attributes:
+        path: the file.
+        facts: texts about robot and connection: "robot", "software", "cabinet", "rate", ...
+        signals: arrays by name; those of pushed states have as many rows as `t`, those that begin with "fri." as many
+            as "fri.t".
+        motions: programs in the order of their beginning.
+        events: what happened, in order.
+        complete: the file has its end; otherwise it was cut off, and what is here is all up to its last whole chunk.
+        lost: states and FRI cycles that could not be recorded; only known of a complete file.
+    """
+
+    path: Path
+    facts: Mapping[str, str]
+    signals: Mapping[str, npt.NDArray[Any]]
+    motions: tuple[RecordedMotion, ...]
+    events: tuple[RecordedEvent, ...]
+    complete: bool
+    lost: int = 0
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        """Array of a signal, such as "q", "fri.tau" or "t".
+
+        Raises:
+            CommandRejected: there is none of that name; the text lists them.
+        """
+        found = self.signals.get(name)
+        if found is None:
+            known = ", ".join(self.signals)
+            raise CommandRejected(
+                f"name must be one of {known}, got {shown(name)}",
+                parameter="name",
+                value=name,
+                allowed=known,
+            )
+        return found
+
+    def __contains__(self, name: object) -> bool:
+        """Whether there is a signal of that name."""
+        return name in self.signals
+
+    def __len__(self) -> int:
+        """Number of pushed states."""
+        return len(self.t)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the signals."""
+        return tuple(self.signals)
+
+    @property
+    def t(self) -> Array:
+        """Times of the pushed states, shape (n,) [s]."""
+        return self.signals["t"]
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last pushed state [s]."""
+        return float(self.t[-1] - self.t[0]) if len(self.t) else 0.0
+
+    @property
+    def robot(self) -> RobotModel | None:
+        """The robot, with its limits; None: unknown to this version."""
+        return ROBOTS.get(self.facts.get("robot", ""))
+
+    @property
+    def notes(self) -> tuple[RecordedEvent, ...]:
+        """The marks that `Recorder.note` has put."""
+        return tuple(one for one in self.events if one.kind == NOTE)
+
+    def between(self, begin: float | str, end: float | str) -> Recording:
+        """A part of the recording; its times stay those of the whole.
+
+        Args:
+            begin: time [s], text of a note, or "begin".
+            end: likewise, or "end".
+
+        Raises:
+            CommandRejected: there is no note with that text.
+        """
+        first, last = self._moment(begin, "begin"), self._moment(end, "end")
+        masks = {prefix: _within(self.signals.get(f"{prefix}t"), first, last) for prefix in ("", FRI)}
+        signals = {
+            name: values[masks[FRI if name.startswith(FRI) else ""]] for name, values in self.signals.items()
+        }
+        return replace(
+            self,
+            signals=signals,
+            motions=tuple(one for one in self.motions if one.begin <= last and not one.end < first),
+            events=tuple(one for one in self.events if first <= one.t <= last),
+        )
+
+    def _moment(self, when: float | str, name: str) -> float:
+        """Time of a mark [s]."""
+        if not isinstance(when, str):
+            return finite(when, name, unit="s")
+        for one in self.notes:
+            if one.text == when:
+                return one.t
+        if when in ("begin", "end"):
+            return -np.inf if when == "begin" else np.inf
+        known = ", ".join(repr(one.text) for one in self.notes) or "none"
+        raise CommandRejected(
+            f"there is no note {shown(when)}; there are {known}", parameter=name, value=when, allowed=known
+        )
+
+    def to_pandas(self, *, fri: bool = False) -> Any:
+        """The signals of the pushed states as a `pandas.DataFrame` over `t`, a column per number, such as "q.A1".
+
+        Args:
+            fri: those of the FRI cycles instead.
+
+        Raises:
+            MissingExtra: pandas is not installed.
+        """
+        prefix = FRI if flag(fri, "fri") else ""
+        chosen = {
+            name.removeprefix(prefix): values
+            for name, values in self.signals.items()
+            if name.startswith(FRI) == fri
+        }
+        return to_frame(chosen, require("pandas", extra="record").DataFrame)
+
+    def plot(self, *signals: str) -> Figure:
+        """A figure of signals over time, with motions and events; without names the usual ones. See `heptarm plot`.
+
+        Raises:
+            CommandRejected: no such signal.
+            MissingExtra: matplotlib is not installed.
+        """
+        from heptarm.record.plot import figure_of
+
+        return figure_of(self, signals)
+
+    def __str__(self) -> str:
+        """A few lines: what is in it."""
+        rate = (len(self) - 1) / self.duration if self.duration else 0.0
+        ending = "" if self.complete else ", cut off at its end"
+        lines = [
+            f"{self.path.name}: {self.facts.get('title', 'robot unknown')}, {self.duration:.2f} s{ending}",
+            f"  states   {len(self)} at {rate:.0f} Hz, {self.lost} lost",
+        ]
+        if f"{FRI}t" in self.signals:
+            lines.append(f"  FRI      {len(self.signals[f'{FRI}t'])} cycles")
+        lines.append(f"  motions  {len(self.motions)}")
+        lines.append(f"  events   {len(self.events)}, {len(self.notes)} notes")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        """Short form."""
+        return f"<Recording {self.path.name}, {len(self)} states, {self.duration:.2f} s>"
+
+
+def _within(t: npt.NDArray[Any] | None, first: float, last: float) -> npt.NDArray[np.bool_]:
+    return np.zeros(0, bool) if t is None else (t >= first) & (t <= last)
+
+
+# ------------------------------------------------------------------------------------------------ reading
+
+
+@dataclass
+class _Content:
+    """What was read from a file so far."""
+
+    facts: dict[str, str] = field(default_factory=dict)
+    end: dict[str, str] | None = None
+    layouts: dict[int, RowLayout] = field(default_factory=dict)
+    topics: dict[int, str] = field(default_factory=dict)
+    payloads: dict[str, list[bytes]] = field(
+        default_factory=lambda: {STATE.full_name: [], FRI_CYCLE.full_name: []}
+    )
+    published: list[int] = field(default_factory=list)
+    cycled: list[int] = field(default_factory=list)
+    entries: list[tuple[int, str, bytes]] = field(default_factory=list)
+
+
+def load(path: str | Path) -> Recording:
+    """Read a recording; one that was cut off is read to its last whole chunk.
+
+    Raises:
+        CommandRejected: the file cannot be read, or is no recording of heptarm.
+        MissingExtra: the package mcap is not installed.
+    """
+    where = Path(instance(path, (str, Path), "path"))
+    content = _Content()
+    try:
+        with where.open("rb") as file:
+            if file.read(len(_MAGIC)) != _MAGIC:
+                raise _no_recording(where, "it does not begin as an MCAP file does")
+            file.seek(0)
+            for record in _whole_records(file):
+                _take(record, content)
+    except OSError as error:
+        raise CommandRejected(
+            f"{where} cannot be read: {error.strerror}", parameter="path", value=str(where)
+        ) from error
+    if not content.facts:
+        raise _no_recording(where, "it has no description of the robot")
+    return _recording(where, content)
+
+
+def _no_recording(path: Path, why: str) -> CommandRejected:
+    return CommandRejected(
+        f"{path} must be a recording of heptarm: {why}",
+        parameter="path",
+        value=str(path),
+        hint="record one with arm.record(...) or heptarm record",
+    )
+
+
+def _whole_records(file: Any) -> Iterator[Any]:
+    """All records up to the end, or to where the file was cut off."""
+    reader = require("mcap.stream_reader", extra="record")
+    exceptions = require("mcap.exceptions", extra="record")
+    stream = reader.StreamReader(file, record_size_limit=None)
+    try:
+        yield from stream.records
+    except (exceptions.McapError, struct.error, ValueError, EOFError, RuntimeError, IndexError):
+        return  # an incomplete record at the end
+    except Exception as error:
+        if type(error).__module__.partition(".")[0] not in ("zstandard", "lz4"):
+            raise
+        return  # an incomplete chunk
+
+
+def _take(record: Any, content: _Content) -> None:
+    kind = type(record).__name__
+    if kind == "Message":
+        topic = content.topics.get(record.channel_id, "")
+        if topic == "/state":
+            content.payloads[STATE.full_name].append(record.data)
+            content.published.append(record.publish_time)
+        elif topic == "/fri":
+            content.payloads[FRI_CYCLE.full_name].append(record.data)
+            content.cycled.append(record.publish_time)
+        elif topic in ("/journal", "/signals"):
+            content.entries.append((record.publish_time, topic, record.data))
+    elif kind == "Channel":
+        content.topics[record.id] = record.topic
+        if "layout" in record.metadata:
+            name = {"/state": STATE.full_name, "/fri": FRI_CYCLE.full_name}[record.topic]
+            content.layouts[record.id] = RowLayout.of_text(name, record.metadata["layout"])
+    elif kind == "Metadata" and record.name == BEGIN:
+        content.facts = dict(record.metadata)
+    elif kind == "Metadata" and record.name == END:
+        content.end = dict(record.metadata)
+
+
+@dataclass(frozen=True)
+class _TimeLine:
+    """Times of a recording: nanoseconds since 1970 to the cabinet's seconds since the first state."""
+
+    published: npt.NDArray[np.float64]
+    t: Array
+    rate: float
+
+    def __call__(self, nanos: npt.ArrayLike) -> Array:
+        """Convert times [ns] to [s]; before and behind the states by the rate of the cabinet's clock."""
+        given = np.asarray(nanos, dtype=np.float64)
+        if not len(self.t):
+            return given * 1e-9
+        inside = np.interp(given, self.published, self.t)
+        early, late = given - self.published[0], given - self.published[-1]
+        outside = np.where(early < 0, early, np.where(late > 0, late, 0.0))
+        return np.asarray(inside + outside * 1e-9 * self.rate)
+
+
+def _recording(path: Path, content: _Content) -> Recording:
+    layouts = {one.full_name: one for one in content.layouts.values()}
+    states = layouts.get(STATE.full_name, STATE).read(content.payloads[STATE.full_name])
+    signals: dict[str, npt.NDArray[Any]] = {}
+    stamps = states["stamp"]
+    t = (stamps - stamps[0]) * 1e-9 if len(stamps) else np.zeros(0)
+    published = np.array(content.published, dtype=np.float64)
+    order = np.argsort(published, kind="stable")
+    line = _TimeLine(published[order], t[order], float(content.facts.get("clock_rate", "1")))
+    signals["t"] = t
+    signals |= signals_of(states)
+    if content.cycled:
+        cycles = layouts.get(FRI_CYCLE.full_name, FRI_CYCLE).read(content.payloads[FRI_CYCLE.full_name])
+        signals[f"{FRI}t"] = line(content.cycled)
+        signals |= {f"{FRI}{name}": one for name, one in signals_of(cycles).items() if name not in _HIDDEN}
+    events = tuple(_events(content.entries, line))
+    return Recording(
+        path,
+        content.facts,
+        signals,
+        tuple(_motions(events, signals)),
+        events,
+        complete=content.end is not None,
+        lost=int((content.end or {}).get("lost", 0)),
+    )
+
+
+def _events(entries: Sequence[tuple[int, str, bytes]], line: _TimeLine) -> Iterator[RecordedEvent]:
+    times = line([at for at, _, _ in entries]) if entries else np.zeros(0)
+    for (_, topic, data), t in sorted(zip(entries, times.tolist()), key=lambda pair: pair[1]):
+        content = json.loads(data)
+        if topic == "/signals":
+            yield RecordedEvent(t, "signals", "Signals", _signals_text(content), content)
+        else:
+            yield RecordedEvent(
+                t, content["kind"], content["name"], content["text"], content["content"], content["id"]
+            )
+
+
+def _signals_text(content: Mapping[str, Any]) -> str:
+    parts = [f"{name} = {value:g}" for name, value in content.get("io", {}).items()]
+    if "mode" in content:
+        mode, tool = content["mode"].get("mode", {}), content["mode"].get("tool", "")
+        parts.append(f"control mode {mode.get('type', '?') if isinstance(mode, dict) else mode}")
+        parts += [f"tool {tool}"] if tool else []
+    return ", ".join(parts)
+
+
+def _motions(
+    events: Sequence[RecordedEvent], signals: Mapping[str, npt.NDArray[Any]]
+) -> Iterator[RecordedMotion]:
+    """Programs: of their events, and of the states where those of another client have none."""
+    texts: dict[int, str] = {}
+    begins: dict[int, float] = {}
+    ends: dict[int, RecordedEvent] = {}
+    for one in events:
+        if one.kind == "request" and one.name in ("Run", "ServoOpen", "FriOpen"):
+            texts[one.id] = (
+                one.text.partition(": ")[2] if one.name == "Run" else one.name.removesuffix("Open")
+            )
+        elif one.name == "MotionStarted":
+            begins.setdefault(int(one.content["id"]), one.t)
+        elif one.name == "MotionFinished":
+            ends[int(one.content["id"])] = one
+    ids, t = signals.get("motion", np.zeros(0, int)), signals["t"]
+    for number in np.unique(ids[ids > 0]).tolist():
+        seen = t[ids == number]
+        begins.setdefault(number, float(seen[0]))
+    for number, begin in sorted(begins.items(), key=lambda pair: pair[1]):
+        seen = t[ids == number]
+        end, is_open = ends.get(number), bool(len(ids) and ids[-1] == number)
+        until = end.t if end is not None else float("nan") if is_open or not len(seen) else float(seen[-1])
+        yield RecordedMotion(
+            number,
+            texts.get(number, f"program {number}"),
+            begin,
+            until,
+            "" if end is None else str(end.content["cause"]),
+            "" if end is None else str(end.content.get("text") or ""),
+        )

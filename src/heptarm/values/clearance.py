@@ -1,0 +1,51 @@
+"""Distances between bodies, and what a collision check answers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from heptarm.values.arrays import Array, Value
+
+
+@dataclass(frozen=True, slots=True)
+class Clearance(Value):
+    """The distance between two bodies.
+
+    Attributes:
+        first: name of a body of the arm, its tool, or what it holds.
+        second: name of the other body.
+        distance: between their surfaces [m]; negative: they overlap by so much.
+    """
+
+    first: str
+    second: str
+    distance: float
+
+    def __str__(self) -> str:
+        """In words."""
+        if self.distance < 0.0:
+            return f"{self.first} is {-self.distance * 1e3:.0f} mm inside {self.second}"
+        return f"{self.first} is {self.distance * 1e3:.0f} mm from {self.second}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TouchOnPath(Value):
+    """The first place on a joint path at which two bodies touch.
+
+    Attributes:
+        clearance: the bodies, and their distance there.
+        at: fraction of the path, 0 to 1: of the length that the fastest joint moves.
+        q: joint positions there, shape (7,) [rad].
+    """
+
+    clearance: Clearance
+    at: float
+    q: Array
+
+
+class CollisionCheck(Protocol):
+    """What `Arm.collision_check` needs; `heptarm.CollisionModel` is one."""
+
+    def first_on(self, path: Array) -> TouchOnPath | None:
+        """The first place on a joint path, shape (n, 7) [rad], at which two bodies touch; None: there is none."""

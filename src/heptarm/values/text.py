@@ -1,0 +1,121 @@
+"""Values as text for people: aligned lines with units, degrees and millimetres beside SI; `repr` stays exact."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, fields
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+#: Units of fields whose name has them at its end, and factors for other fields by name.
+_SUFFIXES = {
+    "_mps": "m/s",
+    "_mps2": "m/s²",
+    "_mps3": "m/s³",
+    "_radps": "rad/s",
+    "_radps2": "rad/s²",
+    "_radps3": "rad/s³",
+}
+_UNITS = {
+    "duration": "s",
+    "distance": "m",
+    "mass": "kg",
+    "com": "m",
+    "residual": "rad",
+    "relative": "of the path",
+    "joint_speed": "of the maximum",
+    "joint_acceleration": "of the maximum",
+    "joint_jerk": "of the maximum",
+}
+_ANGLES = ("q", "near", "e1")
+#: Fields of base classes, which are shown behind a class's own.
+_LAST = ("triggers", "dynamics", "blending")
+#: Entries of a list that are shown.
+_SHOWN = 6
+
+
+def fixed(value: float, digits: int) -> str:
+    """Fixed-point text without a negative zero; "-" for NaN."""
+    return "-" if math.isnan(value) else f"{round(float(value), digits) + 0.0:.{digits}f}"
+
+
+def columns(values: Iterable[float], digits: int, width: int = 8) -> str:
+    """Numbers in columns of the same width."""
+    return "".join(f"{fixed(value, digits):>{width}}" for value in values)
+
+
+def degrees(values: npt.ArrayLike, digits: int = 2) -> str:
+    """Angles in degrees and in radians: "20.00 35.00 deg (0.3491 0.6109 rad)"."""
+    given = np.atleast_1d(np.asarray(values, dtype=np.float64))
+    in_degrees = " ".join(fixed(value, digits) for value in np.degrees(given))
+    return f"{in_degrees} deg ({' '.join(fixed(value, digits + 2) for value in given)} rad)"
+
+
+def lines(title: str, rows: Mapping[str, str]) -> str:
+    """A title and aligned rows below it; empty ones are left out."""
+    shown = {name: text for name, text in rows.items() if text}
+    width = max((len(name) for name in shown), default=0)
+    indent = " " * (width + 4)
+    below = (f"  {name:{width}}  " + text.replace("\n", f"\n{indent}") for name, text in shown.items())
+    return "\n".join([title, *below])
+
+
+def as_html(text: str) -> str:
+    """The same text for a notebook."""
+    return f"<pre>{html.escape(text)}</pre>"
+
+
+def described(value: Any, title: str) -> str:
+    """The fields of a value that do not have their defaults, a line each."""
+    return lines(title, dict(_rows(value)))
+
+
+def _rows(value: Any) -> Iterable[tuple[str, str]]:
+    for one in sorted(fields(value), key=lambda one: one.name in _LAST):
+        entry = getattr(value, one.name)
+        default = one.default if one.default is not MISSING else None
+        if entry is default or (default is not None and _same(entry, default)):
+            continue
+        if one.name in ("dynamics", "blending"):
+            yield from ((name, text) for name, text in _rows(entry) if text != "-")
+        else:
+            yield one.name, _text(one.name, entry)
+
+
+def _same(entry: Any, default: Any) -> bool:
+    try:
+        return bool(entry == default)
+    except ValueError:  # arrays
+        return False
+
+
+def _text(name: str, value: Any) -> str:
+    """A field's content in a line or a few."""
+    if isinstance(value, np.ndarray):
+        if np.isnan(value).all():
+            return "-"
+        if name in _ANGLES:
+            return degrees(value)
+        numbers = np.unique(value) if value.ndim == 1 else value
+        text = " ".join(f"{one:g}" for one in (numbers if len(numbers) == 1 else value.reshape(-1)))
+        return f"{text} {_unit(name)}".rstrip()
+    if isinstance(value, float):
+        if name in _ANGLES:
+            return degrees(value)
+        return "-" if math.isnan(value) else f"{value:g} {_unit(name)}".rstrip()
+    if isinstance(value, tuple) and len(value) > 0:
+        shown = [" ".join(str(one).split()) for one in value[:_SHOWN]]
+        more = [f"... {len(value) - _SHOWN} more"] if len(value) > _SHOWN else []
+        return "\n".join(shown + more)
+    return str(value)
+
+
+def _unit(name: str) -> str:
+    for suffix in sorted(_SUFFIXES, key=len, reverse=True):
+        if name.endswith(suffix):
+            return _SUFFIXES[suffix]
+    return _UNITS.get(name, "")

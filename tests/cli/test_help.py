@@ -1,0 +1,140 @@
+"""Help, completion, and how the command line refuses: for every command and every option."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+
+import pytest
+from cyclopts import App
+
+from heptarm.cli.main import app
+from heptarm.cli.progress import timed
+from tests.cli.running import HEPTARM, run
+from tests.interrupts import ctrl_c_interrupts
+from tests.simulators import FASTER
+
+
+def commands(group: App = app, words: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], App]]:
+    for name in group:
+        if name.startswith("-"):
+            continue
+        one = group[name]
+        below = [name for name in one if not name.startswith("-")]
+        if below:
+            yield from commands(one, (*words, name))
+        else:
+            yield (*words, name), one
+
+
+COMMANDS = dict(commands())
+
+
+def test_the_table_has_every_command() -> None:
+    assert ("move", "lin-rel") in COMMANDS and ("targets", "add") in COMMANDS and len(COMMANDS) > 20
+
+
+@pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
+def test_every_option_has_a_help_text_and_no_double(words: tuple[str, ...]) -> None:
+    wrong = []
+    for argument in COMMANDS[words].assemble_argument_collection(default_parameter=app.default_parameter):
+        if not argument.show:
+            continue
+        if not (argument.parameter.help or "").strip():
+            wrong.append(argument.name)
+        wrong += [
+            name for name in argument.names if name.startswith(("--no-", "--empty-")) and name != "--no-key"
+        ]
+    assert not wrong
+
+
+def test_help_lists_no_double() -> None:
+    assert "--empty" not in run("sim", "--help").stdout
+
+
+@pytest.mark.parametrize("words", [("move", "ptp"), ("state",), ("targets", "add"), ("servo",)], ids=" ".join)
+def test_help_shows_an_example(words: tuple[str, ...]) -> None:
+    done = run(*words, "--help")
+    assert (
+        done.returncode == 0 and "For example" in done.stdout and f"heptarm {' '.join(words)} " in done.stdout
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("state", "--no-watch"), "--no-watch"),
+        (("move", "ptp", "0", "0"), "ptp"),
+        (("servo", "--rate", "fast"), "fast"),
+        (("sim", "--empty-fault"), "--empty-fault"),
+        (("rotate",), "rotate"),
+        (("state", "--rate", "0"), "rate must be in (0, 1000] Hz, got 0 Hz"),
+        (("state", "--duration", "-1"), "duration must be in (0, 86400] s, got -1 s"),
+        (("servo", "--rate", "0", "--target", "sim://iiwa14"), "rate must be in (0, 1000] Hz, got 0 Hz"),
+        (("recover", "--timeout", "-1"), "timeout must be in [0, 86400] s, got -1 s"),
+        (("replay", "nowhere.npz"), "nowhere.npz"),
+    ],
+    ids=lambda one: " ".join(one) if isinstance(one, tuple) else "",
+)
+def test_every_refusal_is_one_sentence(words: tuple[str, ...], said: str) -> None:
+    done = run(*words)
+    assert done.returncode == 1 and done.stdout == "", done.stdout
+    (line,) = done.stderr.strip().splitlines()
+    assert line.startswith("heptarm: ") and said in line
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_knows_commands_and_options(shell: str) -> None:
+    script = run("completion", shell).stdout
+    for word in ("install-cabinet", "lin-rel", "targets", "speed-scaling"):
+        assert word in script
+    if shell == "bash":
+        subprocess.run(["bash", "-n"], input=script, text=True, check=True, timeout=60)
+
+
+def test_nothing_is_coloured_in_a_pipe(cabinet) -> None:  # type: ignore[no-untyped-def]
+    for words in (("--help",), ("state", "--target", cabinet.target), ("doctor", "--target", cabinet.target)):
+        done = run(*words)
+        assert "\x1b" not in done.stdout + done.stderr
+
+
+def on_a_terminal(*words: str, interrupt: str = "") -> tuple[int, str]:
+    """A command with a terminal; Ctrl-C once its output matches `interrupt`."""
+    ours, theirs = pty.openpty()
+    with ctrl_c_interrupts():
+        process = subprocess.Popen([*HEPTARM, *words], stdin=theirs, stdout=theirs, stderr=theirs)
+    os.close(theirs)
+    seen, deadline = "", time.monotonic() + 120
+    while time.monotonic() < deadline:
+        try:
+            if select.select([ours], [], [], 1.0)[0]:
+                seen += os.read(ours, 4096).decode()
+        except OSError:  # the terminal's other end is closed
+            break
+        if interrupt and re.search(interrupt, seen):
+            process.send_signal(signal.SIGINT)
+            interrupt = ""
+    code = process.wait(timeout=60)
+    os.close(ours)
+    return code, seen
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
+def test_a_long_motion_shows_progress_and_ctrl_c_reports_that_the_arm_rests() -> None:
+    words = ("move", "ptp", "160", "0", "0", "-90", "0", "60", "0", "--deg", "--speed", "0.1")
+    code, seen = on_a_terminal(
+        *words, "--target", f"sim://iiwa14?speed={FASTER:g}", interrupt=r"\d+%, [\d.]+ s left"
+    )
+    assert re.search(r"\d+%, [\d.]+ s left", seen), seen
+    assert code == 130 and "heptarm: Ctrl-C: the arm was stopped and is at rest" in seen, seen
+
+
+def test_progress_of_a_known_time() -> None:
+    assert timed(1.0, 4.0) == " 25%, 3.0 s left" and timed(5.0, 4.0) == "100%, 0.0 s left"

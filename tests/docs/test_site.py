@@ -1,0 +1,90 @@
+"""The documentation's site: it builds, its links lead somewhere, and every page fits a desktop and a phone."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urldefrag, urlsplit
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+#: Width and height of a desktop and of a phone [px].
+SIZES = ((1280, 900), (390, 844))
+#: What is wider than the window, and images that do not load; wide tables and code scroll in boxes of their own.
+LOOK = """
+const width = document.documentElement.clientWidth;
+const wide = document.documentElement.scrollWidth > width + 1;
+const culprits = wide ? [...document.querySelectorAll("main *")]
+    .filter(e => e.getBoundingClientRect().right > width + 1)
+    .slice(0, 3).map(e => e.tagName + ": " + e.textContent.trim().slice(0, 60)) : [];
+const images = [...document.images].filter(i => !i.complete || i.naturalWidth === 0).map(i => i.getAttribute("src"));
+return {wide: wide, culprits: culprits, images: images, title: document.title};
+"""
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The built site; a warning is an error."""
+    out = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "-W", "-q", "-b", "html", str(ROOT / "docs"), str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+class References(HTMLParser):
+    """Anchors of a page, and what it refers to."""
+
+    def __init__(self, page: Path) -> None:
+        super().__init__()
+        self.anchors: set[str] = set()
+        self.targets: set[str] = set()
+        self.feed(page.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        values = dict(attrs)
+        if identifier := values.get("id"):
+            self.anchors.add(identifier)
+        for name in ("href", "src"):
+            if (target := values.get(name)) and not urlsplit(target).scheme and not target.startswith("//"):
+                self.targets.add(target)
+
+
+def test_every_link_within_the_site_has_its_target(site: Path) -> None:
+    pages = {path.resolve(): References(path) for path in site.rglob("*.html")}
+    broken = []
+    for path, page in pages.items():
+        for target in page.targets:
+            name, anchor = urldefrag(target)
+            other = (path.parent / unquote(urlsplit(name).path)).resolve() if name else path
+            if not other.exists():
+                broken.append(f"{path.relative_to(site)}: {target}")
+            elif anchor and other in pages and unquote(anchor) not in pages[other].anchors:
+                broken.append(f"{path.relative_to(site)}: {target} (no such anchor)")
+    assert not broken, "\n".join(sorted(broken))
+
+
+@pytest.mark.browser
+def test_every_page_fits_a_desktop_and_a_phone(site: Path, browser: Any) -> None:
+    wrong = []
+    for width, height in SIZES:
+        browser.execute_cdp_cmd(
+            "Emulation.setDeviceMetricsOverride",
+            {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600},
+        )
+        for page in sorted(site.rglob("*.html")):
+            name = page.relative_to(site).as_posix()
+            if name.startswith(("_modules/", "_static/")):
+                continue
+            browser.get(page.as_uri())
+            seen = browser.execute_script(LOOK)
+            if seen["wide"]:
+                wrong.append(f"{name} at {width} px is too wide: {seen['culprits']}")
+            wrong += [f"{name}: image {source} does not load" for source in seen["images"]]
+    assert not wrong, "\n".join(wrong)

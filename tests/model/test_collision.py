@@ -1,0 +1,188 @@
+"""Collisions foreseen: known postures, paths through a table, what the arm holds, and the paths of motions."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm import model
+from heptarm.model.joint_path import PathGeometry, joint_paths
+from heptarm.values.motion.motion import Motion
+from heptarm.values.pose import Pose, deg
+from heptarm.values.robot import robot
+
+IIWA = robot("iiwa14")
+ORIGIN = Pose.at()
+HOME = deg(0, 30, 0, -90, 0, 60, 0)
+TABLE = "0.6,0,0.1,0.4,0.8,0.2"
+GEOMETRY = PathGeometry(IIWA, lambda name: ORIGIN, lambda name: ORIGIN if name == "base" else None)
+
+
+@pytest.fixture(scope="module")
+def bare() -> ha.CollisionModel:
+    return ha.CollisionModel("iiwa14", boxes=[TABLE])
+
+
+@pytest.fixture(scope="module")
+def table() -> ha.CollisionModel:
+    return ha.CollisionModel("iiwa14", scene="table")
+
+
+def pairs(found: tuple[ha.Clearance, ...]) -> set[frozenset[str]]:
+    return {frozenset((one.first, one.second)) for one in found}
+
+
+@pytest.mark.parametrize(
+    "q", [HOME, deg(0, 0, 0, 0, 0, 0, 0), deg(90, 25, 0, -90, 0, 65, 0), deg(0, 40, 0, -60, 0, 80, 0)]
+)
+def test_postures_of_everyday_touch_nothing(bare: ha.CollisionModel, q: np.ndarray) -> None:
+    assert bare.touching(q) == ()
+
+
+def test_the_folded_arm_touches_itself(table: ha.CollisionModel) -> None:
+    folded = pairs(ha.CollisionModel("iiwa14").touching(deg(-58, -115, 15, 115, -65, 70, -152)))
+    assert frozenset(("link_0", "link_6")) in folded
+    gripper = pairs(table.touching(deg(80, -75, 148, -115, 23, 111, 93)))
+    assert frozenset(("link_1", "left_finger")) in gripper  # in the air, with nothing else near
+
+
+def test_the_arm_in_the_floor_and_in_a_box(bare: ha.CollisionModel) -> None:
+    lying = bare.touching(deg(180, 112, 0, 0, 0, 0, 0))
+    assert frozenset(("link_7", "floor")) in pairs(lying)
+    assert all(one.second == "floor" for one in lying) and lying[0].distance < -0.03
+    q = model.solve(IIWA, Pose.of((0.6, 0.0, 0.15), (0.0, 1.0, 0.0, 0.0)), near=HOME.tolist())
+    (found,) = (one for one in bare.touching(q) if one.first == "link_7")
+    assert found.second == "box 0" and "mm inside box 0" in str(found)
+
+
+def test_a_clearance_is_the_distance_of_the_shapes(bare: ha.CollisionModel) -> None:
+    for height in (0.25, 0.28, 0.30):  # of the flange, whose last link is a cylinder around its axis
+        q = model.solve(IIWA, Pose.of((0.6, 0.0, height), (0.0, 1.0, 0.0, 0.0)), near=HOME.tolist())
+        nearest = {one.first: one.distance for one in bare.clearances(q, below=0.12) if one.second == "box 0"}
+        assert nearest["link_7"] == pytest.approx(height - 0.2, abs=1e-4)
+    assert bare.clearances(q, below=0.05) == ()
+
+
+def test_a_path_through_the_table_is_found_where_it_enters(bare: ha.CollisionModel) -> None:
+    above = model.solve(IIWA, Pose.of((0.6, 0.0, 0.4), (0.0, 1.0, 0.0, 0.0)), near=HOME.tolist())
+    down = joint_paths(GEOMETRY, above, [ha.lin_rel(z=-0.3, frame="base")])[0]
+    found = bare.first_on(down)
+    assert found is not None and found.clearance.second == "box 0"
+    height = model.forward(IIWA, found.q)[2, 3]
+    assert 0.19 < height <= 0.2 + bare.margin + 1e-6
+    assert bare.first_on(down[: len(down) // 3]) is None
+    assert bare.first_on(np.array([above])) is None
+
+
+def test_a_contact_may_be_left_but_not_deepened(bare: ha.CollisionModel) -> None:
+    inside = model.solve(IIWA, Pose.of((0.6, 0.0, 0.198), (0.0, 1.0, 0.0, 0.0)), near=HOME.tolist())
+    assert bare.touching(inside)
+    up, deeper = (joint_paths(GEOMETRY, inside, [ha.lin_rel(z=z, frame="base")])[0] for z in (0.1, -0.02))
+    assert bare.first_on(up) is None
+    assert bare.first_on(deeper) is not None
+    assert bare.first_on(np.concatenate([up, up[::-1]])) is not None  # what was left counts again
+
+
+def test_tool_and_scene_are_part_of_it(table: ha.CollisionModel) -> None:
+    assert {"tool", "left_finger", "cube", "table", "link_7"} <= set(table.bodies)
+    q = model.solve(IIWA, Pose.of((0.7, 0.0, 0.36), (0.0, 1.0, 0.0, 0.0)), near=HOME.tolist())
+    assert pairs(table.touching(q)) == {
+        frozenset(("left_finger", "table")),
+        frozenset(("right_finger", "table")),
+    }
+    allowed = ha.CollisionModel(
+        "iiwa14", scene="table", allowed=[("table", "left_finger"), ("right_finger", "table")]
+    )
+    assert allowed.touching(q) == ()
+
+
+def test_what_the_arm_holds_moves_with_it_and_may_touch_its_gripper(table: ha.CollisionModel) -> None:
+    in_hand = Pose.of((0.0, 0.0, 0.2), (0.0, 0.0, 0.0, 1.0))  # a long way out of the fingers
+    q = model.solve(IIWA, Pose.of((0.7, 0.0, 0.40), (0.0, 1.0, 0.0, 0.0)), near=HOME.tolist())
+    assert table.touching(q) == ()
+    table.hold("cube", in_hand)
+    assert pairs(table.touching(q)) == {frozenset(("cube", "table"))}
+    table.hold("cube", Pose.at(0.0, 0.0, 0.16))
+    assert table.touching(q) == ()  # between the fingers
+    table.place("cube", Pose.at(0.7, 0.0, 0.31))
+    assert pairs(table.touching(q)) == {frozenset(("cube", "tool"))}
+    table.place("cube", Pose.at(0.55, 0.0, 0.22))
+    with pytest.raises(ha.CommandRejected, match="one of cube, block, can; got 'table'"):
+        table.hold("table", in_hand)
+
+
+def test_refusals(bare: ha.CollisionModel) -> None:
+    with pytest.raises(ha.CommandRejected, match="one of bins, peg-in-hole, table"):
+        ha.CollisionModel("iiwa14", scene="nowhere")
+    with pytest.raises(ha.CommandRejected, match="box must be"):
+        ha.CollisionModel("iiwa14", boxes=["1,2"])
+    with pytest.raises(ha.CommandRejected):
+        ha.CollisionModel("kr6")
+    with pytest.raises(ha.ShapeError, match="shape"):
+        bare.first_on(HOME)
+    with pytest.raises(ha.LimitError, match="step"):
+        bare.first_on([HOME], step=0.0)
+
+
+def test_the_model_agrees_with_contacts_of_the_simulated_arm() -> None:
+    """What touches in the collision model makes contact in MuJoCo, and the other way round, at random postures."""
+    from heptarm.sim.plant.world import Box, compiled
+
+    arm = ha.CollisionModel("iiwa14", boxes=[TABLE], margin=0.0)
+    world = compiled("iiwa14", [Box.of(TABLE)])
+    data = mujoco.MjData(world)
+    random, touching = np.random.default_rng(3), 0
+    for _ in range(300):
+        q = random.uniform(IIWA.q_min, IIWA.q_max)
+        data.qpos[:] = q
+        mujoco.mj_forward(world, data)
+        deepest = min((one.dist for one in data.contact[: data.ncon]), default=1.0)
+        if abs(deepest) > 1e-9:
+            assert bool(arm.touching(q)) == (deepest < 0.0)
+        touching += deepest < 0.0
+    assert 20 < touching < 280
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [
+        ha.ptp(deg(20, 40, 0, -80, 0, 60, 10)),
+        ha.ptp(Pose.of((0.5, 0.2, 0.4), (0.0, 1.0, 0.0, 0.0))),
+        ha.lin(Pose.of((0.5, 0.2, 0.4), (0.0, 1.0, 0.0, 0.0))),
+        ha.lin_rel(x=0.05, z=-0.05, a=0.3),
+        ha.lin_rel(y=0.1, frame="base"),
+        ha.circ(Pose.of((0.55, 0.1, 0.5), (0, 1, 0, 0)), Pose.of((0.6, 0.0, 0.45), (0, 1, 0, 0))),
+        ha.spline([Pose.of((0.5, 0.1, 0.4), (0, 1, 0, 0)), Pose.of((0.6, 0.1, 0.4), (0, 1, 0, 0))]),
+        ha.spline_joints([deg(10, 30, 0, -90, 0, 60, 0), deg(20, 30, 0, -90, 0, 60, 0)]),
+        ha.ptp_home(),
+        ha.hold(1.0),
+        ha.hand_guide(),
+    ],
+    ids=lambda motion: type(motion).__name__,
+)
+def test_every_motion_has_a_joint_path(motion: Motion) -> None:
+    path = GEOMETRY.joint_path(HOME, motion)
+    assert path.shape[1] == 7 and np.array_equal(path[0], HOME)
+    if type(motion).__name__ in ("Lin", "LinRel", "Circ", "Spline"):
+        assert len(path) > 5 and np.abs(np.diff(path, axis=0)).max() < 0.2
+
+
+def test_an_arc_goes_around_its_centre() -> None:
+    start = Pose.from_matrix(model.forward(IIWA, HOME))
+    centre = start.xyz - (0.05, 0.0, 0.0)
+    via, end = (
+        Pose.of(centre + 0.05 * np.array(at), start.quat) for at in ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
+    )
+    path = GEOMETRY.joint_path(HOME, ha.circ(via, end))
+    radii = [np.linalg.norm(model.forward(IIWA, q)[:3, 3] - centre) for q in path]
+    assert radii == pytest.approx([0.05] * len(path), abs=1e-6)
+    assert any(model.forward(IIWA, q)[1, 3] > start.y + 0.0475 for q in path)
+    assert model.forward(IIWA, path[-1])[:3, 3] == pytest.approx(end.xyz, abs=1e-6)
+
+
+def test_motions_follow_each_other() -> None:
+    first, second = joint_paths(GEOMETRY, HOME, [ha.lin_rel(z=0.1), ha.lin_rel(z=-0.1)])
+    assert np.array_equal(first[-1], second[0])
+    assert second[-1] == pytest.approx(HOME, abs=1e-6)

@@ -1,0 +1,1 @@
+"""Recordings, the black box, plots, streams of a motion."""

@@ -1,0 +1,101 @@
+"""Streams: what belongs to one, and what becomes of points that cannot be followed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from heptarm.ros.trajectory.goal import GoalRefused, TrajectoryGoal, TrajectoryPoint
+from heptarm.ros.trajectory.stream import PointStream, is_streamed
+from heptarm.ros.trajectory.trajectory import KinematicState
+from heptarm.values.robot import robot
+
+ARM = robot("iiwa14")
+HERE = KinematicState.at_rest(np.zeros(7))
+ACCELERATION = np.full(7, 2.0)
+POINT = TrajectoryGoal(("A1",), (TrajectoryPoint(0.02, (0.0,)),), from_topic=True)
+WINDOW = replace(POINT, points=tuple(TrajectoryPoint(0.02 * k, (0.0,)) for k in range(10)), start=99.9)
+
+
+@pytest.mark.parametrize(
+    ("goal", "streamed"),
+    [
+        (POINT, True),
+        (WINDOW, True),
+        (replace(POINT, from_topic=False), False),
+        (replace(WINDOW, from_topic=False), False),
+        (replace(POINT, points=(TrajectoryPoint(0.5, (0.0,)),)), False),
+        (replace(POINT, points=(TrajectoryPoint(0.0, (0.0,)),)), False),
+        (replace(POINT, start=90.0), False),
+        (replace(POINT, start=99.9), True),
+        (replace(WINDOW, start=110.0), False),
+        (replace(WINDOW, points=(*WINDOW.points, TrajectoryPoint(0.8, (0.0,)))), False),
+        (replace(POINT, points=()), False),
+    ],
+)
+def test_what_belongs_to_a_stream(goal: TrajectoryGoal, streamed: bool) -> None:
+    assert is_streamed(goal, 100.0) is streamed
+
+
+def test_a_steady_stream_is_followed_where_it_is() -> None:
+    """Not where it was a period or a horizon ago."""
+    stream, speed, period = PointStream(ARM), 0.3 * np.eye(7)[6], 0.02
+    here, path = HERE, None
+    for k in range(50):
+        now = 10.0 + k * period
+        path = stream.add_point(now, now, here, period, (k + 1) * period * speed, None, ACCELERATION)
+        here = path.sample(period)
+    np.testing.assert_allclose(here.q, 50 * period * speed, atol=1e-4)
+    np.testing.assert_allclose(here.dq, speed, atol=1e-3)
+    assert path is not None and not path.end.dq.any()
+    np.testing.assert_allclose(path.end.q, 50 * period * speed, atol=1e-9)
+
+
+def test_jitter_of_arrivals_hardly_shows() -> None:
+    rng = np.random.default_rng(5)
+    stream, speed, period = PointStream(ARM), 0.3 * np.eye(7)[6], 0.01
+    here, speeds = HERE, []
+    times = 10.0 + period * np.arange(200) + rng.uniform(0.0, 0.004, 200)
+    for k, now in enumerate(times):
+        path = stream.add_point(now, now, here, period, (k + 1) * period * speed, None, ACCELERATION)
+        here = path.sample(float(times[k + 1] - now) if k + 1 < len(times) else period)
+        speeds.append(here.dq[6])
+    assert np.abs(np.array(speeds[50:]) / 0.3 - 1.0).max() < 0.15
+    smooth = np.convolve(speeds, np.ones(20) / 20.0, "valid")
+    assert np.abs(smooth[50:] / 0.3 - 1.0).max() < 0.03
+
+
+def test_a_joint_at_its_limit_stays_inside() -> None:
+    stream, period = PointStream(ARM), 0.02
+    here = KinematicState.at_rest(0.95 * ARM.q_max * np.eye(7)[6])
+    for k in range(100):
+        now = 10.0 + k * period
+        q = np.minimum(here.q + 0.002, ARM.q_max) * np.eye(7)[6]
+        path = stream.add_point(now, now, here, period, q, None, ACCELERATION)
+        assert path.positions(np.linspace(0.0, path.duration, 50)).max() <= ARM.q_max[6] + 1e-3
+        here = path.sample(period)
+
+
+def test_points_too_far_away_and_windows_of_the_past_are_refused() -> None:
+    stream = PointStream(ARM)
+    with pytest.raises(GoalRefused, match="within 0.5 rad"):
+        stream.add_point(1.0, 1.0, HERE, 0.02, 0.6 * np.eye(7)[2], None, ACCELERATION)
+    times = np.array([-0.3, -0.2, -0.1])
+    with pytest.raises(GoalRefused, match="in the future"):
+        stream.add_window(HERE, times, np.zeros((3, 7)), None, ACCELERATION)
+    with pytest.raises(GoalRefused, match="within 0.5 rad"):
+        stream.add_window(HERE, np.array([0.1, 0.2]), np.ones((2, 7)), None, ACCELERATION)
+
+
+def test_a_window_is_passed_at_its_times() -> None:
+    stream, speed = PointStream(ARM), 0.1 * np.eye(7)[3]
+    times = np.arange(-0.1, 0.11, 0.02)
+    here = KinematicState(-0.0 * speed, speed, np.zeros(7))
+    path = stream.add_window(here, times, times[:, None] * speed, None, ACCELERATION)
+    for t in (0.06, 0.08, 0.1):
+        np.testing.assert_allclose(path.sample(t).q, t * speed, atol=1e-9)
+        np.testing.assert_allclose(path.sample(t).dq, speed, atol=1e-9)
+    assert not path.end.dq.any()
+    np.testing.assert_allclose(path.end.q, 0.1 * speed, atol=1e-12)
