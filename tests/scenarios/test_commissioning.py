@@ -24,6 +24,9 @@ from tests.retry import retry
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "explanation" / "fidelity.md"
 STEPS = {one.name: one for one in commissioning.steps()}
+#: Sections of the page whose assumptions have no step yet: to settle them the arm has to touch something, or rest
+#: long under measured loads.
+NOT_YET = {"Contact", "Sensors"}
 #: Steps in which a simulator measures nothing: a document, a person or a program on the cabinet has the answer.
 READ = {
     "sunrise.names",
@@ -37,18 +40,34 @@ READ = {
 }
 
 
-def rows() -> Iterator[tuple[str, str, list[str]]]:
-    """Behaviour, certainty and named steps of each row of the page."""
-    columns: list[str] = []
-    for line in PAGE.read_text(encoding="utf-8").splitlines():
+def tables() -> Iterator[tuple[str, list[dict[str, str]]]]:
+    """Section and rows of each table of the page that says how sure its rows are."""
+    section, columns, found = "", [""], []
+    for line in [*PAGE.read_text(encoding="utf-8").splitlines(), ""]:
+        section = line.removeprefix("## ") if line.startswith("## ") else section
         cells = [cell.strip() for cell in line.strip("|").split("|")] if line.startswith("|") else []
         if not cells:
-            columns = []
+            if "sure?" in columns:
+                yield section, found
+            columns, found = [], []
         elif not columns:
             columns = cells
         elif not set(line) <= set("|-"):
-            row = dict(zip(columns, cells, strict=True))
-            yield cells[0], row["sure?"], re.findall(r"`([\w.]+)`", row["settled by"])
+            found.append(dict(zip(columns, cells, strict=True)))
+
+
+def rows() -> Iterator[tuple[str, str, list[str]]]:
+    """Behaviour, certainty and named steps of each row that names steps or has a place for them."""
+    for _, found in tables():
+        for row in found:
+            if "settled by" in row:
+                names = re.findall(r"`([\w.]+)`", row["settled by"])
+                yield next(iter(row.values())), row["sure?"], names
+
+
+def test_only_these_tables_have_no_steps_yet() -> None:
+    without = {section for section, found in tables() if "settled by" not in found[0]}
+    assert without <= NOT_YET, "add a column `settled by` with a step for each assumption"
 
 
 def test_each_assumption_names_the_steps_that_settle_it() -> None:
@@ -208,7 +227,7 @@ def test_the_command_line_writes_both_files(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
     found = json.loads(base.with_suffix(".json").read_text())
     assert [one["verdict"] for one in found["steps"]] == ["agrees", "skipped"]
-    assert "| dynamics.braking | A7 moves on after a stop by |" in base.read_text()
+    assert "| dynamics.braking | A7 moves on after the brake began by |" in base.read_text()
     assert "1 agrees, 0 differs, 1 skipped" in done.stdout
     done = run("check", "--commission", "--list")
     assert all(name in done.stdout for name in ("fri.handshake", "safety.t1_speed"))
