@@ -30,6 +30,8 @@ def kinematics_in_bulk() -> Iterator[Figure]:
     found = model.solve_batch(robot, poses, e1=own.e1, status=own.status)
     solved = float((np.abs(model.forward_batch(robot, found) - poses).max(axis=(1, 2)) < 1e-9).mean())
     peer = _Pinocchio(robot)
+    if not np.allclose(peer.forward(q[:100]), poses[:100], atol=1e-9):
+        raise RuntimeError("Pinocchio computes another chain")
     sides: dict[str, tuple[Callable[[], object], Callable[[], object] | None, float]] = {
         "bulk_forward": (lambda: model.forward_batch(robot, q), lambda: peer.forward(q[:OTHERS]), FORWARD),
         "bulk_jacobian": (

@@ -1,7 +1,4 @@
-"""Where the time of a request goes, from the call in Python to its return.
-
-`python -m bench.speed.request` prints the table of docs/explanation/where-the-time-goes.md.
-"""
+"""Where the time of a request goes, from the call in Python to its return."""
 
 from __future__ import annotations
 
@@ -126,13 +123,6 @@ def parts() -> dict[str, list[float]]:
 
 @benchmark("request_parts")
 def request_parts() -> Iterator[Figure]:
-    """Where the time of a request goes: encoding, sending, the way to Java and back, Java, decoding."""
+    """Where the time of a request goes: encoding, sending, the kernel, Java, decoding."""
     for name, values in parts().items():
         yield Figure(name, float(np.median(values)), "us")
-
-
-if __name__ == "__main__":
-    print("| part of a request | µs |\n|---|---|")
-    measured = {name: float(np.median(values)) for name, values in parts().items()}
-    for name, text in (PARTS | {"request_whole": "the whole request"}).items():
-        print(f"| {text} | {measured[name]:.1f} |")

@@ -93,7 +93,7 @@ def _never(_: bool) -> None:
     raise AssertionError
 
 
-WAYS = {
+CAUSES = {
     "a motion": lambda plant, operator: plant.submit(_motion()),
     "a condition": lambda plant, operator: plant.condition_monitor.observe(
         seam.SignalIs(place=0, value=True), _never, at_once=False
@@ -107,12 +107,12 @@ WAYS = {
 }
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_whatever_happens_ends_the_rest(way: str) -> None:
+@pytest.mark.parametrize("cause", CAUSES)
+def test_whatever_happens_ends_the_rest(cause: str) -> None:
     plant = ready()
     rest, _, operator = rested(plant)
     assert not rest.pass_time()
-    WAYS[way](plant, operator)
+    CAUSES[cause](plant, operator)
     assert rest.pass_time()
     woken = plant.tick_count
     while plant.tick_count < woken + AWAKE - 1:

@@ -7,7 +7,7 @@ that follow each other without a pause, and a machine that was suspended kept it
 While the robot rests, nothing is simulated and the loop wakes only for readers of the state: see `RestingPlant`.
 Python's garbage collector does not run by itself: what exists at the start is frozen, and the loop collects the rest
 every few seconds, in the pause between two ticks.
-Real-time priority is requested while an FRI client has to answer each tick, or always, as the option says; a refusal is
+Real-time priority is requested while an FRI client has to answer each tick, or always, by the option; a refusal is
 named in the statistics. Only then the loop wakes shortly before a tick and spins for the rest: several cabinets that
 do so starve a machine. Memory is not locked: that would commit all the memory that the JVM has only reserved.
 """

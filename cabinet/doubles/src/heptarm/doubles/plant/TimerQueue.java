@@ -11,8 +11,8 @@ import heptarm.doubles.seam.Seam;
 /**
  * Threads that sleep in simulation time; the plant calls {@link #tick} only when at least one of them is due.
  *
- * <p>While the robot rests, the realtime loop of the plant waits here as well, see {@link #rest}. Whoever changes something that the
- * plant must not miss ends that by {@link #rouse}.
+ * <p>While the robot rests, the realtime loop of the plant waits here as well, see {@link #rest}. A change that the plant must not
+ * miss ends that by {@link #rouse}.
  */
 public final class TimerQueue {
     private static final class Sleeper {
