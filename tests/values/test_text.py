@@ -52,7 +52,9 @@ def test_a_state_has_a_line_for_each_quantity_in_columns() -> None:
 def test_results_tools_motions_and_statistics() -> None:
     result = str(ha.Result(ha.Cause.STOPPED, STATE, 0.01, 1.5, code=9, text="somebody pressed it"))
     assert "stopped: somebody pressed it (code 9)" in result and "0.5730 deg (0.010000 rad)" in result
-    assert "1.500 s" in result
+    assert "1.500 s" in result and "force" not in result
+    contact = ha.Result(ha.Cause.CONDITION, peak_force=21.234, rest_force=3.0)
+    assert "peak 21.23 N, at rest 3.00 N" in str(contact)
     tool = str(ha.Tool("gripper", mass=1.2, com=(0, 0, 0.06), tcp=ha.Pose.at(0, 0, 0.12)))
     assert tool.startswith("Tool gripper\n") and "0.0 0.0 60.0 mm" in tool and "z 120.0 mm" in tool
     motion = str(ha.lin(POSE, speed_mps=0.1, blend_m=0.02))
