@@ -11,6 +11,7 @@ import pytest
 import heptarm as ha
 from heptarm.errors import ConnectionLost, MotionAborted, SafetyStop
 from heptarm.record import black_box
+from heptarm.record.journal import Journal
 from heptarm.wire import messages as wire
 from heptarm.wire.codes import Code
 from tests.arm.peer import Peer
@@ -124,3 +125,18 @@ def test_its_folder_is_that_of_the_users_state(monkeypatch: pytest.MonkeyPatch, 
     monkeypatch.delenv("HEPTARM_BLACK_BOX")
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     assert black_box.folder() == tmp_path / "heptarm" / "black-box"
+
+
+def test_the_journal_keeps_no_more_than_it_needs() -> None:
+    now = [0]
+    journal = Journal(lambda: now[0])
+    for second in range(100):
+        now[0] = second * 1_000_000_000
+        journal.add("note", f"at {second}")
+    assert [one.text for one in journal.since(0)] == [f"at {second}" for second in range(68, 100)]
+    queue = journal.open()
+    journal.add("fri", "earlier", at=90_000_000_000)
+    assert [one.time for one in queue] == [90_000_000_000]
+    journal.close(queue)
+    journal.add("note", "late")
+    assert len(queue) == 1

@@ -153,3 +153,39 @@ def test_text() -> None:
         "Pose(x=0.5000 y=0.0000 z=0.3000 m, a=180.00 b=0.00 c=0.00 deg)"
     )
     assert deg(180).tolist() == [math.pi]
+
+
+def test_a_pose_is_shifted_and_rotated_in_its_own_and_in_the_bases_axes() -> None:
+    pose = Pose.xyz_abc(0.5, 0.1, 0.4, *deg(30, 20, 10))
+    np.testing.assert_allclose(pose.shifted(x=0.1, z=-0.2).xyz, pose.xyz + [0.1, 0.0, -0.2])
+    np.testing.assert_allclose(
+        pose.shifted(0.1, 0.2, 0.3, frame="tool").xyz, (pose @ Pose.at(0.1, 0.2, 0.3)).xyz
+    )
+    turn = Pose.xyz_abc(a=0.3, b=-0.2, c=0.1)
+    np.testing.assert_allclose(pose.rotated(0.3, -0.2, 0.1).matrix, (pose @ turn).matrix, atol=1e-12)
+    based = pose.rotated(0.3, -0.2, 0.1, frame="base")
+    np.testing.assert_allclose(based.rotation, turn.rotation @ pose.rotation, atol=1e-12)
+    np.testing.assert_allclose(based.xyz, pose.xyz)
+
+
+def test_rotation_vector_and_roll_pitch_yaw() -> None:
+    pose = Pose.xyz_abc(0, 0, 0, 0.3, -0.2, 0.1)
+    np.testing.assert_allclose(pose.rpy, (0.1, -0.2, 0.3), atol=1e-12)
+    vector = np.array([0.0, math.pi - 1e-3, 0.0])
+    np.testing.assert_allclose(Pose.from_rotvec((1, 2, 3), vector).rotvec, vector, atol=1e-9)
+    assert Pose.from_rotvec((0, 0, 0), (0.0, 0.0, 0.0)).rotvec.tolist() == [0.0, 0.0, 0.0]
+    assert float(np.linalg.norm(Pose.xyz_abc(c=math.pi).rotvec)) == pytest.approx(math.pi)
+    again = Pose.from_rotvec(pose.xyz, pose.rotvec)
+    assert again.angle_to(pose) < 1e-12
+
+
+def test_interpolation_turns_at_constant_speed_on_the_shortest_rotation() -> None:
+    first, second = Pose.xyz_abc(0.1, 0.2, 0.3), Pose.xyz_abc(0.5, 0.2, -0.3, *deg(170, 20, 30))
+    for fraction in (0.0, 0.25, 0.5, 1.0):
+        between = first.interpolate(second, fraction)
+        assert between.angle_to(first) == pytest.approx(fraction * second.angle_to(first), abs=1e-9)
+        np.testing.assert_allclose(between.xyz, first.xyz + fraction * (second.xyz - first.xyz))
+    with pytest.raises(LimitError, match="fraction"):
+        first.interpolate(second, 1.1)
+    with pytest.raises(ShapeError, match="frame"):
+        first.shifted(x=0.1, frame="flange")

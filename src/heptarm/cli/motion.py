@@ -174,15 +174,7 @@ def servo(
 
 def report(stats: ServoStats, lag: float) -> str:
     """A report of a stream, for people."""
-    return "\n".join(
-        (
-            f"sent      {stats.sent} targets at {stats.rate:.1f} Hz, {stats.late_ticks} ticks late",
-            f"set       {stats.set_median * 1e6:.0f} us median, {stats.set_p99 * 1e6:.0f} us p99",
-            f"cabinet   {stats.received} received, {stats.applied} applied, {stats.refused} refused, {stats.late} gaps",
-            f"age       {stats.age_median * 1e3:.2f} ms median, {stats.age_p99 * 1e3:.2f} ms p99 when applied",
-            f"lag       {np.degrees(lag):.2f} deg at most behind the targets",
-        )
-    )
+    return f"{stats}\n  lag      {np.degrees(lag):.2f} deg at most behind the targets"
 
 
 def teach(

@@ -15,8 +15,8 @@ from heptarm.wire import messages as wire
 
 #: Kinds of entries.
 REQUEST, REFUSAL, EVENT, ERROR, NOTE, FRI = "request", "refusal", "event", "error", "note", "fri"
-#: Entries that are kept for the black box, and those that a slow recorder may leave waiting.
-KEPT, WAITING = 5_000, 100_000
+#: Entries that are kept for the black box, their age [ns], and entries that a slow recorder may leave waiting.
+KEPT, KEPT_TIME, WAITING = 5_000, 31_000_000_000, 100_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +136,10 @@ class Journal:
     def add(self, kind: str, content: Any, number: int = 0, *, at: int | None = None) -> None:
         """Add an entry of a time of our clock [ns], None: now; costs a microsecond, blocks never."""
         entry = JournalEntry(self._clock() if at is None else at, kind, content, number)
-        self._kept.append(entry)
+        kept = self._kept
+        kept.append(entry)
+        while kept[0].time < entry.time - KEPT_TIME:  # programs of a thousand motions are large
+            kept.popleft()
         for queue in self._queues:
             queue.append(entry)
 

@@ -10,7 +10,7 @@ from heptarm.values.arrays import Value
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.trigger import Notify, Trigger
 from heptarm.values.state import State
-from heptarm.values.text import degrees, lines
+from heptarm.values.text import degrees, fixed, lines
 
 
 class Cause(Enum):
@@ -72,6 +72,7 @@ class Result(Value):
             "cause": cause,
             "stopped by": fired,
             "duration": f"{self.duration:.3f} s",
+            "force": "" if isnan(self.peak_force) else self._forces,
             "residual": "" if isnan(self.residual) else f"{degrees(self.residual, 4)}",
         }
         if self.state is not None and self.state.joints is not None:
@@ -79,6 +80,10 @@ class Result(Value):
         if self.state is not None and self.state.groups.pose is not None:
             rows["pose"] = str(self.state.pose)
         return lines("Result", rows)
+
+    @property
+    def _forces(self) -> str:
+        return f"peak {fixed(self.peak_force, 2)} N, at rest {fixed(self.rest_force, 2)} N"
 
     @property
     def arrived(self) -> bool:

@@ -26,6 +26,7 @@ from heptarm.values.mode.mode import MODES, Mode
 from heptarm.values.pose import Pose, check_pose
 from heptarm.values.result import Result
 from heptarm.values.state import State
+from heptarm.values.text import as_html, fixed, lines
 from heptarm.wire import messages as wire
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
@@ -278,6 +279,21 @@ class ServoStats:
     age_median: float = nan
     age_p99: float = nan
     text: str = ""
+
+    def __str__(self) -> str:
+        """A few aligned lines with units."""
+        rows = {
+            "sent": f"{self.sent} targets at {self.rate:.1f} Hz, {self.late_ticks} ticks late",
+            "set": f"{fixed(self.set_median * 1e6, 0)} us median, {fixed(self.set_p99 * 1e6, 0)} us p99",
+            "cabinet": f"{self.received} received, {self.applied} applied, {self.refused} refused, {self.late} gaps",
+            "age": f"{fixed(self.age_median * 1e3, 2)} ms median, {fixed(self.age_p99 * 1e3, 2)} ms p99 when applied",
+            "refused": self.text,
+        }
+        return lines("Servo", rows)
+
+    def _repr_html_(self) -> str:
+        """The same for a notebook."""
+        return as_html(str(self))
 
 
 class Servo(Block):

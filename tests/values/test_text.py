@@ -1,0 +1,92 @@
+"""Values as text for people: aligned lines with units; `repr` stays exact; notebooks show the same."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm.arm.motion.servo import ServoStats
+from heptarm.values.state import (
+    Cartesian,
+    Groups,
+    Joints,
+    MotionStatus,
+    OperationMode,
+    Safety,
+    State,
+    Torques,
+    Wrench,
+)
+from heptarm.values.text import fixed, lines
+
+POSE = ha.Pose.xyz_abc(0.5, -0.1, 0.3, *ha.deg(10, 0, 180))
+STATE = State(
+    Groups(
+        joints=Joints(10**9, ha.deg(1, -2, 3, -4, 5, -6, 7), np.zeros(7), np.full(7, math.nan)),
+        torques=Torques(10**9, np.arange(7.0), np.zeros(7), np.zeros(7)),
+        pose=Cartesian(10**9, POSE, POSE, ha.Redundancy()),
+        wrench=Wrench(10**9, (1.0, 2.0, -3.5), (0.1, 0.2, 0.3)),  # type: ignore[arg-type]
+        motion=MotionStatus(10**9, id=12, progress=0.43, queued=2),
+        safety=Safety(10**9, OperationMode.T1, emergency_stop=True),
+    )
+)
+
+
+def test_a_state_has_a_line_for_each_quantity_in_columns() -> None:
+    text = str(STATE)
+    rows = {line.split("  ")[1].strip(): line for line in text.splitlines()[1:]}
+    assert text.startswith("State at 1.000 s of the cabinet")
+    assert rows["q [deg]"].split()[2:] == ["1.00", "-2.00", "3.00", "-4.00", "5.00", "-6.00", "7.00"]
+    assert rows["q [rad]"].split()[2] == "0.0175" and rows["dq [deg/s]"].split()[-1] == "-"
+    assert len({len(rows[name]) for name in ("joint", "q [deg]", "q [rad]", "tau [Nm]")}) == 1
+    assert "x 500.0  y -100.0  z 300.0 mm" in rows["pose"] and "(0.5000 -0.1000 0.3000 m" in rows["pose"]
+    assert "force 1.00 2.00 -3.50 N" in rows["wrench"]
+    assert "12, item 0, 43%, 2 waiting" in rows["motion"]
+    assert "T1, not ready, emergency stop" in rows["safety"]
+    assert "io" not in rows and "control" not in rows
+
+
+def test_results_tools_motions_and_statistics() -> None:
+    result = str(ha.Result(ha.Cause.STOPPED, STATE, 0.01, 1.5, code=9, text="somebody pressed it"))
+    assert "stopped: somebody pressed it (code 9)" in result and "0.5730 deg (0.010000 rad)" in result
+    assert "1.500 s" in result and "force" not in result
+    contact = ha.Result(ha.Cause.CONDITION, peak_force=21.234, rest_force=3.0)
+    assert "peak 21.23 N, at rest 3.00 N" in str(contact)
+    tool = str(ha.Tool("gripper", mass=1.2, com=(0, 0, 0.06), tcp=ha.Pose.at(0, 0, 0.12)))
+    assert tool.startswith("Tool gripper\n") and "0.0 0.0 60.0 mm" in tool and "z 120.0 mm" in tool
+    motion = str(ha.lin(POSE, speed_mps=0.1, blend_m=0.02))
+    assert (
+        motion.splitlines()[0] == "Lin" and "0.1 m/s" in motion and "0.02 m" in motion and "nan" not in motion
+    )
+    assert "... 4 more" in str(ha.spline([POSE.shifted(x=0.01 * i) for i in range(10)]))
+    assert "0.5 of the maximum" in str(ha.ptp(ha.deg(1, 2, 3, 4, 5, 6, 7), speed=0.5))
+    assert "3 s" in str(ha.hold(3.0))
+    stats = str(ServoStats(10, 99.5, 1, 20e-6, 50e-6))
+    assert "20 us median" in stats and "- ms median" in stats
+
+
+def test_notebooks_show_the_same_and_nothing_of_it_is_markup() -> None:
+    tool = ha.Tool("<b>", mass=1.0)
+    assert tool._repr_html_() == "<pre>" + str(tool).replace("<b>", "&lt;b&gt;") + "</pre>"
+    assert STATE._repr_html_().startswith("<pre>State at 1.000 s")
+
+
+def test_repr_stays_exact() -> None:
+    assert "Joints(stamp=1000000000" in repr(STATE)
+    assert repr(ha.Result(ha.Cause.FINISHED)).startswith("Result(cause=<Cause.FINISHED")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(-1e-9, "0.00"), (math.nan, "-"), (1.005, "1.00"), (-2.5, "-2.50")]
+)
+def test_fixed_point_has_no_negative_zero(value: float, text: str) -> None:
+    assert fixed(value, 2) == text
+
+
+def test_rows_that_are_empty_are_left_out() -> None:
+    assert lines("Title", {"a": "1", "long name": "2\n3", "none": ""}) == (
+        "Title\n  a          1\n  long name  2\n             3"
+    )
