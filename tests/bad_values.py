@@ -105,6 +105,11 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "Arm.touch": {"distance": 0.01, "force": 5.0},
     "Arm.touch_twice": {"distance": 0.01, "force": 5.0},
     "connect": {"target": "127.0.0.1:9"},
+    "CollisionModel": {"robot": "iiwa14"},
+    "CollisionModel.first_on": {"path": (HOME, HOME)},
+    **{f"CollisionModel.{verb}": {"body": "cube"} for verb in ("place", "hold", "release")},
+    "spiral": {"radius": 0.003},
+    "Spiral": {"radius": 0.003},
     "CollisionGuard.named": {"part": heptarm.CollisionGuard.of(20.0).parts[0], "state": None},
     **{
         f"{band}.{side}": {"low": 0.5, "high": 1.5}
@@ -163,15 +168,19 @@ OPERATORS: dict[str, Callable[[Any, Any], object]] = {
 REPORTS = (
     *(
         "Arm",
+        "Clearance",
         "Collision",
         "Contact",
         "Fri",
+        "Gripper",
+        "Insertion",
         "JointServo",
         "MotionEvent",
         "MotionHandle",
         "Outcome",
         "PoseServo",
         "Recording",
+        "TouchOnPath",
     ),
     *("Recovery", "Replay", "Report", "Result", "Scenario", "ServoStats", "State", "States", "Stats"),
 )

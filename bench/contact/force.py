@@ -15,7 +15,7 @@ TABLE = 0.2
 THRESHOLD = 20.0
 #: Speeds [m/s].
 SPEEDS = (0.01, 0.02, 0.05)
-#: Before the joints were elastic, 356 N at 50 mm/s, peak and rest alike.
+#: Before the joints were elastic, 293 N at 50 mm/s.
 HARDEST = 100.0
 #: Of a touch at 20 mm/s with a threshold of 10 N.
 AT_REST = 15.0

@@ -35,6 +35,7 @@ _TUN_SET_INTERFACE, _TUN_WITHOUT_HEADER = 0x400454CA, 0x1001
 _SET_FLAGS, _SET_ADDRESS, _SET_MASK, _UP = 0x8914, 0x8916, 0x891C, 0x1 | 0x40
 _DEVICE = b"ha0"
 _PACKET = 65536
+_PRIORITY = 5
 
 
 @dataclass(frozen=True)
@@ -133,11 +134,13 @@ class BadNetwork:
         impairment: the present one.
         passed: packets that arrived.
         lost: packets that did not.
+        stall: longest time by which a packet was later than it had to be, because this machine was busy [s].
     """
 
     def __init__(self, impairment: Impairment, *, seed: int = 1) -> None:
         self.impairment = impairment
         self.passed = self.lost = 0
+        self.stall = 0.0
         self._random = random.Random(seed)
         self._sides = {side: _Namespace(side) for side in ADDRESSES}
         self._ends = os.pipe()
@@ -149,6 +152,8 @@ class BadNetwork:
         return self._sides[side].call(function)
 
     def _carry(self) -> None:
+        with contextlib.suppress(OSError):  # a network does not wait for the load of this machine
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
         client, cabinet = self._sides["client"].device, self._sides["cabinet"].device
         other = {client: cabinet, cabinet: client}
         waiting: list[tuple[float, int, int, bytes]] = []
@@ -161,13 +166,14 @@ class BadNetwork:
             for device in ready:
                 with contextlib.suppress(BlockingIOError):
                     packet = os.read(device, _PACKET)
-                    due = self._due(packet)
-                    if due is not None:
+                    arrival = self._due(packet)
+                    if arrival is not None:
                         count += 1
-                        heapq.heappush(waiting, (due, count, other[device], packet))
+                        heapq.heappush(waiting, (arrival, count, other[device], packet))
             now = time.monotonic()
             while waiting and waiting[0][0] <= now:
-                _, _, device, packet = heapq.heappop(waiting)
+                due, _, device, packet = heapq.heappop(waiting)
+                self.stall = max(self.stall, now - due)
                 self._write(device, packet)
 
     def _due(self, packet: bytes) -> float | None:

@@ -28,7 +28,7 @@ import heptarm as ha
 from heptarm.errors import HeptarmError
 
 target, datagrams, seconds, rate = sys.argv[1], sys.argv[2] == "udp", float(sys.argv[3]), float(sys.argv[4])
-found = {"outcome": "not connected", "lived": 0.0, "received": 0, "gap": None, "stop": None, "age": None}
+found = {"outcome": "not connected", "lived": 0.0, "received": 0, "gap": None, "stop": None, "age": None, "pause": 0.0}
 arm = None
 try:
     arm = ha.connect(target, datagrams=datagrams, timeout=30.0, watchdog=0.5, groups=("joints", "motion"))
@@ -48,7 +48,7 @@ try:
         with servo:
             found["outcome"] = "ended"
             while servo.tick() and servo.t < seconds:
-                found["lived"] = servo.t
+                found["pause"], found["lived"] = max(found["pause"], servo.t - found["lived"]), servo.t
                 servo.set(servo.start.q + 0.1 * np.sin(servo.t) * np.eye(7)[5])
             if servo.active:
                 found["outcome"], began = "alive", time.monotonic()
@@ -89,6 +89,7 @@ class Outcome:
         gap: longest time without a state [s].
         stop: from the call of `arm.stop()` until a state shows that the motion has ended [s].
         age: 99th percentile of the targets' ages [s].
+        pause: longest time between two targets of the client [s]: how long this machine held it up.
         copies: targets that went over TCP as well.
         targets: sent by datagram.
     """
@@ -99,6 +100,7 @@ class Outcome:
     gap: float | None
     stop: float | None
     age: float | None
+    pause: float
     copies: int = 0
     targets: int = 0
 
@@ -140,9 +142,15 @@ def bad_network() -> Iterator[Figure]:
             kind: [stream(network, cabinet.port, kind, SECONDS) for _ in range(STREAMS)]
             for kind in ("udp", "tcp")
         }
-        detail = {"seconds": SECONDS, "passed": network.passed, "lost": network.lost}
+        detail = {
+            "seconds": SECONDS,
+            "passed": network.passed,
+            "lost": network.lost,
+            "stall": round(network.stall, 3),
+        }
     noisy, udp, tcp = noise.is_noisy, found["udp"], found["tcp"]
     detail["ended"] = [one.outcome for one in udp if not one.is_alive]
+    detail["pauses"] = [round(one.pause, 3) for one in udp]
     detail["copies"] = sum(one.copies for one in udp) / max(1, sum(one.targets for one in udp))
     yield Figure(
         "bad_network_alive",

@@ -39,6 +39,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -261,6 +262,15 @@ class Timeout(HeptarmError, TimeoutError):
 
 class MissingExtra(HeptarmError, ImportError):
     """An optional package is not installed."""
+
+
+#: A class of an exception of Java, and the colon behind it.
+_JAVA = re.compile(r"(?:\b[a-z]\w*\.)+[A-Z]\w*(?:Exception|Error)\b(?:: ?|(?=[\s.,;)]|$))")
+
+
+def without_java(text: str) -> str:
+    """A text without the names of Java's exceptions, which say nothing to people; empty if nothing is left."""
+    return _JAVA.sub("", text).strip()
 
 
 #: Packages that each extra of heptarm brings, as they are imported.

@@ -10,6 +10,7 @@ import threading
 import pytest
 
 import heptarm as ha
+from heptarm.arm.translate.errors import error_of
 from heptarm.arm.translate.motions import items
 from heptarm.errors import (
     CommandRejected,
@@ -19,6 +20,7 @@ from heptarm.errors import (
     MissingExtra,
     missing_extra,
     require_extra,
+    without_java,
 )
 from heptarm.values.robot import robot
 from heptarm.wire.codes import MEANINGS, Code
@@ -97,6 +99,23 @@ def test_a_lost_controller_learns_how_to_raise_its_watchdog() -> None:
     assert "connect(..., watchdog=2.0)" in MEANINGS[Code.CONTROLLER_LOST].advice
 
 
+@pytest.mark.parametrize(
+    ("text", "left"),
+    [
+        ("java.lang.NullPointerException", ""),
+        ("java.net.BindException: Address already in use", "Address already in use"),
+        (
+            "the stop failed: com.kuka.roboticsAPI.CommandInvalidException: not now",
+            "the stop failed: not now",
+        ),
+        ("Can not plan motion: the target is at 1.2 m", "Can not plan motion: the target is at 1.2 m"),
+    ],
+)
+def test_no_exception_of_java_reaches_the_user(text: str, left: str) -> None:
+    assert without_java(text) == left
+    assert "Exception" not in str(error_of(Code.INTERNAL, text))
+
+
 def test_a_missing_extra_is_one_sentence_with_the_command() -> None:
     error = missing_extra("viser.transforms")
     assert str(error) == "this needs the package 'viser', which is not installed (pip install 'heptarm[viz]')"
@@ -104,7 +123,7 @@ def test_a_missing_extra_is_one_sentence_with_the_command() -> None:
     require_extra("sim")
 
 
-def test_windows_is_told_what_does_not_work_there(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_windows_gets_one_sentence_for_what_does_not_work_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("heptarm.errors._PLATFORM", "win32")
     with pytest.raises(
         CommandRejected, match=r"the virtual cabinet runs on Linux, this is Windows \(use WSL"

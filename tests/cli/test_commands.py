@@ -103,7 +103,7 @@ def test_servo_swings_an_axis_and_reports_how_the_stream_went(target: str) -> No
     reported = json.loads(done.stdout)
     assert reported["received"] == reported["sent"] > 1
     assert reported["refused"] == reported["late"] == 0 and reported["largest_lag_rad"] < 0.5
-    done = retry(lambda: run("servo", "--duration", "1", "--target", target), starved)
+    done = retry(lambda: run("servo", "--duration", "1", "--datagrams", "--target", target), starved)
     rate = re.search(r" targets at ([\d.]+) Hz", done.stdout)
     assert rate and 1.0 < float(rate[1]) < 110.0 and "when applied" in done.stdout
     assert run("servo", "--axis", "8", "--target", target).returncode == 1
@@ -167,6 +167,7 @@ def test_doctor_looks_at_a_cabinet(target: str) -> None:
     verdicts = {one["what"]: one for one in objects("doctor", "--target", target)}
     assert verdicts["session"]["how"] == verdicts["network"]["how"] == verdicts["safety"]["how"] == "ok"
     assert "us median" in verdicts["round trip"]["found"]
+    assert re.search(r"\d+ of \d+ pings answered by UDP", verdicts["datagrams"]["found"])
 
 
 def test_doctor_names_what_to_do_when_nobody_answers() -> None:

@@ -127,7 +127,7 @@ def on_a_terminal(*words: str, interrupt: str = "") -> tuple[int, str]:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
-def test_a_long_motion_shows_progress_and_ctrl_c_says_that_the_arm_rests() -> None:
+def test_a_long_motion_shows_progress_and_ctrl_c_reports_that_the_arm_rests() -> None:
     words = ("move", "ptp", "160", "0", "0", "-90", "0", "60", "0", "--deg", "--speed", "0.1")
     code, seen = on_a_terminal(
         *words, "--target", f"sim://iiwa14?speed={FASTER:g}", interrupt=r"\d+%, [\d.]+ s left"

@@ -324,7 +324,7 @@ def test_moveit_servo_is_started_with_its_configuration(monkeypatch: pytest.Monk
     assert is_streamed(window, 100.0)
 
 
-@pytest.mark.parametrize("path", sorted(ROOT.glob("ros[12]/**/launch/*")), ids=lambda path: path.name)
+@pytest.mark.parametrize("path", sorted(ROOT.glob("ros[12]/**/launch/*.*")), ids=lambda path: path.name)
 def test_every_launch_file_can_be_read(path: Path) -> None:
     if path.suffix == ".py":
         tree = ast.parse(path.read_text())

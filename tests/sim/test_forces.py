@@ -30,7 +30,7 @@ def test_a_push_shows_in_the_joints_and_in_the_wrench(force: tuple[float, float,
     wanted = jacobian(plant.robot, state.q)[:3].T @ np.array(force)
     assert state.tau_ext == pytest.approx(wanted, abs=0.02 * float(np.linalg.norm(wanted)))
     assert state.wrench[:3] == pytest.approx(force, abs=0.02 * float(np.linalg.norm(force)))
-    assert np.abs(state.q - state.q_cmd).max() < 2e-4, "position control holds against a push"
+    assert np.abs(state.q - state.q_cmd).max() < 1e-3, "position control holds against a push"
     plant.apply_wrench((0.0, 0.0, 0.0))
     plant.step(600)
     assert np.abs(plant.snapshot.tau_ext).max() < 1e-9

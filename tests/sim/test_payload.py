@@ -53,7 +53,7 @@ def test_a_load_that_was_not_declared_is_an_external_force() -> None:
     seen = plant.snapshot
     assert np.allclose(seen.wrench, weight(plant, LOAD), atol=0.05)
     assert np.abs(seen.tau_ext).max() > 10.0
-    assert np.abs(seen.q - np.array(READY)).max() < 1e-4  # position control holds it all the same
+    assert np.abs(seen.q - np.array(READY)).max() < 2e-3  # position control holds it all the same
 
 
 def test_declaring_it_takes_the_force_away() -> None:

@@ -152,7 +152,7 @@ def test_brakes_hold_a_compliant_arm_against_a_push() -> None:
     plant.apply_wrench((0.0, 60.0, 0.0))
     plant.step(500)
     state = plant.snapshot
-    assert np.abs(state.q - before).max() < 2e-3 and np.abs(state.tau_cmd).max() == 0.0
+    assert np.abs(state.q - before).max() < 5e-3 and np.abs(state.tau_cmd).max() == 0.0
     assert state.wrench[1] == pytest.approx(60.0, abs=1.0)  # and the sensors still measure it
     plant.apply_wrench((0.0, 0.0, 0.0))
     plant.safety.withdraw()

@@ -24,7 +24,7 @@ from tests.bad_values import HOME, HUGE, POSE, REPORTS, Call, made_by, methods_o
 
 MODULES = (heptarm, heptarm.fri, heptarm.when, heptarm.modes, heptarm.do, heptarm.model)
 #: Made with a running process or a connection; tests/arm/test_bad_values.py has these.
-CONNECTED = ("connect", "target_from_env", "Client", "Recorder")
+CONNECTED = ("connect", "target_from_env", "Client", "Recorder", "TwoSignalGripper")
 #: Values whose methods are called, by the name in a report.
 OBJECTS: dict[str, object] = {
     "Pose": POSE,
@@ -36,6 +36,7 @@ OBJECTS: dict[str, object] = {
     "Tool": heptarm.Tool("t", frames={"tip": POSE}),
     "Trajectory": bad_values.BY_ANNOTATION["Trajectory"],
     "CollisionGuard": heptarm.CollisionGuard.of(20.0),
+    "CollisionModel": heptarm.CollisionModel("iiwa14", scene="table"),
     "CartesianImpedance": CartesianImpedance(),
     "timed": SineImpedance(),
     "force": force,

@@ -34,7 +34,7 @@ from heptarm.skills import collision_guard as guarding
 from heptarm.skills import replay as replaying
 from heptarm.skills import teaching
 from heptarm.skills import touch as touching
-from heptarm.values.arrays import callback, instance, integer, within, word
+from heptarm.values.arrays import callback, instance, integer, shown, within, word
 from heptarm.values.clearance import CollisionCheck
 from heptarm.values.condition.condition import Condition, check_condition
 from heptarm.values.condition.reaction import Reaction, check_reaction
@@ -383,12 +383,13 @@ class Arm:
 
     @collision_check.setter
     def collision_check(self, value: CollisionCheck | None) -> None:
-        if value is not None:
-            if not callable(getattr(value, "first_on", None)):
-                raise ShapeError(
-                    f"collision_check must have a method first_on, as ha.CollisionModel has, got {type(value).__name__}",
-                    parameter="collision_check",
-                )
+        if value is not None and not callable(getattr(value, "first_on", None)):
+            raise ShapeError(
+                f"collision_check must have a method first_on, got {shown(value)}",
+                parameter="collision_check",
+                value=value,
+                hint='for example heptarm.CollisionModel("iiwa14", scene="table")',
+            )
         self._foresight.check = value
 
     def move(

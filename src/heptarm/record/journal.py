@@ -51,11 +51,14 @@ class JournalEntry:
             return f"motion {self.id}: {describe(self.content)}"
         if self.kind == REQUEST and self.id:
             return f"{self.name} {self.id}"
-        text = data.pop("text", "") if isinstance(data, dict) else ""
+        text = data.pop("text", "")
+        hidden = ("type", "code", "q") if not data.get("code") else ("type", "q")
         said = ", ".join(
-            f"{name} {_short(value)}" for name, value in data.items() if not isinstance(value, dict)
+            f"{name} {_short(value)}"
+            for name, value in data.items()
+            if name not in hidden and value is not None and not isinstance(value, dict)
         )
-        return f"{self.name}: {text or said}"[:500]
+        return f"{self.name}: {', '.join(part for part in (said, text) if part)}"[:500]
 
     @property
     def level(self) -> str:
@@ -130,9 +133,9 @@ class Journal:
         self._queues: tuple[deque[JournalEntry], ...] = ()
         self.sessions: tuple[Reader, ...] = ()
 
-    def add(self, kind: str, content: Any, number: int = 0) -> None:
-        """Add an entry; costs a microsecond, blocks never."""
-        entry = JournalEntry(self._clock(), kind, content, number)
+    def add(self, kind: str, content: Any, number: int = 0, *, at: int | None = None) -> None:
+        """Add an entry of a time of our clock [ns], None: now; costs a microsecond, blocks never."""
+        entry = JournalEntry(self._clock() if at is None else at, kind, content, number)
         self._kept.append(entry)
         for queue in self._queues:
             queue.append(entry)

@@ -245,7 +245,7 @@ def _draw_signal(
         f"{quantity.title}\n{'[fraction of limit]' if by_limit else f'[{quantity.unit}]'}", fontsize=8
     )
     if has_legend and len(names) > 1:
-        axes.legend(ncols=len(names), loc="upper right", frameon=False, fontsize=7)
+        axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize=7)
     axes.set_xlabel("time [s]", fontsize=8)
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)
@@ -284,7 +284,14 @@ def _draw_bands(axes: Axes, recording: Recording, *, is_first: bool) -> None:
         if is_first:
             middle = (one.begin + until) / 2
             axes.text(
-                middle, 1.02, one.text[:18], transform=top, fontsize=7, ha="center", va="bottom", clip_on=True
+                middle,
+                1.02,
+                one.text[:18],
+                transform=top,
+                fontsize=7,
+                ha="center",
+                va="bottom",
+                clip_on=False,
             )
     for event in recording.events:
         if event.kind == "note" or event.kind == "error" or event.name in _MARKED:

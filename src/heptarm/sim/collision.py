@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError, require
-from heptarm.values.arrays import Array, array, shown, within
+from heptarm.values.arrays import Array, array, finite_entries, instance, numbers, shown, within
 from heptarm.values.clearance import Clearance, TouchOnPath
 from heptarm.values.pose import Pose, check_pose
 
@@ -58,6 +58,17 @@ class CollisionModel:
         margin: float = MARGIN,
         allowed: Iterable[tuple[str, str]] = (),
     ) -> None:
+        instance(robot, str, "robot")
+        instance(scene, str, "scene")
+        texts = [instance(text, str, "boxes") for text in _listed(boxes, "boxes")]
+        pairs = [tuple(_listed(pair, "allowed")) for pair in _listed(allowed, "allowed")]
+        if any(len(pair) != 2 or not all(isinstance(name, str) for name in pair) for pair in pairs):
+            raise ShapeError(
+                f"allowed must be pairs of names of bodies, got {shown(allowed)}",
+                parameter="allowed",
+                value=allowed,
+                hint='for example [("tool", "table")]',
+            )
         self._mujoco: Any = require("mujoco", extra="sim")
         from heptarm.sim.plant.gripper import driven_joints, has_gripper
         from heptarm.sim.plant.scene import PREFIX, Scene, plain
@@ -67,7 +78,7 @@ class CollisionModel:
         self._robot = known(robot)
         self._plain, self._prefix = plain, PREFIX
         try:
-            made: list[Box] = [Box.of(text) for text in boxes]
+            made: list[Box] = [Box.of(text) for text in texts]
             self._model = compiled(robot, made, Scene.of(scene) if scene else None)
         except ValueError as error:
             if isinstance(error, CommandRejected):
@@ -78,7 +89,7 @@ class CollisionModel:
             for joint in driven_joints(self._model):
                 self._data.qpos[self._model.jnt_qposadr[joint]] = self._model.jnt_range[joint, 1]
         self._margin = within(margin, "margin", 0.0, 0.1, unit="m")
-        self._allowed = {frozenset(pair) for pair in allowed}
+        self._allowed = {frozenset(pair) for pair in pairs}
         self._held: dict[
             int, tuple[Pose, int]
         ] = {}  # by body: its pose in the flange frame, its place in qpos
@@ -137,6 +148,7 @@ class CollisionModel:
 
     def _free(self, name: str) -> tuple[int, int]:
         """Index of a free body, and where its pose is in qpos."""
+        instance(name, str, "body")
         model, mujoco = self._model, self._mujoco
         free = {
             self._plain(model.body(int(model.jnt_bodyid[joint])).name): joint
@@ -198,8 +210,8 @@ class CollisionModel:
         Raises:
             ShapeError: no path.
         """
-        points = np.asarray(path, dtype=np.float64)
-        if points.ndim != 2 or points.shape[1] != 7 or not len(points) or not np.isfinite(points).all():
+        points = finite_entries(numbers(path, "path", "joint positions of shape (n, 7)"), "path")
+        if points.ndim != 2 or points.shape[1] != 7 or not len(points):
             raise ShapeError(
                 f"path must be joint positions of shape (n, 7), got shape {points.shape}",
                 parameter="path",
@@ -279,6 +291,17 @@ class CollisionModel:
 
 #: A pair that touches at the start of a path may get so much nearer, by rounding [m].
 _NEARER = 1e-4
+
+
+def _listed(values: object, name: str) -> list[Any]:
+    """The entries of what is a list, a tuple or another iterable, but no text.
+
+    Raises:
+        ShapeError: it is something else.
+    """
+    if isinstance(values, str | bytes) or not isinstance(values, Iterable):
+        raise ShapeError(f"{name} must be a list, got {shown(values)}", parameter=name, value=values)
+    return list(values)
 
 
 def _quaternion(mujoco: Any, matrix: Array) -> Array:

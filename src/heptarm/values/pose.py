@@ -23,6 +23,7 @@ from heptarm.values.arrays import (
     within,
     word,
 )
+from heptarm.values.text import fixed
 
 #: Whose axes an offset of a pose may refer to.
 _FRAMES = ("base", "tool")
@@ -327,11 +328,10 @@ class Pose(Value):
 
     def __str__(self) -> str:
         """One line: millimetres and degrees, and the same in SI units."""
-        a, b, c = np.degrees(self.abc)
-        x, y, z = (f"{v * 1e3 + 0.0:.1f}" for v in self.xyz)
-        si = " ".join(f"{v + 0.0:.4f}" for v in self.xyz)
-        quat = " ".join(f"{v + 0.0:.4f}" for v in self.quat)
-        return f"x {x}  y {y}  z {z} mm   a {a:.2f}  b {b:.2f}  c {c:.2f} deg   ({si} m, xyzw {quat})"
+        a, b, c = (fixed(v, 2) for v in np.degrees(self.abc))
+        x, y, z = (fixed(v * 1e3, 1) for v in self.xyz)
+        si, quat = (" ".join(fixed(v, 4) for v in one) for one in (self.xyz, self.quat))
+        return f"x {x}  y {y}  z {z} mm   a {a}  b {b}  c {c} deg   ({si} m, xyzw {quat})"
 
     def __repr__(self) -> str:
         """Short form in KUKA's notation, degrees."""

@@ -392,7 +392,7 @@ class Fri(Block):
     def _take_events(self) -> None:
         for event in self.client.events():
             self._events.append(event)
-            self._connection.journal.add(FRI, event.text)
+            self._connection.journal.add(FRI, event.text, at=event.at)
             if event.kind is Kind.CLIENT and event.text.startswith(LAW_FAILED):
                 self._law_error = self._law_error or event.text
 

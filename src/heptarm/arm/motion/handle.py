@@ -33,6 +33,7 @@ from heptarm.errors import (
     Starved,
     StreamError,
     Timeout,
+    without_java,
 )
 from heptarm.values.arrays import callback as check_callback
 from heptarm.values.arrays import integer, scalar, within
@@ -523,7 +524,7 @@ class MotionHandle:
         if result.cause in _GOOD:
             return None
         meaning = MEANINGS.get(message.code)
-        what = message.text or ("" if meaning is None else meaning.title)
+        what = without_java(message.text) or ("" if meaning is None else meaning.title)
         text = f"motion {message.id} {_ABORTED[result.cause]}{': ' + what if what else ''}"
         hint = "" if meaning is None else meaning.advice
         if result.cause is Cause.LOST:

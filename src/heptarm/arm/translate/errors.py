@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from heptarm import errors
-from heptarm.errors import CommandRejected, HeptarmError, NeedsOperator
+from heptarm.errors import CommandRejected, HeptarmError, NeedsOperator, without_java
 from heptarm.wire.codes import MEANINGS
 from heptarm.wire.messages import Goodbye, Refusal, Rejected
 
@@ -14,7 +14,7 @@ def error_of(
     """The error of a code, with the cabinet's text and the remedy from the table of codes."""
     meaning = MEANINGS.get(code)
     kind: type[HeptarmError] = CommandRejected if meaning is None else getattr(errors, meaning.error)
-    what = text or (meaning.title if meaning is not None else f"refused with code {code}")
+    what = without_java(text) or (meaning.title if meaning is not None else f"refused with code {code}")
     if parameter and value and value not in what:
         what += f": {parameter} is {value}"
     if allowed and allowed not in what:

@@ -172,6 +172,8 @@ class Record:
             self._layout.trouble.write(self._trouble)
 
 
+#: Largest count of states.
+_LARGEST_COUNT = 1 << 62
 #: Polling period for a state that is due [s].
 _POLL = 1e-4
 #: Longest time limit [s].
@@ -245,7 +247,7 @@ class Reader:
         Returns:
             The words, shape (n, 122); the count for the next call; how many states were overwritten before.
         """
-        return self._layout.states.since(count)
+        return self._layout.states.since(integer(count, "count", 0, _LARGEST_COUNT))
 
     def history(self, size: int | None = None) -> list[State]:
         """Get the last states, oldest first, without those that were overwritten in the meantime."""

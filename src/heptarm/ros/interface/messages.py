@@ -44,8 +44,8 @@ class RosAdapter:
         seconds: converts a time or a duration of a message to [s].
         duration: makes a duration of a message from [s].
         level: makes a level of a diagnostic message.
-        empty_stops: whether an empty trajectory on the topic stops the arm, as upstream's controller of ROS 1 does; that of
-            ROS 2 refuses it.
+        empty_stops: whether an empty trajectory on the topic stops the arm, as upstream's controller of ROS 1
+            does; that of ROS 2 refuses it.
     """
 
     joint_state: Any

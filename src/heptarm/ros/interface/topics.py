@@ -106,7 +106,7 @@ def command_lin(context: NodeContext, message: Any) -> None:
 
 
 def joint_trajectory(context: NodeContext, message: Any) -> None:
-    """Execute a trajectory_msgs/JointTrajectory, or follow a stream of them; in ROS 1 one without points stops the arm."""
+    """Execute a trajectory_msgs/JointTrajectory, or follow a stream; in ROS 1 one without points stops the arm."""
     if not message.points and context.ros.empty_stops:
         context.driver.end_trajectory()
         return

@@ -36,7 +36,8 @@ def joint_velocity(robot: RobotModel, q: Array, twist: Array, point: Array | Non
 
 def limited_twist(twist: Array, speed: float, turn_speed: float) -> Array:
     """Scale a twist down to a speed [m/s] and an angular speed [rad/s]; its direction stays."""
-    fraction = max(np.linalg.norm(twist[:3]) / speed, np.linalg.norm(twist[3:]) / turn_speed, 1.0)
+    linear, angular = float(np.linalg.norm(twist[:3])), float(np.linalg.norm(twist[3:]))
+    fraction = max(linear / speed, angular / turn_speed, 1.0)
     return np.asarray(twist / fraction)
 
 
@@ -50,7 +51,7 @@ def limited_velocity(robot: RobotModel, q: Array, dq: Array, speed: float) -> Ar
         speed: speed limit, a fraction of each axis' maximum.
 
     Returns:
-        A multiple of `dq`, so that the direction of the motion stays: the arm halts where a joint would leave its range.
+        A multiple of `dq`, so that the direction stays: the arm halts where a joint would leave its range.
     """
     left = np.where(dq > 0.0, robot.q_max - q, q - robot.q_min) - _MARGIN
     allowed = np.minimum(speed * robot.dq_max, np.sqrt(2.0 * _DECELERATION * np.maximum(left, 0.0)))

@@ -34,10 +34,19 @@ class TargetStream:
         arm: in control.
         timeout: the arm brakes if no target arrives for this time [s].
         options: speed and acceleration limits.
-        line_speed: along each axis of the base, on straight lines [m/s].
+        line_speed: along each axis of the base on straight lines, and of twists [m/s].
+        turn_speed: of twists [rad/s].
     """
 
-    def __init__(self, arm: Arm, *, timeout: float, options: ServoOptions, line_speed: float = 0.25) -> None:
+    def __init__(
+        self,
+        arm: Arm,
+        *,
+        timeout: float,
+        options: ServoOptions,
+        line_speed: float = 0.25,
+        turn_speed: float = 0.5,
+    ) -> None:
         self._arm = arm
         self._timeout = timeout
         self._options = options

@@ -30,6 +30,9 @@ from heptarm.ros.trajectory.trajectory import (
 from heptarm.values.arrays import Array, Value, frozen
 from heptarm.values.robot import RobotModel
 
+#: Largest acceleration to join a stream and to settle after it, a fraction of each axis' maximum.
+_STREAM_ACCELERATION = 0.5
+
 
 def _default_tolerances() -> TrajectoryTolerances:
     position, velocity = frozen(np.full(7, 0.01)), frozen(np.full(7, 0.02))
@@ -211,14 +214,15 @@ class TrajectoryRunner:
         here, settings = self._start_state(effective, state), self.settings
         q, dq = check_points(goal, self.names, self._robot, here=here, rules=settings.rules)
         times = np.array([point.time for point in goal.points])
+        acceleration = np.maximum(settings.deceleration, _STREAM_ACCELERATION * self._robot.ddq_max)
         if len(times) == 1:
             speed = None if dq is None else dq[0]
             trajectory = self._stream.add_point(
-                now, effective, here, float(times[0]), q[0], speed, settings.deceleration
+                now, effective, here, float(times[0]), q[0], speed, acceleration
             )
         else:
             late = 0.0 if goal.start is None else effective - goal.start
-            trajectory = self._stream.add_window(here, times - late, q, dq, settings.deceleration)
+            trajectory = self._stream.add_window(here, times - late, q, dq, acceleration)
         check_between_points(trajectory, self.names, self._robot, settings.rules)
         if self._active is None or not self._active.streamed:
             self._end(GoalOutcome.PREEMPTED, ErrorCode.INVALID_GOAL, "preempted by a stream of points")

@@ -23,7 +23,7 @@ _LONGEST_PERIOD, _LONGEST_WINDOW = 0.1, 0.5
 _LARGEST_DELAY = 0.5
 #: Least time to a point [s], several cycles of the execution, and the factor by which it grows until the acceleration
 #: to the point is small enough; longest time to it.
-_LEAST_HORIZON, _GROWTH, _LONGEST_HORIZON = 0.04, 1.25, 2.0
+_LEAST_HORIZON, _GROWTH, _LONGEST_HORIZON = 0.06, 1.25, 2.0
 #: The time to a point covers the longest recent gap between two messages with a margin, so that jitter does not show.
 _HISTORY, _MARGIN, _LONGEST_GAP = 1.0, 1.5, 0.15
 #: Largest distance from the arm to a point [rad]; the stream goes on while the motion that follows it opens.
@@ -155,7 +155,7 @@ class PointStream:
     def _settled(
         self, here: KinematicState, times: Array, q: Array, dq: Array, rest: Array, acceleration: Array
     ) -> JointTrajectory:
-        """From a state through points, then to rest; joints that would leave their range meanwhile stop at the last one."""
+        """From a state through points, then to rest; joints that would leave their range stop at the last point."""
         q, dq = np.vstack([here.q, q]), np.vstack([here.dq, dq])
         times = np.concatenate([[0.0], times])
         # a cubic from (q, v) back to (q, 0) within s starts with the acceleration 4 v / s and overshoots by 4 v s / 27
@@ -168,7 +168,7 @@ class PointStream:
         return JointTrajectory(times, q, dq, np.full(q.shape, np.nan))
 
     def _ahead(self, q: Array, place: Array, speed: Array, time: float) -> tuple[Array, Array]:
-        """Where the stream will be after a time [s], and its velocity; joints that would leave their range rest at q."""
+        """Place [rad] and velocity of the stream after a time [s]; joints that would leave their range rest at `q`."""
         there = place + speed * time
         inside = (there >= self._robot.q_min) & (there <= self._robot.q_max)
         return np.where(inside, there, q), np.where(inside, speed, 0.0)

@@ -159,9 +159,13 @@ class ToleranceMonitor:
                 return ToleranceVerdict(GoalOutcome.ABORTED, ErrorCode.PATH_TOLERANCE_VIOLATED, text)
         if overdue < 0.0:
             return None
-        # at an end that moves the arm passes, so it is compared with the trajectory at the time of the measurement
-        end = desired if self._end.dq.any() else self._end
-        violation = self._tolerances.goal.violation(self._names, end, q, dq)
+        violation = self._tolerances.goal.violation(self._names, self._end, q, dq)
+        if self._end.dq.any() and violation:
+            # the arm passes such an end, so it is compared with the trajectory at the time of the measurement; or it
+            # is late and rests there
+            ends = desired, KinematicState.at_rest(self._end.q)
+            if not all(self._tolerances.goal.violation(self._names, end, q, dq) for end in ends):
+                violation = ""
         if not violation:
             if moving:
                 return None

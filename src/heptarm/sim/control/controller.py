@@ -103,8 +103,8 @@ class ActiveLaw:
         return True
 
     def take_over(self, law: PositionLaw) -> None:
-        """Continue where the brakes have held the arm."""
-        self._law, self._frames = law.released(), None
+        """Continue with position control where the brakes have held the arm."""
+        self._law, self._frames = law, None
 
     def retune(self, mode: Mode) -> bool:
         """Change the parameters of the law in force; returns whether the mode is of its kind."""

@@ -116,9 +116,13 @@ class PositionLaw:
         """The law of closed brakes: they hold the motors where the present torques [Nm] have wound the joints."""
         return cls(torque - sensed.bias + sensed.passive, is_locked=True)
 
-    def released(self) -> PositionLaw:
-        """The law that continues without a step when the brakes open."""
-        return PositionLaw(self._preload)
+    def released(self, held: MeasuredState) -> PositionLaw:
+        """The law that takes over from closed brakes at the measured positions: without a step, then unwinding.
+
+        Args:
+            held: the measured state, with the positions where the brakes hold the motors as set-points.
+        """
+        return PositionLaw(self.torque(held) - held.bias + held.passive)
 
     def torque(self, sensed: MeasuredState) -> Array:
         """Torques of the motors, shape (7,) [Nm]."""

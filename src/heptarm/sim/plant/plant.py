@@ -370,8 +370,8 @@ class Plant:
         """Close the brakes when a stop has brought the arm to rest; open them when execution may continue."""
         if not self.safety.latched:
             if self._tripped and self._brakes is not None:  # the arm is where the brakes have stopped it
-                self._control.take_over(self._brakes)
-                self.interpolator.command.stay(self._braked.now)
+                self._control.take_over(self._brakes.released(self._braked))
+                self.interpolator.command.stay(self._q)
             if self._tripped and self._monitor is not None:
                 self._monitor.acknowledge(self._q)
             self._brakes, self._halted, self._tripped = None, 0, False

@@ -14,7 +14,6 @@ import gc
 import json
 import logging
 import os
-import re
 import signal
 import sys
 import threading
@@ -24,7 +23,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, cast, get_args, get_type_hints
 
-from heptarm.errors import HeptarmError
+from heptarm.errors import HeptarmError, without_java
 from heptarm.fri.protocol.version import Version
 from heptarm.io.keys import find_key
 from heptarm.sim.fri.sessions import Sessions
@@ -203,7 +202,9 @@ class VirtualCabinet:
         failure = str(self.host.failure() or "no reason given")
         if "Address already in use" in failure:
             failure = f"port {self.options.port} is in use by another program"
-        raise RuntimeError(f"the cabinet application did not start: {without_classes(failure)}")
+        raise RuntimeError(
+            f"the cabinet application did not start: {without_java(failure) or 'no reason given'}"
+        )
 
     def close(self) -> None:
         """Write the statistics for the last time, and what is left of the trace."""
@@ -291,14 +292,6 @@ def _operate(operator: SimulatedOperator, words: str) -> None:
     except ValueError as refused:
         error = str(refused)
     print(json.dumps({"operator": words, "error": error, "shown": shown}), flush=True)
-
-
-def without_classes(text: str) -> str:
-    """The text of a Java exception without the names of its classes."""
-    return (
-        re.sub(r"(?:\b[a-z]\w*\.)+[A-Z]\w*(?:Exception|Error)\b(?:: |$)", "", text).strip()
-        or "no reason given"
-    )
 
 
 def _announce(cabinet: VirtualCabinet, stopping: threading.Event, failed: list[str]) -> None:

@@ -55,8 +55,8 @@ class DrawnWorld:
         self._flange = server.scene.add_frame("/flange", axes_length=0.10, axes_radius=0.003)
 
     def _is_drawn(self, index: int) -> bool:
-        kind = self._model.geom_type[index]
-        endless = kind in (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
+        kind = int(self._model.geom_type[index])
+        endless = kind in (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
         return not endless and int(self._model.geom_group[index]) < _HIDDEN_GROUP
 
     def _shape(self, server: Any, index: int) -> Any:

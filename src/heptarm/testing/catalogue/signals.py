@@ -6,10 +6,14 @@ import threading
 
 from heptarm.arm.arm import Arm
 from heptarm.errors import HeptarmError
+from heptarm.skills.gripper import TwoSignalGripper
 from heptarm.testing.measure import holds, near, note
 from heptarm.testing.scenario import Risk, scenario
 
 _FLANGE = ("MediaFlange.OutputX3Pin1", "MediaFlange.OutputX3Pin11")
+#: Outputs that open and close a gripper, and the switches of its open and its closed end.
+_GRIPPER = ("MediaFlange.OutputX3Pin1", "MediaFlange.OutputX3Pin2")
+_SWITCHES = ("MediaFlange.InputX3Pin3", "MediaFlange.InputX3Pin4")
 _PATIENCE = 20.0
 
 
@@ -31,6 +35,34 @@ def outputs(arm: Arm) -> None:
         note(error.text)
     holds(arm.io[close] is False, "and nothing else was")
     arm.io.set({open_: False})
+
+
+@scenario(line=7, rows="I9", risk=Risk.STILL, operator=True, needs=("io",), signals=(*_GRIPPER, *_SWITCHES))
+def gripper(arm: Arm) -> None:
+    """A gripper behind two signals: its end switches confirm that it is open, and that it holds something."""
+    is_open, is_closed = _SWITCHES
+    arm.operator.set_signal(is_closed, False)
+    arm.operator.set_signal(is_open, True)
+    hand = TwoSignalGripper(
+        arm, open=_GRIPPER[0], close=_GRIPPER[1], is_open=is_open, is_closed=is_closed, settle=0.3
+    )
+    hand.open()
+    holds(hand.is_open and not hand.holds_something, "it is open")
+
+    def follow() -> None:
+        """Leave the open end once the valve is switched, as the fingers do."""
+        arm.io.wait(_GRIPPER[1], timeout=_PATIENCE)
+        arm.operator.set_signal(is_open, False)
+
+    fingers = threading.Thread(target=follow, daemon=True)
+    fingers.start()
+    hand.close()
+    fingers.join()
+    holds(hand.holds_something, "it is closed on something: neither switch is on")
+    arm.operator.set_signal(is_open, True)
+    hand.open()
+    arm.io.set(dict.fromkeys(_GRIPPER, False))
+    arm.operator.set_signal(is_open, False)
 
 
 @scenario(line=7, rows="J4 J5", risk=Risk.STILL, operator=True, needs=("io",),

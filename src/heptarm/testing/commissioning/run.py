@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from heptarm.arm.arm import Arm
-from heptarm.errors import CommandRejected, HeptarmError, ModeConflict, NotReady
+from heptarm.errors import CommandRejected, ConnectionLost, HeptarmError, ModeConflict, NotReady
 from heptarm.testing.commissioning.person import PATIENCE, PROVES, PersonTask, Person
 from heptarm.testing.commissioning.report import Agreement, CommissioningReport, StepOutcome
 from heptarm.testing.commissioning.step import STEPS, CommissioningStep
@@ -118,9 +118,9 @@ def check_mode(arm: Arm) -> None:
     mode = arm.state.safety.mode
     if mode is not OperationMode.T1:
         raise ModeConflict(
-            f"operation mode must be T1 for the commissioning run, got {mode.value}",
+            f"operation mode must be T1 for the commissioning run, got {mode.name}",
             parameter="mode",
-            value=mode.value,
+            value=mode.name,
             allowed="T1",
             hint="turn the key switch of the smartPAD to T1; at the terminal of `heptarm sim`, type t1 and enable",
         )
@@ -130,6 +130,8 @@ def _try(one: CommissioningStep, arm: Arm, person: Person) -> StepOutcome:
     lacks = [name for name in one.needs if name not in arm.capabilities]
     if lacks:
         return StepOutcome(one, Agreement.SKIPPED, text=f"this cabinet lacks {', '.join(lacks)}")
+    if not arm.connected:
+        arm.reconnect()
     if one.movement is not None:
         check_mode(arm)  # its error ends the run: nobody turns the key switch by accident
     try:
@@ -144,6 +146,8 @@ def _try(one: CommissioningStep, arm: Arm, person: Person) -> StepOutcome:
         return StepOutcome(one, Agreement.SKIPPED, text=text)
     except NotReady as error:
         return StepOutcome(one, Agreement.SKIPPED, text=f"the robot is not ready: {error}")
+    except ConnectionLost as error:  # the cabinet has stopped the arm; this settles nothing
+        return StepOutcome(one, Agreement.SKIPPED, text=f"the connection was lost: {error}")
     except HeptarmError as error:
         return StepOutcome(one, Agreement.DIFFERS, text=f"{type(error).__name__}: {error}")
     agrees = all(comparison.agrees for comparison in comparisons)

@@ -32,6 +32,14 @@ class Spiral(Value):
     pitch: float = PITCH
     speed_mps: float = SPEED
 
+    def __post_init__(self) -> None:
+        radius = within(self.radius, "radius", 0.0, _WIDEST, above=True, unit="m")
+        narrowest = 2.0 * pi * radius / (_STEP * _MOST_POINTS)
+        object.__setattr__(self, "radius", radius)
+        object.__setattr__(self, "pitch", within(self.pitch, "pitch", narrowest, radius, unit="m"))
+        speed = within(self.speed_mps, "speed_mps", 0.0, _FASTEST, above=True, unit="m/s")
+        object.__setattr__(self, "speed_mps", speed)
+
     @property
     def length(self) -> float:
         """Length of its path [m], without the small part along the radius."""
@@ -60,13 +68,7 @@ def spiral(radius: float, *, pitch: float = PITCH, speed_mps: float = SPEED) -> 
     Raises:
         LimitError: a value outside its range, or more turns than a motion can have.
     """
-    radius = within(radius, "radius", 0.0, _WIDEST, above=True, unit="m")
-    narrowest = 2.0 * pi * radius / (_STEP * _MOST_POINTS)
-    return Spiral(
-        radius,
-        within(pitch, "pitch", narrowest, radius, unit="m"),
-        within(speed_mps, "speed_mps", 0.0, _FASTEST, above=True, unit="m/s"),
-    )
+    return Spiral(radius, pitch, speed_mps)
 
 
 def _at(angle: float, pitch: float) -> tuple[float, float]:

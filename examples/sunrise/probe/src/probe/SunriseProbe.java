@@ -122,16 +122,23 @@ public class SunriseProbe extends RoboticsAPIApplication {
     }
 
     private void time() {
-        long began = System.nanoTime();
+        long[] joints = new long[CALLS];
+        long[] forces = new long[CALLS];
         for (int i = 0; i < CALLS; i++) {
+            long began = System.nanoTime();
             lbr.getCurrentJointPosition();
-        }
-        facts.put("read_joints_ms", milliseconds((System.nanoTime() - began) / CALLS));
-        began = System.nanoTime();
-        for (int i = 0; i < CALLS; i++) {
+            long between = System.nanoTime();
             lbr.getExternalForceTorque(lbr.getFlange());
+            joints[i] = between - began;
+            forces[i] = System.nanoTime() - between;
         }
-        facts.put("read_force_ms", milliseconds((System.nanoTime() - began) / CALLS));
+        facts.put("read_joints_ms", median(joints));
+        facts.put("read_force_ms", median(forces));
+    }
+
+    private static String median(long[] nanos) {
+        Arrays.sort(nanos);
+        return milliseconds(nanos[nanos.length / 2]);
     }
 
     private void holdForNoTime() {

@@ -52,9 +52,9 @@ final class BreakReactions {
         this.log = log;
     }
 
-    /** A record of an item that a break condition may end. */
-    ContactLog record(Item item) {
-        return new ContactLog(sensors, clock, log, item.reaction instanceof Retreat ? (Retreat) item.reaction : null);
+    /** A record of an item, or of items that run as one batch, that a break condition may end. */
+    ContactLog record(int first, Item item) {
+        return new ContactLog(sensors, clock, log, first, item.reaction instanceof Retreat ? (Retreat) item.reaction : null);
     }
 
     /** Reacts if the condition of an item has ended the program; returns when the arm rests. */

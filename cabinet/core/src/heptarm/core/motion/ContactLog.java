@@ -29,18 +29,23 @@ final class ContactLog {
     /** Length of the retreat [m]; 0: none. */
     private final double distance;
     private final List<Point> passed = new ArrayList<Point>();
+    /** Index of the first item that it records, and the cabinet time of its start [ns]; what was passed before does not count. */
+    private final int first;
+    private volatile long began = Long.MAX_VALUE;
     private boolean isTouching;
     private boolean hasFailed;
     private long due;
     private double peak = Double.NaN;
     private double rest = Double.NaN;
 
-    /** Commanded joints [rad] and commanded position of the motion frame [m]. */
+    /** Commanded joints [rad] and commanded position of the motion frame [m] at a cabinet time [ns]. */
     private static final class Point {
+        final long time;
         final double[] q;
         final double[] xyz;
 
-        Point(double[] q, double[] xyz) {
+        Point(long time, double[] q, double[] xyz) {
+            this.time = time;
             this.q = q;
             this.xyz = xyz;
         }
@@ -63,12 +68,21 @@ final class ContactLog {
     }
 
     /** Retreat: the reaction for which the passed joints are recorded; null: none. */
-    ContactLog(Sensors sensors, Clock clock, Log log, Retreat retreat) {
+    ContactLog(Sensors sensors, Clock clock, Log log, int first, Retreat retreat) {
         this.sensors = sensors;
         this.clock = clock;
         this.log = log;
+        this.first = first;
         distance = retreat == null ? 0.0 : retreat.distance;
         due = clock.nanos();
+        recordJoints(); // an arm that already moves has another start
+    }
+
+    /** An item has started. Any thread. */
+    void started(int item) {
+        if (item >= first) {
+            began = Math.min(began, clock.nanos());
+        }
     }
 
     /** Whether there is something to record now and then. */
@@ -135,14 +149,18 @@ final class ContactLog {
             return null;
         }
         Point here = passed.get(passed.size() - 1);
-        for (int i = passed.size() - 2; i >= 0; i--) {
+        int start = passed.size() - 1;
+        while (start > 0 && passed.get(start).time > began) {
+            start--;
+        }
+        for (int i = passed.size() - 2; i >= start; i--) {
             double far = here.distance(passed.get(i));
             if (far >= distance) {
                 double near = here.distance(passed.get(i + 1));
                 return between(passed.get(i + 1).q, passed.get(i).q, (distance - near) / Math.max(far - near, 1e-12));
             }
         }
-        return passed.get(0).q;
+        return passed.get(start).q;
     }
 
     private static double[] between(double[] from, double[] to, double fraction) {
@@ -159,7 +177,7 @@ final class ContactLog {
         }
         clock.hold(clock.nanos());
         try {
-            Point here = new Point(sensors.readJoints(clock.stamp()).q_cmd, sensors.readPose(clock.stamp()).xyz_cmd);
+            Point here = new Point(clock.stamp(), sensors.readJoints(clock.stamp()).q_cmd, sensors.readPose(clock.stamp()).xyz_cmd);
             Point last = passed.isEmpty() ? null : passed.get(passed.size() - 1);
             if (last == null || here.distance(last) > RESOLUTION * distance || here.turn(last) > TURN) {
                 passed.add(here);

@@ -347,7 +347,7 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
             }
             int together = BlendedBatches.length(program.run.items, i);
             Item last = program.run.items[i + together - 1];
-            program.contact = last.until.nodes.length > 0 ? reactions.record(last) : null;
+            program.contact = last.until.nodes.length > 0 ? reactions.record(i, last) : null;
             if (together > 1) {
                 start(program, i, together);
                 i += together - 1;

@@ -266,6 +266,10 @@ final class Program {
         return new MotionJob.Listener() {
             public void started() {
                 moved = true;
+                ContactLog record = contact;
+                if (record != null) {
+                    record.started(index);
+                }
                 boolean isOver; // it was handed over while the program ended, and is cancelled at once
                 synchronized (Program.this) {
                     isOver = cause != null;

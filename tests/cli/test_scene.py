@@ -1,0 +1,110 @@
+"""`heptarm sim --scene`, and the view that draws the scene and its moving bodies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import heptarm as ha
+from heptarm.sim.plant.plant import Plant
+from heptarm.sim.plant.scene import Scene
+from heptarm.sim.plant.shared_state import PositionsFile
+from tests.cli.running import run, sim
+
+pytest.importorskip("trimesh")
+
+
+@dataclass
+class Drawing:
+    """A shape or frame, as viser has it."""
+
+    vertices: Any = None
+    color: tuple[int, ...] = ()
+    position: Any = None
+    wxyz: Any = None
+
+
+@dataclass
+class Canvas:
+    """A viser server that draws nothing: its scene is itself."""
+
+    shapes: dict[str, Drawing] = field(default_factory=dict)
+
+    @property
+    def scene(self) -> Canvas:
+        return self
+
+    def add_grid(self, name: str, **_: object) -> None: ...
+
+    def add_frame(self, name: str, **_: object) -> Drawing:
+        return Drawing()
+
+    def add_mesh_simple(self, name: str, vertices: Any, faces: Any, *, color: tuple[int, ...]) -> Drawing:
+        assert faces.max() < len(vertices)
+        self.shapes[name] = Drawing(vertices, color)
+        return self.shapes[name]
+
+
+def test_every_shape_of_arm_and_scene_is_drawn_and_moves_with_its_body(tmp_path: Path) -> None:
+    from heptarm.sim.runtime.view import DrawnWorld
+
+    plant = Plant(q=(0.0, 0.4, 0.0, -1.5, 0.0, 1.1, 0.0), scene=Scene.of("table"))
+    file, canvas = tmp_path / "positions", Canvas()
+    world = DrawnWorld(canvas, "iiwa14", Scene.of("table"), file)
+    model = plant.model
+    assert len(canvas.shapes) == model.ngeom - 1  # all but the floor
+    index = model.geom("scene/cube").id
+    cube = canvas.shapes[f"/world/{index}"]
+    assert np.ptp(cube.vertices, axis=0) == pytest.approx((0.04, 0.04, 0.04))
+    assert cube.color[0] > 2 * cube.color[1]  # red
+    q = np.array((0.0, 0.4, 0.0, -1.5, 0.0, 1.1, 0.0))
+    world.show(q)
+    assert cube.position == pytest.approx((0.55, 0.0, 0.22), abs=1e-3)  # as in the file of the scene
+    plant.data.qpos[model.jnt_qposadr[model.body("scene/cube").jntadr[0]] + 2] = 0.5
+    PositionsFile(file, model.nq).write(plant.data.qpos)
+    world.show(q)
+    assert cube.position == pytest.approx((0.55, 0.0, 0.5), abs=1e-3)
+    pad = canvas.shapes[f"/world/{model.geom('scene/left_pad').id}"]
+    assert abs(float(pad.position[1])) > 0.04  # the simulator's gripper is open
+
+
+def test_shapes_of_every_kind_are_drawn(tmp_path: Path) -> None:
+    from heptarm.sim.runtime.view import DrawnWorld
+
+    file = tmp_path / "shapes.xml"
+    file.write_text(
+        """<mujoco><asset><mesh name="wedge" vertex="0 0 0  1 0 0  0 1 0  0 0 1"/></asset><worldbody>
+        <geom type="sphere" size="0.1"/><geom type="ellipsoid" size="0.1 0.2 0.3"/><geom type="capsule" size="0.1 0.2"/>
+        <geom type="cylinder" size="0.1 0.2"/><geom type="mesh" mesh="wedge"/><geom type="plane" size="1 1 1"/>
+        <geom type="box" size="0.1 0.2 0.3" group="3"/></worldbody></mujoco>"""
+    )
+    bare, canvas = Canvas(), Canvas()
+    DrawnWorld(bare, "iiwa14")
+    DrawnWorld(canvas, "iiwa14", Scene.of(str(file))).show(np.zeros(7))
+    assert len(canvas.shapes) == len(bare.shapes) + 5
+    mesh = [one for one in canvas.shapes.values() if len(one.vertices) == 4]
+    assert len(mesh) == 1 and np.ptp(mesh[0].vertices, axis=0).max() > 1.0  # in its principal axes
+    sizes = {tuple(np.ptp(one.vertices, axis=0).round(2).tolist()) for one in canvas.shapes.values()}
+    assert {(0.2, 0.2, 0.2), (0.2, 0.4, 0.6), (0.2, 0.2, 0.6), (0.2, 0.2, 0.4)} <= sizes
+
+
+def test_a_virtual_cabinet_with_a_scene_serves_its_clients() -> None:
+    with sim("--scene", "table") as ready, ha.connect(ready["target"], watchdog=5.0, timeout=30.0) as arm:
+        arm.io["InputX3Pin3"]
+        arm.io.wait("InputX3Pin3", timeout=30.0)  # the gripper is open
+
+
+@pytest.mark.parametrize(
+    ("options", "because"),
+    [
+        (("--scene", "nowhere"), "one of bins, peg-in-hole, table"),
+        (("--scene", "table", "--fri", "1.15"), "--scene cannot be used with --fri"),
+    ],
+)
+def test_a_scene_that_cannot_be_is_refused(options: tuple[str, ...], because: str) -> None:
+    done = run("sim", "--port", "0", *options)
+    assert done.returncode != 0 and because in done.stderr
