@@ -106,6 +106,13 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "Arm.touch_twice": {"distance": 0.01, "force": 5.0},
     "connect": {"target": "127.0.0.1:9"},
     "CollisionModel": {"robot": "iiwa14"},
+    **{f"{verb}_batch": {"q": np.array([HOME, HOME + 0.1])} for verb in ("forward", "jacobian", "redundancy")},
+    "solve_batch": {
+        "poses": np.eye(4)[None] + np.array([[0, 0, 0, 0.5], [0, 0, 0, 0], [0, 0, 0, 0.5], [0, 0, 0, 0]]),
+        "e1": (0.1,),
+        "status": (2,),
+        "near": np.array([HOME]),
+    },
     "CollisionModel.first_on": {"path": (HOME, HOME)},
     **{f"CollisionModel.{verb}": {"body": "cube"} for verb in ("place", "hold", "release")},
     "spiral": {"radius": 0.003},
@@ -122,7 +129,7 @@ RECORDING = heptarm.Recording(
     Path("run.mcap"), {"robot": "iiwa14"}, {"t": np.arange(3.0), "q": np.zeros((3, 7))}, (), (), True
 )
 #: Functions that only heptarm itself calls.
-INTERNAL = ("Output.on", "Params", "Params.replace", "Stats.of")
+INTERNAL = ("Output.on", "Params", "Params.replace", "RedundancyBatch", "Stats.of")
 _OPEN = "NaN keeps the default"
 _FREE = "infinite: no limit"
 #: Values with a documented meaning that their type does not show: function or parameter, the bad value, the meaning.

@@ -115,10 +115,10 @@ class DatagramRelay:
         self._up = _bound(0)
         self._up.connect(("127.0.0.1", relay.cabinet))
         self._closed = False
-        ways: list[tuple[Direction, socket.socket]] = [("up", self._down), ("down", self._up)]
+        ends: list[tuple[Direction, socket.socket]] = [("up", self._down), ("down", self._up)]
         self._threads = [
             threading.Thread(target=self._pass, args=(direction, source), name="datagram relay")
-            for direction, source in ways
+            for direction, source in ends
         ]
         for thread in self._threads:
             thread.start()

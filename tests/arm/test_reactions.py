@@ -90,10 +90,10 @@ def test_it_retreats_along_joints_too(arm: ha.Arm) -> None:
 
 
 def test_a_compliant_motion_reacts_as_well(arm: ha.Arm) -> None:
-    soft = CartesianImpedance(stiffness=(3000, 3000, 3000, 200, 200, 200))
-    assert press(arm, "relax", mode=soft).rest_force < 10.0
+    compliant = CartesianImpedance(stiffness=(3000, 3000, 3000, 200, 200, 200))
+    assert press(arm, "relax", mode=compliant).rest_force < 10.0
     arm.move(ha.lin_rel(z=0.02, frame="base", speed_mps=0.1))
-    assert press(arm, ha.Retreat(0.02), mode=soft).rest_force < 2.0
+    assert press(arm, ha.Retreat(0.02), mode=compliant).rest_force < 2.0
 
 
 def test_what_follows_starts_from_where_it_has_reacted(arm: ha.Arm) -> None:

@@ -27,14 +27,14 @@ from tests.conformance.client import Client, ReceivedFeedback
 
 
 def consistent(
-    told: list[ReceivedFeedback], wanted: TrajectoryGoal, here: Array, joints: tuple[str, ...]
+    reported: list[ReceivedFeedback], wanted: TrajectoryGoal, here: Array, joints: tuple[str, ...]
 ) -> None:
     """All numbers of a message belong to one instant of a trajectory of positions only."""
     times = np.array([0.0, *(one.time for one in wanted.points)])
     order = [wanted.joints.index(joint) for joint in joints]
     path = np.vstack([here, *(np.array(one.q)[order] for one in wanted.points)])
-    assert told
-    for one in told:
+    assert reported
+    for one in reported:
         there = np.array([np.interp(one.time, times, path[:, joint]) for joint in range(7)])
         # messages have whole nanoseconds; the arm starts from its set-point
         np.testing.assert_allclose(one.desired.q, there, atol=2e-3)
@@ -57,11 +57,11 @@ def times_and_indices_of_feedback_never_fall(client: Client) -> None:
     here = rests(client)
     path = swing(client)
     wanted = goal(client, *(point(0.15 * k, here + 0.2 * k * path) for k in range(1, 6)))
-    told = client.feedback(succeeds(client, wanted))
-    for a, b in itertools.pairwise(told):
+    reported = client.feedback(succeeds(client, wanted))
+    for a, b in itertools.pairwise(reported):
         assert a.time <= b.time and a.elapsed <= b.elapsed
         assert a.index is None or b.index is None or a.index <= b.index
-    assert all(0.0 <= one.time <= wanted.points[-1].time + 60.0 for one in told)
+    assert all(0.0 <= one.time <= wanted.points[-1].time + 60.0 for one in reported)
 
 
 @case
@@ -88,8 +88,8 @@ def feedback_begins_before_the_first_point_and_ends_after_the_last(client: Clien
 
 @case
 def at_full_speed_both_times_are_equal(client: Client) -> None:
-    told = client.feedback(succeeds(client, step(client, time=1.0)))
-    for one in told:
+    reported = client.feedback(succeeds(client, step(client, time=1.0)))
+    for one in reported:
         if one.time < 1.0 - 1e-6:  # a spline has speeds and no times
             assert abs(one.time - one.elapsed) < (1e-6 if client.timely else 0.4), one
 

@@ -1,4 +1,4 @@
-"""The documentation's site: it builds, its links lead somewhere, and every page fits a desktop and a phone."""
+"""The documentation's site: it builds, its links have targets, and every page fits a desktop and a phone."""
 
 from __future__ import annotations
 

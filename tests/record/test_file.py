@@ -141,7 +141,7 @@ def _parsed(name: str, descriptors: bytes, data: bytes) -> Any:
     return message_factory.GetMessageClass(pool.FindMessageTypeByName(name)).FromString(data)
 
 
-def test_a_row_has_the_size_that_its_layout_says() -> None:
+def test_a_row_has_the_size_that_its_layout_has() -> None:
     message = _parsed(STATE.full_name, STATE.descriptor, STATE.rows(1).tobytes())
     assert len(message.ListFields()) >= sum(one.size > 1 for one in STATE.fields)
 

@@ -1,4 +1,4 @@
-"""Streams: what belongs to one, and what becomes of points that cannot be followed."""
+"""Streams: what belongs to one, and the end of points that cannot be followed."""
 
 from __future__ import annotations
 

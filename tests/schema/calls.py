@@ -79,6 +79,10 @@ def _until(make: Callable[[Any], Any]) -> Callable[[Arm, Any], object]:
     return lambda arm, value: arm.start(ha.hold(1.0), until=make(value))
 
 
+def _then(make: Callable[[Any], Any]) -> Callable[[Arm, Any], object]:
+    return lambda arm, value: arm.start(ha.hold(1.0), until=force > 5, then=make(value))
+
+
 def _fri(**settings: Any) -> Callable[[Arm, Any], object]:
     def do(arm: Arm, value: Any) -> object:
         given = {name: value if one is ... else one for name, one in settings.items()}
@@ -212,6 +216,8 @@ CALLS: dict[str, Call] = {
     "JointTorqueOutside.joint": Call(_until(lambda v: torque[v] > 5), "joint"),
     "JointTorqueOutside.low": Call(_until(lambda v: torque[3].outside(v, 5.0)), "low"),
     "JointTorqueOutside.high": Call(_until(lambda v: torque[3].outside(-5.0, v)), "high"),
+    "Retreat.distance": Call(_then(lambda v: ha.Retreat(v)), "distance"),
+    "Retreat.speed": Call(_then(lambda v: ha.Retreat(0.01, v)), "speed"),
     "SignalIs.signal": Call(_until(lambda v: io[v]), "signal"),
     "SignalOutside.signal": Call(_until(lambda v: io[v] > 5), "signal"),
     "SignalOutside.low": Call(_until(lambda v: io["MediaFlange.UserButton"].outside(v, 5.0)), "low"),

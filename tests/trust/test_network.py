@@ -92,7 +92,7 @@ def test_a_cut_of_everything_stops_the_arm(network: BadNetwork, cabinet: Cabinet
         follows(servo, 5.0)
 
 
-def test_doctor_tells_whether_datagrams_get_through(network: BadNetwork, arm: ha.Arm) -> None:
+def test_doctor_reports_whether_datagrams_get_through(network: BadNetwork, arm: ha.Arm) -> None:
     assert datagram_check(arm).how == "ok"
     network.impairment = Impairment(cut=frozenset(["udp"]))
     time.sleep(1.2)  # the last answer is older than a second

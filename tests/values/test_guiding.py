@@ -104,7 +104,7 @@ def test_a_spline_goes_through_points_of_it() -> None:
 
 def test_files(tmp_path: Path) -> None:
     whole = taught()
-    file = whole.save(tmp_path / "travel")
+    file = whole.save(tmp_path / "path")
     assert file.name == "path.npz" and ha.Trajectory.load(file) == whole
     other = tmp_path / "other.npz"
     np.savez(other, format="something", times=whole.times, q=whole.q, robot="")

@@ -301,7 +301,7 @@ def solve_batch(
     count = len(given)
     hints = None
     if near is not None:
-        hints = np.asarray(near)
+        hints = numbers(near, "near", f"numbers of shape (7,) or ({count}, 7)")
         hints = _rows(hints[None] if hints.ndim == 1 else hints, (7,), "near")
         if len(hints) not in (1, count):
             raise ShapeError(

@@ -278,7 +278,7 @@ class Driver:
         return self._execution.cancel(number)
 
     def end_trajectory(self) -> None:
-        """Cancel the active goal, whoever sent it; without one stop what moves the arm."""
+        """Cancel the active goal of any client; without one stop what moves the arm."""
         if not self._execution.cancel(self._execution.goal):
             self.stop()
 

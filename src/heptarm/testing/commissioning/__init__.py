@@ -5,13 +5,12 @@ move, compares what it measures with what the virtual cabinet has, and ends as "
 `heptarm check --commission` runs the steps and writes the report; `commission` does the same in a program.
 """
 
-from heptarm.testing.commissioning.person import PersonTask, AskedPerson, Person, SimulatedPerson
+from heptarm.testing.commissioning.person import AskedPerson, Person, PersonTask, SimulatedPerson
 from heptarm.testing.commissioning.report import Agreement, CommissioningReport, StepOutcome
 from heptarm.testing.commissioning.run import commission, find_steps, steps
 from heptarm.testing.commissioning.step import CommissioningStep, Comparison, Movement
 
 __all__ = [
-    "PersonTask",
     "Agreement",
     "AskedPerson",
     "CommissioningReport",
@@ -19,6 +18,7 @@ __all__ = [
     "Comparison",
     "Movement",
     "Person",
+    "PersonTask",
     "SimulatedPerson",
     "StepOutcome",
     "commission",

@@ -6,7 +6,7 @@ import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.sim.plant.drive_monitor import BEYOND, LAG, SPEED, TORQUE, TORQUE_TICKS
-from heptarm.testing.commissioning.person import PersonTask, Person, number
+from heptarm.testing.commissioning.person import Person, PersonTask, number
 from heptarm.testing.commissioning.step import Comparison, Movement, at_most, largest, near, same, step
 from heptarm.testing.measure import Unfit, record
 from heptarm.testing.stage import HOME

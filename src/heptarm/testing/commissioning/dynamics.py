@@ -139,7 +139,12 @@ def spline_segments(arm: Arm, person: Person) -> tuple[Comparison, ...]:
     def at(y: float, z: float) -> Pose:
         return Pose.of(start.xyz + (0.0, y, z), start.quat)
 
-    points: list[Spl | Lin] = [spl(at(0.02, -0.02)), spl(at(0.04, -0.04)), lin(at(0.04, -0.02)), spl(at(0.02, 0.0))]
+    points: list[Spl | Lin] = [
+        spl(at(0.02, -0.02)),
+        spl(at(0.04, -0.04)),
+        lin(at(0.04, -0.02)),
+        spl(at(0.02, 0.0)),
+    ]
     handle = arm.start(spline(points, speed_mps=0.02))
     handle.wait()
     seen = sum(event.kind == "segment" for event in handle.events())

@@ -11,7 +11,7 @@ import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.errors import CommandRejected, ConnectionLost, HeptarmError, ModeConflict, NotReady
-from heptarm.testing.commissioning.person import PATIENCE, PROVES, PersonTask, Person
+from heptarm.testing.commissioning.person import PATIENCE, PROVES, Person, PersonTask
 from heptarm.testing.commissioning.report import Agreement, CommissioningReport, StepOutcome
 from heptarm.testing.commissioning.step import STEPS, CommissioningStep
 from heptarm.testing.measure import Unfit

@@ -6,7 +6,7 @@ import numpy as np
 
 from heptarm.arm.arm import Arm
 from heptarm.errors import HeptarmError
-from heptarm.testing.commissioning.person import PersonTask, Person, expect
+from heptarm.testing.commissioning.person import Person, PersonTask, expect
 from heptarm.testing.commissioning.step import Comparison, Movement, at_least, at_most, same, step
 from heptarm.testing.measure import record
 from heptarm.testing.stage import HOME
@@ -86,7 +86,11 @@ def emergency_stop(arm: Arm, person: Person) -> tuple[Comparison, ...]:
         except HeptarmError:
             refused = "refused"
     expect(
-        arm, person, PersonTask.RELEASE_STOP, lambda s: not s.safety.emergency_stop, "the released emergency stop"
+        arm,
+        person,
+        PersonTask.RELEASE_STOP,
+        lambda s: not s.safety.emergency_stop,
+        "the released emergency stop",
     )
     recovery = arm.recover(timeout=60.0)
     compared = [

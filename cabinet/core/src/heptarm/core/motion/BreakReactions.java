@@ -35,7 +35,7 @@ import heptarm.wire.Trigger;
  */
 final class BreakReactions {
     private static final int JOINTS = 7;
-    /** Stiffness [Nm/rad], damping ratio and duration [s] of relaxing: soft beside position control, but an unknown load of 1 kg moves the hand by millimetres only. */
+    /** Stiffness [Nm/rad], damping ratio and duration [s] of relaxing: compliant beside position control, but an unknown load of 1 kg moves the hand by millimetres only. */
     private static final double STIFFNESS = 1000.0;
     private static final double DAMPING = 1.0;
     private static final double DURATION = 0.2;
