@@ -29,7 +29,7 @@ class SetPoints:
         after: of the next tick.
     """
 
-    __slots__ = ("_fastest", "_highest", "_leap", "_lowest", "after", "before", "now")
+    __slots__ = ("_fastest", "_highest", "_leap", "_lowest", "_small", "after", "before", "now")
 
     before: Array
     now: Array
@@ -38,6 +38,7 @@ class SetPoints:
     def __init__(self, robot: RobotModel, here: Array) -> None:
         self._fastest = robot.dq_max
         self._leap = OVERSPEED * robot.dq_max * TICK
+        self._small = float(self._leap.min()) ** 2
         self._lowest, self._highest = robot.q_min - ON_LIMIT, robot.q_max + ON_LIMIT
         self.stay(here)
 
@@ -73,7 +74,10 @@ class SetPoints:
 
     def leap(self, there: Array) -> int | None:
         """The fastest axis that a next set-point would move too fast, from 0; None: there is none."""
-        leap = np.abs(there - self.after) > self._leap
+        step = there - self.after
+        if float(step @ step) <= self._small:  # the usual case: all axes together stay below each limit
+            return None
+        leap = np.abs(step) > self._leap
         return int(leap.argmax()) if leap.any() else None
 
     def beyond(self, there: Array) -> int | None:
