@@ -106,7 +106,9 @@ ARGUMENTS: dict[str, dict[str, object]] = {
     "Arm.touch_twice": {"distance": 0.01, "force": 5.0},
     "connect": {"target": "127.0.0.1:9"},
     "CollisionModel": {"robot": "iiwa14"},
-    **{f"{verb}_batch": {"q": np.array([HOME, HOME + 0.1])} for verb in ("forward", "jacobian", "redundancy")},
+    **{
+        f"{verb}_batch": {"q": np.array([HOME, HOME + 0.1])} for verb in ("forward", "jacobian", "redundancy")
+    },
     "solve_batch": {
         "poses": np.eye(4)[None] + np.array([[0, 0, 0, 0.5], [0, 0, 0, 0], [0, 0, 0, 0.5], [0, 0, 0, 0]]),
         "e1": (0.1,),

@@ -41,7 +41,7 @@ READ = {
 
 
 def tables() -> Iterator[tuple[str, list[dict[str, str]]]]:
-    """Section and rows of each table of the page that says how sure its rows are."""
+    """Section and rows of each table of the page that states how sure its rows are."""
     section, columns, found = "", [""], []
     for line in [*PAGE.read_text(encoding="utf-8").splitlines(), ""]:
         section = line.removeprefix("## ") if line.startswith("## ") else section

@@ -216,7 +216,7 @@ CALLS: dict[str, Call] = {
     "JointTorqueOutside.joint": Call(_until(lambda v: torque[v] > 5), "joint"),
     "JointTorqueOutside.low": Call(_until(lambda v: torque[3].outside(v, 5.0)), "low"),
     "JointTorqueOutside.high": Call(_until(lambda v: torque[3].outside(-5.0, v)), "high"),
-    "Retreat.distance": Call(_then(lambda v: ha.Retreat(v)), "distance"),
+    "Retreat.distance": Call(_then(ha.Retreat), "distance"),
     "Retreat.speed": Call(_then(lambda v: ha.Retreat(0.01, v)), "speed"),
     "SignalIs.signal": Call(_until(lambda v: io[v]), "signal"),
     "SignalOutside.signal": Call(_until(lambda v: io[v] > 5), "signal"),

@@ -164,7 +164,7 @@ def test_the_same_commands_give_the_same_states_bit_by_bit() -> None:
     assert np.array_equal(tracks[0].q, tracks[1].q) and np.array_equal(tracks[0].dq, tracks[1].dq)
 
 
-@pytest.mark.parametrize("share", [1.0, 0.3])
+@pytest.mark.parametrize("part", [1.0, 0.3])
 def test_a_lin_keeps_every_axis_speed_acceleration_and_jerk(part: float) -> None:
     plant = ready()
     robot = plant.robot

@@ -37,7 +37,7 @@ def test_a_good_line_carries_everything_at_once() -> None:
 
 
 @pytest.mark.parametrize(
-    ("faults", "count", "share"),
+    ("faults", "count", "fraction"),
     [
         (LinkFaults(loss=0.1), lambda d: d.lost, 0.1),
         (LinkFaults(duplicate=0.2), lambda d: d.duplicated, 0.2),

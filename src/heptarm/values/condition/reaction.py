@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, cast, get_args
 
 from heptarm.errors import ShapeError
 from heptarm.values.arrays import Value, shown, within
@@ -33,9 +33,11 @@ class Retreat(Value):
         object.__setattr__(self, "speed", within(self.speed, "speed", 0.0, 1.0, above=True))
 
 
+_Word: TypeAlias = Literal["stay", "relax"]
+
 #: "stay": hold the position where the arm has braked; in position control it goes on pushing. "relax": be compliant for
 #: 0.2 s (1000 Nm/rad in every joint), then hold the position reached. Or move back.
-Reaction: TypeAlias = Literal["stay", "relax"] | Retreat
+Reaction: TypeAlias = _Word | Retreat
 
 
 def check_reaction(value: object, parameter: str = "then") -> Reaction:
@@ -44,8 +46,11 @@ def check_reaction(value: object, parameter: str = "then") -> Reaction:
     Raises:
         ShapeError: see above.
     """
-    if isinstance(value, Retreat) or value == "stay" or value == "relax":
+    if isinstance(value, Retreat):
         return value
+    for known in get_args(_Word):
+        if isinstance(value, str) and value == known:
+            return cast(_Word, known)
     raise ShapeError(
         f"{parameter} must be 'stay', 'relax' or a Retreat, got {shown(value)}",
         parameter=parameter,
