@@ -97,6 +97,13 @@ def test_what_does_not_compile_is_reported_with_the_compilers_words(lab: Path) -
         compile_application(lab, lab)
 
 
+@needs_javac
+def test_static_imports_of_all_members_count_as_used(lab: Path, tmp_path: Path) -> None:
+    source = FOREIGN.replace("BasicMotions.ptp;", "BasicMotions.*;")
+    (lab / "src" / "lab" / "Nod.java").write_text(source)
+    compile_application(lab, tmp_path / "out")
+
+
 def test_applications_are_found_and_one_has_to_be_chosen(lab: Path) -> None:
     assert find(lab) == ["lab.Nod"]
     assert find(SAMPLES) == ["heptarm.samples.Stir", "heptarm.samples.Visit"]
