@@ -13,12 +13,15 @@ import pytest
 import heptarm as ha
 from heptarm.arm.fri.session import Fri
 from heptarm.arm.fri.settings import FriRequest
+from heptarm.arm.link.state_stream import StateFeed
 from heptarm.arm.motion.handle import MotionHandle
 from heptarm.arm.translate.state import read_result
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.loop.client import Client
 from heptarm.fri.protocol.messages import CommandMode
 from heptarm.fri.protocol.version import Version
+from heptarm.io.clock import RealClock
+from heptarm.record.journal import Journal
 from heptarm.wire import messages as wire
 from tests.fri_loop.controller import Controller
 
@@ -30,6 +33,8 @@ class Cabinet:
         self.controller: Controller | None = None
         self.link = SimpleNamespace(peer="127.0.0.1:30000")
         self.clock = SimpleNamespace(nanos=time.monotonic_ns, sleep=time.sleep)
+        self.journal = Journal(time.monotonic_ns)
+        self.feed = StateFeed(RealClock())
 
     def check_may_wait(self, call: str) -> None:
         """No callback waits here."""

@@ -100,7 +100,7 @@ def test_lists() -> None:
 fraction = st.floats(0.001, 1.0)
 maybe = st.none() | fraction
 axes = st.tuples(*(st.floats(float(a), float(b)) for a, b in zip(ROBOT.q_min, ROBOT.q_max, strict=True)))
-angles = st.floats(-10.0, 10.0)
+angles = st.floats(-6.28, 6.28)
 poses = st.builds(Pose.xyz_abc, *[st.floats(-1.5, 1.5)] * 3, *[angles] * 3)
 motions = st.one_of(
     st.builds(
