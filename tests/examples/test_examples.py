@@ -21,7 +21,8 @@ REAL_TIME = (
 )
 RUNNER = """
 import runpy, sys
-runpy.run_path(sys.argv[1], run_name="__main__")
+del sys.argv[0]  # as if the example had been started by itself
+runpy.run_path(sys.argv[0], run_name="__main__")
 """
 EXAMPLES = sorted(
     (Path(__file__).parents[2] / "examples").glob("*.py"),
