@@ -34,6 +34,12 @@ WITHOUT_A_CONNECTION = {
     "key set",
     "key list",
     "key forget",
+    "targets list",
+    "targets add",
+    "targets remove",
+    "plot",
+    "convert",
+    "completion",
     "rl train",
     "rl eval",
 }
