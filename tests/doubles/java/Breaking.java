@@ -75,10 +75,12 @@ public class Breaking extends RoboticsAPIApplication {
         IMotionContainer up = lbr.move(linRel(0, 0, 80, lbr.getRootFrame()).setCartVelocity(100)
                 .breakWhen(touch.and(never)).breakWhen(new TorqueComponentCondition(lbr.getFlange(), CoordinateAxis.X, -50, 50)));
         say("without a firing there is no info", up.getFiredBreakConditionInfo() == null && !up.hasFired(touch));
-        for (int i = 0; i < 3000 && edges.get() != 101; i++) { // listeners are called by a thread of their own
+        // listeners are called by a thread of their own; an elastic arm may bounce, then there are more edges
+        for (int i = 0; i < 3000 && (edges.get() < 101 || edges.get() % 100 != edges.get() / 100); i++) {
             ThreadUtil.milliSleep(10);
         }
-        say("the observer heard both edges", edges.get() == 101 && observer.isEnabled());
+        int heard = edges.get();
+        say("the observer heard both edges", heard >= 101 && heard % 100 == heard / 100 && observer.isEnabled());
         observers.removeConditionObserver(observer);
         say("a removed one hears nothing", !observer.isEnabled() && observers.getRegisteredConditionObservers().isEmpty());
 

@@ -144,7 +144,7 @@ final class RequestDispatcher {
     }
 
     private static void reject(ClientConnection client, int type, long request, CommandRejected why) {
-        long id = Messages.isRequest(type) ? request : 0; // a target has a number there
+        long id = CommandHandler.isTarget(type) ? 0 : request; // a target has a number there
         client.answer(new Rejected(why.code, why.parameter, why.value, why.allowed, why.getMessage()), id);
     }
 }
