@@ -36,4 +36,6 @@ def test_java_runtime_and_simulation_are_not_needed_by_the_core() -> None:
         "cyclopts",
         "lazy-loader",
         "numpy",
+        "rich",
+        "tomli",
     ]
