@@ -26,7 +26,22 @@ pytest_plugins = ["tests.processes", "tests.hangs", "tests.retry", "tests.browse
 
 _LATE = ("slow", "browser")
 #: Folders with what takes long; training at the end of them, since it leaves little time to what runs beside it.
-_LONG_FIRST = ("docs", "arm", "examples", "cli", "scenarios", "doubles", "ros", "cabinet", "house", "rl")
+_LONG_FIRST = (
+    "docs",
+    "strangers",
+    "arm",
+    "examples",
+    "cli",
+    "trust",
+    "scenarios",
+    "doubles",
+    "ros",
+    "cabinet",
+    "cpp",
+    "record",
+    "house",
+    "rl",
+)
 
 # no timing assertions, above all on a busy machine
 settings.register_profile("heptarm", deadline=None)

@@ -43,7 +43,7 @@ def test_what_is_typed_is_done() -> None:
             said.append(json.loads(process.stdout.readline()))
         refused = json.loads(process.stdout.readline())
         assert any(one.get("say") == "emergency_stop" for one in said)
-        assert said[-1] == {"operator": "operator_safety", "error": ""}
+        assert said[-1] == {"operator": "operator_safety", "error": "", "shown": ""}
         assert refused["operator"] == "explode" and "emergency_stop" in refused["error"]
         process.stdin.close()  # ends nothing
         with ha.connect(ready["target"], control=False, timeout=30.0) as arm:

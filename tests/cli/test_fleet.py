@@ -54,7 +54,7 @@ def test_both_accept_clients_and_typed_words_name_one_of_them() -> None:
         process.stdin.write("2 emergency_stop\n3 emergency_stop\nt1\n")
         process.stdin.flush()
         said = [_line(process) for _ in range(4)]
-        assert {"operator": "emergency_stop", "error": "", "cabinet": 2} in said
+        assert {"operator": "emergency_stop", "error": "", "shown": "", "cabinet": 2} in said
         assert any("there is no cabinet 3" in one["error"] for one in said)
         assert sorted(one["cabinet"] for one in said if one["operator"] == "t1") == [1, 2]
         with (
