@@ -418,7 +418,7 @@ def _type_to_all(cabinets: list[subprocess.Popen[str]], as_json: bool) -> None:
             continue
         if not 0 <= number <= len(cabinets):
             text = f"there is no cabinet {number}; there are 1 to {len(cabinets)}"
-            print(json.dumps({"operator": said, "error": text}) if as_json else text, flush=True)
+            _put(json.dumps({"operator": said, "error": text}) if as_json else text)
             continue
         chosen = [cabinets[number - 1]] if number else cabinets
         for cabinet in chosen:
@@ -648,7 +648,7 @@ def _say(cabinet: subprocess.Popen[str], words: str) -> None:
 def _print_words(as_json: bool) -> None:
     for words, meaning in WORDS.items():
         about = json.dumps({"say": words, "to": meaning}) if as_json else f"{words:26} {meaning}"
-        print(about, flush=True)
+        _put(about)
 
 
 def _converse(cabinet: subprocess.Popen[str], as_json: bool) -> None:
@@ -687,11 +687,17 @@ def _answer(cabinet: subprocess.Popen[str], as_json: bool, *, number: int = 0) -
         if "operator" not in reply:
             failure = str(reply.get("error", ""))
         elif as_json:
-            print(json.dumps(reply | {"cabinet": number}) if number else line.strip(), flush=True)
+            _put(json.dumps(reply | {"cabinet": number}) if number else line.strip())
         elif reply["operator"]:
             text = reply["error"] or reply["shown"] or f"done: {reply['operator']}"
-            print(f"{number}: {text}" if number else text, flush=True)
+            _put(f"{number}: {text}" if number else text)
     return failure
+
+
+def _put(line: str) -> None:
+    """Print a line at once and in one piece: several threads print."""
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
 
 
 class _child(subprocess.Popen[str]):
