@@ -191,7 +191,7 @@ def case_a_collision_guard_stops_motions_and_makes_compliant(probe: Probe, stage
     home(probe)  # the guard is disabled, and a command replaces the compliant hold
     refused(probe.call("collision_guard", "SetCollisionGuard", threshold=[-1.0]), "threshold")
     refused(
-        probe.call("collision_guard", "SetCollisionGuard", reaction="flee"), "flee", "brake, compliant_mode"
+        probe.call("collision_guard", "SetCollisionGuard", reaction="flee"), "flee", "soft"
     )
 
 
