@@ -293,13 +293,22 @@ class Client:
         return SentGoal(True, handle=handle)
 
     def send_all(self, goals: list[TrajectoryGoal]) -> list[SentGoal]:
-        """Send goals without waiting between them; wait until each is accepted or rejected."""
+        """Send goals without waiting between them; wait until each is accepted or rejected.
+
+        actionlib calls a goal lost that has left the server's list before this process, held up, has read its status;
+        such a goal is sent again.
+        """
         handles = [self._action.send_goal(action_goal(goal)) for goal in goals]
-        pending = (GoalStatus.PENDING, GoalStatus.LOST)
-        until(
-            lambda: all(one.get_goal_status() not in pending for one in handles),
-            "the goals are neither accepted nor rejected",
-        )
+        for _ in range(5):
+            until(
+                lambda: all(one.get_goal_status() != GoalStatus.PENDING for one in handles),
+                "the goals are neither accepted nor rejected",
+            )
+            lost = [k for k, one in enumerate(handles) if one.get_goal_status() == GoalStatus.LOST]
+            for k in lost:
+                handles[k] = self._action.send_goal(action_goal(goals[k]))
+            if not lost:
+                break
         rejected = [one.get_goal_status() == GoalStatus.REJECTED for one in handles]
         return [SentGoal(not refused, handle=one) for one, refused in zip(handles, rejected)]
 
