@@ -8,13 +8,20 @@ terminal is not for a background job.
 from __future__ import annotations
 
 import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 
 @contextmanager
 def ctrl_c_interrupts() -> Iterator[None]:
-    """Let SIGINT raise KeyboardInterrupt here, and end the processes that are started meanwhile."""
+    """Let SIGINT raise KeyboardInterrupt here, and end the processes that are started meanwhile.
+
+    Only the main thread may set handlers; in another one nothing changes.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a handler becomes the default on exec
     try:
         yield
