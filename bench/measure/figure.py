@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+import tempfile
 import traceback
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from statistics import median
 from typing import Any
 
 from bench.measure.noise import Noise
 from heptarm.errors import HeptarmError
 
+ROOT = Path(__file__).resolve().parents[2]
 #: Errors that a busy machine can cause; any other is a defect.
 LATE = (HeptarmError, TimeoutError)
 
@@ -135,7 +138,10 @@ class Benchmark:
                     yield replace(figure, group=self.group)
         except Exception as error:
             traceback.print_exc()
-            detail = {"error": f"{type(error).__name__}: {error}"[:500], "others": round(noise.others, 2)}
+            text = f"{type(error).__name__}: {error}".replace(str(ROOT), ".").replace(
+                tempfile.gettempdir(), "TMP"
+            )
+            detail = {"error": text[:500], "others": round(noise.others, 2)}
             yield Figure(
                 f"{self.name}_failed",
                 math.nan,

@@ -190,9 +190,7 @@ def case_a_collision_guard_stops_motions_and_makes_compliant(probe: Probe, stage
     until(lambda: states[-1].motion, "the arm is not compliant")
     home(probe)  # the guard is disabled, and a command replaces the compliant hold
     refused(probe.call("collision_guard", "SetCollisionGuard", threshold=[-1.0]), "threshold")
-    refused(
-        probe.call("collision_guard", "SetCollisionGuard", reaction="flee"), "flee", "soft"
-    )
+    refused(probe.call("collision_guard", "SetCollisionGuard", reaction="flee"), "flee", "soft")
 
 
 def case_the_arm_is_guided_by_hand(probe: Probe, stage: Stage) -> None:

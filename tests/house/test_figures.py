@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import json
+import tempfile
+from collections.abc import Iterator
 from fnmatch import fnmatchcase
 from pathlib import Path
 from types import ModuleType
@@ -140,3 +142,12 @@ def test_unknown_names_are_refused(
     monkeypatch.setattr(command.sys, "argv", ["bench", "--group", "frei"])
     assert command.main() == 2
     assert "no group 'frei'; there are contact, fri, lab, motion" in capsys.readouterr().err
+
+
+def test_what_failed_names_no_path_of_the_machine() -> None:
+    def fails() -> Iterator[Figure]:
+        raise RuntimeError(f"{ROOT}/.venv/bin/python {tempfile.gettempdir()}/x")
+        yield  # a generator
+
+    (found,) = Benchmark("broken", "house", "", fails).figures()
+    assert found.detail["error"] == "RuntimeError: ./.venv/bin/python TMP/x"
