@@ -337,12 +337,10 @@ class Interpolator:
 
     def _follow(self, run: RunningMotion) -> tuple[float, float]:
         planned = run.plan
-        if run.cancelled and not (run.ended or run.braking or self.is_overlaid):
-            if self._speed_override.rests and run.stop is None:
+        if run.cancelled and run.stop is None and not (run.ended or run.braking or self.is_overlaid):
+            if self._speed_override.rests:
                 run.ended = True
-            elif (
-                not self._safety.latched and run.stop is None
-            ):  # the stop ended before the motion was at rest
+            elif not self._safety.latched:  # the stop ended before the motion was at rest
                 self._brake_on_path(run)
         if run.ended:
             return self._settle(run)
@@ -443,7 +441,7 @@ class Interpolator:
             return
         run.cancelled = True
         # a stop in force brings a motion to rest sooner, but it does not act on hand guiding
-        if run.guided is not None or (not self._safety.latched and run.stop is None):
+        if run.guided is not None or not (self._safety.latched or run.stop is not None):
             self._brake_on_path(run)
 
     def _brake_on_path(self, run: RunningMotion) -> None:
