@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import threading
+import time
+
 import numpy as np
 import pytest
 
+from heptarm.sim import seam
 from heptarm.sim.controller.safety import StopRequest
 from heptarm.sim.planning.command import Order
 from heptarm.sim.runtime.operator import WORDS, SimulatedOperator, timed, understood
@@ -141,3 +145,25 @@ def test_signals_are_set_and_keys_pressed_also_at_a_time() -> None:
     operator.do("press 1 heptarm second")
     assert pressed == [("client", 2), ("heptarm", 0), ("heptarm", 5)]
     assert plant.signals.names == ("Cell.Door", "Flange.Door")
+
+
+def test_signals_that_are_set_at_once_are_edges_all_the_same() -> None:
+    plant = ready()
+    operator = SimulatedOperator(plant)
+    place = plant.signals.place("Station.Start", is_output=False)
+    edges: list[bool] = []
+    plant.condition_monitor.observe(seam.SignalIs(place, True), edges.append, at_once=False)
+    plant.step()
+
+    def type_lines() -> None:
+        for value in (1, 0) * 5:
+            operator.await_tick(f"set Station.Start {value}")
+            operator.do(f"set Station.Start {value}")
+
+    typing = threading.Thread(target=type_lines)
+    typing.start()
+    while typing.is_alive():
+        plant.step()
+        time.sleep(0.005)  # a machine with other work
+    plant.step(2)
+    assert edges == [True, False] * 5

@@ -288,6 +288,7 @@ def _operate(operator: SimulatedOperator, words: str) -> None:
     shown = error = ""
     try:
         if words:
+            operator.await_tick(words)
             shown = operator.do(words)
     except ValueError as refused:
         error = str(refused)

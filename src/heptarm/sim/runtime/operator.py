@@ -11,11 +11,13 @@ from __future__ import annotations
 import heapq
 import logging
 import re
+import time
 from collections.abc import Callable
 from itertools import count
 from typing import TYPE_CHECKING
 
 from heptarm.sim.controller.safety import StopRequest
+from heptarm.sim.planning.command import TICK
 from heptarm.sim.plant.shared_state import NEVER
 from heptarm.sim.seam import OperationMode
 
@@ -81,6 +83,10 @@ _COUNTS = {
     "press": (1, 3),
     "answer": (1, 1),
 }
+#: A tick that began after a signal was set has ended when so many ticks have begun.
+SEEN = 2
+#: So long a line waits for a tick at most: the simulation may stand still [s].
+LONGEST_WAIT = 1.0
 #: User keys of a bar; higher numbers are their second halves.
 SLOTS = 4
 _TRUTH = {"true": 1.0, "false": 0.0}
@@ -164,6 +170,7 @@ class SimulatedOperator:
         self._plant = plant
         self._due: list[tuple[int, int, str]] = []
         self._numbers = count()
+        self._set_at = -SEEN
         self._verbs: dict[str, Callable[..., str | None]] = {
             **{request.value: self._requesting(request) for request in StopRequest},
             **{mode.name.lower(): self._choosing(mode) for mode in OperationMode},
@@ -180,7 +187,7 @@ class SimulatedOperator:
             "start": plant.resume,
             "push": self._push,
             "where": self._where,
-            "set": plant.signals.set,
+            "set": self._set,
             "press": self._press,
             "answer": self._answer,
         }
@@ -228,6 +235,19 @@ class SimulatedOperator:
         shown = self._verbs[name](*values) or ""
         self.on_action()
         return shown
+
+    def await_tick(self, words: str) -> None:
+        """Before a signal is set: wait until conditions have been evaluated with the signal that was set last.
+
+        Two lines that come at once, `set Start 0` and `set Start 1`, are a rising edge then. Not from the thread of the ticks.
+        """
+        until = time.monotonic() + LONGEST_WAIT
+        while words[:4].lower() == "set " and self._plant.tick_count < self._set_at + SEEN and time.monotonic() < until:
+            time.sleep(0.5 * TICK)
+
+    def _set(self, name: str, value: float) -> None:
+        self._plant.signals.set(name, value)
+        self._set_at = self._plant.tick_count
 
     def _requesting(self, request: StopRequest) -> Callable[[], None]:
         return lambda: self._plant.safety.request_stop(request)
