@@ -152,7 +152,7 @@ def test_signals_that_are_set_at_once_are_edges_all_the_same() -> None:
     operator = SimulatedOperator(plant)
     place = plant.signals.place("Station.Start", is_output=False)
     edges: list[bool] = []
-    plant.condition_monitor.observe(seam.SignalIs(place, True), edges.append, at_once=False)
+    plant.condition_monitor.observe(seam.SignalIs(place=place, value=True), edges.append, at_once=False)
     plant.step()
 
     def type_lines() -> None:
