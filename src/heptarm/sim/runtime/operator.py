@@ -239,7 +239,7 @@ class SimulatedOperator:
     def await_tick(self, words: str) -> None:
         """Before a signal is set: wait until conditions have been evaluated with the signal that was set last.
 
-        Two lines that come at once, `set Start 0` and `set Start 1`, are a rising edge then. Never call it from the ticks.
+        Two lines that come at once, `set Start 0` and `set Start 1`, are a rising edge then. The ticks never call this.
         """
         until = time.monotonic() + LONGEST_WAIT
         while words[:4].lower() == "set " and self._plant.tick_count < self._set_at + SEEN and time.monotonic() < until:
