@@ -133,7 +133,7 @@ COURSES = {
     ),
     "noisy sensors": Course({3: submit("ptp")}, noisy=True),
     "contact": Course(
-        {3: submit("lin", offset=(0.0, 0.0, -0.25, 0.0, 0.0, 0.0, 1.0), cart_velocity=0.3)},
-        box=Box((0.6, 0.0, 0.1), (0.6, 0.8, 0.2)),
+        {3: submit("lin", offset=(0.0, 0.0, -0.25, 0.0, 0.0, 0.0, 1.0), cart_velocity=0.12)},
+        box=Box((0.6, 0.0, 0.25), (0.6, 0.8, 0.3)),
     ),
 }

@@ -20,6 +20,13 @@ from heptarm.values.robot import RobotModel
 class JointPath(Protocol):
     """Joint positions over s."""
 
+    @property
+    def is_direct(self) -> bool:
+        """Whether joint positions follow from s alone, so that there is a `row` of them."""
+
+    def row(self, s: Array) -> Array:
+        """Joint positions at values of s, shape (n,), as `at` computes them; shape (n, 7) [rad]."""
+
     def at(self, s: float, near: Array) -> Array:
         """Joint positions next to `near`, shape (7,) [rad].
 
@@ -33,8 +40,14 @@ class JointLine:
 
     __slots__ = ("_span", "_start")
 
+    is_direct = True
+
     def __init__(self, start: Array, end: Array) -> None:
         self._start, self._span = start, end - start
+
+    def row(self, s: Array) -> Array:
+        """See `JointPath`."""
+        return self._start + s[:, None] * self._span
 
     def at(self, s: float, near: Array) -> Array:
         """Joint positions, shape (7,) [rad]; `near` is not used."""
@@ -83,7 +96,19 @@ class TcpInverseKinematics:
         )
 
 
-class CartesianPath:
+class Sequential:
+    """A path whose joint positions have to be computed one after the other."""
+
+    __slots__ = ()
+
+    is_direct = False
+
+    def row(self, s: Array) -> Array:
+        """There is none."""
+        raise NotImplementedError
+
+
+class CartesianPath(Sequential):
     """Path of the tool frame in space, the arm angle linear with s.
 
     Args:
