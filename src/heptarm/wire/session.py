@@ -389,14 +389,12 @@ class Session:
 
 
 @functools.cache
-def _plain(
-    state: SessionState, source: str
-) -> tuple[frozenset[type[Message]], dict[int, type[Message]]]:
+def _plain(state: SessionState, source: str) -> tuple[frozenset[type[Message]], dict[int, type[Message]]]:
     """Requests that a side may send, and answers that it may get, by their ids: those that keep the state as it is."""
     legal = TRANSITIONS[state]
     kept = [kind for kind in MESSAGES.values() if legal.get(_SYMBOLS[kind]) is state]
     requests = (kind for kind in kept if kind.KIND == "request" and kind.SOURCE in (source, "both"))
-    answers = (kind for kind in kept if kind.KIND == "answer" and kind.SOURCE != source)
+    answers = (kind for kind in kept if kind.KIND == "answer" and source != kind.SOURCE)
     return frozenset(requests), {kind.TYPE: kind for kind in answers}
 
 
