@@ -9,6 +9,7 @@ import enum
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from functools import cache
+from operator import attrgetter
 from typing import Any, NoReturn, TypeVar
 
 from heptarm.values.frames import TOOL
@@ -40,6 +41,8 @@ def message_of(kind: type[_Message], value: object, **given: object) -> _Message
 
 def value_of(kind: type[_Value], message: Any, **given: object) -> _Value:
     """A value whose fields are those of a message under the same names, besides the `given` ones."""
+    if not given:
+        return kind(*_getter(kind)(message))
     return kind(**{name: getattr(message, name) for name in _names(kind) if name not in given}, **given)  # type: ignore[arg-type]
 
 
@@ -51,6 +54,14 @@ def frame_message(name: str) -> str:
 @cache
 def _names(kind: type) -> tuple[str, ...]:
     return tuple(one.name for one in fields(kind))
+
+
+@cache
+def _getter(kind: type) -> Callable[[Any], tuple[Any, ...]]:
+    names = _names(kind)
+    if len(names) < 2:  # then an attrgetter returns no tuple
+        return lambda message: tuple(getattr(message, name) for name in names)
+    return attrgetter(*names)
 
 
 @cache

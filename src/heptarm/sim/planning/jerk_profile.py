@@ -44,7 +44,7 @@ class TimeLaw(Protocol):
         """s, ds/dt, d²s/dt² at a time [s]; constant after the end."""
 
     def places(self, times: Array) -> Array:
-        """Values of s at the first of ascending times, shape (n,) [s], as `at` has them: as many as there are at once."""
+        """Values of s at the first of ascending times [s], shape (n,), as `at` has them: as many as it has at once."""
 
 
 class _OneByOne:
