@@ -136,7 +136,7 @@ def array(value: npt.ArrayLike, size: int, name: str, *, nan: bool = False) -> A
         ShapeError: it is not a vector of that size.
         LimitError: an entry is infinite, or NaN where that is not allowed.
     """
-    if type(value) is tuple and len(value) == size and all(type(entry) is float for entry in value):
+    if isinstance(value, tuple) and len(value) == size and all(type(entry) is float for entry in value):
         result = np.array(value)
         if math.isfinite(sum(value)):  # the usual case: every entry is finite
             result += 0.0  # as `numbers` does

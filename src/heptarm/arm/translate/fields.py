@@ -41,8 +41,9 @@ def message_of(kind: type[_Message], value: object, **given: object) -> _Message
 
 def value_of(kind: type[_Value], message: Any, **given: object) -> _Value:
     """A value whose fields are those of a message under the same names, besides the `given` ones."""
-    if not given:
-        return kind(*_getter(kind)(message))
+    getter = None if given else _getter(kind)  # type: ignore[arg-type]
+    if getter is not None:
+        return kind(*getter(message))
     return kind(**{name: getattr(message, name) for name in _names(kind) if name not in given}, **given)  # type: ignore[arg-type]
 
 
@@ -57,10 +58,11 @@ def _names(kind: type) -> tuple[str, ...]:
 
 
 @cache
-def _getter(kind: type) -> Callable[[Any], tuple[Any, ...]]:
+def _getter(kind: type) -> Callable[[Any], tuple[Any, ...]] | None:
+    """All fields of a value at once, in order; None: not all of them may be given in order."""
     names = _names(kind)
-    if len(names) < 2:  # then an attrgetter returns no tuple
-        return lambda message: tuple(getattr(message, name) for name in names)
+    if len(names) < 2 or any(one.kw_only for one in fields(kind)):  # an attrgetter of one name returns no tuple
+        return None
     return attrgetter(*names)
 
 

@@ -48,9 +48,10 @@ class SetPointsAhead:
         places = np.clip(profile.places(times[1:]), 0.0, 1.0)
         joints = path.row(places[places < 1.0])
         joints = joints[: command.followable(joints)]
-        self.joints = list(joints)
+        self.joints: list[Array] = list(joints)
         self._size = len(self.joints)
-        self.times, self.places = times.tolist(), places.tolist()
+        self.times: list[float] = times.tolist()
+        self.places: list[float] = places.tolist()
 
     def take(self, time: float, step: float, here: Array) -> float:
         """Take the next set-point, which `last` and `place` then are.

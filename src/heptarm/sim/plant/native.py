@@ -146,7 +146,7 @@ class NativeTick:
         memory.straight, memory.on_axis = straight, on_axis
         memory.mass_damping, memory.stiffness_damping = MASS_DAMPING, STIFFNESS_DAMPING
         memory.stiffness[:], memory.most[:] = STIFFNESS.tolist(), robot.tau_max.tolist()
-        self._points = np.frombuffer(memory.points).reshape(3, AXES)  # type: ignore[call-overload]
+        self._points = np.frombuffer(memory.points).reshape(3, AXES)
 
     def believe(self, mass: Array, bias: Array, *, is_misjudged: bool) -> None:
         """Set where the controller's model is: inertia matrix of shape (7, 7), and its torques of shape (7,)."""
