@@ -28,12 +28,14 @@ from heptarm.ros.trajectory.stream import is_streamed
 from heptarm.values.robot import ROBOTS
 from tests.conformance.stage import Stage
 from tests.interrupts import ctrl_c_interrupts
-from tests.ros2.peer import Ros, until
+from tests.ros2.launching import LaunchedNode, describe, flat, parameters_of
+from tests.ros2.peer import NodeProcess, Ros, until
 
 ROOT = Path(__file__).parents[2]
 ROS2 = ROOT / "ros2"
 URDF = ROS2 / "heptarm_description" / "urdf"
 PACKAGES = ("heptarm_bringup", "heptarm_description", "heptarm_moveit_config", "heptarm_msgs", "heptarm_ros2")
+CONTROLLERS = ROS2 / "heptarm_bringup" / "config" / "controllers.yaml"
 LAUNCHES = sorted(ROS2.glob("*/launch/*.xml"))
 
 
@@ -136,7 +138,8 @@ def test_ros2_control_over_the_nodes_topics(control: str, plugin: str) -> None:
     assert block is not None and block.findtext("hardware/plugin") == plugin
     assert [joint.get("name") for joint in block.findall("joint")] == [f"left_A{i}" for i in range(1, 8)]
     for joint in block.findall("joint"):
-        assert [e.get("name") for e in joint.findall("command_interface")] == ["position"]
+        commands = [e.get("name") for e in joint.findall("command_interface")]
+        assert commands == (["position", "velocity"] if control == "mock" else ["position"])
         assert [e.get("name") for e in joint.findall("state_interface")] == ["position", "velocity"]
     topics = {param.get("name"): param.text for param in block.findall("hardware/param")}
     if control == "topic":
@@ -199,7 +202,7 @@ def test_upstreams_interfaces_are_upstreams() -> None:
 @pytest.mark.parametrize("path", LAUNCHES, ids=lambda path: path.name)
 def test_a_launch_file_declares_what_it_uses_and_starts_what_there_is(path: Path) -> None:
     launch = ET.parse(path).getroot()
-    declared = {arg.get("name") for arg in launch.findall("arg")}
+    declared = {arg.get("name") for arg in (*launch.findall("arg"), *launch.findall("let"))}
     assert all(arg.get("description") for arg in launch.findall("arg"))
     assert set(re.findall(r"\$\(var (\w+)\)", path.read_text())) <= declared
     known = {one.name for one in (*PARAMETERS, *joint_parameters([f"A{i}" for i in range(1, 8)]))}
@@ -218,13 +221,6 @@ def test_a_launch_file_declares_what_it_uses_and_starts_what_there_is(path: Path
         assert given <= {arg.get("name") for arg in inner.findall("arg")}
 
 
-def flat(values: dict[str, Any], before: str = "") -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for name, value in values.items():
-        found |= flat(value, f"{before}{name}.") if isinstance(value, dict) else {f"{before}{name}": value}
-    return found
-
-
 def test_the_nodes_parameter_file_has_its_defaults() -> None:
     given = flat(
         yaml.safe_load((ROS2 / "heptarm_bringup/config/heptarm.yaml").read_text())["/**"]["ros__parameters"]
@@ -236,8 +232,6 @@ def test_the_nodes_parameter_file_has_its_defaults() -> None:
 
 def test_controllers_and_moveit_have_the_nodes_joints_and_action() -> None:
     joints = list(NodeConfiguration.of({}).joints)
-    controllers = yaml.safe_load((ROS2 / "heptarm_bringup/config/controllers.yaml").read_text())
-    assert controllers["joint_trajectory_controller"]["ros__parameters"]["joints"] == joints
     moveit = yaml.safe_load((ROS2 / "heptarm_moveit_config/config/moveit_controllers.yaml").read_text())
     ours = moveit["moveit_simple_controller_manager"]
     assert ours["controller_names"] == ["heptarm"] and ours["heptarm"]["joints"] == joints
@@ -258,6 +252,83 @@ def test_moveits_semantic_description_names_what_there_is() -> None:
     }
     assert home.keys() <= joints
     ROBOTS["iiwa14"].check(np.array(list(home.values())))
+
+
+# --------------------------------------------------------------------------- descriptions, really built
+
+
+def by_executable(nodes: list[LaunchedNode]) -> dict[str, LaunchedNode]:
+    return {node.name or node.executable: node for node in nodes}
+
+
+@pytest.mark.parametrize("control", ["mock", "topics"])
+def test_ros2_control_starts_with_all_its_controllers(control: str) -> None:
+    found = by_executable(
+        describe(
+            "heptarm_bringup", "control.launch.xml", control=control, namespace="left", prefix="l_", model="med7"
+        )
+    )
+    assert ("heptarm" in found) == (control == "topics")
+    assert {node.namespace for node in found.values()} == {"/left"}
+    joints = [f"l_A{i}" for i in range(1, 8)]
+    arm = ET.fromstring(found["robot_state_publisher"].parameters["robot_description"])
+    system = arm.find("ros2_control")
+    assert system is not None and [joint.get("name") for joint in system.findall("joint")] == joints
+    manager = found["ros2_control_node"]
+    values = yaml.safe_load(CONTROLLERS.read_text().replace("$(var prefix)", "l_"))
+    names = {"joint_state_broadcaster", "joint_trajectory_controller", "forward_position_controller"}
+    names |= {"forward_velocity_controller"}
+    manager.name = "controller_manager"
+    types = parameters_of(values, manager)
+    assert {name.removesuffix(".type") for name in types} == names | {"update_rate"}
+    for name in names - {"joint_state_broadcaster"}:
+        controller = LaunchedNode("", "", name, "/left")
+        assert parameters_of(values, controller)["joints"] == joints
+    active, inactive = (found[f"spawner_of_{which}_ones"].arguments for which in ("active", "inactive"))
+    assert active == ["joint_state_broadcaster", "joint_trajectory_controller"]
+    commanded = {e.get("name") for e in system.findall("joint/command_interface")}
+    others = ["forward_position_controller"] + ["forward_velocity_controller"] * (control == "mock")
+    assert inactive == ["--inactive", *others] and ("velocity" in commanded) == (control == "mock")
+    if control == "topics":
+        topics = {param.get("name"): param.text for param in system.findall("hardware/param")}
+        assert topics["joint_states_topic"] == "/left/heptarm/joint_states"
+        assert topics["joint_commands_topic"] == "/left/heptarm/servo/joint"
+        # the broadcaster alone publishes joint_states
+        assert found["heptarm"].remaps == {"joint_states": "heptarm/joint_states"}
+        assert found["heptarm"].parameters["forward_controllers"] is False
+
+
+@pytest.mark.parametrize("name", ["forward_position_controller", "forward_velocity_controller"])
+def test_another_controller_may_be_the_active_one(name: str) -> None:
+    found = by_executable(describe("heptarm_bringup", "control.launch.xml", control="mock", controller=name))
+    active, inactive = (found[f"spawner_of_{which}_ones"].arguments for which in ("active", "inactive"))
+    assert active == ["joint_state_broadcaster", name]
+    assert name not in inactive and len(inactive) == 3
+
+
+def test_two_arms_are_two_nodes_with_their_descriptions() -> None:
+    nodes = describe("heptarm_bringup", "two_arms.launch.xml", left="sim://a", right="sim://b")
+    arms = {node.namespace: node for node in nodes if node.executable == "heptarm_node"}
+    assert {space: node.parameters["target"] for space, node in arms.items()} == {
+        "/left": "sim://a",
+        "/right": "sim://b",
+    }
+    for node in nodes:
+        if node.executable == "robot_state_publisher":
+            arm = ET.fromstring(node.parameters["robot_description"])
+            assert f"{node.namespace[1:]}_A1" in {joint.get("name") for joint in arm.findall("joint")}
+
+
+def test_the_node_runs_as_its_launch_file_starts_it(spare: Stage, ros: Ros) -> None:
+    given = {"target": spare.target, "namespace": "launched", "prefix": "l_", "description": "false"}
+    (node,) = describe("heptarm_bringup", "heptarm.launch.xml", **given, joint_states="heptarm/joint_states")
+    process = NodeProcess(spare.target, words=node.command())
+    try:
+        states = ros.collect(JointState, "/launched/heptarm/joint_states")
+        until(lambda: states, "the node does not start")
+        assert list(states[-1].name) == [f"l_A{i}" for i in range(1, 8)]
+    finally:
+        process.finish()
 
 
 class Anything:
