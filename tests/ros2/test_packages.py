@@ -265,7 +265,12 @@ def by_executable(nodes: list[LaunchedNode]) -> dict[str, LaunchedNode]:
 def test_ros2_control_starts_with_all_its_controllers(control: str) -> None:
     found = by_executable(
         describe(
-            "heptarm_bringup", "control.launch.xml", control=control, namespace="left", prefix="l_", model="med7"
+            "heptarm_bringup",
+            "control.launch.xml",
+            control=control,
+            namespace="left",
+            prefix="l_",
+            model="med7",
         )
     )
     assert ("heptarm" in found) == (control == "topics")

@@ -52,9 +52,7 @@ def gripper_command(context: NodeContext, goal: Any) -> GoalWork:
 class _GripperGoal:
     """A goal that opens or closes the gripper, in a thread of its own: the arm may move meanwhile."""
 
-    def __init__(
-        self, context: NodeContext, gripper: TwoSignalGripper, width: float, *, opens: bool
-    ) -> None:
+    def __init__(self, context: NodeContext, gripper: TwoSignalGripper, width: float, *, opens: bool) -> None:
         self._context, self._gripper = context, gripper
         self._width, self._opens = width, opens
         self._number = context.gripper_goal = next(_numbers)

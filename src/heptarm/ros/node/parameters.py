@@ -103,8 +103,8 @@ PARAMETERS = (
     Parameter(
         "names",
         "heptarm",
-        "whose names of topics and actions to offer besides heptarm's own",
-        choices=("heptarm", "libiiwa", "iiwa_stack"),
+        "whose names of topics, services and actions to offer besides heptarm's own",
+        choices=("heptarm", "libiiwa", "iiwa_stack", "lbr_stack"),
     ),
     Parameter(
         "forward_controllers",
