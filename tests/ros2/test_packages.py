@@ -22,6 +22,9 @@ import yaml
 from sensor_msgs.msg import JointState
 
 from heptarm.model.kinematics import forward
+from heptarm.ros.interface.actions import ACTIONS
+from heptarm.ros.interface.services import SERVICES
+from heptarm.ros.interface.topics import TOPICS
 from heptarm.ros.node.parameters import PARAMETERS, NodeConfiguration, joint_parameters
 from heptarm.ros.trajectory.goal import TrajectoryGoal, TrajectoryPoint
 from heptarm.ros.trajectory.stream import is_streamed
@@ -156,6 +159,30 @@ def test_the_numbers_are_written_by_their_script() -> None:
 
 
 # ---------------------------------------------------------------------------------------- packages
+
+
+@pytest.mark.parametrize(
+    "path", sorted(ROOT.glob("ros[12]/heptarm_*/package.xml")), ids=lambda path: path.parent.name
+)
+def test_a_package_can_be_released(path: Path) -> None:
+    manifest = ET.parse(path).getroot()
+    assert {url.get("type") for url in manifest.findall("url")} == {"website", "repository", "bugtracker"}
+    version = re.search(r'^version = "(.*)"', (ROOT / "pyproject.toml").read_text(), re.M)
+    assert version is None or manifest.findtext("version") == version.group(1)
+    log = (path.parent / "CHANGELOG.rst").read_text().splitlines()
+    assert log[1] == f"Changelog for package {path.parent.name}" and "Forthcoming" in log
+
+
+def test_the_node_depends_on_every_package_it_imports() -> None:
+    for name, folder in (("ros2/heptarm_ros2", "heptarm_ros2"), ("ros1/heptarm_ros1", "src/heptarm_ros1")):
+        manifest = ET.parse(ROOT / name / "package.xml").getroot()
+        declared = {one.text for one in manifest if one.tag.endswith("depend")}
+        text = "\n".join(path.read_text() for path in (ROOT / name / folder).glob("*.py"))
+        used = set(re.findall(r"^\s*(?:from|import) (\w+)(?:\.(?:msg|srv|action))? ?", text, re.M))
+        used |= {row.type.partition("/")[0] for row in (*SERVICES, *TOPICS, *ACTIONS)}
+        ours = {"heptarm", Path(name).name, "__future__", *sys.stdlib_module_names}
+        keys = {"numpy": "python3-numpy"}
+        assert {keys.get(one, one) for one in used - ours} <= declared
 
 
 @pytest.mark.parametrize("name", PACKAGES)
