@@ -454,10 +454,10 @@ def test_upstreams_launch_reads_them(path: Path) -> None:
     shutil.which("ros2") is None,
     reason="upstream's launch is in no wheel: this needs an installation of ROS 2",
 )
-def test_upstreams_launch_starts_the_node(stage: Stage, ros: Ros) -> None:
+def test_upstreams_launch_starts_the_node(spare: Stage, ros: Ros) -> None:
     if subprocess.run(["ros2", "pkg", "prefix", "heptarm_bringup"], check=False).returncode:
         pytest.skip("heptarm_bringup is in no workspace that is sourced")
-    command = ["ros2", "launch", "heptarm_bringup", "heptarm.launch.xml", f"target:={stage.target}"]
+    command = ["ros2", "launch", "heptarm_bringup", "heptarm.launch.xml", f"target:={spare.target}"]
     command += ["namespace:=launched", "prefix:=l_", "description:=false"]
     with ctrl_c_interrupts():
         process = subprocess.Popen(command, start_new_session=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from rclpy.node import Node
+from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from heptarm.ros.interface.messages import RosAdapter, class_of
 from heptarm.ros.interface.names import PRESETS
@@ -17,7 +18,15 @@ class PresetPublisher:
     def __init__(self, node: Node, ros: RosAdapter, configuration: NodeConfiguration) -> None:
         self._node, self._ros, self._names = node, ros, configuration
         self._publishers = [
-            (entry, node.create_publisher(class_of(entry.type, "msg"), entry.name, 10))
+            (
+                entry,
+                node.create_publisher(
+                    class_of(entry.type, "msg"),
+                    entry.name,
+                    10,
+                    qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+                ),
+            )
             for entry in PRESETS[configuration.values["names"]].published()
         ]
 
