@@ -189,6 +189,17 @@ def test_install_cabinet_writes_sources_and_steps_once(tmp_path: Path) -> None:
     assert again.returncode == 1 and "must be a new or empty folder" in again.stderr
 
 
+def test_install_cabinet_leaves_options_out(tmp_path: Path) -> None:
+    (reported,) = objects("install-cabinet", "--out", str(tmp_path / "some"), "--without", "hand-guiding,fri")
+    assert reported["without"] == ["fri", "hand-guiding"]
+    app = tmp_path / "some/src/heptarm/app"
+    assert "left out" in (app / "SunriseFri.java").read_text(encoding="utf-8")
+    assert "SmartServo" in (app / "SunriseServo.java").read_text(encoding="utf-8")
+    done = run("install-cabinet", "--out", str(tmp_path / "none"), "--without", "welding")
+    assert done.returncode == 1 and "servoing, fri, hand-guiding, got 'welding'" in done.stderr
+    assert not (tmp_path / "none").exists()
+
+
 def test_demo_goes_as_designed_and_saves_a_plot(tmp_path: Path) -> None:
     plot = tmp_path / "demo.png"
     steps = objects("demo", "--plot", str(plot))
