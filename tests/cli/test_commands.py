@@ -139,7 +139,7 @@ def test_dry_run_moves_nothing(target: str) -> None:
             ("move", "ptp", "0", "150", "0", "-90", "0", "60", "0", "--deg"),
             ("A2", "150.00", "[-120, 120] deg"),
         ),
-        (("move", "ptp", "0", "nan", "0", "-1", "0", "1", "0"), ("nan",)),
+        (("move", "ptp", "0", "inf", "0", "-1", "0", "1", "0"), ("inf",)),
         (("move", "lin-rel", "--x", "3"), ("Can not plan motion",)),
         (("move", "lin-rel", "--x", "0.01", "--speed", "1.5"), ("speed", "(0, 1]")),
     ],
@@ -167,6 +167,11 @@ def test_doctor_looks_at_a_cabinet(target: str) -> None:
     verdicts = {one["what"]: one for one in objects("doctor", "--target", target)}
     assert verdicts["session"]["how"] == verdicts["network"]["how"] == verdicts["safety"]["how"] == "ok"
     assert "us median" in verdicts["round trip"]["found"]
+    assert verdicts["options"]["how"] == "ok" and "Sunrise.FRI" in verdicts["options"]["found"]
+    docs = Path(__file__).parents[2] / "docs"
+    for verdict in verdicts.values():
+        place, _, _ = verdict["page"].partition("/docs/")[2].partition("#")
+        assert (docs / place).is_file(), verdict
     assert re.search(r"\d+ of \d+ pings answered by UDP", verdicts["datagrams"]["found"])
 
 
