@@ -27,8 +27,7 @@ The features of the open frameworks for this arm (libiiwa, iiwa_stack, KUKA-IIWA
 their names in Python and the scenarios that show them. [Scenarios](../guide/scenarios.md) run on the virtual cabinet
 and, with care, on a robot.
 
-The column *known from* lists the systems in which the feature works completely; it is empty where none has it. *Partly*: a part
-of it is missing, and the text states which. This page is written by `scripts/features.py` from `docs/features.toml`.
+The column *known from* lists the systems in which the feature works completely; none: it is empty. *Partly*: a part of it is missing, and the text states which. `scripts/features.py` writes this page from `docs/features.toml`.
 """
 
 
@@ -120,7 +119,11 @@ def page() -> str:
     every = scenarios()
     partly, left_out = sum(bool(row.partly) for row in rows), sum(bool(row.left_out) for row in rows)
     complete = len(rows) - partly - left_out
-    lines = [HEAD, f"Of {len(rows)} features {complete} are complete, {partly} partly here, {left_out} missing.", ""]
+    lines = [
+        HEAD,
+        f"Of {len(rows)} features {complete} are complete, {partly} partly here, {left_out} missing.",
+        "",
+    ]
     for letter, title in groups.items():
         lines += [
             f"## {title}",
