@@ -27,7 +27,9 @@ The features of the open frameworks for this arm (libiiwa, iiwa_stack, KUKA-IIWA
 their names in Python and the scenarios that show them. [Scenarios](../guide/scenarios.md) run on the virtual cabinet
 and, with care, on a robot.
 
-The column *known from* lists the systems in which the feature works completely; none: it is empty. *Partly*: a part of it is missing, and the text states which. `scripts/features.py` writes this page from `docs/features.toml`.
+The column *known from* lists the systems in which the feature works completely; it is empty where none does.
+*Partly*: a part of it is missing, and the text states which. `scripts/features.py` writes this page from
+`docs/features.toml`.
 """
 
 
