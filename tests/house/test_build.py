@@ -126,7 +126,7 @@ def test_sources_compile_in_a_workbench_without_options(
         zipfile.ZipFile(library, "w") as some,
     ):
         for name in every.namelist():
-            if name.startswith(("com/", "javax/")) and not name.startswith(gone):
+            if not name.startswith(gone):
                 some.writestr(name, every.read(name))
     sources = sorted(str(path) for path in (out / "src").rglob("*.java"))
     java7 = toolchain.java7_library(jdk, tmp_path)
