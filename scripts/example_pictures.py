@@ -175,7 +175,7 @@ def _plot(axes: Any, plot: str, seen: dict[str, Array]) -> None:
 
 HEAD = """# Examples
 
-Programs for tasks of a lab. Each runs as it stands: `python examples/01_first_motion.py` on a private simulator, or on
+Programs for tasks of a lab. Each runs unchanged: `python examples/01_first_motion.py` on a private simulator, or on
 the robot in `HEPTARM_TARGET`. The pictures are what the arm reported meanwhile, drawn by `scripts/example_pictures.py`.
 The folder also has programs for [ROS](ros2.md), for [Sunrise applications](own-applications.md) and for FRI in C++.
 """
