@@ -4,7 +4,7 @@ STAMPS := build/stamps
 .DEFAULT_GOAL := setup
 
 .PHONY: setup cabinet demo test test-computing test-ros test-ros2 test-ros1 test-pythons test-long conformance lint check bench soak figures lock docs \
-	wheel clean help
+	wheel first-hour clean help
 
 ##@ To try it
 
@@ -130,8 +130,11 @@ docs: $(STAMPS)/venv  ## the site, in docs/_build/html
 	.venv/bin/sphinx-build -W -q -b html docs docs/_build/html
 	@echo docs/_build/html/index.html
 
-wheel: setup  ## a wheel with the compiled jars, in dist/
-	$(PY) -m build --wheel
+wheel: cabinet  ## a wheel with the compiled jars, in dist/; installs only what that needs
+	$(PY) -m pip wheel -q --no-deps --no-build-isolation --wheel-dir dist .
+
+first-hour:  ## what a newcomer does, timed: clone, demo, tutorial, the wheel with each Python of this machine
+	python3 scripts/first_hour.py
 
 clean:  ## everything that make made, but for the virtual environment
 	rm -rf build dist docs/_build src/heptarm/sim/jars .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
