@@ -59,6 +59,13 @@ def sim(
     ] = "fri",
     view: Annotated[bool, Parameter(negative="", help="Open a live 3D view in the browser.")] = False,
     view_port: Annotated[int, Parameter(help="Port of the view; 0 takes a free one.")] = 8080,
+    meshes: Annotated[
+        str,
+        Parameter(
+            help="With --view: DIR with link_0.stl to link_7.stl, or .obj: draw the arm in these meshes instead of "
+            "heptarm's own."
+        ),
+    ] = "",
     key_file: KeyFile = None,
     key: Annotated[str, Parameter(show=False)] = "",
     fault: Annotated[
@@ -224,6 +231,7 @@ def sim(
         defaults = {
             "--view": (view, False),
             "--view-port": (view_port, 8080),
+            "--meshes": (meshes, ""),
             "--host": (host, "127.0.0.1"),
             "--port": (port, 30001),
             "--count": (count, 1),
@@ -275,6 +283,7 @@ def sim(
 
         own = {
             "--view": view,
+            "--meshes": bool(meshes),
             "--key-file": key_file is not None,
             "--project": project is not None,
             "--scene": bool(scene),
@@ -310,6 +319,7 @@ def sim(
         )
         return fri_sim.run(options, verbose=verbose, as_json=as_json)
     _check_count(count, port, has_view=view)
+    _check_meshes(meshes, has_view=view)
     cabinet = SimulatorOptions(
         model=model,
         host=host,
@@ -326,7 +336,28 @@ def sim(
     )
     if count > 1:
         return _fleet(cabinet, count, key_file=key_file, as_json=as_json)
-    return _cabinet(cabinet, view=view, view_port=view_port, key_file=key_file, as_json=as_json)
+    return _cabinet(
+        cabinet, view=view, view_port=view_port, meshes=meshes, key_file=key_file, as_json=as_json
+    )
+
+
+def _check_meshes(folder: str, *, has_view: bool) -> None:
+    """Check meshes for the view before anything starts.
+
+    Raises:
+        CommandRejected: there is no view to use them, or they cannot be used.
+    """
+    if not folder:
+        return
+    if not has_view:
+        raise CommandRejected("--meshes needs --view", parameter="meshes", hint="add --view")
+    require_extra("sim")
+    from heptarm.sim.plant.appearance import ArmMeshes
+
+    try:
+        ArmMeshes.of(folder)
+    except ValueError as error:
+        raise CommandRejected(str(error), parameter="meshes", value=folder) from None
 
 
 def _check_count(count: int, port: int, *, has_view: bool) -> None:
@@ -427,7 +458,13 @@ def _type_to_all(cabinets: list[subprocess.Popen[str]], as_json: bool) -> None:
 
 
 def _cabinet(
-    options: SimulatorOptions, *, view: bool, view_port: int, key_file: Path | None, as_json: bool
+    options: SimulatorOptions,
+    *,
+    view: bool,
+    view_port: int,
+    meshes: str,
+    key_file: Path | None,
+    as_json: bool,
 ) -> int:
     """Run a virtual cabinet until Ctrl-C or SIGTERM; lines on standard input are the operator's actions.
 
@@ -457,6 +494,7 @@ def _cabinet(
                         target,
                         "--port",
                         str(view_port),
+                        *(["--meshes", meshes] if meshes else []),
                         *(
                             []
                             if positions is None
@@ -490,7 +528,7 @@ def _refuse_beside_app(names: set[str]) -> None:
         CommandRejected: there is such an option.
     """
     for name in sorted(names):
-        if name.startswith("--view"):
+        if name.startswith("--view") or name == "--meshes":
             reason = "the view needs heptarm's own application in the cabinet"
         elif name.startswith("--fri"):
             reason = "an FRI session is opened by the application itself"

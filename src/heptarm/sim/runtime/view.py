@@ -19,6 +19,7 @@ import mujoco
 import numpy as np
 
 from heptarm.errors import require
+from heptarm.sim.plant.appearance import HIDDEN_GROUP, ArmMeshes
 from heptarm.sim.plant.scene import Scene
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
@@ -26,8 +27,6 @@ from heptarm.sim.runtime.view_guard import ViewGuard
 from heptarm.values.arrays import Array
 
 _RATE = 30.0
-#: MuJoCo's groups of shapes from this one on are not drawn, as in MuJoCo's own viewer.
-_HIDDEN_GROUP = 3
 _COLOURS = {"silver": (192, 194, 199), "orange": (255, 107, 10), "dark": (64, 64, 69)}
 
 
@@ -39,12 +38,18 @@ class DrawnWorld:
         model: "iiwa7", "iiwa14", "med7" or "med14".
         scene: what is around the arm and on its flange; None: nothing.
         positions: file in which the simulator writes all positions; None: only the arm moves.
+        meshes: of the arm; None: heptarm's own.
     """
 
     def __init__(
-        self, server: Any, model: str, scene: Scene | None = None, positions: Path | None = None
+        self,
+        server: Any,
+        model: str,
+        scene: Scene | None = None,
+        positions: Path | None = None,
+        meshes: ArmMeshes | None = None,
     ) -> None:
-        self._model = compiled(model, (), scene)
+        self._model = compiled(model, (), scene, meshes or ArmMeshes())
         self._data = mujoco.MjData(self._model)
         self._positions = None if positions is None else PositionsFile(positions, self._model.nq)
         self._handles = [
@@ -57,7 +62,7 @@ class DrawnWorld:
     def _is_drawn(self, index: int) -> bool:
         kind = int(self._model.geom_type[index])
         endless = kind in (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
-        return not endless and int(self._model.geom_group[index]) < _HIDDEN_GROUP
+        return not endless and int(self._model.geom_group[index]) < HIDDEN_GROUP
 
     def _shape(self, server: Any, index: int) -> Any:
         vertices, faces = self._mesh(index)
@@ -124,13 +129,15 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--port", type=int, default=8080)
     parser.add_argument("--scene", default="")
     parser.add_argument("--positions", type=Path, default=None)
+    parser.add_argument("--meshes", default="", help="folder with link_0.stl to link_7.stl or .obj")
     options = parser.parse_args(argv)
     from heptarm.arm.connect import connect
     from heptarm.errors import HeptarmError
 
     try:
         viser = require("viser", extra="viz")
-    except HeptarmError as error:  # the parent prints it
+        meshes = ArmMeshes.of(options.meshes)
+    except (HeptarmError, ValueError) as error:  # the parent prints it
         print(json.dumps({"ready": False, "error": str(error), "host": True}), flush=True)
         return 1
     signal.signal(signal.SIGTERM, lambda *_: os._exit(0))
@@ -142,7 +149,7 @@ def main(argv: list[str] | None = None) -> int:
             server = viser.ViserServer(host=options.host, port=options.port, verbose=False)
         guard.port = server.get_port()
         scene = Scene.of(options.scene) if options.scene else None
-        world = DrawnWorld(server, arm.robot.name, scene, options.positions)
+        world = DrawnWorld(server, arm.robot.name, scene, options.positions, meshes)
         server.scene.set_up_direction("+z")
         server.initial_camera.position = (1.25, -1.1, 1.0)
         server.initial_camera.look_at = (0.15, 0.0, 0.5)
