@@ -1,5 +1,6 @@
 """The public names of this package and where they live: the one list, read by type checkers and at run time."""
 
+from . import devices as devices
 from .arm.arm import (
     Arm as Arm,
 )

@@ -284,6 +284,7 @@ EXTRAS = {
     "viz": ("viser", "matplotlib", "trimesh"),
     "rl": ("torch", "gymnasium", "PIL"),
     "record": ("mcap", "pandas", "pyarrow"),
+    "devices": ("evdev", "pyspacemouse"),
 }
 
 

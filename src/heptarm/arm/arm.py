@@ -673,7 +673,7 @@ class Arm:
             self._connection,
             message,
             limits,
-            twist=TwistLimits(self._speed * along, change, self._speed * turn, spin),
+            twist=TwistLimits(along, change, turn, spin),
             moving=moving,
             axes=self._tooling.axes(TOOL if request.frame is None else request.frame),
             period=period,

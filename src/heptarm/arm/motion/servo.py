@@ -106,10 +106,10 @@ class ServoRequest:
             The lower one of this and `arm.speed` applies.
         acceleration: likewise, of the acceleration and the jerk.
         speed_mps: of "lin": largest speed along each axis of the base [m/s], up to 10; None: 0.25. `arm.speed`
-            scales it, since the joints' own limits are not checked. Of "twist": largest speed.
+            scales it, since the joints' own limits are not checked. Of "twist": largest speed, not scaled.
         acceleration_mps2: likewise [m/s²], up to 100; None: 1. Not scaled.
         speed_radps: largest angular velocity about each axis of the base, of "twist" about any axis [rad/s], up to
-            20; None: 0.5. Scaled.
+            20; None: 0.5. Scaled for "lin".
         acceleration_radps2: likewise [rad/s²], up to 200; None: 2. Not scaled.
         min_trajectory_time: shortest trajectory to a target [s]; None: a period and 5 ms.
         goal_timeout: time at its target without another one after which the cabinet's servo motion ends [s];
