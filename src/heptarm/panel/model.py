@@ -140,7 +140,7 @@ class PanelArm:
         self._visiting: tuple[str, ...] = ()
         self._message: Advice | None = None
         self._last_stop: Advice | None = None
-        self._stops: tuple[str, ...] = ()
+        self._stops: tuple[str, ...] | None = None
         self._seen = 0
         self._forces: deque[tuple[float, float]] = deque(maxlen=_MOST_FORCES)
         self._path: deque[Array] = deque(maxlen=_MOST_PLACES)
@@ -191,8 +191,8 @@ class PanelArm:
         safety = state.groups.safety
         if safety is None:
             return
-        new = [reason for reason in safety.stops if reason not in self._stops]
-        self._stops = safety.stops
+        before, self._stops = self._stops, safety.stops
+        new = [] if before is None else [reason for reason in safety.stops if reason not in before]
         if new:
             remedies = [one.remedy for one in self._reasons(safety) if one.what in map(str.capitalize, new)]
             self._last_stop = Advice(

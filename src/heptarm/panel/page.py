@@ -351,7 +351,9 @@ class ArmPage:
         self._button("Cancel", model.end_run, color="gray")
         save = gui.add_button("Save", color="gray")
         save.on_click(
-            lambda event: event.client.send_file_download("points.json", model.points.to_json().encode())
+            lambda event: event.client.send_file_download(
+                "points.json", model.points.to_json().encode(), save_immediately=True
+            )
         )
         load = gui.add_upload_button("Load", color="gray", mime_type="application/json")
         load.on_upload(lambda event: self._do(lambda: self._load(event.target.value.content)))
