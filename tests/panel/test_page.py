@@ -82,7 +82,7 @@ def observer() -> Iterator[Callable[[str], ha.Arm]]:
         arm.close()
 
 
-def test_every_control_does_what_it_says(browser: Any, observer: Callable[[str], ha.Arm]) -> None:
+def test_every_control_does_what_it_is_labelled(browser: Any, observer: Callable[[str], ha.Arm]) -> None:
     with sim("--panel", "--view-port", "0") as ready:
         arm = observer(ready["target"])
         page = Page(browser, ready["panel"])

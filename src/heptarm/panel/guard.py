@@ -22,7 +22,7 @@ from heptarm.errors import HeptarmError
 
 #: Names under which a browser on this machine reaches a panel that listens on an address of it.
 _LOCAL = ("127.0.0.1", "localhost", "[::1]")
-#: An address that the route to the network is looked up for; nothing is sent to it (RFC 5737, TEST-NET-1).
+#: A remote address, to look up which own one is used for it; nothing is sent to it (RFC 5737, TEST-NET-1).
 _SOMEWHERE = ("192.0.2.1", 9)
 
 

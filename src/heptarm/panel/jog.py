@@ -36,7 +36,7 @@ _CEILING = 0.5
 #: Distance from a joint limit at which jogging stops [rad].
 _MARGIN = 0.02
 #: The target waits while it is further ahead of the commanded pose than this [m], [rad].
-_LEAD, _TURN_LEAD = 0.03, 0.12
+_AHEAD, _AHEAD_TURN = 0.03, 0.12
 #: A velocity below this is rest, a fraction of the largest.
 _REST = 0.01
 
@@ -165,7 +165,7 @@ class Jogger:
         """End the movement now, without waiting until it has ended.
 
         Args:
-            owner: end it only if this one asked for it; None: whoever did.
+            owner: end it only if this one asked for it; None: in any case.
         """
         with self._changed:
             if owner is None or owner == self._owner:
@@ -249,7 +249,7 @@ class Jogger:
                     servo.set(target)
                     return
                 commanded = self._arm.state.pose_cmd
-                if target.distance_to(commanded) < _LEAD and target.angle_to(commanded) < _TURN_LEAD:
+                if target.distance_to(commanded) < _AHEAD and target.angle_to(commanded) < _AHEAD_TURN:
                     target = Pose(
                         target.xyz + line * passed,
                         multiply(Pose.from_rotvec(np.zeros(3), turn * passed).quat, target.quat),
@@ -275,7 +275,7 @@ def _towards(jog: PoseJog, target: Pose) -> tuple[Array, Array]:
     )
 
 
-def _braked(way: Array, speed: float, ramp: float) -> Array:
+def _braked(rest: Array, speed: float, ramp: float) -> Array:
     """The velocity along what is left of a path, low enough to stop at its end with half of a ramp."""
-    size = float(np.linalg.norm(way))
-    return np.zeros(3) if size < 1e-6 else way * (min(speed, float(np.sqrt(ramp * size))) / size)
+    size = float(np.linalg.norm(rest))
+    return np.zeros(3) if size < 1e-6 else rest * (min(speed, float(np.sqrt(ramp * size))) / size)
