@@ -26,6 +26,7 @@ COMMANDS = {
     "stop": "stop:stop",
     "recover": "motion:recover",
     "servo": "motion:servo",
+    "jog": "jog:jog",
     "teach": "motion:teach",
     "replay": "motion:replay",
     "record": "record:record",
