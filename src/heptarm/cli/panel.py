@@ -30,6 +30,9 @@ def panel(
         ),
     ] = False,
     scene: Annotated[str, Parameter(help="NAME or FILE (MJCF) of what is drawn around the first arm.")] = "",
+    meshes: Annotated[
+        str, Parameter(help="DIR with link_0.stl to link_7.stl, or .obj, in place of heptarm's own.")
+    ] = "",
     recordings: Annotated[Path, Parameter(help="Folder for recordings.")] = Path(),
     light: Annotated[bool, Parameter(negative="", help="A light page instead of a dark one.")] = False,
     target: CommandTargets = NO_TARGETS,
@@ -48,6 +51,7 @@ def panel(
         allow_control=allow_control,
         read_only=read_only,
         scene=scene,
+        meshes=meshes,
         recordings=recordings,
         light=light,
     )

@@ -63,6 +63,13 @@ def sim(
         Parameter(negative="", help="Open the panel in the browser: look, jog, and be the operator."),
     ] = False,
     view_port: Annotated[int, Parameter(help="Port of view or panel; 0 takes a free one.")] = 8080,
+    meshes: Annotated[
+        str,
+        Parameter(
+            help="With --view or --panel: DIR with link_0.stl to link_7.stl, or .obj: draw the arm in these meshes "
+            "instead of heptarm's own."
+        ),
+    ] = "",
     key_file: KeyFile = None,
     key: Annotated[str, Parameter(show=False)] = "",
     fault: Annotated[
@@ -229,6 +236,7 @@ def sim(
             "--view": (view, False),
             "--panel": (panel, False),
             "--view-port": (view_port, 8080),
+            "--meshes": (meshes, ""),
             "--host": (host, "127.0.0.1"),
             "--port": (port, 30001),
             "--count": (count, 1),
@@ -281,6 +289,7 @@ def sim(
         own = {
             "--view": view,
             "--panel": panel,
+            "--meshes": bool(meshes),
             "--key-file": key_file is not None,
             "--project": project is not None,
             "--scene": bool(scene),
@@ -319,7 +328,9 @@ def sim(
         raise CommandRejected(
             "--view and --panel show the same cabinet", parameter="view", hint="leave out --view"
         )
-    _check_count(count, port, page="--panel" if panel else "--view" if view else "")
+    page = "panel" if panel else "view" if view else ""
+    _check_count(count, port, page=page)
+    _check_meshes(meshes, page=page)
     cabinet = SimulatorOptions(
         model=model,
         host=host,
@@ -336,8 +347,28 @@ def sim(
     )
     if count > 1:
         return _fleet(cabinet, count, key_file=key_file, as_json=as_json)
-    page = "panel" if panel else "view" if view else ""
-    return _cabinet(cabinet, page=page, page_port=view_port, key_file=key_file, as_json=as_json)
+    return _cabinet(
+        cabinet, page=page, page_port=view_port, meshes=meshes, key_file=key_file, as_json=as_json
+    )
+
+
+def _check_meshes(folder: str, *, page: str) -> None:
+    """Check meshes for the page before anything starts.
+
+    Raises:
+        CommandRejected: there is no page to use them, or they cannot be used.
+    """
+    if not folder:
+        return
+    if not page:
+        raise CommandRejected("--meshes needs --view or --panel", parameter="meshes", hint="add --view")
+    require_extra("sim")
+    from heptarm.sim.plant.appearance import ArmMeshes
+
+    try:
+        ArmMeshes.of(folder)
+    except ValueError as error:
+        raise CommandRejected(str(error), parameter="meshes", value=folder) from None
 
 
 def _check_count(count: int, port: int, *, page: str) -> None:
@@ -356,8 +387,8 @@ def _check_count(count: int, port: int, *, page: str) -> None:
         )
     if count > 1 and page:
         raise CommandRejected(
-            f"{page} cannot be used with --count: it shows one cabinet",
-            parameter=page.lstrip("-"),
+            f"--{page} cannot be used with --count: it shows one cabinet",
+            parameter=page,
             hint="run heptarm panel --target sim://HOST:PORT, with one --target for each of them",
         )
 
@@ -438,7 +469,13 @@ def _type_to_all(cabinets: list[subprocess.Popen[str]], as_json: bool) -> None:
 
 
 def _cabinet(
-    options: SimulatorOptions, *, page: str, page_port: int, key_file: Path | None, as_json: bool
+    options: SimulatorOptions,
+    *,
+    page: str,
+    page_port: int,
+    meshes: str,
+    key_file: Path | None,
+    as_json: bool,
 ) -> int:
     """Run a virtual cabinet until Ctrl-C or SIGTERM; lines on standard input are the operator's actions.
 
@@ -446,6 +483,7 @@ def _cabinet(
         options: of the cabinet.
         page: "panel" or "view", which only shows; empty: no page in the browser.
         page_port: TCP port of the page.
+        meshes: folder with meshes of the arm for the page; empty: heptarm's own.
         key_file: file with the key.
         as_json: print JSON.
 
@@ -465,10 +503,15 @@ def _cabinet(
         ready = _ready(cabinet, f"the virtual cabinet does not start on {host}:{port}")
         target = f"sim://{host}:{ready['port']}"
         if page:
-            scene = [] if positions is None else ["--scene", options.scene, "--positions", str(positions)]
-            shows = ["--read-only"] if page == "view" else []
             command = [sys.executable, "-m", "heptarm.panel.process", "--target", target]
-            viewer = stack.enter_context(_child([*command, "--port", str(page_port), *scene, *shows], key))
+            command += ["--port", str(page_port)]
+            if positions is not None:
+                command += ["--scene", options.scene, "--positions", str(positions)]
+            if meshes:
+                command += ["--meshes", meshes]
+            if page == "view":
+                command += ["--read-only"]
+            viewer = stack.enter_context(_child(command, key))
             ready[page] = _ready(viewer, f"the {page} does not start")["url"]
             threading.Thread(target=_careful, args=(_obey, viewer, cabinet), daemon=True).start()
         if as_json:
@@ -503,7 +546,7 @@ def _refuse_beside_app(names: set[str]) -> None:
         CommandRejected: there is such an option.
     """
     for name in sorted(names):
-        if name.startswith(("--view", "--panel")):
+        if name.startswith(("--view", "--panel")) or name == "--meshes":
             reason = "the page in the browser needs heptarm's own application in the cabinet"
         elif name.startswith("--fri"):
             reason = "an FRI session is opened by the application itself"

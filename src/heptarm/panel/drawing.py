@@ -10,14 +10,13 @@ import mujoco
 import numpy as np
 
 from heptarm.errors import require
+from heptarm.sim.plant.appearance import HIDDEN_GROUP, ArmMeshes
 from heptarm.sim.plant.scene import Scene
 from heptarm.sim.plant.shared_state import PositionsFile
 from heptarm.sim.plant.world import compiled
 from heptarm.values.arrays import Array
 from heptarm.values.pose import Pose
 
-#: MuJoCo's groups of shapes from this one on are not drawn, as in MuJoCo's own viewer.
-_HIDDEN_GROUP = 3
 _COLOURS = {"silver": (192, 194, 199), "orange": (255, 107, 10), "dark": (64, 64, 69)}
 _ACCENT, _TRAIL, _TOOL = (255, 107, 10), (64, 160, 255), (150, 152, 158)
 #: Length of the arrow of a contact [m/N], its longest [m], and the force that is not drawn [N].
@@ -42,6 +41,7 @@ class DrawnWorld:
         model: "iiwa7", "iiwa14", "med7" or "med14".
         scene: what is around the arm and on its flange; None: nothing.
         positions: file in which the simulator writes all positions; None: only the arm moves.
+        meshes: of the arm; None: heptarm's own.
         root: node of viser's scene that is the base of the arm; empty: the world.
     """
 
@@ -51,11 +51,12 @@ class DrawnWorld:
         model: str,
         scene: Scene | None = None,
         positions: Path | None = None,
+        meshes: ArmMeshes | None = None,
         *,
         root: str = "",
     ) -> None:
         self._root = root
-        self._model = compiled(model, (), scene)
+        self._model = compiled(model, (), scene, meshes or ArmMeshes())
         self._data = mujoco.MjData(self._model)
         self._positions = None if positions is None else PositionsFile(positions, self._model.nq)
         self._handles = [
@@ -67,7 +68,7 @@ class DrawnWorld:
     def _is_drawn(self, index: int) -> bool:
         kind = int(self._model.geom_type[index])
         endless = kind in (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
-        return not endless and int(self._model.geom_group[index]) < _HIDDEN_GROUP
+        return not endless and int(self._model.geom_group[index]) < HIDDEN_GROUP
 
     def _shape(self, server: Any, index: int) -> Any:
         vertices, faces = self._mesh(index)

@@ -55,6 +55,7 @@ class PanelOptions:
         read_only: nobody may control the arms.
         scene: what is drawn around the first arm; empty: nothing.
         positions: file in which a simulator writes the positions of all bodies of the scene; None: there is none.
+        meshes: folder with meshes of the arms; empty: heptarm's own.
         recordings: folder for recordings.
         light: a light page instead of a dark one.
     """
@@ -65,6 +66,7 @@ class PanelOptions:
     read_only: bool = False
     scene: str = ""
     positions: Path | None = None
+    meshes: str = ""
     recordings: Path = Path()
     light: bool = False
 
@@ -86,15 +88,20 @@ class Panel:
 
     Raises:
         MissingExtra: viser is not installed.
-        CommandRejected: the scene cannot be drawn, or the port is taken.
+        CommandRejected: the scene or the meshes cannot be drawn.
     """
 
     def __init__(self, arms: Sequence[PanelArm], options: PanelOptions) -> None:
         viser = require("viser", extra="viz")
         from heptarm.panel.drawing import DrawnMarks, DrawnWorld
         from heptarm.panel.page import ArmPage
+        from heptarm.sim.plant.appearance import ArmMeshes
         from heptarm.sim.plant.scene import Scene
 
+        try:
+            meshes = ArmMeshes.of(options.meshes)
+        except ValueError as error:
+            raise CommandRejected(str(error), parameter="meshes", value=options.meshes) from None
         integer(options.port, "port", 0, 65535)
         guard = PageGuard(options.host)
         # viser's own lines have a URL without the token, which lets nobody in
@@ -145,6 +152,7 @@ class Panel:
                         model.arm.robot.name,
                         scene,
                         options.positions if number == 0 else None,
+                        meshes,
                         root=root,
                     ),
                     DrawnMarks(server, root),
@@ -279,6 +287,7 @@ def main(argv: list[str] | None = None) -> int:
     parser.add_argument("--port", type=int, default=8080)
     parser.add_argument("--scene", default="")
     parser.add_argument("--positions", type=Path, default=None)
+    parser.add_argument("--meshes", default="", help="folder with link_0.stl to link_7.stl or .obj")
     parser.add_argument("--read-only", action="store_true")
     given = parser.parse_args(argv)
     from heptarm.arm.connect import connect
@@ -288,6 +297,7 @@ def main(argv: list[str] | None = None) -> int:
         port=given.port,
         scene=given.scene,
         positions=given.positions,
+        meshes=given.meshes,
         read_only=given.read_only,
     )
     try:
