@@ -28,6 +28,7 @@ def readout(**changes: object) -> Readout:
         "in_control": False,
         "controller": "",
         "is_jogging": False,
+        "slowed": "",
         "running": "",
         "target": None,
         "stands": (),

@@ -1,8 +1,8 @@
 """Jogging: the arm moves while somebody asks for it again and again, and stops when nobody does.
 
 This is the one module of the panel that makes the arm move by hand. A press of a button becomes a stream of `hold`
-calls; each is good for `HOLD` seconds. The arm follows a servo stream whose targets are integrated here from a velocity
-that rises and falls along a ramp, so that a release, a lost page or a lost network all end the same way.
+calls; each is good for `HOLD` seconds. The arm follows a stream of velocities, which ramps, brakes before limits, and
+falls to zero by itself; so a release, a lost page and a lost network all end in the same manner.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 
 from heptarm.errors import CommandRejected, HeptarmError, LimitError
 from heptarm.values.arrays import Array, Value, array
-from heptarm.values.frames import BASE, TOOL
+from heptarm.values.frames import BASE
 from heptarm.values.pose import Pose, multiply
 
 if TYPE_CHECKING:
@@ -27,18 +27,14 @@ if TYPE_CHECKING:
 HOLD = 0.35
 #: Largest speeds of jogging, at 100 %: of a joint [rad/s], of the motion frame [m/s] and about it [rad/s].
 JOINT_SPEED, LINE_SPEED, TURN_SPEED = 0.5, 0.25, 0.5
-#: Ramps of these speeds [rad/s²], [m/s²], [rad/s²].
-_JOINT_RAMP, _LINE_RAMP, _TURN_RAMP = 2.0, 0.8, 2.0
-#: Rate of the servo stream [Hz].
+#: Accelerations of the motion frame [m/s²], [rad/s²], and of the joints, a fraction of each axis' maximum.
+_LINE_RAMP, _TURN_RAMP, _JOINT_RAMP = 1.0, 3.0, 0.5
+#: Velocities per second that are set [Hz].
 _RATE = 50.0
-#: Ceiling of the joints' speed while the motion frame is jogged, a fraction of their maxima.
+#: Ceiling of the joints' speeds, a fraction of their maxima.
 _CEILING = 0.5
-#: Distance from a joint limit at which jogging stops [rad].
-_MARGIN = 0.02
-#: The target waits while it is further ahead of the commanded pose than this [m], [rad].
-_AHEAD, _AHEAD_TURN = 0.03, 0.12
-#: A velocity below this is rest, a fraction of the largest.
-_REST = 0.01
+#: On the last piece to a pose the speed is the distance that is left times this [1/s].
+_GAIN = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,6 +122,7 @@ class Jogger:
         self._is_barred = False
         self._is_closed = False
         self._is_moving = False
+        self._slowed = ""
         self._thread = threading.Thread(target=self._work, name="heptarm-panel-jog", daemon=True)
         self._thread.start()
 
@@ -133,6 +130,11 @@ class Jogger:
     def is_moving(self) -> bool:
         """Whether the arm follows, or brakes after, a request."""
         return self._is_moving
+
+    @property
+    def slowed(self) -> str:
+        """Why the arm is slower than asked for, such as "limit of A4"; empty: it is not."""
+        return self._slowed
 
     def hold(self, jog: Jog, owner: object = None) -> None:
         """Ask for a movement for the next `HOLD` seconds.
@@ -185,97 +187,81 @@ class Jogger:
 
     # --------------------------------------------------------------------------------- the thread
 
-    def _wanted(self, kind: tuple[type[Jog], ...]) -> Jog | None:
-        """What is held now; None: nothing, or a movement of another kind."""
+    def _wanted(self, axes: str | None) -> Jog | None:
+        """What is held now; None: nothing, or a movement along other axes.
+
+        Args:
+            axes: frame whose axes are meant; None: the joints.
+        """
         with self._changed:
             if time.monotonic() - self._held_at > HOLD:
                 self._jog = None
-            return self._jog if isinstance(self._jog, kind) else None
+            return self._jog if self._jog is not None and _axes(self._jog) == axes else None
 
     def _work(self) -> None:
         while True:
             with self._changed:
-                self._is_moving = False
+                self._is_moving, self._slowed = False, ""
                 self._changed.wait_for(lambda: self._jog is not None or self._is_closed)
-                if self._is_closed:
+                if self._is_closed or self._jog is None:
                     return
-                jog, self._is_moving = self._jog, True
+                axes, self._is_moving = _axes(self._jog), True
             try:
-                if isinstance(jog, JointJog):
+                if axes is None:
                     self._turn()
                 else:
-                    self._drive()
+                    self._drive(axes)
             except HeptarmError as error:
                 self.bar()
                 self._on_error(error)
 
     def _turn(self) -> None:
-        """Follow the joints' velocity until nobody asks for it and it is zero."""
-        robot = self._arm.robot
-        low, high = robot.q_min + _MARGIN, robot.q_max - _MARGIN
-        with self._arm.servo("joint", rate=_RATE, speed=_CEILING, acceleration=_CEILING) as servo:
-            q, velocity = np.array(servo.start.q_cmd), np.zeros(7)
-            while (passed := servo.tick()) is not None:
-                jog = self._wanted((JointJog,))
-                wanted = jog.velocity if isinstance(jog, JointJog) else np.zeros(7)
-                room = np.where(wanted > 0, high - q, q - low).clip(0.0)
-                braking = np.sqrt(2.0 * _JOINT_RAMP * room)
-                velocity = _ramped(velocity, wanted.clip(-braking, braking), _JOINT_RAMP * passed)
-                if jog is None and np.abs(velocity).max() < _REST * JOINT_SPEED:
-                    servo.set(q)
-                    return
-                q = q + velocity * passed
-                servo.set(q, velocity)
+        """Let the joints turn until nobody asks for it."""
+        with self._arm.servo(
+            "velocity", rate=_RATE, timeout=HOLD, speed=_CEILING, acceleration=_JOINT_RAMP
+        ) as servo:
+            while servo.tick() is not None and isinstance(jog := self._wanted(None), JointJog):
+                servo.set(jog.velocity)
+                self._slowed = servo.stats.slowdown.reason
 
-    def _drive(self) -> None:
-        """Follow the velocity of the motion frame, or move towards a pose, until nobody asks for it."""
-        with self._arm.servo("pose", rate=_RATE, speed=_CEILING, acceleration=_CEILING) as servo:
-            target, line, turn = servo.start.pose_cmd, np.zeros(3), np.zeros(3)
-            while (passed := servo.tick()) is not None:
-                jog = self._wanted((TwistJog, PoseJog))
+    def _drive(self, axes: str) -> None:
+        """Move the motion frame until nobody asks for it."""
+        with self._arm.servo(
+            "twist",
+            frame=axes,
+            rate=_RATE,
+            timeout=HOLD,
+            speed=_CEILING,
+            acceleration=_JOINT_RAMP,
+            speed_mps=LINE_SPEED,
+            acceleration_mps2=_LINE_RAMP,
+            speed_radps=TURN_SPEED,
+            acceleration_radps2=_TURN_RAMP,
+        ) as servo:
+            while servo.tick() is not None:
+                jog = self._wanted(axes)
                 if isinstance(jog, TwistJog):
-                    axes = target.rotation if jog.frame == TOOL else self._arm.pose(jog.frame).rotation
-                    wanted_line, wanted_turn = axes @ jog.twist[:3], axes @ jog.twist[3:]
+                    servo.set(jog.twist)
                 elif isinstance(jog, PoseJog):
-                    wanted_line, wanted_turn = _towards(jog, target)
+                    servo.set(_towards(jog, self._arm.state.pose))
                 else:
-                    wanted_line, wanted_turn = np.zeros(3), np.zeros(3)
-                line = _ramped(line, wanted_line, _LINE_RAMP * passed)
-                turn = _ramped(turn, wanted_turn, _TURN_RAMP * passed)
-                is_slow = (
-                    np.linalg.norm(line) < _REST * LINE_SPEED and np.linalg.norm(turn) < _REST * TURN_SPEED
-                )
-                if jog is None and is_slow:
-                    servo.set(target)
                     return
-                commanded = self._arm.state.pose_cmd
-                if target.distance_to(commanded) < _AHEAD and target.angle_to(commanded) < _AHEAD_TURN:
-                    target = Pose(
-                        target.xyz + line * passed,
-                        multiply(Pose.from_rotvec(np.zeros(3), turn * passed).quat, target.quat),
-                    )
-                servo.set(target)
+                self._slowed = servo.stats.slowdown.reason
 
 
-def _ramped(velocity: Array, wanted: Array, step: float) -> Array:
-    """A velocity one step nearer to the wanted one, along the straight line between them."""
-    change = wanted - velocity
-    size = float(np.linalg.norm(change))
-    return wanted if size <= step else velocity + change * (step / size)
+def _axes(jog: Jog) -> str | None:
+    """The frame whose axes a movement has; None: it is one of the joints."""
+    return None if isinstance(jog, JointJog) else jog.frame if isinstance(jog, TwistJog) else BASE
 
 
-def _towards(jog: PoseJog, target: Pose) -> tuple[Array, Array]:
-    """Velocity and angular velocity, base axes, with which a target goes to a pose and stops there."""
-    away = jog.pose.xyz - target.xyz
-    back = target.quat * np.array([-1.0, -1.0, -1.0, 1.0])
-    around = Pose(np.zeros(3), multiply(jog.pose.quat, back)).rotvec
-    return (
-        _braked(away, jog.speed * LINE_SPEED, _LINE_RAMP),
-        _braked(around, jog.speed * TURN_SPEED, _TURN_RAMP),
-    )
+def _towards(jog: PoseJog, pose: Pose) -> Array:
+    """The twist, base axes, with which a pose goes to that of a movement and stops there, shape (6,)."""
+    away = jog.pose.xyz - pose.xyz
+    around = Pose(np.zeros(3), multiply(jog.pose.quat, pose.quat * np.array([-1.0, -1.0, -1.0, 1.0]))).rotvec
+    return np.concatenate([_slowed(away, jog.speed * LINE_SPEED), _slowed(around, jog.speed * TURN_SPEED)])
 
 
-def _braked(rest: Array, speed: float, ramp: float) -> Array:
-    """The velocity along what is left of a path, low enough to stop at its end with half of a ramp."""
-    size = float(np.linalg.norm(rest))
-    return np.zeros(3) if size < 1e-6 else rest * (min(speed, float(np.sqrt(ramp * size))) / size)
+def _slowed(left: Array, speed: float) -> Array:
+    """The velocity along what is left of a path, slower at its end."""
+    size = float(np.linalg.norm(left))
+    return np.zeros(3) if size < 1e-6 else left * (min(speed, _GAIN * size) / size)

@@ -82,6 +82,7 @@ class Readout(Value):
         in_control: this panel controls the arm.
         controller: name of the client that controls it; empty: nobody.
         is_jogging: the arm follows a button of the panel.
+        slowed: why it is slower than the button asks for; empty: it is not.
         running: name of the taught point that the arm is moving to; empty: none.
         target: pose to which the panel moves the arm; None: to none.
         stands: why the arm cannot move, with remedies; empty: it can.
@@ -99,6 +100,7 @@ class Readout(Value):
     in_control: bool
     controller: str
     is_jogging: bool
+    slowed: str
     running: str
     target: Pose | None
     stands: tuple[Advice, ...]
@@ -174,6 +176,7 @@ class PanelArm:
             in_control=arm.in_control,
             controller=arm.controller,
             is_jogging=self._jogger.is_moving,
+            slowed=self._jogger.slowed,
             running=running,
             target=self._target(running),
             stands=stands,

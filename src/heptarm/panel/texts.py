@@ -73,7 +73,7 @@ def head(readout: Readout) -> str:
     else:
         chips.append(_chip(f"in control: {readout.controller or 'nobody'}"))
     if readout.is_jogging:
-        chips.append(_chip("jogging", "warn"))
+        chips.append(_chip(f"jogging, slowed: {readout.slowed}" if readout.slowed else "jogging", "warn"))
     if readout.running:
         chips.append(_chip(f"to {readout.running}", "warn"))
     if readout.recording:
