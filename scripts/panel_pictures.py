@@ -115,10 +115,10 @@ def main(folder: Path) -> int:
         browser.get(ready["panel"])
         settled(browser)
         with ha.connect(ready["target"], name="cell", watchdog=5.0, timeout=30.0) as arm:
-            arm.move(ha.ptp(ha.deg(-25, 40, 0, -80, 0, 60, 0), speed=0.4))
-            for x, y in ((0.0, 0.25), (0.1, 0.0), (0.0, -0.25), (-0.1, 0.0)):
-                arm.move(ha.lin_rel(x=x, y=y, frame="base", speed_mps=0.25))
-            arm.move(ha.ptp(ha.deg(15, 40, 0, -80, 0, 60, 0), speed=0.4))
+            arm.move(ha.ptp(ha.deg(-20, 25, 0, -80, 0, 75, 0), speed=0.4))
+            for x, y, z in ((0.0, 0.25, 0.05), (0.08, 0.0, 0.1), (0.0, -0.25, -0.05), (-0.08, 0.0, -0.1)):
+                arm.move(ha.lin_rel(x=x, y=y, z=z, frame="base", speed_mps=0.25))
+            arm.move(ha.ptp(ha.deg(15, 25, 0, -80, 0, 75, 0), speed=0.4))
         press(browser, "Take control")
         press(browser, "Program")
         for _ in range(3):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -227,12 +228,12 @@ def test_stop_works_without_control(model: PanelArm, observer: ha.Arm) -> None:
 @pytest.mark.usefixtures("patient")
 def test_stop_ends_jogging_although_the_button_is_held(model: PanelArm, observer: ha.Arm) -> None:
     jog = JointJog(np.array((0.2, 0, 0, 0, 0, 0, 0)))
-    held(model, jog, lambda: observer.state.q[0] > 0.02)
+    held(model, jog, lambda: observer.state.q[0] > 0.02, "somebody")
     model.stop()
     for _ in range(8):
-        model.jog(jog)
+        model.jog(jog, "somebody")
         time.sleep(0.05)
-    until(lambda: not model.poll().is_jogging, meanwhile=lambda: model.jog(jog))
+    until(lambda: not model.poll().is_jogging, meanwhile=lambda: model.jog(jog, "somebody"))
     assert observer.wait_for_rest(timeout=PATIENCE).q[0] < 1.0
 
 
@@ -315,8 +316,10 @@ def test_the_list_is_edited_and_survives_a_file(model: PanelArm) -> None:
     ):
         with pytest.raises(CommandRejected, match="no taught points"):
             points.load(wrong)
+    content = json.loads(text)
+    content["points"][0]["q"][0] = 9.0
     with pytest.raises(LimitError, match="A1 must be in"):
-        points.load(text.replace('"q": [\n        ', '"q": [\n        9', 1))
+        points.load(json.dumps(content))
     assert points.names == ("c", "first")
     for name, why in (("c", "named 'c' already"), ("", "printable"), ("x" * 65, "printable")):
         with pytest.raises(CommandRejected, match=why):
@@ -411,8 +414,9 @@ def test_who_may_control(host: str, words: dict[str, bool], may: bool) -> None:
     assert PanelOptions(host=host, **words).may_control is may
 
 
-def test_recordings_go_where_they_are_wanted(model: PanelArm, tmp_path: Path) -> None:
-    lost = PanelArm(model.arm, halt=lambda: None, folder=tmp_path / "nowhere")
+def test_a_recording_that_cannot_be_written_is_refused(model: PanelArm, tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("")
+    lost = PanelArm(model.arm, halt=lambda: None, folder=tmp_path / "taken")
     with pytest.raises(CommandRejected):
         lost.start_recording()
     assert lost.poll().recording == ""

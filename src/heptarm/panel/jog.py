@@ -176,7 +176,8 @@ class Jogger:
     def bar(self) -> None:
         """End the movement, and ignore the button that is still held."""
         with self._changed:
-            self._jog, self._is_barred = None, True
+            self._is_barred = self._is_barred or self._jog is not None
+            self._jog = None
 
     def close(self) -> None:
         """End the movement and the thread; wait until the arm follows no more."""
