@@ -21,6 +21,7 @@ from heptarm.errors import HeptarmError, missing_extra
 COMMANDS = {
     "demo": "demo:demo",
     "sim": "sim:sim",
+    "panel": "panel:panel",
     "state": "state:state",
     "stop": "stop:stop",
     "recover": "motion:recover",
