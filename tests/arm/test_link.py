@@ -99,6 +99,30 @@ def test_control_that_is_lost_is_noticed(peer: Peer) -> None:
         assert arm.in_control
 
 
+def test_a_loop_over_fast_states_reads_the_link_itself_until_it_ends(peer: Peer) -> None:
+    with peer.arm(rate=400.0) as arm:
+        link, here = arm.connection.link, threading.get_ident()
+        take, readers = link._on_state, []
+
+        def taken(body: bytes, now: int) -> None:
+            readers.append(threading.get_ident())
+            take(body, now)
+
+        link._on_state = taken
+        states, deadline = arm.states(), time.monotonic() + 20.0
+        stamps = []
+        while readers.count(here) < 50:
+            stamps.append(next(states).stamp)
+            assert time.monotonic() < deadline
+        assert stamps == sorted(set(stamps))
+        arm.stop()  # a request in between
+        states.close()
+        count = len(readers)
+        while set(readers[count:]) <= {here}:
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+
+
 def test_requests_from_many_threads(peer: Peer) -> None:
     with peer.arm() as arm:
         problems: list[BaseException] = []
