@@ -1,4 +1,4 @@
-"""The arithmetic of a tick in C does what the one in Python does: two plants have the same courses."""
+"""The arithmetic of a tick in C does what the one in Python does: two plants follow the same scripts."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from heptarm.sim.planning.native_inverse import inverse_library
 from heptarm.sim.plant.native import tick_library
 from heptarm.sim.plant.plant import Plant
 from heptarm.sim.seam import StateWords
-from tests.sim.courses import COURSES
 from tests.sim.driving import READY
+from tests.sim.plant_scripts import PLANT_SCRIPTS
 
 try:
     tick_library()
@@ -50,11 +50,11 @@ def in_python(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         inverse_library.cache_clear()
 
 
-@pytest.mark.parametrize("name", COURSES)
+@pytest.mark.parametrize("name", PLANT_SCRIPTS)
 def test_every_state_of_a_course_is_the_same(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = COURSES[name].record()
+    found = PLANT_SCRIPTS[name].record()
     with in_python(monkeypatch):
-        expected = COURSES[name].record()
+        expected = PLANT_SCRIPTS[name].record()
     assert (found[:, WHOLE].view(np.int64) == expected[:, WHOLE].view(np.int64)).all()
     off = np.abs(np.nan_to_num((found - expected) / np.maximum(1.0, np.abs(expected))))
     torques = [StateWords.TAU, StateWords.TAU_EXT, StateWords.TAU_CMD, StateWords.WRENCH]

@@ -425,8 +425,8 @@ final class ClientConnection implements ControlAuthority.Controller, StateSample
     }
 
     /**
-     * Send a state at once in the sampler's thread if the connection is free; waking the writer costs as much as the rest of its
-     * way. After a write that had to wait for the client, the writer has the next states.
+     * Send a state at once in the sampler's thread if the connection is free; waking the writer costs as much as all the rest.
+     * After a write that had to wait for the client, the writer has the next states.
      */
     public void receiveAlone(State state) {
         if (sendByDatagram(state)) {

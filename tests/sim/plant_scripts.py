@@ -1,4 +1,4 @@
-"""Courses of a plant: what happens to it tick by tick, and the record of all its states."""
+"""Scripts of a plant: what happens to it tick by tick, and the record of all its states."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from tests.sim.ideal import KINDS
 
 Event = Callable[[Plant], object]
 
-_SOFT = JointImpedance([300.0] * 7)
+_COMPLIANT = JointImpedance([300.0] * 7)
 
 
 @dataclass(frozen=True)
-class Course:
+class PlantScript:
     """A plant, and what happens to it.
 
     Attributes:
@@ -89,40 +89,42 @@ def _target(q: tuple[float, ...]) -> Event:
 _BODY = Body(3.0, np.array((0.0, 0.02, 0.1)))
 _LATER = (0.3, 0.4, 0.2, -1.1, 0.2, 0.7, 0.1)
 
-COURSES = {
-    **{kind: Course({3: submit(kind)}) for kind in ("ptp", "lin", "circ", "batch", "spline")},
-    "from the straight arm": Course({3: submit("ptp")}, q=(0.0,) * 7),
-    "from home, twice": Course(
+PLANT_SCRIPTS = {
+    **{kind: PlantScript({3: submit(kind)}) for kind in ("ptp", "lin", "circ", "batch", "spline")},
+    "from the straight arm": PlantScript({3: submit("ptp")}, q=(0.0,) * 7),
+    "from home, twice": PlantScript(
         {3: submit("ptp"), 5: submit("ptp", id=2, joints=HOME), 7: submit("lin", id=3)}, ticks=3000, q=HOME
     ),
-    "overrides": Course(
+    "overrides": PlantScript(
         {3: submit("ptp"), 200: _override(0.3), 500: _override(0.9), 700: _override(1.0), 900: _override(0.0)}
     ),
-    "pause": Course({3: submit("lin"), 300: Plant.pause, 700: Plant.resume}),
-    "stop on the path": Course({3: submit("circ"), 400: Plant.stop}),
-    "fast stop, and another motion": Course(
+    "pause": PlantScript({3: submit("lin"), 300: Plant.pause, 700: Plant.resume}),
+    "stop on the path": PlantScript({3: submit("circ"), 400: Plant.stop}),
+    "fast stop, and another motion": PlantScript(
         {3: submit("ptp"), 400: Plant.stop_fast, 700: submit("ptp", id=2, joints=READY)}
     ),
-    "emergency stop and release": Course({3: submit("ptp"), 400: _stop, 900: _go_on}, ticks=1600),
-    "T1": Course({3: _t1, 5: submit("ptp")}),
-    "servo": Course({3: submit("servo"), 20: _target(_LATER), 400: _target(READY)}),
-    "direct": Course({3: submit("direct"), 20: _target(_LATER), 200: _target(READY)}),
-    "joint impedance": Course({3: submit("ptp", mode=_SOFT), 1100: submit("ptp", id=2, joints=READY)}),
-    "cartesian impedance": Course(
+    "emergency stop and release": PlantScript({3: submit("ptp"), 400: _stop, 900: _go_on}, ticks=1600),
+    "T1": PlantScript({3: _t1, 5: submit("ptp")}),
+    "servo": PlantScript({3: submit("servo"), 20: _target(_LATER), 400: _target(READY)}),
+    "direct": PlantScript({3: submit("direct"), 20: _target(_LATER), 200: _target(READY)}),
+    "joint impedance": PlantScript(
+        {3: submit("ptp", mode=_COMPLIANT), 1100: submit("ptp", id=2, joints=READY)}
+    ),
+    "cartesian impedance": PlantScript(
         {
             3: submit("hold", mode=CartesianImpedance((800.0, 900.0, 700.0, 60.0, 70.0, 50.0)), duration=0.6),
             100: lambda plant: plant.apply_wrench((10.0, -5.0, 8.0), duration=0.2),
         }
     ),
-    "a push": Course(
+    "a push": PlantScript(
         {
             3: submit("ptp"),
             200: lambda plant: plant.apply_wrench((20.0, 5.0, -8.0), (1.0, 0.5, 0.2), duration=0.3),
         }
     ),
-    "load data": Course({3: lambda plant: plant.set_load_data(_BODY), 5: submit("lin")}),
-    "an unknown payload": Course({3: lambda plant: plant.set_payload(_BODY), 5: submit("ptp")}),
-    "a trip of a drive": Course(
+    "load data": PlantScript({3: lambda plant: plant.set_load_data(_BODY), 5: submit("lin")}),
+    "an unknown payload": PlantScript({3: lambda plant: plant.set_payload(_BODY), 5: submit("ptp")}),
+    "a trip of a drive": PlantScript(
         {
             3: submit("ptp"),
             300: lambda plant: plant.apply_wrench((1500.0, 900.0, 0.0), duration=0.05),
@@ -131,8 +133,8 @@ COURSES = {
         },
         ticks=1500,
     ),
-    "noisy sensors": Course({3: submit("ptp")}, noisy=True),
-    "contact": Course(
+    "noisy sensors": PlantScript({3: submit("ptp")}, noisy=True),
+    "contact": PlantScript(
         {3: submit("lin", offset=(0.0, 0.0, -0.25, 0.0, 0.0, 0.0, 1.0), cart_velocity=0.12)},
         box=Box((0.6, 0.0, 0.25), (0.6, 0.8, 0.3)),
     ),
