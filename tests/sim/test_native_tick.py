@@ -51,7 +51,7 @@ def in_python(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("name", PLANT_SCRIPTS)
-def test_every_state_of_a_course_is_the_same(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_state_of_a_script_is_the_same(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     found = PLANT_SCRIPTS[name].record()
     with in_python(monkeypatch):
         expected = PLANT_SCRIPTS[name].record()
