@@ -9,6 +9,7 @@ import enum
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from functools import cache
+from inspect import signature
 from operator import attrgetter
 from typing import Any, NoReturn, TypeVar
 
@@ -61,7 +62,10 @@ def _names(kind: type) -> tuple[str, ...]:
 def _getter(kind: type) -> Callable[[Any], tuple[Any, ...]] | None:
     """All fields of a value at once, in order; None: not all of them may be given in order."""
     names = _names(kind)
-    is_in_order = len(names) > 1 and not any(one.kw_only for one in fields(kind))
+    in_order = tuple(
+        one.name for one in signature(kind).parameters.values() if one.kind is one.POSITIONAL_OR_KEYWORD
+    )
+    is_in_order = in_order == names and len(names) > 1
     return attrgetter(*names) if is_in_order else None  # one of a single name returns no tuple
 
 
