@@ -1,0 +1,255 @@
+"""Compiled control laws: functions that the native loop calls without Python.
+
+`law` compiles a Python function with Numba, `law_from` takes a function from a shared library in C or C++. The process
+of the loop compiles and loads them when the client starts, before any cabinet is asked for a session.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import inspect
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, overload
+
+import numpy.typing as npt
+
+from heptarm.errors import CommandRejected
+from heptarm.fri.loop import law_interface as interface
+from heptarm.values.arrays import callback, instance
+from heptarm.values.robot import RobotModel
+
+#: Number of arguments of a law with memory: state, output, parameters, memory.
+WITH_MEMORY = 4
+_Numbers = Mapping[str, npt.ArrayLike]
+
+
+def include_dir() -> Path:
+    """Folder of heptarm_law.h, for the compiler of a law in C or C++: `-I` and this folder."""
+    return Path(__file__).resolve().with_name("include")
+
+
+class CompiledLaw:
+    """A law that the native loop calls.
+
+    Args:
+        params: parameters and their initial values; those of the session replace them.
+        memory: members of its memory and their initial values; those of the session replace them.
+
+    Attributes:
+        success: what its function returns unless it has failed.
+    """
+
+    success = 0
+
+    def __init__(self, params: _Numbers | None = None, memory: _Numbers | None = None) -> None:
+        self.params: dict[str, Any] = dict(params or {})
+        self.memory: dict[str, Any] = dict(memory or {})
+        interface.flat(self.params, "params")
+        interface.flat(self.memory, "memory")
+
+    def parameters(self, arm: RobotModel) -> Mapping[str, Any]:
+        """Parameters and their initial values for a robot."""
+        return self.params
+
+    @property
+    def python(self) -> Callable[..., object] | None:
+        """The same law in Python, for a loop without a native part; None if there is none."""
+        return None
+
+    def load(self, params: interface.Schema, memory: interface.Schema) -> tuple[int, object]:
+        """Compile or load the law in this process.
+
+        Args:
+            params: schema of its parameters.
+            memory: schema of its memory.
+
+        Returns:
+            Address of its function, and what has to live as long as the function.
+
+        Raises:
+            CommandRejected: it cannot be compiled or loaded; the text has the place and the hint a remedy.
+        """
+        raise NotImplementedError
+
+
+def arity(function: Callable[..., object]) -> int:
+    """Number of positional arguments that a law takes; 3 if its signature is unknown."""
+    try:
+        found = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        return WITH_MEMORY - 1
+    return sum(one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD) for one in found)
+
+
+class NumbaLaw(CompiledLaw):
+    """A Python function that Numba compiles; made by `law`. Called directly, it runs in Python.
+
+    Args:
+        function: `function(state, out, params)` or `function(state, out, params, memory)`.
+        params: see `CompiledLaw`.
+        memory: see `CompiledLaw`.
+    """
+
+    success = 1  # Numba's function returns 0 after an exception
+
+    def __init__(
+        self,
+        function: Callable[..., object],
+        params: _Numbers | None = None,
+        memory: _Numbers | None = None,
+    ) -> None:
+        super().__init__(params, memory)
+        functools.update_wrapper(self, callback(function, "function"))
+        self._function = function
+
+    def __call__(self, *arguments: object) -> object:
+        """Run it in Python, for a test."""
+        return self._function(*arguments)
+
+    @property
+    def python(self) -> Callable[..., object] | None:
+        """The function itself."""
+        return self._function
+
+    def load(self, params: interface.Schema, memory: interface.Schema) -> tuple[int, object]:
+        """Compile it with Numba; see `CompiledLaw.load`."""
+        try:
+            from heptarm.fri.loop import numba_law
+        except ImportError as error:
+            raise CommandRejected(
+                f"a law with @ha.law needs Numba: {error}",
+                parameter="law",
+                hint='install it with `pip install "heptarm[laws]"`, or leave out @ha.law: the law then runs in Python',
+            ) from None
+        return numba_law.compiled(
+            self._function, params, memory, takes_memory=arity(self._function) >= WITH_MEMORY
+        )
+
+
+@overload
+def law(function: Callable[..., object], /) -> NumbaLaw: ...
+
+
+@overload
+def law(
+    *, params: _Numbers | None = None, memory: _Numbers | None = None
+) -> Callable[[Callable[..., object]], NumbaLaw]: ...
+
+
+def law(
+    function: Callable[..., object] | None = None,
+    /,
+    *,
+    params: _Numbers | None = None,
+    memory: _Numbers | None = None,
+) -> NumbaLaw | Callable[[Callable[..., object]], NumbaLaw]:
+    """Compile a law with Numba when its session opens; the loop then calls it without Python.
+
+    ::
+
+        @ha.law(memory={"x": np.zeros(7)})
+        def spring(s, out, p, m):
+            m.x = m.x + s.dt * (p.goal - m.x) / p.tau
+            out.tau[:] = p.k * (m.x - s.q) - p.d * s.dq
+
+    Args:
+        function: `function(state, out, params)` or `function(state, out, params, memory)`.
+        params: parameters and their initial values; those of `arm.fri(..., params=...)` replace them.
+        memory: members of the law's memory and their initial values; those of `arm.fri(..., memory=...)` replace them.
+
+    Raises:
+        ShapeError: params or memory are not numbers and arrays by name.
+    """
+    if function is not None:
+        return NumbaLaw(function)
+    return lambda given: NumbaLaw(given, params, memory)
+
+
+class LibraryLaw(CompiledLaw):
+    """A function of a shared library; made by `law_from`.
+
+    Args:
+        path: of the library.
+        name: of the function.
+        params: see `CompiledLaw`.
+        memory: see `CompiledLaw`.
+    """
+
+    def __init__(
+        self, path: Path, name: str, params: _Numbers | None = None, memory: _Numbers | None = None
+    ) -> None:
+        super().__init__(params, memory)
+        self.path, self.name = path, name
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name} of {self.path}>"
+
+    def load(self, params: interface.Schema, memory: interface.Schema) -> tuple[int, object]:
+        """Load the library and check its structures; see `CompiledLaw.load`."""
+        try:
+            library = ctypes.CDLL(str(self.path))
+        except OSError as error:
+            raise CommandRejected(
+                f"the library of the law cannot be loaded: {error}",
+                parameter="law",
+                hint="build it for this machine with -shared -fPIC",
+            ) from None
+        try:
+            function = getattr(library, self.name)
+            checks = (ctypes.c_int64 * 3).in_dll(library, f"{self.name}_check")
+        except (AttributeError, ValueError):
+            raise CommandRejected(
+                f"{self.path.name} exports no law {self.name!r}",
+                parameter="law",
+                hint=f"write HEPTARM_LAW({self.name}, ...) of heptarm_law.h at the end of its source",
+            ) from None
+        version, *sizes = checks
+        if version != interface.VERSION:
+            raise CommandRejected(
+                f"{self.path.name} was built with version {version} of heptarm_law.h, this loop needs "
+                f"{interface.VERSION}",
+                parameter="law",
+                hint="build it again with the header of this installation: heptarm.fri.include_dir()",
+            )
+        for what, size, schema in (("params", sizes[0], params), ("memory", sizes[1], memory)):
+            given = 8 * interface.size(schema)
+            if given != size and not (given == 0 and size == 8):
+                members = ", ".join(f"{name}{list(shape) or ''}" for name, (shape, _) in schema.items())
+                raise CommandRejected(
+                    f"the {what} of {self.name} in {self.path.name} have {size} bytes, {what}= has {given}: "
+                    f"{members or 'nothing'}",
+                    parameter="law",
+                    hint=f"{what}= and the structure in C have the same members in the same order, all of type double",
+                )
+        address = ctypes.cast(function, ctypes.c_void_p).value
+        assert address is not None
+        return address, library
+
+
+def law_from(
+    path: str | Path, name: str, *, params: _Numbers | None = None, memory: _Numbers | None = None
+) -> LibraryLaw:
+    """Take a law from a shared library in C or C++, which was built with heptarm_law.h; see `include_dir`.
+
+    Args:
+        path: of the library.
+        name: first argument of HEPTARM_LAW in its source.
+        params: parameters and their initial values, in the order of the structure in C.
+        memory: members of its memory and their initial values, in the order of the structure in C.
+
+    Raises:
+        CommandRejected: there is no such file.
+        ShapeError: params or memory are not numbers and arrays by name.
+    """
+    file = Path(instance(path, (str, Path), "path")).expanduser().resolve()
+    instance(name, str, "name")
+    if not file.is_file():
+        raise CommandRejected(
+            f"there is no library {file}",
+            parameter="path",
+            value=str(path),
+            hint=f"build it: cc -O2 -shared -fPIC -I{include_dir()} -o {file.name} ...",
+        )
+    return LibraryLaw(file, name, params, memory)
