@@ -80,8 +80,9 @@ class Twins:
             return raw
         self.plain += 1
         if size == LAW:
-            states = bench.layout.states
-            bench.cycle.call_law(State(states.floats[states.count % len(states.ints)]), self.out, bench.now)
+            states, dq = bench.layout.states, np.frombuffer(native.memory.dq)
+            state = State(states.floats[states.count % len(states.ints)], dq=dq)
+            bench.cycle.call_law(state, self.out, bench.now)
             native.memory.is_ending = bench.cycle.is_ending
             size = native.answer()
         native.finish(bench.now + 30_000)

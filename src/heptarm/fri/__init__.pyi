@@ -19,6 +19,9 @@ from .loop.compiled import (
     CompiledLaw as CompiledLaw,
 )
 from .loop.compiled import (
+    LawTrial as LawTrial,
+)
+from .loop.compiled import (
     include_dir as include_dir,
 )
 from .loop.law_interface import (

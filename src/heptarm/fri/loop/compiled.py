@@ -9,16 +9,17 @@ from __future__ import annotations
 import ctypes
 import functools
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, overload
 
+import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected
 from heptarm.fri.loop import law_interface as interface
-from heptarm.values.arrays import callback, instance
-from heptarm.values.robot import RobotModel
+from heptarm.values.arrays import callback, instance, within
+from heptarm.values.robot import RobotModel, robot
 
 #: Number of arguments of a law with memory: state, output, parameters, memory.
 WITH_MEMORY = 4
@@ -253,3 +254,99 @@ def law_from(
             hint=f"build it: cc -O2 -shared -fPIC -I{include_dir()} -o {file.name} ...",
         )
     return LibraryLaw(file, name, params, memory)
+
+
+class LawTrial:
+    """A compiled law in this process, called with states of your own: for tests, simulations and plots.
+
+    A law that crashes ends this process; in a session it does not.
+
+    Args:
+        compiled: the law.
+        params: parameters, in place of the law's.
+        memory: memory, in place of the law's.
+        model: robot, for laws that need its model.
+        dt: command period [s].
+
+    Attributes:
+        params: parameters; assign to them between calls.
+        memory: memory; read it or assign to it between calls.
+        t: time of the next call [s].
+
+    Raises:
+        CommandRejected: the law cannot be compiled or loaded.
+    """
+
+    def __init__(
+        self,
+        compiled: CompiledLaw,
+        *,
+        params: _Numbers | None = None,
+        memory: _Numbers | None = None,
+        model: str | RobotModel = "iiwa14",
+        dt: float = 1e-3,
+    ) -> None:
+        self._law = instance(compiled, CompiledLaw, "compiled")
+        arm = robot(model) if isinstance(model, str) else instance(model, RobotModel, "model")
+        self._dt = within(dt, "dt", 1e-6, 1.0, unit="s")
+        values, schema = interface.flat({**compiled.parameters(arm), **(params or {})}, "params")
+        kept, remembered = interface.flat({**compiled.memory, **(memory or {})}, "memory")
+        address, self._kept = compiled.load(schema, remembered)
+        self._function = ctypes.CFUNCTYPE(ctypes.c_int, *[ctypes.c_void_p] * 4)(address)
+        self._params, self._memory = np.append(values, 0.0), np.append(kept, 0.0)
+        self.params = interface.Memory(self._params, schema)
+        self.memory = interface.Memory(self._memory, remembered)
+        self._state = np.full(_words(interface.STATE), np.nan)
+        self._command = np.zeros(_words(interface.COMMAND))
+        self._shown = interface.Memory(self._state, _places(interface.STATE))
+        self._made = interface.Memory(self._command, _places(interface.COMMAND))
+        self.t = 0.0
+
+    def __call__(
+        self,
+        q: npt.ArrayLike,
+        dq: npt.ArrayLike | None = None,
+        *,
+        q_ipo: npt.ArrayLike | None = None,
+        tau_ext: npt.ArrayLike | None = None,
+    ) -> interface.Memory:
+        """Call the law for the next cycle.
+
+        Args:
+            q: measured positions, shape (7,) [rad].
+            dq: velocities, shape (7,) [rad/s]; None: zero.
+            q_ipo: interpolator's positions, shape (7,) [rad]; None: those of the first call.
+            tau_ext: external torques, shape (7,) [Nm]; None: zero.
+
+        Returns:
+            Its command: `q`, `tau`, `wrench`; the arrays are overwritten by the next call.
+
+        Raises:
+            CommandRejected: the law has failed.
+        """
+        shown, out = self._shown, self._made
+        shown.q, shown.dq = q, np.zeros(7) if dq is None else dq
+        shown.tau_ext = np.zeros(7) if tau_ext is None else tau_ext
+        if q_ipo is not None or self.t == 0.0:
+            shown.q_ipo = q if q_ipo is None else q_ipo
+        shown.t, shown.dt = self.t, self._dt
+        self._state.view(np.int64)[_words(interface.STATE[:_FLOATS]) :] = 0
+        out.q, out.tau, out.wrench = shown.q_ipo, 0.0, 0.0
+        out.pose, out.e1 = np.nan, np.nan
+        self.t += self._dt
+        code = self._function(*(one.ctypes.data for one in (self._state, self._command, self._params, self._memory)))
+        if code != self._law.success:
+            raise CommandRejected(f"the law has failed: it returned {code}", parameter="law")
+        return out
+
+
+#: Members of `heptarm_state` that are floats; integers follow.
+_FLOATS = sum(kind == "real" for kind, *_ in interface.STATE)
+
+
+def _words(rows: Sequence[tuple[str, tuple[int, ...], str, str]]) -> int:
+    return sum(shape[0] if shape else 1 for _, shape, _, _ in rows)
+
+
+def _places(rows: Sequence[tuple[str, tuple[int, ...], str, str]]) -> dict[str, tuple[tuple[int, ...], int]]:
+    return {name: (shape, _words(rows[:index])) for index, (_, shape, name, _) in enumerate(rows)}

@@ -311,8 +311,8 @@ class Native:
             return f"it commanded numbers that are not finite {LAW_PATIENCE} times in a row"
         if status is LawStatus.SLOW:
             return (
-                f"it took longer than its time budget, {LAW_SHARE:g} of the command period, {LAW_PATIENCE} times in a row; "
-                f"the last call took {code * 1e-3:.0f} us"
+                f"it took longer than its time budget, {LAW_SHARE:g} of the command period, {LAW_PATIENCE} times in a "
+                f"row; the last call took {code * 1e-3:.0f} us"
             )
         if self.raised:
             return self.raised.pop()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeAlias
 
 import numba
 from llvmlite import ir
@@ -24,6 +24,10 @@ from heptarm.errors import CommandRejected
 from heptarm.fri.loop import law_interface as interface
 
 
+#: Name, kind ("real" or "word"), shape and first word of each member.
+_Members: TypeAlias = tuple[tuple[str, str, tuple[int, ...], int], ...]
+
+
 class Structure(types.Type):  # type: ignore[misc]
     """A structure of words.
 
@@ -33,9 +37,7 @@ class Structure(types.Type):  # type: ignore[misc]
         writable: whether the law may change its members.
     """
 
-    def __init__(
-        self, what: str, members: tuple[tuple[str, str, tuple[int, ...], int], ...], *, writable: bool
-    ) -> None:
+    def __init__(self, what: str, members: _Members, *, writable: bool) -> None:
         self.what, self.writable = what, writable
         self.members = {name: (kind, shape, start) for name, kind, shape, start in members}
         super().__init__(name=f"{what}({members})")
@@ -115,9 +117,7 @@ def _set(context: Any, builder: Any, signature: Any, arguments: Any, name: str) 
     return context.get_dummy_value()
 
 
-def _table(
-    rows: tuple[tuple[str, tuple[int, ...], str, str], ...],
-) -> tuple[tuple[str, str, tuple[int, ...], int], ...]:
+def _table(rows: tuple[tuple[str, tuple[int, ...], str, str], ...]) -> _Members:
     members, start = [], 0
     for kind, shape, name, _ in rows:
         members.append((name, kind, shape, start))
@@ -125,7 +125,7 @@ def _table(
     return tuple(members)
 
 
-def _fields(schema: interface.Schema) -> tuple[tuple[str, str, tuple[int, ...], int], ...]:
+def _fields(schema: interface.Schema) -> _Members:
     return tuple((name, "real", tuple(shape), start) for name, (shape, start) in schema.items())
 
 
@@ -141,7 +141,8 @@ def compiled(
         takes_memory: whether it takes the memory.
 
     Returns:
-        Address of a function with C's calling convention, which returns 0 after an exception, 1 otherwise; what keeps it alive.
+        Address of a function with C's calling convention, which returns 0 after an exception and 1 otherwise; what
+        keeps it alive.
 
     Raises:
         CommandRejected: Numba cannot compile it; the text has file and line, the hint a remedy.
@@ -187,6 +188,7 @@ def _refusal(function: Callable[..., object], error: NumbaError) -> CommandRejec
     place = next((line for file, line in places if file.endswith(code.co_filename.rpartition("/")[2])), None)
     line = int(place) if place else getattr(getattr(error, "loc", None), "line", code.co_firstlineno)
     reason = next((one for one in lines if not one.startswith(_HEADINGS)), lines[0] if lines else str(error))
+    reason = re.sub(r"of type (state|out|params|memory)\(.*", r"of \1", reason)
     hint = next((hint for pattern, hint in _REMEDIES if re.search(pattern, text)), _REMEDY)
     return CommandRejected(
         f"Numba cannot compile the law {function.__qualname__!r}: {code.co_filename}, line {line}: {reason}",
@@ -197,8 +199,8 @@ def _refusal(function: Callable[..., object], error: NumbaError) -> CommandRejec
 
 _HEADINGS = ("Failed in nopython", "During: ", "File ", "No implementation of function")
 _REMEDY = (
-    "use numbers and NumPy arrays only (docs/guide/laws.md lists what a compiled law may contain), or leave out @ha.law: "
-    "the law then runs in Python"
+    "use numbers and NumPy arrays only (docs/guide/laws.md lists what a compiled law may contain), or leave out "
+    "@ha.law: the law then runs in Python"
 )
 _REMEDIES = (
     (
@@ -211,7 +213,7 @@ _REMEDIES = (
     ),
     (
         r"Unknown attribute .* of type state\(",
-        "a compiled law has the members of `heptarm_state`; signals and poses need a law in Python",
+        "a compiled law sees the members of heptarm_state; signals and poses need a law in Python",
     ),
     (
         r"Unknown attribute .* of type out\(",
@@ -219,6 +221,7 @@ _REMEDIES = (
     ),
     (
         r"[Uu]ntyped global name|cannot determine Numba type",
-        "let the law use numbers and arrays that are constants, its parameters and its memory, and functions with @numba.njit",
+        "let the law use constant numbers and arrays, its parameters, its memory, and functions with @numba.njit; or "
+        "leave out @ha.law: the law then runs in Python",
     ),
 )
