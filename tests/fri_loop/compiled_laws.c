@@ -43,7 +43,7 @@ static int misbehave(const struct heptarm_state *s, struct heptarm_command *out,
     m->calls += 1.0;
     switch ((int)p->what) {
     case 1: out->q[2] = NAN; break;
-    case 2: out->q[0] = 1 / zero; break;
+    case 2: out->q[0] = 1000 / zero; break;
     case 3: *nowhere = 1; break;
     case 4:
         for (;;) zero++;

@@ -45,10 +45,10 @@ class CompiledLaw:
     success = 0
 
     def __init__(self, params: _Numbers | None = None, memory: _Numbers | None = None) -> None:
+        for values, what in ((params, "params"), (memory, "memory")):
+            interface.flat({} if values is None else values, what)  # checks them
         self.params: dict[str, Any] = dict(params or {})
         self.memory: dict[str, Any] = dict(memory or {})
-        interface.flat(self.params, "params")
-        interface.flat(self.memory, "memory")
 
     def parameters(self, arm: RobotModel) -> Mapping[str, Any]:
         """Parameters and their initial values for a robot."""
@@ -334,7 +334,9 @@ class LawTrial:
         out.q, out.tau, out.wrench = shown.q_ipo, 0.0, 0.0
         out.pose, out.e1 = np.nan, np.nan
         self.t += self._dt
-        code = self._function(*(one.ctypes.data for one in (self._state, self._command, self._params, self._memory)))
+        code = self._function(
+            *(one.ctypes.data for one in (self._state, self._command, self._params, self._memory))
+        )
         if code != self._law.success:
             raise CommandRejected(f"the law has failed: it returned {code}", parameter="law")
         return out

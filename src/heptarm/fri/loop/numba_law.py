@@ -23,7 +23,6 @@ from numba.np.arrayobj import make_array, populate_array
 from heptarm.errors import CommandRejected
 from heptarm.fri.loop import law_interface as interface
 
-
 #: Name, kind ("real" or "word"), shape and first word of each member.
 _Members: TypeAlias = tuple[tuple[str, str, tuple[int, ...], int], ...]
 
