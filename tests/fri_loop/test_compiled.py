@@ -203,7 +203,7 @@ def test_the_guard_limits_a_compiled_law(laws: Path) -> None:
         )
 
 
-# ------------------------------------------------------------------------------------------ what is refused at the start
+# ----------------------------------------------------------------------------------------- what is refused at the start
 
 
 @pytest.mark.parametrize(

@@ -80,11 +80,10 @@ def test_cartesian_impedance_is_a_spring_of_its_stiffness() -> None:
 def test_the_null_space_moves_the_elbow_and_not_the_flange() -> None:
     away = HOME + [0.25, 0.0, -0.3, 0.0, 0.3, 0.0, -0.2]
     plant = Plant(laws.cartesian_impedance(posture=away, posture_stiffness=30.0))
-    begin, elbow = plant.place, model.redundancy(ARM, plant.q) if hasattr(model, "redundancy") else None
+    begin = plant.place
     plant.run(1.5)
     assert np.abs(plant.place - begin).max() < 4e-3, "the flange stays"
     assert np.abs(plant.q - HOME).max() > 0.05, "the joints move"
-    assert elbow is None or elbow != model.redundancy(ARM, plant.q)
 
 
 def test_cartesian_impedance_stays_stable_in_contact_with_a_stiff_wall() -> None:
@@ -155,7 +154,8 @@ def test_free_guiding_is_light_inside_and_a_wall_outside() -> None:
     plant.push = lambda t: np.array([0.0, -20.0, 0.0])
     places = np.array(plant.run(1.5))[:, 1]
     assert places[300] < -0.02, "it moves by a hand's force"
-    assert places.min() > place[1] - 0.05 - 0.02, "and stops at the wall: 20 N on 2000 N/m are 10 mm"
+    assert places.min() > place[1] - 0.05 - 0.025, "it runs into the wall"
+    assert places[-1] == pytest.approx(place[1] - 0.05 - 0.01, abs=1e-3), "which stops it: 20 N on 2000 N/m are 10 mm"
     assert plant.trial.memory.force[1] == pytest.approx(20.0, rel=0.2)
     plant.push = lambda t: np.zeros(3)
     plant.run(1.0)

@@ -14,6 +14,7 @@ enum { N = 7, BODIES = 8 };
 struct robot {
     double origin[N][3], mass[N], com[N][3], inertia[N][6], flange[3];
     double load_mass, load_com[3], load_inertia[6];
+    double rotor; /* inertia that a motor shows behind its gear [kg m2] */
 };
 
 struct posture {
@@ -143,6 +144,12 @@ static void mass_matrix(const struct posture *p, double m[N][N]) {
         inverse_dynamics(p, none, unit, none, column);
         for (int i = 0; i < N; i++) m[i][j] = column[i];
     }
+}
+
+/* With the inertia of the motors: what a torque accelerates. */
+static void moved_mass(const struct robot *robot, const struct posture *p, double m[N][N]) {
+    mass_matrix(p, m);
+    for (int i = 0; i < N; i++) m[i][i] += robot->rotor;
 }
 
 static void coriolis(const struct posture *p, const double *dq, double *tau) {

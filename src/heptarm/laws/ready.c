@@ -86,7 +86,7 @@ static int cartesian(const struct heptarm_state *s, struct heptarm_command *out,
     }
     follow_pose(p, s->dt, m);
     jacobian(&posture, posture.place, j);
-    mass_matrix(&posture, mass);
+    moved_mass(&p->robot, &posture, mass);
     memcpy(factor, mass, sizeof factor);
     if (!factorise(factor, N)) return 1;
     for (int r = 0; r < 6; r++) {
@@ -156,7 +156,7 @@ static int joints(const struct heptarm_state *s, struct heptarm_command *out, co
         m->q[i] += s->dt * m->dq_goal[i];
     }
     find_posture(&p->robot, s->q, &posture);
-    mass_matrix(&posture, mass);
+    moved_mass(&p->robot, &posture, mass);
     for (int i = 0; i < N; i++) {
         m->feed_forward[i] = dot(mass[i], ddq, N);
         double damping = 2.0 * p->damping * sqrt(fmax(0.0, p->stiffness[i]) * mass[i][i]);
@@ -377,6 +377,7 @@ HEPTARM_LAW(search_by_force, search, struct search, struct search_memory)
 
 /* ------------------------------------------------------------------------------- the model alone, for its tests */
 
+/* Dynamics without the motors' inertia, as in heptarm.model. */
 void heptarm_model(const struct robot *robot, const double *q, const double *dq, double *mass, double *bias, double *weight, double *j, double *pose) {
     static const double fall[3] = {0.0, 0.0, -9.81};
     struct posture posture;

@@ -28,6 +28,8 @@ _ANYWHERE = (math.nan,) * 7
 _ZEROS7, _ZEROS6, _ZEROS3 = (0.0,) * 7, (0.0,) * 6, (0.0,) * 3
 #: Time constant of the low pass of the velocities [s].
 FILTER = 0.002
+#: Inertia that a motor is assumed to show behind its gear and its torque control, as in the simulator [kg m²].
+ROTOR = 0.1
 #: Fraction of the robot's torques that a law may use.
 TORQUE_SHARE = 0.3
 
@@ -47,13 +49,13 @@ def shared_library() -> Path:
 
 
 def constants(arm: RobotModel, load: Body | None = None) -> Array:
-    """`struct robot` of model.h: the links and the load on the flange, shape (104,)."""
+    """`struct robot` of model.h: the links, the load on the flange, the motors; shape (105,)."""
     links = arm.links
     inertia = links.inertia.reshape(7, 9)[:, [0, 4, 8, 1, 2, 5]]
     body = load or Body(0.0, np.zeros(3))
     parts = (
         *(links.origin, links.mass, links.com, inertia, links.flange),
-        *([body.mass], body.com, body.inertia),
+        *([body.mass], body.com, body.inertia, [ROTOR]),
     )
     return np.concatenate([np.ravel(part) for part in parts])
 
@@ -111,8 +113,10 @@ def cartesian_impedance(
         goal: of the flange in the base; None: where it is. Live: `rt.params.goal`, x y z [m] and quaternion x y z w.
         stiffness: along and about the axes of the base, shape (6,) [N/m, Nm/rad].
         damping: ratio; the damping follows from the stiffness and the mass that the flange shows.
-        force_max, moment_max: largest force and moment of the spring [N], [Nm].
-        speed, turn_speed: largest speed of the followed goal [m/s], [rad/s].
+        force_max: largest force of the spring [N].
+        moment_max: largest moment of the spring [Nm].
+        speed: largest speed of the followed goal [m/s].
+        turn_speed: largest angular velocity of the followed goal [rad/s].
         posture: joint positions of the null space, shape (7,) [rad]; None: those at the beginning.
         posture_stiffness: stiffness of every joint in the null space [Nm/rad].
         tau_max: largest torques, shape (7,) [Nm]; None: 30 % of the robot's.
@@ -159,8 +163,8 @@ def joint_impedance(
 ) -> ReadyLaw:
     """Joint impedance around a smoothed goal, with the torques of its acceleration M(q) ddq as feed-forward.
 
-    `rt.memory` has `q` and `dq_goal` (the reference), `feed_forward` [Nm] and `saturated`, the number of cycles in which
-    a torque was limited.
+    `rt.memory` has `q` and `dq_goal` (the reference), `feed_forward` [Nm] and `saturated`, the number of cycles in
+    which a torque was limited.
 
     Args:
         goal: shape (7,) [rad]; None: where the arm is. Live: `rt.params.goal`.
@@ -209,14 +213,15 @@ def free_guiding(
 ) -> ReadyLaw:
     """Guide the arm by hand inside virtual walls; gravity is compensated.
 
-    The walls hold the flange in a box and the joints inside their limits. They push with a spring and a damper, and never
-    pull. `rt.memory` has `force`, that of the walls [N], and `saturated`, the number of cycles in which it or a torque was
-    limited.
+    The walls hold the flange in a box and the joints inside their limits. They push with a spring and a damper, and
+    never pull. `rt.memory` has `force`, that of the walls [N], and `saturated`, the number of cycles in which it or a
+    torque was limited.
 
     Args:
         box: lower and upper corner for the flange in the base [m]; None: no walls.
         damping: of the joints, shape (7,) [Nm s/rad].
-        wall_stiffness, wall_damping: of the walls [N/m], [N s/m].
+        wall_stiffness: of the walls [N/m].
+        wall_damping: of the walls [N s/m].
         force_max: largest force of the walls [N].
         margin: distance to the limits of the joints at which their walls begin [rad].
         joint_stiffness: of these walls [Nm/rad].
@@ -269,7 +274,7 @@ def admittance(
     speed: float = 0.2,
     turn_speed: float = 0.8,
 ) -> ReadyLaw:
-    """Let the flange of a position-controlled arm move under the external wrench like a mass with a damper and a spring.
+    """Let the flange of a position-controlled arm move under the external wrench like a mass on a spring and a damper.
 
     `rt.memory` has `wrench` (external, base axes, after the dead band [N, Nm]), `offset` from the beginning [m, rad],
     `velocity` and `saturated`, the number of cycles in which a speed was limited.
@@ -279,8 +284,10 @@ def admittance(
         damping: shape (6,) [N s/m, Nm s/rad].
         stiffness: towards the pose at the beginning, shape (6,) [N/m, Nm/rad].
         wrench: that pushes in addition, shape (6,) [N, Nm]; pressing on a surface with it is force control.
-        dead_band, moment_dead_band: external force and moment that do not move the flange [N], [Nm].
-        speed, turn_speed: largest speed [m/s], [rad/s].
+        dead_band: external force that does not move the flange [N].
+        moment_dead_band: external moment that does not turn it [Nm].
+        speed: largest speed [m/s].
+        turn_speed: largest angular velocity [rad/s].
     """
     return ReadyLaw(
         "admittance_of_the_flange",
