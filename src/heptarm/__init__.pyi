@@ -124,6 +124,12 @@ from .errors import (
 from .errors import (
     VersionMismatch as VersionMismatch,
 )
+from .fri.loop.compiled import (
+    law as law,
+)
+from .fri.loop.compiled import (
+    law_from as law_from,
+)
 from .record.recorder import (
     Recorder as Recorder,
 )
