@@ -18,6 +18,12 @@ from .arm.link.target import (
 from .arm.motion.handle import (
     MotionHandle as MotionHandle,
 )
+from .arm.motion.preview import (
+    LimitApproach as LimitApproach,
+)
+from .arm.motion.preview import (
+    ProgramPreview as ProgramPreview,
+)
 from .arm.motion.servo import (
     JointServo as JointServo,
 )
@@ -140,6 +146,9 @@ from .skills.replay import (
 )
 from .values.clearance import (
     Clearance as Clearance,
+)
+from .values.clearance import (
+    ForeseenCollision as ForeseenCollision,
 )
 from .values.clearance import (
     TouchOnPath as TouchOnPath,
