@@ -33,6 +33,27 @@ from .arm.motion.servo import (
 from .arm.motion.servo import (
     ServoStats as ServoStats,
 )
+from .arm.several import (
+    Arms as Arms,
+)
+from .arm.several import (
+    MotionOfArms as MotionOfArms,
+)
+from .arm.several import (
+    StatesOfArms as StatesOfArms,
+)
+from .arm.several import (
+    connect_all as connect_all,
+)
+from .arm.several import (
+    start_together as start_together,
+)
+from .arm.several import (
+    states_together as states_together,
+)
+from .arm.several import (
+    stop_all as stop_all,
+)
 from .errors import (
     ArrivalError as ArrivalError,
 )

@@ -118,7 +118,9 @@ def test_what_the_controller_would_refuse(
 
 
 def test_a_line_through_a_singularity_is_refused() -> None:
-    stretched = deg(0, 5, 0, -10, 0, 5, 0)  # the line passes over the base, where A1 and A3 would have to jump
+    stretched = deg(
+        0, 5, 0, -10, 0, 5, 0
+    )  # the line passes over the base, where A1 and A3 would have to jump
     frames = FramesOfArm(lambda name: Pose.at(), lambda name: None)
     with pytest.raises(ha.CommandRejected, match="singularity|not reachable|would have to jump"):
         look_ahead(IIWA, stretched, [ha.lin_rel(x=-0.5)], frames, step=0.01)

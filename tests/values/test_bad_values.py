@@ -24,7 +24,10 @@ from tests.bad_values import HOME, HUGE, POSE, REPORTS, Call, made_by, methods_o
 
 MODULES = (heptarm, heptarm.fri, heptarm.when, heptarm.modes, heptarm.do, heptarm.model)
 #: Made with a running process or a connection; tests/arm/test_bad_values.py has these.
-CONNECTED = ("connect", "target_from_env", "Client", "Recorder", "TwoSignalGripper")
+CONNECTED = (
+    *("connect", "connect_all", "target_from_env", "Client", "Recorder", "TwoSignalGripper"),
+    *("start_together", "states_together", "stop_all"),
+)
 #: Values whose methods are called, by the name in a report.
 OBJECTS: dict[str, object] = {
     "Pose": POSE,

@@ -336,7 +336,7 @@ class Arm:
             CommandRejected: the file cannot be written (when the block begins).
             MissingExtra: the package mcap is not installed (when the block begins).
         """
-        return Recorder(self._connection, Path(instance(path, (str, Path), "path")), rate=rate)
+        return Recorder({"": self._connection}, Path(instance(path, (str, Path), "path")), rate=rate)
 
     def wait_until(self, condition: Callable[[State], object], *, timeout: float = 30.0) -> State:
         """Wait until a condition holds for a pushed state; checked by this program, not by the cabinet.

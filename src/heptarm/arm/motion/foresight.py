@@ -6,7 +6,6 @@ Both plan with the planner of the virtual cabinet, which needs `pip install 'hep
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import pairwise
 from math import isinf
 from typing import TYPE_CHECKING
@@ -17,7 +16,7 @@ from heptarm.arm.devices.tools import Tooling
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.preview import PreviewedMotion, ProgramPreview
 from heptarm.arm.translate.motions import items
-from heptarm.errors import CollisionForeseen, CommandRejected, ModeConflict, require
+from heptarm.errors import CollisionForeseen, ModeConflict, require
 from heptarm.model.batch import forward_batch
 from heptarm.model.dynamics import inverse_dynamics
 from heptarm.values.arrays import Array, frozen
@@ -25,7 +24,7 @@ from heptarm.values.clearance import CollisionCheck, ForeseenCollision, TouchOnP
 from heptarm.values.frames import TOOL
 from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.motion.motion import Hold, Motion, hold
-from heptarm.values.pose import Pose, quaternion
+from heptarm.values.pose import quaternion
 from heptarm.values.state import State
 
 if TYPE_CHECKING:

@@ -170,7 +170,7 @@ class ProgramPreview(Value):
         rows |= {name: str(self.closest(name)) for name in ("position", "velocity", "torque")}
         found = "\n".join(map(str, self.collisions)) or "none on the path, by the collision model"
         rows["collisions"] = found if self.is_checked else "not checked"
-        return lines(f"Preview of {count} motion{'s' * (count != 1)}; nothing has moved", rows)
+        return lines(f"Preview of {count} motion{'s' * (count != 1)}; nothing was moved", rows)
 
     def _listed(self) -> list[str]:
         rows = [

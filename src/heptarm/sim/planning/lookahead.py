@@ -117,7 +117,9 @@ def look_ahead(
     kept = [slice(0, None), *[slice(1, None)] * (len(samples) - 1)]
     both = list(zip(samples, kept, strict=True))
     return PlannedProgram(
-        frozen(np.concatenate([begin + one.t[part] for begin, (one, part) in zip(starts, both, strict=False)])),
+        frozen(
+            np.concatenate([begin + one.t[part] for begin, (one, part) in zip(starts, both, strict=False)])
+        ),
         frozen(np.concatenate([one.q[part] for one, part in both])),
         frozen(np.concatenate([one.dq[part] for one, part in both])),
         frozen(np.concatenate([one.ddq[part] for one, part in both])),
@@ -331,5 +333,5 @@ def _redundancy(robot: RobotModel, motion: Blended) -> tuple[float, int, int]:
 
 
 def _seven(pose: Pose) -> Seven:
-    """x y z [m] and quaternion."""
+    """Position [m] and quaternion."""
     return (*pose.xyz.tolist(), *pose.quat.tolist())
