@@ -88,11 +88,15 @@ def test_the_cabinet_does_what_was_planned(arm: ha.Arm, name: str) -> None:
         assert off < 1e-3
         pose = Pose.from_matrix(model.forward(arm.robot, q)) @ TOOL.tcp
         assert np.linalg.norm(preview.tcp[:, :3] - pose.xyz, axis=1).min() < 1e-3 + 0.5 * 0.01
-        if speeds[np.searchsorted(preview.t, time) - 1] > 0.2 * speeds.max():  # else a place has no sharp time
+        if (
+            speeds[np.searchsorted(preview.t, time) - 1] > 0.2 * speeds.max()
+        ):  # else a place has no sharp time
             offsets.append(stamp * 1e-9 - time)
     assert max(offsets) - min(offsets) < 0.01 * preview.duration
     arrival = next(stamp for stamp, q in seen if np.abs(q - preview.q[-1]).max() < 1e-6) * 1e-9
-    assert arrival - offsets[0] == pytest.approx(preview.duration, rel=0.01, abs=0.01)  # of 4 ms between states
+    assert arrival - offsets[0] == pytest.approx(
+        preview.duration, rel=0.01, abs=0.01
+    )  # of 4 ms between states
     assert result.duration > 0.99 * preview.duration  # until the arm has settled
     end = arm.wait_for_rest()
     assert end.q == pytest.approx(preview.q[-1], abs=1e-3)

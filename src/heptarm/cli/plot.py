@@ -34,7 +34,9 @@ def plot(
     """Plot a recording: joints, speeds and torques by their limits, wrench, path; motions and events as bands."""
     names = tuple(name.strip() for name in signals.split(",") if name.strip())
     run = load(file, arm=arm)
-    figure = plots.figure_of(run, names) if compare is None else plots.compare(run, load(compare, arm=arm), names)
+    figure = (
+        plots.figure_of(run, names) if compare is None else plots.compare(run, load(compare, arm=arm), names)
+    )
     written = plots.save(figure, file.with_suffix(".png") if out is None else out)
     if as_json:
         emit(

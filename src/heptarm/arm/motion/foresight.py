@@ -1,4 +1,4 @@
-"""Looks ahead of the motions of an arm: previews, and the check for collisions before a program is sent.
+"""Looks ahead of the motions of an arm: previews, and the checks for collisions and workspace before one is sent.
 
 Both plan with the planner of the virtual cabinet, which needs `pip install 'heptarm[sim]'`, but no simulator.
 """
@@ -15,9 +15,11 @@ import numpy as np
 from heptarm.arm.devices.tools import Tooling
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.preview import PreviewedMotion, ProgramPreview
+from heptarm.arm.motion.program import with_kept_joints
 from heptarm.arm.translate.motions import items
 from heptarm.errors import CollisionForeseen, ModeConflict, require
 from heptarm.model.batch import forward_batch
+from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.dynamics import inverse_dynamics
 from heptarm.values.arrays import Array, frozen
 from heptarm.values.clearance import CollisionCheck, ForeseenCollision, TouchOnPath
@@ -26,12 +28,16 @@ from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.motion.motion import Hold, Motion, hold
 from heptarm.values.pose import quaternion
 from heptarm.values.state import State
+from heptarm.values.tool import unknown
+from heptarm.values.workspace import Workspace
 
 if TYPE_CHECKING:
     from heptarm.sim.planning.lookahead import PlannedProgram
 
 #: Largest time between two samples of a path that is checked [s].
 _STEP = 0.02
+#: Largest movement of a joint between two checks of the workspace [rad].
+_TURN = 0.02
 #: Most samples at which torques are computed; between them they are interpolated.
 _MOST_TORQUES = 600
 _BRIEF = hold(0.01)
@@ -46,6 +52,7 @@ class Foresight:
 
     Attributes:
         check: answers where bodies touch; None: nothing is checked.
+        workspace: where tool and joints may be; None: anywhere.
     """
 
     def __init__(self, connection: Connection, tooling: Tooling) -> None:
@@ -53,6 +60,21 @@ class Foresight:
         self._tooling = tooling
         self._end: Array | None = None  # where the last program that was checked ends
         self.check: CollisionCheck | None = None
+        self.workspace: Workspace | None = None
+
+    def boundary(self) -> Boundary | None:
+        """The boundary of the workspace for the attached tool; None: there is no workspace.
+
+        Raises:
+            CommandRejected: its frame is no fixed frame.
+        """
+        workspace = self.workspace
+        if workspace is None:
+            return None
+        frame = self._tooling.in_base(workspace.frame)
+        if frame is None:
+            raise unknown(workspace.frame, "frame", ("base", *self._tooling.taught))
+        return Boundary(workspace, self._connection.robot, frame, self._tooling.on_flange(TOOL))
 
     def examine(self, motions: Sequence[Motion], when: str, ceiling: float) -> None:
         """Check the paths of motions that are about to be sent.
@@ -66,11 +88,13 @@ class Foresight:
 
         Raises:
             CollisionForeseen: bodies would touch.
+            OutsideWorkspace: a motion leaves the workspace.
             CommandRejected: a motion cannot be planned; LimitError and Unreachable are such errors.
             StaleState: the newest state is too old, or lacks the joints.
             MissingExtra: the planner is not installed.
         """
-        if self.check is None:
+        boundary = self.boundary()
+        if self.check is None and boundary is None:
             return
         state = self._connection.fresh()
         start = self._end if _is_busy(state) and when == "queue" and self._end is not None else state.q
@@ -83,14 +107,17 @@ class Foresight:
         ]
         program = self._planned(finite, np.asarray(start), ceiling, _STEP)
         for index, path in enumerate(_paths(program)):
-            touch = self.check.first_on(path)
+            name = f"motions[{index}]" if len(motions) > 1 else "motion"
+            if boundary is not None:
+                _check_inside(path, boundary, name)
+            touch = None if self.check is None else self.check.first_on(path)
             if touch is not None:
                 of = f"motions[{index}]: " if len(motions) > 1 else ""
                 raise CollisionForeseen(
                     f"{of}{touch.clearance} after {touch.at:.0%} of the path",
                     touch=touch,
                     motion=index,
-                    parameter=f"motions[{index}]" if len(motions) > 1 else "motion",
+                    parameter=name,
                     value=round(touch.clearance.distance, 4),
                     hint="choose another path; or arm.collision_check = None, if the model of the scene is wrong",
                 )
@@ -107,13 +134,18 @@ class Foresight:
     ) -> ProgramPreview:
         """Look ahead; see `Arm.plan`."""
         robot, tooling = self._connection.robot, self._tooling
-        items(motions, robot, ceiling)
-        tooling.check(motions, None)
         if start is None:
             start = self._rest()
         else:
             robot.check(start, "start")
+        motions = with_kept_joints(self._connection, tuple(motions), start)
+        items(motions, robot, ceiling)
+        tooling.check(motions, None)
         program = self._planned(motions, start, ceiling, step)
+        boundary = self.boundary()
+        if boundary is not None:
+            for index, path in enumerate(_paths(program)):
+                _check_inside(path, boundary, f"motions[{index}]" if len(motions) > 1 else "motion")
         load = tooling.load
         every = max(1, -(-len(program.t) // _MOST_TORQUES))
         kept = np.unique(np.append(np.arange(0, len(program.t), every), len(program.t) - 1))
@@ -164,6 +196,25 @@ class Foresight:
         places = frames[:, :3, 3] + frames[:, :3, :3] @ tip.xyz
         turns = frames[:, :3, :3] @ tip.rotation
         return frozen(np.hstack([places, [quaternion(turn) for turn in turns]]))
+
+
+def _check_inside(path: Array, boundary: Boundary, name: str) -> None:
+    """Check that a joint path stays inside; one that starts outside may lead inside.
+
+    Raises:
+        OutsideWorkspace: it leaves the workspace, or ends outside.
+    """
+    least = boundary.excess(path[0])
+    for first, last in pairwise(path):
+        count = max(1, int(np.ceil(np.abs(last - first).max() / _TURN)))
+        for number in range(1, count + 1):
+            q = first + number / count * (last - first)
+            excess = boundary.excess(q)
+            if excess > least + TOLERANCE:
+                raise boundary.refusal(q, name, parameter=name)
+            least = min(least, excess)
+    if len(path) > 1 and least > TOLERANCE:
+        raise boundary.refusal(path[-1], f"the end of {name}", parameter=name)
 
 
 def _is_busy(state: State) -> bool:
