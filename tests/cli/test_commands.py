@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from heptarm.wire.messages import MAJOR, MINOR
@@ -128,7 +129,24 @@ def test_dry_run_moves_nothing(target: str) -> None:
         "move", "ptp", "50", "30", "0", "-90", "0", "60", "0", "--deg", "--dry-run", "--target", target
     )
     (after,) = objects("state", "--target", target)
-    assert done.returncode == 0 and "nothing was moved" in done.stdout
+    assert done.returncode == 0 and "nothing was moved" in done.stdout and "at full override" in done.stdout
+    assert after["q"] == pytest.approx(before["q"], abs=1e-6)
+
+
+def test_plan_reports_limits_and_collisions_and_moves_nothing(target: str, tmp_path: Path) -> None:
+    (before,) = objects("state", "--target", target)
+    words = ("plan", "ptp", "0", "90", "0", "-30", "0", "60", "0", "--deg", "--speed", "0.5")
+    (ahead,) = objects(*words, "--out", str(tmp_path / "plan.svg"), "--target", target)
+    assert ahead["closest"]["velocity"]["fraction"] == pytest.approx(0.5, abs=0.02)
+    assert ahead["duration_s"] > 0.5 and (tmp_path / "plan.svg").stat().st_size > 1000
+    assert ahead["checked"] is False and ahead["end_q"] == pytest.approx(
+        np.radians([0, 90, 0, -30, 0, 60, 0])
+    )
+    done = run(*words, "--box", "0.6,0,0.1,0.6,0.8,0.2", "--target", target)
+    assert done.returncode == 1 and re.search(r"collisions .*link_\d .*box 0 after", done.stdout)
+    refused = run("plan", "lin-rel", "--x", "3", "--target", target)
+    assert refused.returncode == 1 and "not reachable" in refused.stderr
+    (after,) = objects("state", "--target", target)
     assert after["q"] == pytest.approx(before["q"], abs=1e-6)
 
 
@@ -139,7 +157,7 @@ def test_dry_run_moves_nothing(target: str) -> None:
             ("move", "ptp", "0", "150", "0", "-90", "0", "60", "0", "--deg"),
             ("A2", "150.00", "[-120, 120] deg"),
         ),
-        (("move", "ptp", "0", "nan", "0", "-1", "0", "1", "0"), ("nan",)),
+        (("move", "ptp", "0", "inf", "0", "-1", "0", "1", "0"), ("inf",)),
         (("move", "lin-rel", "--x", "3"), ("Can not plan motion",)),
         (("move", "lin-rel", "--x", "0.01", "--speed", "1.5"), ("speed", "(0, 1]")),
     ],
@@ -167,6 +185,11 @@ def test_doctor_looks_at_a_cabinet(target: str) -> None:
     verdicts = {one["what"]: one for one in objects("doctor", "--target", target)}
     assert verdicts["session"]["how"] == verdicts["network"]["how"] == verdicts["safety"]["how"] == "ok"
     assert "us median" in verdicts["round trip"]["found"]
+    assert verdicts["options"]["how"] == "ok" and "Sunrise.FRI" in verdicts["options"]["found"]
+    docs = Path(__file__).parents[2] / "docs"
+    for verdict in verdicts.values():
+        place, _, _ = verdict["page"].partition("/docs/")[2].partition("#")
+        assert (docs / place).is_file(), verdict
     assert re.search(r"\d+ of \d+ pings answered by UDP", verdicts["datagrams"]["found"])
 
 
@@ -187,6 +210,17 @@ def test_install_cabinet_writes_sources_and_steps_once(tmp_path: Path) -> None:
     )
     again = run("install-cabinet", "--out", str(out))
     assert again.returncode == 1 and "must be a new or empty folder" in again.stderr
+
+
+def test_install_cabinet_leaves_options_out(tmp_path: Path) -> None:
+    (reported,) = objects("install-cabinet", "--out", str(tmp_path / "some"), "--without", "hand-guiding,fri")
+    assert reported["without"] == ["fri", "hand-guiding"]
+    app = tmp_path / "some/src/heptarm/app"
+    assert "left out" in (app / "SunriseFri.java").read_text(encoding="utf-8")
+    assert "SmartServo" in (app / "SunriseServo.java").read_text(encoding="utf-8")
+    done = run("install-cabinet", "--out", str(tmp_path / "none"), "--without", "welding")
+    assert done.returncode == 1 and "servoing, fri, hand-guiding, got 'welding'" in done.stderr
+    assert not (tmp_path / "none").exists()
 
 
 def test_demo_goes_as_designed_and_saves_a_plot(tmp_path: Path) -> None:

@@ -16,9 +16,10 @@ from heptarm.fri import Client, include_dir
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.compiled import CompiledLaw, LibraryLaw
 from heptarm.fri.loop.law_interface import Memory, dtype, flat
-from heptarm.fri.loop.native import Native, Unavailable, library
+from heptarm.fri.loop.native import Native, library
 from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol.messages import CommandMode
+from heptarm.io.compiled import Unavailable
 
 from . import laws as python_laws
 from .controller import IPO, Controller

@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 
 from heptarm.fri.guard.fallback import Missing, Policy
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.loop.native import HANDBACK, LAW, Native, Unavailable, library
+from heptarm.fri.loop.native import HANDBACK, LAW, Native, library
 from heptarm.fri.loop.user_api import Output, State
 from heptarm.fri.protocol.messages import CommandMode, Quality, SessionState
 from heptarm.fri.protocol.protobuf import put_bytes, put_varint
 from heptarm.fri.protocol.version import MONITORING_ID, Version
+from heptarm.io.compiled import Unavailable
 from tests.long import longer
 
 from .controller import IPO

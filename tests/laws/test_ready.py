@@ -11,7 +11,8 @@ import pytest
 from heptarm import laws, model
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.fri import LawTrial
-from heptarm.fri.loop.native import Unavailable, library
+from heptarm.fri.loop.native import library
+from heptarm.io.compiled import Unavailable
 from heptarm.laws.ready import across, constants, shared_library
 from heptarm.values.pose import Pose
 from heptarm.values.robot import ROBOTS, Body, robot
@@ -155,7 +156,9 @@ def test_free_guiding_is_light_inside_and_a_wall_outside() -> None:
     places = np.array(plant.run(1.5))[:, 1]
     assert places[300] < -0.02, "it moves by a hand's force"
     assert places.min() > place[1] - 0.05 - 0.025, "it runs into the wall"
-    assert places[-1] == pytest.approx(place[1] - 0.05 - 0.01, abs=1e-3), "which stops it: 20 N on 2000 N/m are 10 mm"
+    assert places[-1] == pytest.approx(place[1] - 0.05 - 0.01, abs=1e-3), (
+        "which stops it: 20 N on 2000 N/m are 10 mm"
+    )
     assert plant.trial.memory.force[1] == pytest.approx(20.0, rel=0.2)
     plant.push = lambda t: np.zeros(3)
     plant.run(1.0)

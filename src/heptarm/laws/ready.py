@@ -17,7 +17,7 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected
 from heptarm.fri.loop import law_interface as interface
 from heptarm.fri.loop.compiled import LibraryLaw, include_dir
-from heptarm.fri.loop.native import Unavailable, built
+from heptarm.io.compiled import Unavailable, compiled_file, with_headers
 from heptarm.values.arrays import Array, array, finite, scalar, within, word
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body, RobotModel
@@ -41,8 +41,8 @@ def shared_library() -> Path:
         CommandRejected: there is no compiler, or it fails.
     """
     try:
-        return built(_SOURCE, *_HEADERS)
-    except (Unavailable, OSError) as error:
+        return compiled_file("laws", with_headers(_SOURCE, *_HEADERS))
+    except Unavailable as error:
         raise CommandRejected(
             f"the ready laws cannot be built: {error}", parameter="law", hint="install gcc"
         ) from None

@@ -9,21 +9,14 @@ from __future__ import annotations
 import ctypes
 import enum
 import functools
-import hashlib
-import os
-import shutil
 import signal
 import socket
-import subprocess
-import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from heptarm.errors import HeptarmError
 from heptarm.fri.guard.fallback import Missing
 from heptarm.fri.guard.joint_guard import AXES, Limited
 from heptarm.fri.loop import shared_memory as at
@@ -34,9 +27,8 @@ from heptarm.fri.protocol.messages import CommandMode, SessionState
 from heptarm.fri.protocol.protobuf import fields
 from heptarm.fri.protocol.version import unwrap
 from heptarm.fri.session.statistics import BINS
+from heptarm.io.compiled import Unavailable, compiled_library, with_headers
 
-#: Environment variable; any value switches the native part off.
-SWITCH = "HEPTARM_PURE_PYTHON"
 HANDBACK, LAW = -1, -2
 TIMEOUT, HANDED_BACK, CHECK, SOCKET_ERROR, CALL_LAW, LAW_FAILED = range(6)
 BUFFER = 2048
@@ -64,10 +56,6 @@ class LawStatus(enum.IntEnum):
     ENDLESS = 3
     NOT_FINITE = 4
     SLOW = 5
-
-
-class Unavailable(HeptarmError):
-    """The native part is not available; the text gives the reason."""
 
 
 #: `struct loop` of native.c, whose header schema/generate.py writes from this table: type, size (1: no array), names.
@@ -147,14 +135,7 @@ def library() -> ctypes.CDLL:
     Raises:
         Unavailable: this system is not supported, or has no compiler.
     """
-    if os.environ.get(SWITCH):
-        raise Unavailable(f"switched off by {SWITCH}")
-    if sys.platform != "linux" or sys.byteorder != "little":
-        raise Unavailable("the native part needs Linux on a little-endian machine")
-    try:
-        made = ctypes.CDLL(str(built(_SOURCE, *_HEADERS)))
-    except OSError as error:
-        raise Unavailable(f"the native part cannot be built or loaded: {error}") from error
+    made = compiled_library("fri", with_headers(_SOURCE, *_HEADERS))
     made.hf_size.restype = _WORD
     made.hf_turn.argtypes = (_POINTER, ctypes.c_char_p, ctypes.c_int, _WORD)
     made.hf_answer.argtypes = (_POINTER,)
@@ -165,47 +146,6 @@ def library() -> ctypes.CDLL:
     if made.hf_size() != ctypes.sizeof(_Memory):
         raise Unavailable(f"`struct loop` must have {ctypes.sizeof(_Memory)} bytes, got {made.hf_size()}")
     return made
-
-
-def built(source: Path, *headers: Path) -> Path:
-    """Build a shared library of this package in C at the first use, and keep it in the user's cache.
-
-    Args:
-        source: the source.
-        headers: what it includes.
-
-    Raises:
-        Unavailable: there is no compiler, or it fails.
-        OSError: the cache cannot be written.
-    """
-    content = b"".join(one.read_bytes() for one in (*headers, source))
-    key = hashlib.sha256(content + os.uname().machine.encode()).hexdigest()[:16]
-    root = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    target = Path(root) / "heptarm" / f"{source.parent.name}-{source.stem}-{key}.so"
-    if not target.exists():
-        _compile(source, target)
-    return target
-
-
-def _compile(source: Path, target: Path) -> None:
-    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-    if compiler is None:
-        raise Unavailable("no C compiler found: install gcc for the fastest loop")
-    target.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    # on the same file system, so that the last step is atomic
-    with tempfile.TemporaryDirectory(dir=target.parent) as folder:
-        made = Path(folder) / "made.so"
-        # without contraction, so that all numbers equal Python's to the last bit
-        flags = ("-O2", "-shared", "-fPIC", "-ffp-contract=off", f"-I{_HEADERS[1].parent}")
-        run = subprocess.run(
-            [compiler, *flags, "-o", str(made), str(source), "-lm", "-lrt"],
-            check=False,
-            capture_output=True,
-            text=True,
-        )
-        if run.returncode:
-            raise Unavailable(f"{compiler} fails: {run.stderr.strip().splitlines()[0]}")
-        os.replace(made, target)
 
 
 class Native:

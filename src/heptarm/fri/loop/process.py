@@ -42,12 +42,12 @@ from heptarm.fri.loop.native import (
     SOCKET_ERROR,
     TIMEOUT,
     Native,
-    Unavailable,
     library,
 )
 from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol.messages import SessionState
 from heptarm.fri.protocol.version import Version
+from heptarm.io.compiled import Unavailable
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import Address, UdpSocket
 
