@@ -31,7 +31,7 @@ FILTER = 0.002
 #: Inertia that a motor is assumed to show behind its gear and its torque control, as in the simulator [kg m²].
 ROTOR = 0.1
 #: Fraction of the robot's torques that a law may use.
-TORQUE_SHARE = 0.3
+TORQUE_FRACTION = 0.3
 
 
 def shared_library() -> Path:
@@ -446,7 +446,7 @@ def _positive(values: Array, name: str, *, above: bool = False) -> Array:
 
 def _torques(values: npt.ArrayLike | None) -> Array | Callable[[RobotModel], Array]:
     if values is None:
-        return lambda arm: TORQUE_SHARE * arm.tau_max
+        return lambda arm: TORQUE_FRACTION * arm.tau_max
     return _positive(array(values, 7, "tau_max"), "tau_max")
 
 

@@ -657,7 +657,7 @@ int hf_law(struct loop *l, const word *slot) {
     struct itimerspec limit = {.it_value = {.tv_sec = LAW_CUT / 1000000000LL, .tv_nsec = LAW_CUT % 1000000000LL}};
     take_parameters(l);
     law_state(l, slot, &state);
-    word budget = (word)(l->law_share * state.dt * 1e9), began = clock_now(CLOCK_MONOTONIC);
+    word budget = (word)(l->law_fraction * state.dt * 1e9), began = clock_now(CLOCK_MONOTONIC);
     int number = sigsetjmp(law_exit, 0);
     if (number) return failed(l, number == TIME_IS_UP ? LAW_ENDLESS : LAW_CRASHED, number);
     if (has_timer) timer_settime(law_timer, 0, &limit, NULL);
