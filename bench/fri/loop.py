@@ -1,4 +1,4 @@
-"""Reply latency of the FRI client and of compiled laws beside a bare UDP echo in C, with a user's process idle and busy."""
+"""Reply latency of the FRI client and of compiled laws beside a bare UDP echo in C, the user's process idle or busy."""
 
 from __future__ import annotations
 

@@ -251,8 +251,8 @@ class Native:
             return f"it commanded numbers that are not finite {LAW_PATIENCE} times in a row"
         if status is LawStatus.SLOW:
             return (
-                f"it took longer than its time budget, {LAW_FRACTION:g} of the command period, {LAW_PATIENCE} times in a "
-                f"row; the last call took {code * 1e-3:.0f} us"
+                f"it took longer than its time budget, {LAW_FRACTION:g} of the command period, {LAW_PATIENCE} times in "
+                f"a row; the last call took {code * 1e-3:.0f} us"
             )
         if self.raised:
             return self.raised.pop()
