@@ -123,8 +123,8 @@ def _bench(law: object, params: dict[str, object], memory: dict[str, object]) ->
             bench.cycle._memory = Memory(bench.cycle.memory_values, schema)
     if isinstance(law, CompiledLaw):
         native = Native(twins.pure.cycle)
+        address, kept = law.load({}, schema)
         for one in (native, twins.native):
-            address, kept = law.load({}, schema)
             one.set_law(address, kept, success=law.success)
     else:
         twins.native = Native(twins.other.cycle)
