@@ -203,7 +203,7 @@ def joint_impedance(
 
 def free_guiding(
     *,
-    box: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
+    box: npt.ArrayLike | None = None,
     damping: npt.ArrayLike = (2.0, 2.0, 2.0, 2.0, 1.0, 0.5, 0.5),
     wall_stiffness: float = 1500.0,
     wall_damping: float = 60.0,
@@ -220,7 +220,7 @@ def free_guiding(
     torque was limited.
 
     Args:
-        box: lower and upper corner for the flange in the base [m]; None: no walls.
+        box: lower and upper corner for the flange in the base, shape (2, 3) [m]; None: no walls.
         damping: of the joints, shape (7,) [Nm s/rad].
         wall_stiffness: of the walls [N/m].
         wall_damping: of the walls [N s/m].
