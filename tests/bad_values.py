@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 import heptarm
+import heptarm.laws
 from heptarm import Cause, HeptarmError, Pose, Result
 from heptarm.do import notify
 from heptarm.fri import SessionState
@@ -55,6 +56,7 @@ BY_ANNOTATION: dict[str, object] = {
     "Motion": heptarm.ptp(HOME),
     "CartesianImpedance": CartesianImpedance(),
     "RobotModel": ROBOT,
+    "CompiledLaw": heptarm.laws.low_pass(),
     "State": State(),
     "Tool": heptarm.Tool("bad-values"),
     "Workpiece": heptarm.Workpiece("bad-values"),
@@ -131,7 +133,7 @@ RECORDING = heptarm.Recording(
     Path("run.mcap"), {"robot": "iiwa14"}, {"t": np.arange(3.0), "q": np.zeros((3, 7))}, (), (), True
 )
 #: Functions that only heptarm itself calls.
-INTERNAL = ("Output.on", "Params", "Params.replace", "RedundancyBatch", "Stats.of")
+INTERNAL = ("LiveMemory", "Memory", "Output.on", "Params", "Params.replace", "RedundancyBatch", "Stats.of")
 _OPEN = "NaN keeps the default"
 _FREE = "infinite: no limit"
 #: Values with a documented meaning that their type does not show: function or parameter, the bad value, the meaning.

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+import heptarm as ha
 from heptarm.fri.loop.user_api import Output, Params, State
 
 Floats = npt.NDArray[np.float64]
@@ -47,3 +49,11 @@ def balance(s: State, out: Output, p: Params) -> None:
 def press(s: State, out: Output, p: Params) -> None:
     """A force along the z axis of the base that rises smoothly."""
     out.wrench[2] = -p.force * fade(s.t, 1.0)
+
+
+@ha.law(params={"goal": [0.0] * 7, "tau": 0.1}, memory={"x": [0.0] * 7, "calls": 0.0})
+def drift(s: State, out: Output, p: Params, m: Any) -> None:
+    """Follow a small offset through a low pass; drift.c is the same in C."""
+    m.x = m.x + s.dt * (p.goal - m.x) / p.tau
+    out.q[:] = s.q_ipo + m.x
+    m.calls += 1.0

@@ -1,8 +1,9 @@
-"""Reply latency of the FRI client beside a bare UDP echo in C, with the user's process idle and busy."""
+"""Reply latency of the FRI client and of compiled laws beside a bare UDP echo in C, the user's process idle or busy."""
 
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import socket
 import struct
@@ -15,10 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from bench.fri.laws import drift
 from bench.measure.blocks import BLOCKS, Comparison, Placement, pin, placed, placements
 from bench.measure.compiler import compiled
 from bench.measure.figure import Figure, benchmark
 from bench.measure.noise import Noise
+from heptarm import law_from
+from heptarm.fri import CompiledLaw, include_dir
 from heptarm.fri.loop.client import Client
 from heptarm.fri.protocol import codec
 from heptarm.fri.protocol import messages as m
@@ -32,6 +36,8 @@ _SOURCES = Path(__file__).parent
 _JOINTS = (0.1, 0.4, -0.1, -1.2, 0.2, 0.9, 0.0)
 #: Counts as the latency of a missing reply [us].
 _NONE = 1000.0
+#: Largest ratio of a compiled law's median to the echo's, each side on a processor of its own.
+_LAW_LIMIT = 1.1
 _LIMITS = (("", 50.0, 1.35), ("_p99", 99.0, 1.5))
 
 
@@ -57,20 +63,41 @@ def fri_loop() -> Iterator[Figure]:
             del os.environ[SWITCH]
 
 
-def _compare(folder: Path, cycles: int, *, busy: bool) -> list[tuple[Comparison, dict[str, Any]]]:
+@benchmark("fri_laws")
+def fri_laws() -> Iterator[Figure]:
+    """Reply latency of a law by Numba and one in C, while the user's process computes and collects garbage."""
+    with tempfile.TemporaryDirectory() as name, placed():
+        folder = Path(name)
+        for program in ("echo", "sender"):
+            compiled(_SOURCES / f"{program}.c", folder)
+        (folder / "datagrams").write_bytes(_datagrams())
+        made = folder / "drift.so"
+        flags = ("-O2", "-shared", "-fPIC", f"-I{include_dir()}")
+        subprocess.run(["cc", *flags, "-o", str(made), str(_SOURCES / "drift.c")], check=True)
+        in_c = law_from(made, "step", params=drift.params, memory=drift.memory)
+        for label, law in (("numba", drift), ("c", in_c)):
+            for found, detail in _compare(folder, CYCLES // BLOCKS, busy=True, law=law):
+                # on one processor the echo does not have to wake up, and a microsecond is a fourth of its latency
+                limit = _LAW_LIMIT if found.placement.name == "two_cores" else None
+                yield found.figure(f"fri_law_{label}", 50.0, "us", limit=limit, detail=detail)
+
+
+def _compare(
+    folder: Path, cycles: int, *, busy: bool, law: CompiledLaw | None = None
+) -> list[tuple[Comparison, dict[str, Any]]]:
     """Latencies of client and echo under each placement, and facts of the last block."""
     comparisons = [Comparison(placement, cap=_NONE) for placement in placements()]
     facts: list[dict[str, Any]] = [{} for _ in comparisons]
     for _ in range(BLOCKS):
         for number, found in enumerate(comparisons):
             with Noise() as noise:
-                replies, echoes, facts[number] = _run(folder, cycles, found.placement, busy=busy)
+                replies, echoes, facts[number] = _run(folder, cycles, found.placement, busy=busy, law=law)
             found.add(np.nan_to_num(replies, nan=_NONE), np.nan_to_num(echoes, nan=_NONE), noise)
     return list(zip(comparisons, facts, strict=True))
 
 
 def _run(
-    folder: Path, cycles: int, placement: Placement, *, busy: bool
+    folder: Path, cycles: int, placement: Placement, *, busy: bool, law: CompiledLaw | None
 ) -> tuple[np.ndarray, np.ndarray, dict[str, Any]]:
     """Latencies of the client and of the echo [us], NaN where no reply came within half a millisecond."""
     (near,), (far,) = placement.near, placement.far
@@ -86,13 +113,14 @@ def _run(
         assert echo.stdout is not None
         if echo.stdout.readline() != "ready\n":
             raise RuntimeError("the echo did not start")
-        client = stack.enter_context(Client(0, cpu=near))
+        client = stack.enter_context(Client(0, cpu=near, law=law))
         words = (client.port, port, far, cycles, folder / "datagrams", results)
         sender = subprocess.Popen([str(folder / "sender"), *map(str, words)])
         stack.callback(sender.kill)
         if busy:
             stop = threading.Event()
-            user = threading.Thread(target=_be_busy, args=(client, stop))
+            work = _be_busy if law is None else _collect_garbage
+            user = threading.Thread(target=work, args=(client, stop))
             user.start()
             stack.callback(user.join)
             stack.callback(stop.set)
@@ -108,6 +136,7 @@ def _run(
         "echo_unanswered": int(np.isnan(echoes).sum()),
         "own_latency_us": [round(value * 1e6, 1) for value in stats.latency],
         "commanded": stats.commanded,
+        "calls_of_the_law": client.memory.calls if law is not None else 0,
         "refused": refused,
     }
     return replies, echoes, detail
@@ -119,6 +148,19 @@ def _be_busy(client: Client, stop: threading.Event) -> None:
         for _ in range(20_000):
             pass
         client.command(q=_JOINTS)
+
+
+def _collect_garbage(client: Client, stop: threading.Event) -> None:
+    """Keep a whole processor busy, collect garbage, change a parameter and read the memory now and then."""
+    count = 0
+    while not stop.is_set():
+        for _ in range(2_000):
+            ring: list[object] = [{}]
+            ring.append(ring)
+        gc.collect()
+        count += 1
+        client.params.goal = [1e-4 * (count % 2)] * 7
+        client.memory.snapshot()
 
 
 def _free_port() -> int:

@@ -22,7 +22,16 @@ BLOCK = re.compile(r"^( *)```(?:python|\{code-block\} python)([^\n]*)\n(.*?)^\1`
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 #: Simulators of these pages run in real time: their programs look at the clock of this machine, or answer FRI.
 REAL_TIME = (
-    *("fri.md", "data-flow-fri.md", "data-flow-servo.md", "guidance.md", "io.md", "servo.md", "state.md"),
+    *(
+        "fri.md",
+        "data-flow-fri.md",
+        "data-flow-servo.md",
+        "guidance.md",
+        "io.md",
+        "laws.md",
+        "servo.md",
+        "state.md",
+    ),
     "stopping.md",
 )
 RUNNER = """

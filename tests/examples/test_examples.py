@@ -17,7 +17,7 @@ SPEED = FASTER
 #: These have one of their own in real time: they look at the clock of this machine, or answer FRI.
 REAL_TIME = (
     *("03_async_cancel.py", "06_servo.py", "07_fri.py", "10_recovery.py", "12_straight_servo.py"),
-    *("13_hand_guiding.py", "18_teleoperation.py"),
+    *("13_hand_guiding.py", "18_teleoperation.py", "21_laws.py"),
 )
 RUNNER = """
 import runpy, sys

@@ -68,5 +68,5 @@ def forgets_memory(s: Any, out: Any, p: Any, m: Any) -> None:
 
 
 @law
-def wants_signals(s: Any, out: Any, p: Any) -> None:
+def asks_for_signals(s: Any, out: Any, p: Any) -> None:
     out.io["lamp"] = True

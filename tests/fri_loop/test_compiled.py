@@ -123,8 +123,8 @@ def _bench(law: object, params: dict[str, object], memory: dict[str, object]) ->
             bench.cycle._memory = Memory(bench.cycle.memory_values, schema)
     if isinstance(law, CompiledLaw):
         native = Native(twins.pure.cycle)
+        address, kept = law.load({}, schema)
         for one in (native, twins.native):
-            address, kept = law.load({}, schema)
             one.set_law(address, kept, success=law.success)
     else:
         twins.native = Native(twins.other.cycle)
@@ -148,7 +148,7 @@ def _bench(law: object, params: dict[str, object], memory: dict[str, object]) ->
         (7, "crashed with SIGSEGV"),
     ],
 )
-def test_a_law_that_fails_brakes_the_arm_and_says_why(what: int, words: str, laws: Path) -> None:
+def test_a_law_that_fails_brakes_the_arm_and_is_named(what: int, words: str, laws: Path) -> None:
     law = ha.law_from(laws, "misbehaving", params={"what": 0.0}, memory={"calls": 0.0})
     with Client(0, law=law, realtime=False) as client:
         controller = Controller(client.port, period_ms=4)
@@ -212,7 +212,7 @@ def test_the_guard_limits_a_compiled_law(laws: Path) -> None:
     [
         ("opens_a_file", "laws.py, line", "leave out @ha.law"),
         ("forgets_memory", "Unknown attribute 'x' of memory", "declare it and its initial value"),
-        ("wants_signals", "Unknown attribute 'io' of out", "signals"),
+        ("asks_for_signals", "Unknown attribute 'io' of out", "signals"),
     ],
 )
 def test_what_numba_cannot_compile_is_named_with_line_and_remedy(name: str, words: str, hint: str) -> None:

@@ -99,7 +99,7 @@ def test_cartesian_impedance_stays_stable_in_contact_with_a_stiff_wall() -> None
         plant.torque_step()
         forces.append(plant.force)
     rest = np.array(forces[-300:])
-    # 1500 N/m at a depth of 20 mm less what the wall gives way
+    # 1500 N/m at a depth of 20 mm less the deflection of the wall
     assert rest.mean() == pytest.approx(30.0, rel=0.1) and np.ptp(rest) < 1.0
     assert max(forces) < 150.0 and plant.energy() < 1e-4
 

@@ -7,18 +7,18 @@ Coriolis torques there, and adds the law's. A goal of NaN is where the arm is wh
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected
+from heptarm.errors import CommandRejected, ShapeError
 from heptarm.fri.loop import law_interface as interface
 from heptarm.fri.loop.compiled import LibraryLaw, include_dir
 from heptarm.io.compiled import Unavailable, compiled_file, with_headers
-from heptarm.values.arrays import Array, array, finite, scalar, within, word
+from heptarm.values.arrays import Array, array, finite, instance, integer, numbers, scalar, within, word
 from heptarm.values.pose import Pose
 from heptarm.values.robot import Body, RobotModel
 
@@ -31,7 +31,7 @@ FILTER = 0.002
 #: Inertia that a motor is assumed to show behind its gear and its torque control, as in the simulator [kg m²].
 ROTOR = 0.1
 #: Fraction of the robot's torques that a law may use.
-TORQUE_SHARE = 0.3
+TORQUE_FRACTION = 0.3
 
 
 def shared_library() -> Path:
@@ -122,11 +122,12 @@ def cartesian_impedance(
         tau_max: largest torques, shape (7,) [Nm]; None: 30 % of the robot's.
         load: on the flange, beside the load data of the cabinet.
     """
+    _check_body(load, "load")
     return ReadyLaw(
         "cartesian_impedance",
         {
             "robot": lambda arm: constants(arm, load),
-            "goal": _ANYWHERE if goal is None else goal.array,
+            "goal": _ANYWHERE if goal is None else instance(goal, Pose, "goal").array,
             "stiffness": _positive(array(stiffness, 6, "stiffness"), "stiffness"),
             "damping": within(damping, "damping", 0.0, 2.0),
             "force_max": within(force_max, "force_max", 0.0, 500.0, unit="N"),
@@ -175,6 +176,7 @@ def joint_impedance(
         tau_max: largest torques, shape (7,) [Nm]; None: 30 % of the robot's.
         load: on the flange, beside the load data of the cabinet.
     """
+    _check_body(load, "load")
     return ReadyLaw(
         "joint_impedance",
         {
@@ -201,7 +203,7 @@ def joint_impedance(
 
 def free_guiding(
     *,
-    box: tuple[Sequence[float], Sequence[float]] | None = None,
+    box: npt.ArrayLike | None = None,
     damping: npt.ArrayLike = (2.0, 2.0, 2.0, 2.0, 1.0, 0.5, 0.5),
     wall_stiffness: float = 1500.0,
     wall_damping: float = 60.0,
@@ -218,7 +220,7 @@ def free_guiding(
     torque was limited.
 
     Args:
-        box: lower and upper corner for the flange in the base [m]; None: no walls.
+        box: lower and upper corner for the flange in the base, shape (2, 3) [m]; None: no walls.
         damping: of the joints, shape (7,) [Nm s/rad].
         wall_stiffness: of the walls [N/m].
         wall_damping: of the walls [N s/m].
@@ -228,8 +230,11 @@ def free_guiding(
         extra: load whose weight the cabinet does not know.
         tau_max: largest torques, shape (7,) [Nm]; None: 30 % of the robot's.
     """
-    low, high = ((-1e3,) * 3, (1e3,) * 3) if box is None else box
-    corners = array(low, 3, "box[0]"), array(high, 3, "box[1]")
+    _check_body(extra, "extra")
+    given = numbers(((-1e3,) * 3, (1e3,) * 3) if box is None else box, "box", "two corners")
+    if given.shape != (2, 3):
+        raise ShapeError(f"box must have shape (2, 3), got {given.shape}", parameter="box", value=box)
+    corners = array(given[0], 3, "box"), array(given[1], 3, "box")
     if not (corners[0] < corners[1]).all():
         raise CommandRejected(
             f"the lower corner of the box must be below the upper one, got {corners[0].tolist()} and "
@@ -356,10 +361,7 @@ def low_pass(
         order: 1 or 2.
         damping: ratio of a filter of second order; 1 is the fastest one without overshoot.
     """
-    if order not in (1, 2):
-        raise CommandRejected(
-            f"order must be 1 or 2, got {order!r}", parameter="order", value=order, allowed="1, 2"
-        )
+    integer(order, "order", 1, 2)
     return ReadyLaw(
         "low_pass_of_targets",
         {
@@ -444,9 +446,14 @@ def _positive(values: Array, name: str, *, above: bool = False) -> Array:
     return values
 
 
+def _check_body(body: Body | None, name: str) -> None:
+    if body is not None:
+        instance(body, Body, name)
+
+
 def _torques(values: npt.ArrayLike | None) -> Array | Callable[[RobotModel], Array]:
     if values is None:
-        return lambda arm: TORQUE_SHARE * arm.tau_max
+        return lambda arm: TORQUE_FRACTION * arm.tau_max
     return _positive(array(values, 7, "tau_max"), "tau_max")
 
 

@@ -43,6 +43,8 @@ from heptarm.values.robot import RobotModel, robot
 PORT = 30200
 #: Longest time limit [s].
 LONGEST = 1e9
+#: Further time for the start of the loop's process if it has to compile a law [s].
+COMPILING = 120.0
 
 
 def check_settings(
@@ -118,7 +120,7 @@ class Client(Reader):
         history: number of states that are kept.
         realtime: request real-time priority and locked memory.
         cpu: processor of the loop; None for any.
-        timeout: time limit for the start of the loop's process [s].
+        timeout: time limit for the start of the loop's process [s], beside the compilation of a law.
 
     Attributes:
         params: parameters of the law; assign to change them while it runs.
@@ -215,7 +217,7 @@ class Client(Reader):
         try:
             self._worker = process.Worker(block.path, sent)
             try:
-                self._wait_for_loop(timeout)
+                self._wait_for_loop(timeout + (COMPILING if isinstance(law, CompiledLaw) else 0.0))
             except BaseException:
                 self._worker.kill()
                 raise

@@ -45,8 +45,7 @@ class CompiledLaw:
     success = 0
 
     def __init__(self, params: _Numbers | None = None, memory: _Numbers | None = None) -> None:
-        for values, what in ((params, "params"), (memory, "memory")):
-            interface.flat({} if values is None else values, what)  # checks them
+        _check(params, memory)
         self.params: dict[str, Any] = dict(params or {})
         self.memory: dict[str, Any] = dict(memory or {})
 
@@ -73,6 +72,13 @@ class CompiledLaw:
             CommandRejected: it cannot be compiled or loaded; the text has the place and the hint a remedy.
         """
         raise NotImplementedError
+
+
+def _check(params: _Numbers | None, memory: _Numbers | None) -> None:
+    """Check that both are numbers and arrays by name, or None."""
+    for values, what in ((params, "params"), (memory, "memory")):
+        if values is not None:
+            interface.flat(values, what)
 
 
 def arity(function: Callable[..., object]) -> int:
@@ -130,7 +136,7 @@ class NumbaLaw(CompiledLaw):
 
 
 @overload
-def law(function: Callable[..., object], /) -> NumbaLaw: ...
+def law(function: Callable[..., object]) -> NumbaLaw: ...
 
 
 @overload
@@ -141,7 +147,6 @@ def law(
 
 def law(
     function: Callable[..., object] | None = None,
-    /,
     *,
     params: _Numbers | None = None,
     memory: _Numbers | None = None,
@@ -164,7 +169,8 @@ def law(
         ShapeError: params or memory are not numbers and arrays by name.
     """
     if function is not None:
-        return NumbaLaw(function)
+        return NumbaLaw(function, params, memory)
+    _check(params, memory)
     return lambda given: NumbaLaw(given, params, memory)
 
 
@@ -287,6 +293,7 @@ class LawTrial:
         dt: float = 1e-3,
     ) -> None:
         self._law = instance(compiled, CompiledLaw, "compiled")
+        _check(params, memory)
         arm = robot(model) if isinstance(model, str) else instance(model, RobotModel, "model")
         self._dt = within(dt, "dt", 1e-6, 1.0, unit="s")
         values, schema = interface.flat({**compiled.parameters(arm), **(params or {})}, "params")

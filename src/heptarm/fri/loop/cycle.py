@@ -41,7 +41,7 @@ MIN_GAP = 25_000_000
 #: A command given up to this long before commanding starts counts [ns].
 GRACE = 50_000_000
 #: Time budget of a law, as a fraction of the command period.
-LAW_SHARE = 0.5
+LAW_FRACTION = 0.5
 #: Beginning of the text of the event after a failure of the law.
 LAW_FAILED = "the law failed, the arm brakes: "
 #: Beginning of the text of the event after a failure of the loop itself.
@@ -760,7 +760,7 @@ class Cycle:
         except BaseException as error:  # sys.exit() as well: the arm has to brake first
             self.law_failed(str(error) if isinstance(error, LawFailure) else describe(error), now)
         if not self.is_compiled:  # the native part counts those of a compiled law
-            self.layout.header[at.OVERRUNS] += time.monotonic_ns() - began > LAW_SHARE * state.dt * 1e9
+            self.layout.header[at.OVERRUNS] += time.monotonic_ns() - began > LAW_FRACTION * state.dt * 1e9
 
     def _take_memory(self) -> None:
         """Take over what the user's process has written to the memory of the law."""

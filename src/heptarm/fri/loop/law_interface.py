@@ -107,6 +107,10 @@ class Fields:
 
     __slots__ = ("_schema", "_values", "_what")
 
+    _schema: dict[str, tuple[tuple[int, ...], int]]
+    _values: Floats
+    _what: str
+
     def __init__(self, values: Floats, schema: Schema, what: str) -> None:
         object.__setattr__(self, "_values", values)
         object.__setattr__(self, "_schema", dict(schema))
@@ -180,6 +184,10 @@ class LiveMemory(Fields):
     """
 
     __slots__ = ("_newest", "_write", "_written")
+
+    _newest: Callable[[], Floats | None]
+    _write: Callable[[Floats], None]
+    _written: Floats
 
     def __init__(
         self,

@@ -542,6 +542,7 @@ static sigjmp_buf law_exit;
 static volatile sig_atomic_t in_law;
 static timer_t law_timer;
 static int has_timer;
+static word law_armed; /* when the timer was set */
 static char law_stack[1 << 16]; /* for the handler of a stack overflow */
 static const int crashes[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT};
 #define TIME_IS_UP (SIGRTMIN + 5)
@@ -573,7 +574,7 @@ int hf_protect(void) {
     return has_timer;
 }
 
-/* Copy the newest slot of a ring behind its sequence word; 0 if there is no newer one than `seen`, or it is being written. */
+/* Copy the newest slot of a ring behind its sequence word; 0 if there is none after `seen`, or it is being written. */
 static int take_slot(const word *ring, word count, word slots, word size, word *seen, double *into) {
     if (count == *seen || count == 0) return 0;
     const word *slot = ring + (count - 1) % slots * (size + 1);
@@ -657,10 +658,13 @@ int hf_law(struct loop *l, const word *slot) {
     struct itimerspec limit = {.it_value = {.tv_sec = LAW_CUT / 1000000000LL, .tv_nsec = LAW_CUT % 1000000000LL}};
     take_parameters(l);
     law_state(l, slot, &state);
-    word budget = (word)(l->law_share * state.dt * 1e9), began = clock_now(CLOCK_MONOTONIC);
+    word budget = (word)(l->law_fraction * state.dt * 1e9), began = clock_now(CLOCK_MONOTONIC);
     int number = sigsetjmp(law_exit, 0);
     if (number) return failed(l, number == TIME_IS_UP ? LAW_ENDLESS : LAW_CRASHED, number);
-    if (has_timer) timer_settime(law_timer, 0, &limit, NULL);
+    if (has_timer && began - law_armed > LAW_CUT / 4) { /* not in every call: it takes as long as a short law */
+        timer_settime(law_timer, 0, &limit, NULL);
+        law_armed = began;
+    }
     in_law = 1;
     int code = ((compiled_law)l->law)(&state, (struct heptarm_command *)l->out_q, l->params, l->memory);
     in_law = 0;

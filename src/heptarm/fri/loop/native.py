@@ -20,7 +20,7 @@ import numpy as np
 from heptarm.fri.guard.fallback import Missing
 from heptarm.fri.guard.joint_guard import AXES, Limited
 from heptarm.fri.loop import shared_memory as at
-from heptarm.fri.loop.cycle import LAW_SHARE, Cycle, LawFailure
+from heptarm.fri.loop.cycle import LAW_FRACTION, Cycle, LawFailure
 from heptarm.fri.loop.telemetry import NAN7
 from heptarm.fri.loop.user_api import Output, State
 from heptarm.fri.protocol.messages import CommandMode, SessionState
@@ -95,7 +95,7 @@ STRUCT: tuple[tuple[str, int, str], ...] = (
     ("pointer", 1, "params_ring memory_ring memory_set_ring"),
     ("word", 1, "params_size memory_size params_seen memory_seen"),
     ("word", 1, "law_success law_status law_code law_reported law_late law_not_finite"),
-    ("real", 1, "law_share"),
+    ("real", 1, "law_fraction"),
     # velocity by differences
     ("word", 1, "q_known"),
     ("real", AXES, "q_before dq"),
@@ -181,7 +181,7 @@ class Native:
             getattr(memory, name)[:] = getattr(limits, name)
         memory.reach = limits.reach
         memory.plausible_low[:], memory.plausible_high[:] = cycle.session.low, cycle.session.high
-        memory.law_share = LAW_SHARE
+        memory.law_fraction = LAW_FRACTION
         memory.f_missing = MISSING.index(policy.missing)
         memory.patience, memory.over = policy.patience, policy.over
 
@@ -251,8 +251,8 @@ class Native:
             return f"it commanded numbers that are not finite {LAW_PATIENCE} times in a row"
         if status is LawStatus.SLOW:
             return (
-                f"it took longer than its time budget, {LAW_SHARE:g} of the command period, {LAW_PATIENCE} times in a "
-                f"row; the last call took {code * 1e-3:.0f} us"
+                f"it took longer than its time budget, {LAW_FRACTION:g} of the command period, {LAW_PATIENCE} times in "
+                f"a row; the last call took {code * 1e-3:.0f} us"
             )
         if self.raised:
             return self.raised.pop()

@@ -227,7 +227,7 @@ struct loop {
     word *params_ring, *memory_ring, *memory_set_ring;
     word params_size, memory_size, params_seen, memory_seen;
     word law_success, law_status, law_code, law_reported, law_late, law_not_finite;
-    double law_share;
+    double law_fraction;
     word q_known;
     double q_before[7], dq[7];
     word t_flags, t_received, t_answer, t_size, t_stamp, t_known;

@@ -27,7 +27,7 @@ from heptarm.fri.loop import law_interface as interface
 _Members: TypeAlias = tuple[tuple[str, str, tuple[int, ...], int], ...]
 
 
-class Structure(types.Type):  # type: ignore[misc]
+class Structure(types.Type):
     """A structure of words.
 
     Args:

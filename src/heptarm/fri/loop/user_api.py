@@ -262,6 +262,8 @@ class Params(Fields):
 
     __slots__ = ("_changed",)
 
+    _changed: Callable[[], None] | None
+
     def __init__(self, values: Floats, schema: Schema, *, changed: Callable[[], None] | None = None) -> None:
         super().__init__(values, schema, "parameter")
         object.__setattr__(self, "_changed", changed)

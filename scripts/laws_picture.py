@@ -1,0 +1,130 @@
+"""Draw docs/_static/laws.png: responses of the ready laws on a simulated arm.
+
+python scripts/laws_picture.py
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from heptarm import laws  # noqa: E402
+from tests.laws.plant import ARM, DT, HOME, Plant  # noqa: E402
+
+
+def main() -> None:
+    """Draw the picture."""
+    figure, axes = plt.subplots(2, 3, figsize=(12, 6), constrained_layout=True)
+    _cartesian(axes[0, 0])
+    _wall(axes[0, 1])
+    _joints(axes[0, 2])
+    _guiding(axes[1, 0])
+    _admittance(axes[1, 1])
+    _targets(axes[1, 2])
+    for one in axes.flat:
+        one.set_xlabel("t [s]")
+        one.grid(alpha=0.3)
+    figure.savefig(ROOT / "docs" / "_static" / "laws.png", dpi=90)
+    print("docs/_static/laws.png")
+
+
+def _times(count: int) -> np.ndarray:
+    return np.arange(count) * DT
+
+
+def _cartesian(axis: plt.Axes) -> None:
+    for damping in (0.3, 0.7, 1.0):
+        plant = Plant(laws.cartesian_impedance(damping=damping, speed=2.0))
+        plant.run(0.02)
+        begin = plant.place
+        goal = np.array(plant.trial.memory.goal)
+        goal[0] += 0.03
+        plant.trial.params.goal = goal
+        moved = 1e3 * (np.array(plant.run(0.8))[:, 0] - begin[0])
+        axis.plot(_times(len(moved)), moved, label=f"damping {damping:g}")
+    axis.set(title="cartesian_impedance: step of 30 mm", ylabel="x [mm]")
+    axis.legend()
+
+
+def _wall(axis: plt.Axes) -> None:
+    plant = Plant(laws.cartesian_impedance(speed=0.1))
+    plant.wall = plant.place[2] - 0.01
+    plant.run(0.02)
+    goal = np.array(plant.trial.memory.goal)
+    goal[2] -= 0.03
+    plant.trial.params.goal = goal
+    forces = []
+    for _ in range(1000):
+        plant.torque_step()
+        forces.append(plant.force)
+    axis.plot(_times(len(forces)), forces)
+    axis.set(title="the same on a wall of 30 kN/m", ylabel="force [N]")
+
+
+def _joints(axis: plt.Axes) -> None:
+    plant = Plant(laws.joint_impedance(smoothing=0.08))
+    plant.run(0.02)
+    plant.trial.params.goal = HOME + np.radians([0, 0, 0, 20, 0, 0, 0])
+    reached, followed = [], []
+    for _ in range(800):
+        plant.torque_step()
+        reached.append(np.degrees(plant.q[3] - HOME[3]))
+        followed.append(np.degrees(plant.trial.memory.q[3] - HOME[3]))
+    axis.plot(_times(len(followed)), followed, "--", label="reference")
+    axis.plot(_times(len(reached)), reached, label="A4")
+    axis.set(title="joint_impedance: step of 20 deg", ylabel="angle [deg]")
+    axis.legend()
+
+
+def _guiding(axis: plt.Axes) -> None:
+    start = Plant(laws.free_guiding()).place
+    plant = Plant(laws.free_guiding(box=(start - [0.2, 0.05, 0.2], start + 0.2)))
+    plant.push = lambda t: np.array([0.0, -20.0 if t < 1.0 else 0.0, 0.0])
+    moved = 1e3 * (np.array(plant.run(1.5))[:, 1] - start[1])
+    axis.plot(_times(len(moved)), moved)
+    axis.axhline(-50.0, color="grey", linestyle=":")
+    axis.set(title="free_guiding: 20 N for 1 s against a wall", ylabel="y [mm]")
+
+
+def _admittance(axis: plt.Axes) -> None:
+    law = laws.admittance(wrench=(0, 0, -20.0, 0, 0, 0), damping=(800,) * 3 + (40,) * 3, dead_band=0.0)
+    plant = Plant(law, wall_stiffness=20_000.0)
+    plant.wall = plant.place[2] - 0.005
+    forces = []
+    for _ in range(1500):
+        plant.position_step()
+        forces.append(plant.force)
+    axis.plot(_times(len(forces)), forces)
+    axis.set(title="admittance: pressing with 20 N on 20 kN/m", ylabel="force [N]")
+
+
+def _targets(axis: plt.Axes) -> None:
+    goal = HOME + np.radians([30, 0, 0, 0, 0, 0, 0])
+    made = (
+        ("minimum_jerk", laws.minimum_jerk()),
+        ("low_pass, order 1", laws.low_pass(order=1)),
+        ("low_pass, order 2", laws.low_pass()),
+    )
+    for name, law in made:
+        trial = Plant(law).trial
+        trial(HOME)
+        path = []
+        for k in range(1500):
+            trial.params.goal = goal if k < 700 else HOME
+            path.append(np.degrees(trial(HOME, q_ipo=HOME).q[0] - HOME[0]))
+        axis.plot(_times(len(path)), path, label=name)
+    axis.set(title=f"targets that change ({ARM.title})", ylabel="A1 [deg]")
+    axis.legend()
+
+
+if __name__ == "__main__":
+    main()
