@@ -36,9 +36,8 @@ def test_a_program_for_lbr_stack(other: Client) -> None:
 
 def test_types_have_the_fields_of_the_other_drivers() -> None:
     """Every type of a preset is generated, and has a hash by which two machines compare it."""
-    share = Path(sys.prefix) / "share"
     for package in ("libiiwa_msgs", "lbr_fri_idl"):
-        described = sorted((share / package).rglob("*.json"))
+        described = sorted((Path(sys.prefix) / "share" / package).rglob("*.json"))
         assert described
         for path in described:
             hashes = yaml.safe_load(path.read_text())["type_hashes"]
