@@ -3,8 +3,8 @@ PY := .venv/bin/python
 STAMPS := build/stamps
 .DEFAULT_GOAL := setup
 
-.PHONY: setup cabinet demo test test-ros test-ros2 test-ros1 test-pythons test-long conformance lint check bench soak figures lock docs \
-	wheel clean help
+.PHONY: setup cabinet demo test test-computing test-ros test-ros2 test-ros1 test-pythons test-long conformance lint check bench soak figures lock docs \
+	wheel first-hour clean help
 
 ##@ To try it
 
@@ -62,9 +62,15 @@ check: $(STAMPS)/venv  ## the generated files agree with the schema
 	$(PY) schema/generate.py --check
 
 test: setup $(STAMPS)/browser lint check  ## everything; what takes long begins first
-	$(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(LONGEST) -m "not alone"
+	@$(MAKE) --no-print-directory test-computing $(STAMPS)/ros2 $(STAMPS)/ros1 > build/test-computing.log 2>&1 & computing=$$!; \
+	$(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(LONGEST) -m "not computing and not alone"; waiting=$$?; \
+	wait $$computing; computing=$$?; cat build/test-computing.log; exit $$((waiting + computing))
 	$(PY) -m pytest $(LONGEST) -m alone
 	@$(MAKE) --no-print-directory test-ros
+
+# It fills the time in which the others wait, and leaves them the processor when they want it.
+test-computing: setup  ## tests that wait for nothing: values, protocols, kinematics, simulated steps, training
+	nice -n 5 $(PY) -m pytest $(LONGEST) -m "computing and not alone"
 
 # They mostly wait for arms that move, so the two parts of each suite run side by side; ROS_JOBS=1 runs one after the other.
 ROS_JOBS ?= 3
@@ -124,8 +130,11 @@ docs: $(STAMPS)/venv  ## the site, in docs/_build/html
 	.venv/bin/sphinx-build -W -q -b html docs docs/_build/html
 	@echo docs/_build/html/index.html
 
-wheel: setup  ## a wheel with the compiled jars, in dist/
-	$(PY) -m build --wheel
+wheel: cabinet  ## a wheel with the compiled jars, in dist/; installs only what that needs
+	$(PY) -m pip wheel -q --no-deps --no-build-isolation --wheel-dir dist .
+
+first-hour:  ## what a newcomer does, timed: clone, demo, tutorial, the wheel with each Python of this machine
+	python3 scripts/first_hour.py
 
 clean:  ## everything that make made, but for the virtual environment
 	rm -rf build dist docs/_build src/heptarm/sim/jars .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

@@ -1,5 +1,6 @@
 """The public names of this package and where they live: the one list, read by type checkers and at run time."""
 
+from . import devices as devices
 from .arm.arm import (
     Arm as Arm,
 )
@@ -17,6 +18,12 @@ from .arm.link.target import (
 )
 from .arm.motion.handle import (
     MotionHandle as MotionHandle,
+)
+from .arm.motion.jog import (
+    TwistServo as TwistServo,
+)
+from .arm.motion.jog import (
+    VelocityServo as VelocityServo,
 )
 from .arm.motion.servo import (
     JointServo as JointServo,
@@ -82,6 +89,9 @@ from .errors import (
     NotReady as NotReady,
 )
 from .errors import (
+    OutsideWorkspace as OutsideWorkspace,
+)
+from .errors import (
     ProtocolError as ProtocolError,
 )
 from .errors import (
@@ -113,6 +123,12 @@ from .errors import (
 )
 from .errors import (
     VersionMismatch as VersionMismatch,
+)
+from .fri.loop.compiled import (
+    law as law,
+)
+from .fri.loop.compiled import (
+    law_from as law_from,
 )
 from .record.recorder import (
     Recorder as Recorder,
@@ -186,6 +202,9 @@ from .values.motion.ptp import (
 from .values.motion.ptp import (
     ptp_home as ptp_home,
 )
+from .values.motion.ptp import (
+    ptp_transport as ptp_transport,
+)
 from .values.motion.search import (
     Spiral as Spiral,
 )
@@ -236,6 +255,9 @@ from .values.tool import (
 )
 from .values.tool import (
     Workpiece as Workpiece,
+)
+from .values.workspace import (
+    Workspace as Workspace,
 )
 
 __version__: str

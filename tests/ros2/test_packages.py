@@ -226,6 +226,14 @@ def test_upstreams_interfaces_are_upstreams() -> None:
 # ------------------------------------------------------------------------------------ launch files
 
 
+def arguments(path: Path) -> dict[str, tuple[str, str]]:
+    """Arguments of a launch file in Python: default and description."""
+    for one in ast.parse(path.read_text()).body:
+        if isinstance(one, ast.Assign) and getattr(one.targets[0], "id", "") == "ARGUMENTS":
+            return dict(ast.literal_eval(one.value))
+    raise AssertionError(f"{path.name} has no ARGUMENTS")
+
+
 @pytest.mark.parametrize("path", LAUNCHES, ids=lambda path: path.name)
 def test_a_launch_file_declares_what_it_uses_and_starts_what_there_is(path: Path) -> None:
     launch = ET.parse(path).getroot()
@@ -243,9 +251,13 @@ def test_a_launch_file_declares_what_it_uses_and_starts_what_there_is(path: Path
     for package, rest in re.findall(r"\$\(find-pkg-share (\w+)\)(/[\w/.]+)", path.read_text()):
         assert (ROS2 / package / rest[1:]).is_file(), rest
     for include in launch.iter("include"):
-        inner = ET.parse(ROS2 / "heptarm_bringup" / "launch" / Path(include.get("file", "")).name).getroot()
+        (inner,) = ROS2.glob(f"*/launch/{Path(include.get('file', '')).name}")
         given = {arg.get("name") for arg in include.findall("arg")}
-        assert given <= {arg.get("name") for arg in inner.findall("arg")}
+        if inner.suffix == ".py":
+            assert given <= arguments(inner).keys()
+        else:
+            found = ET.parse(inner).getroot()
+            assert given <= {arg.get("name") for arg in found.findall("arg")}
 
 
 def test_the_nodes_parameter_file_has_its_defaults() -> None:
@@ -261,7 +273,8 @@ def test_controllers_and_moveit_have_the_nodes_joints_and_action() -> None:
     joints = list(NodeConfiguration.of({}).joints)
     moveit = yaml.safe_load((ROS2 / "heptarm_moveit_config/config/moveit_controllers.yaml").read_text())
     ours = moveit["moveit_simple_controller_manager"]
-    assert ours["controller_names"] == ["heptarm"] and ours["heptarm"]["joints"] == joints
+    named = [name.replace("$(arg prefix)", "") for name in ours["heptarm"]["joints"]]
+    assert ours["controller_names"] == ["heptarm"] and named == joints
     assert ours["heptarm"]["action_ns"] == "follow_joint_trajectory"
 
 
@@ -379,7 +392,7 @@ class Anything:
         if self._name == "get_package_share_directory":
             return str(ROS2 / given[0])
         if self._name.endswith(".perform"):
-            return "iiwa14"
+            return {"model": "iiwa14"}.get(Anything.made[-2][1][0], "")
         return self
 
 
@@ -405,7 +418,7 @@ def started(path: Path, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
 def test_moveits_launch_file_uses_files_that_are_there(monkeypatch: pytest.MonkeyPatch) -> None:
     path = ROS2 / "heptarm_moveit_config/launch/move_group.launch.py"
-    assert len(started(path, monkeypatch)) == 2
+    assert len(started(path, monkeypatch)) == 3
     assert sum("file_path" in named for _, _, named in Anything.made) == 6
 
 
@@ -414,7 +427,7 @@ def test_moveit_servo_is_started_with_its_configuration(monkeypatch: pytest.Monk
     nodes = [named for name, _, named in Anything.made if name == "Node"]
     assert nodes[0]["package"] == "moveit_servo"
     servo = nodes[0]["parameters"][0]["moveit_servo"]
-    assert servo["command_out_topic"] == "/heptarm/joint_trajectory"
+    assert servo["command_out_topic"] == "heptarm/joint_trajectory"
     assert servo["command_out_type"] == "trajectory_msgs/JointTrajectory"
     semantic = expand(ROS2 / "heptarm_moveit_config/config/heptarm.srdf.xacro")
     assert [group.get("name") for group in semantic.findall("group")] == [servo["move_group_name"]]
