@@ -50,7 +50,7 @@ RUNTIME = ("rosidl_runtime_c", "rcutils")
 
 
 #: What upstream's generators match definitions and descriptions with: by the name alone, which a message and an action
-#: may share, as in control_msgs/GripperCommand.
+#: may have in common, as in control_msgs/GripperCommand.
 _MATCHING = "build_type_description_tuples"
 
 

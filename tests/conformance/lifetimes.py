@@ -53,7 +53,7 @@ def feedback_ends_with_its_goal(client: Client) -> None:
 
 
 @case
-def feedback_of_the_next_goal_begins_anew(client: Client) -> None:
+def feedback_of_the_next_goal_begins_at_its_start(client: Client) -> None:
     succeeds(client, step(client, time=0.8))
     reported = client.feedback(succeeds(client, step(client, time=0.5)))
     assert reported and 0.0 <= reported[0].time < LATE
@@ -61,7 +61,7 @@ def feedback_of_the_next_goal_begins_anew(client: Client) -> None:
 
 
 @case
-def feedback_of_a_goal_that_takes_anothers_place_begins_anew(client: Client) -> None:
+def feedback_of_a_goal_that_takes_anothers_place_begins_at_its_start(client: Client) -> None:
     here = client.place().q
     first = client.send(long(client))
     under_way(client, here)

@@ -84,7 +84,7 @@ RULES = (
     Rule(r"gone along|goes along|goes over into", "follow, move along, transition to"),
     Rule(r"told|tells|hears? of|heard of", "reported, sends, receives, no event received"),
     Rule(r"says", "reports, states, sends"),
-    Rule(r"wish|wishes|wished|wants|demands?|demanded", "request, command, target"),
+    Rule(r"wish|wishes|wished|wants|demands?|demanded", "request, command, target", but=r"on-demand"),
     Rule(r"moved frames?", "tool frame or TCP (say which), or motion frame"),
     Rule(r"(?:link|connection|it) (?:stands|is up)", "is connected", but=r"it is up to"),
     Rule(r"octets?", "bytes"),

@@ -61,6 +61,7 @@ def test_every_service_topic_and_action_of_ours_is_reported_in_a_row(table) -> N
         "~/joint_trajectory",
         "~/query_state",
         "~/controller_state",
+        "~/gripper_cmd",  # of the class TwoSignalGripper, which is no member of the arm
         "forward_position_controller/commands",
         "forward_velocity_controller/commands",
         "/tf",

@@ -35,31 +35,26 @@ def arrives(states: list[JointState], joint: int, value: float) -> None:
     until(lambda: abs(states[-1].position[joint] - value) < 2e-3, f"joint {joint} does not arrive")
 
 
-@pytest.fixture(scope="module")
-def libiiwa(ros: None, spare: Stage) -> Iterator[Client]:
-    node = NodeProcess(spare.target, ns="/libiiwa", names="libiiwa", speed=0.6)
-    yield Client("/libiiwa")
+@pytest.fixture
+def other(ros: None, spare: Stage, request: pytest.FixtureRequest) -> Iterator[Client]:
+    """A node with the names of the driver that the test is for."""
+    node = NodeProcess(spare.target, ns="/other", names=request.param, speed=0.6)
+    yield Client("/other")
     assert node.end() == 0, node.said
 
 
-def test_a_program_for_libiiwa(libiiwa: Client) -> None:
-    names.a_program_for_libiiwa(libiiwa)
-
-
-def test_a_stream_for_libiiwa(libiiwa: Client) -> None:
-    names.servo_of_libiiwa(libiiwa)
-
-
-def test_a_trajectory_for_libiiwa(libiiwa: Client) -> None:
-    states = libiiwa.listen("iiwa/state/joint_states", "sensor_msgs/JointState")
+@pytest.mark.parametrize("other", ["libiiwa"], indirect=True)
+def test_a_program_for_libiiwa(other: Client) -> None:
+    names.a_program_for_libiiwa(other)
+    names.servo_of_libiiwa(other)
+    states = other.listen("iiwa/state/joint_states", "sensor_msgs/JointState")
     until(lambda: states, "no states come")
-    follow("/libiiwa/iiwa_controller/follow_joint_trajectory", states)
+    follow("/other/iiwa_controller/follow_joint_trajectory", states)
 
 
-def test_a_program_for_lbr_stack(ros: None, spare: Stage) -> None:
-    node = NodeProcess(spare.target, ns="/other", names="lbr_stack")
-    names.a_program_for_lbr_stack(Client("/other"))
-    assert node.end() == 0, node.said
+@pytest.mark.parametrize("other", ["lbr_stack"], indirect=True)
+def test_a_program_for_lbr_stack(other: Client) -> None:
+    names.a_program_for_lbr_stack(other)
 
 
 def test_a_program_for_iiwa_stack(ros: None, spare: Stage) -> None:

@@ -128,7 +128,7 @@ def step_anywhere(client: Client):
 def test_without_a_cabinet_or_with_a_wrong_parameter_it_waits_and_reports_it(ros: None, spare: Stage) -> None:
     lonely = NodeProcess("127.0.0.1:9", name="lonely")
     wrong = NodeProcess(spare.target, name="wrong", servo__rate=-3)
-    lonely.waits_for("not configured")
+    lonely.waits_for("wait, the next attempt is in 2 s")
     wrong.waits_for("servo.rate must be in [1, 500], got -3")
     assert lonely.end() == 0, lonely.said
     assert wrong.end(signal.SIGTERM) == 0, wrong.said

@@ -182,8 +182,10 @@ class Ros:
         nodes = [f"{above}/get_parameters" for above in map(str, PurePosixPath(name).parents)]
 
         def parameters() -> str:
-            there = {service for service, _ in self.node.get_service_names_and_types()}
-            return next((service for service in nodes if service in there), "")
+            there = [service for service, _ in self.node.get_service_names_and_types()]
+            near = (one for one in there if PurePosixPath(one).parts[1:2] == PurePosixPath(name).parts[1:2])
+            others = (one for one in near if one.endswith("/get_parameters"))  # with a name of another driver
+            return next((one for one in nodes if one in there), "") or next(others, "")
 
         service = until(parameters, f"no node with {name} is there")
         probe = self.node.create_client(GetParameters, service)

@@ -15,32 +15,29 @@ from tests.ros2.peer import PATIENT, NodeProcess, Ros
 from tests.ros2.test_surface import Client
 
 
-@pytest.fixture(scope="module")
-def libiiwa(ros: Ros, spare: Stage) -> Iterator[Client]:
-    node = NodeProcess(spare.target, space="/libiiwa", names="libiiwa", speed=0.6, **PATIENT)
-    yield Client(ros, "/libiiwa")
+@pytest.fixture
+def other(ros: Ros, spare: Stage, request: pytest.FixtureRequest) -> Iterator[Client]:
+    """A node with the names of the driver that the test is for."""
+    node = NodeProcess(spare.target, space="/other", names=request.param, speed=0.6, **PATIENT)
+    yield Client(ros, "/other")
     node.finish()
 
 
-def test_a_program_for_libiiwa(libiiwa: Client) -> None:
-    names.a_program_for_libiiwa(libiiwa)
+@pytest.mark.parametrize("other", ["libiiwa"], indirect=True)
+def test_a_program_for_libiiwa(other: Client) -> None:
+    names.a_program_for_libiiwa(other)
+    names.servo_of_libiiwa(other)
 
 
-def test_a_stream_for_libiiwa(libiiwa: Client) -> None:
-    names.servo_of_libiiwa(libiiwa)
-
-
-def test_a_program_for_lbr_stack(ros: Ros, spare: Stage) -> None:
-    node = NodeProcess(spare.target, space="/other", names="lbr_stack", **PATIENT)
-    names.a_program_for_lbr_stack(Client(ros, "/other"))
-    node.finish()
+@pytest.mark.parametrize("other", ["lbr_stack"], indirect=True)
+def test_a_program_for_lbr_stack(other: Client) -> None:
+    names.a_program_for_lbr_stack(other)
 
 
 def test_types_have_the_fields_of_the_other_drivers() -> None:
     """Every type of a preset is generated, and has a hash by which two machines compare it."""
-    share = Path(sys.prefix) / "share"
     for package in ("libiiwa_msgs", "lbr_fri_idl"):
-        described = sorted((share / package).rglob("*.json"))
+        described = sorted((Path(sys.prefix) / "share" / package).rglob("*.json"))
         assert described
         for path in described:
             hashes = yaml.safe_load(path.read_text())["type_hashes"]

@@ -66,7 +66,7 @@ def test_the_life_cycle_from_unconfigured_and_back(sleeper: Client, spare: Stage
 def test_it_waits_for_a_cabinet_and_starts_by_itself(ros: Ros, spare: Stage, nodes: Start) -> None:
     spare.kill()
     node = nodes(spare.target, name="early", space="/alone")
-    node.waits_for("not configured")
+    node.waits_for("wait, the next attempt is in 2 s")
     spare.restart()
     client = Client(ros, spare, "/alone/early")
     client.ready()

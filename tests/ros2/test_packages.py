@@ -173,6 +173,11 @@ def test_a_package_can_be_released(path: Path) -> None:
     assert log[1] == f"Changelog for package {path.parent.name}" and "Forthcoming" in log
 
 
+def test_builds_leave_out_the_interfaces_of_others() -> None:
+    assert (ROS2 / "interfaces" / "COLCON_IGNORE").is_file()
+    assert (ROOT / "ros1" / "interfaces" / "CATKIN_IGNORE").is_file()
+
+
 def test_the_node_depends_on_every_package_it_imports() -> None:
     for name, folder in (("ros2/heptarm_ros2", "heptarm_ros2"), ("ros1/heptarm_ros1", "src/heptarm_ros1")):
         manifest = ET.parse(ROOT / name / "package.xml").getroot()
