@@ -2,8 +2,9 @@
 
     .venv/bin/python scripts/arm_meshes.py [FOLDER]
 
-Writes src/heptarm/sim/models/meshes (OBJ, a file for each colour of a link) and ros2/heptarm_description/meshes (Collada,
-a file for each link); a test compares. The shapes are for the eye: contacts, masses and inertias have their own numbers.
+Writes src/heptarm/sim/models/meshes (OBJ, a file for each colour of a link) and, for ROS, Collada with a file for each
+link into ros2/heptarm_description/meshes; a test compares. The shapes are for the eye: contacts, masses and inertias have
+their own numbers.
 
 A link is the zero set of a signed distance: a tube along the z axis of its one joint, and a drum along the y axis of its
 other one, blended into each other. The tube is sampled in horizontal rings, the drum is turned on a lathe; both lie on
@@ -447,15 +448,16 @@ def collada(parts: list[Part]) -> str:
             sources.append(
                 f'<source id="{name}-{kind}"><float_array id="{name}-{kind}-array" count="{values.size}">'
                 f"{_numbers(values, digits)}</float_array><technique_common>"
-                f'<accessor source="#{name}-{kind}-array" count="{len(values)}" stride="3"><param name="X" type="float"/>'
-                '<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>'
+                f'<accessor source="#{name}-{kind}-array" count="{len(values)}" stride="3">'
+                '<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>'
             )
         indices = " ".join(map(str, part.faces.ravel().tolist()))
         geometries.append(
             f'<geometry id="{name}-mesh"><mesh>{"".join(sources)}<vertices id="{name}-vertices">'
             f'<input semantic="POSITION" source="#{name}-position"/><input semantic="NORMAL" source="#{name}-normal"/>'
             f'</vertices><triangles material="{name}" count="{len(part.faces)}">'
-            f'<input semantic="VERTEX" source="#{name}-vertices" offset="0"/><p>{indices}</p></triangles></mesh></geometry>'
+            f'<input semantic="VERTEX" source="#{name}-vertices" offset="0"/><p>{indices}</p></triangles>'
+            "</mesh></geometry>"
         )
         nodes.append(
             f'<node id="{name}-node"><instance_geometry url="#{name}-mesh"><bind_material><technique_common>'

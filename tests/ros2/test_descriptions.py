@@ -36,17 +36,17 @@ def script() -> types.ModuleType:
     return module
 
 
-@pytest.mark.parametrize("ros", [ROS1, ROS2], ids=["ros1", "ros2"])
+@pytest.mark.parametrize("folder", [ROS1, ROS2], ids=["ros1", "ros2"])
 @pytest.mark.parametrize("model", ROBOTS)
-def test_every_link_has_a_mesh_and_an_inertia(model: str, ros: Path) -> None:
-    arm = expand(ros / "heptarm_description/urdf/heptarm.urdf.xacro", model=model, prefix="l_")
+def test_every_link_has_a_mesh_and_an_inertia(model: str, folder: Path) -> None:
+    arm = expand(folder / "heptarm_description/urdf/heptarm.urdf.xacro", model=model, prefix="l_")
     for index in range(8):
         link = arm.find(f"link[@name='l_link_{index}']")
         assert link is not None
         mesh = link.find("visual/geometry/mesh")
         assert mesh is not None and link.find("collision/geometry/cylinder") is not None
         package, _, rest = mesh.get("filename", "").removeprefix("package://").partition("/")
-        assert ET.parse(ros / package / rest).getroot().tag.endswith("COLLADA")
+        assert ET.parse(folder / package / rest).getroot().tag.endswith("COLLADA")
     base = arm.find("link[@name='l_link_0']/inertial")
     assert base is not None
     shape = ET.parse(ROOT / f"src/heptarm/sim/models/{model.replace('med', 'iiwa')}.xml").getroot()

@@ -1,4 +1,4 @@
-"""How the arm is drawn: its own meshes fit the kinematics, a folder's replace them, and the physics knows of neither."""
+"""How the arm is drawn: own meshes fit the kinematics, a folder's replace them, the physics knows of neither."""
 
 from __future__ import annotations
 
