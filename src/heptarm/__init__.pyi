@@ -1,5 +1,6 @@
 """The public names of this package and where they live: the one list, read by type checkers and at run time."""
 
+from . import devices as devices
 from .arm.arm import (
     Arm as Arm,
 )
@@ -17,6 +18,12 @@ from .arm.link.target import (
 )
 from .arm.motion.handle import (
     MotionHandle as MotionHandle,
+)
+from .arm.motion.jog import (
+    TwistServo as TwistServo,
+)
+from .arm.motion.jog import (
+    VelocityServo as VelocityServo,
 )
 from .arm.motion.servo import (
     JointServo as JointServo,
@@ -80,6 +87,9 @@ from .errors import (
 )
 from .errors import (
     NotReady as NotReady,
+)
+from .errors import (
+    OutsideWorkspace as OutsideWorkspace,
 )
 from .errors import (
     ProtocolError as ProtocolError,
@@ -186,6 +196,9 @@ from .values.motion.ptp import (
 from .values.motion.ptp import (
     ptp_home as ptp_home,
 )
+from .values.motion.ptp import (
+    ptp_transport as ptp_transport,
+)
 from .values.motion.search import (
     Spiral as Spiral,
 )
@@ -236,6 +249,9 @@ from .values.tool import (
 )
 from .values.tool import (
     Workpiece as Workpiece,
+)
+from .values.workspace import (
+    Workspace as Workspace,
 )
 
 __version__: str

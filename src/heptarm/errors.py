@@ -12,7 +12,8 @@
     ├── CommandRejected (ValueError)        refused before anything moved
     │   ├── ShapeError                      wrong shape or length
     │   ├── LimitError                      outside a range
-    │   │   └── Unreachable                 no joint position reaches the pose
+    │   │   ├── Unreachable                 no joint position reaches the pose
+    │   │   └── OutsideWorkspace            a command leaves `arm.workspace`
     │   ├── ModeConflict                    conflicts with what is running
     │   ├── CollisionForeseen               `arm.collision_check` found bodies that would touch
     │   └── NotInControl                    this client does not control the robot
@@ -47,6 +48,8 @@ from typing import Any, TypeVar
 
 _Error = TypeVar("_Error", bound="HeptarmError")
 
+#: Documentation of the codes.
+_PAGE = "https://github.com/heptarm/heptarm/blob/main/docs/reference/errors.md"
 #: The operating system.
 _PLATFORM = sys.platform
 
@@ -85,6 +88,11 @@ class HeptarmError(Exception):
     def __str__(self) -> str:
         """The text and, if there is one, the hint."""
         return f"{self.text} ({self.hint})" if self.hint else self.text
+
+    @property
+    def page(self) -> str:
+        """Address of the documentation of its code: what it means, and what to do."""
+        return f"{_PAGE}#code-{self.code}" if self.code else _PAGE
 
     @property
     def black_box(self) -> Path | None:
@@ -139,6 +147,10 @@ class LimitError(CommandRejected):
 
 class Unreachable(LimitError):
     """No joint position reaches the pose."""
+
+
+class OutsideWorkspace(LimitError):
+    """A command leaves `arm.workspace`; it was not sent."""
 
 
 class ModeConflict(CommandRejected):
@@ -279,6 +291,7 @@ EXTRAS = {
     "viz": ("viser", "matplotlib", "trimesh"),
     "rl": ("torch", "gymnasium", "PIL"),
     "record": ("mcap", "pandas", "pyarrow"),
+    "devices": ("evdev", "pyspacemouse"),
 }
 
 

@@ -24,6 +24,7 @@ from heptarm.arm.link.state_stream import GROUPS, States
 from heptarm.arm.motion import program
 from heptarm.arm.motion.foresight import Foresight
 from heptarm.arm.motion.handle import LONGEST_STREAM, STREAM_SIZE, BreakRule, MotionHandle, check_timeout
+from heptarm.arm.motion.jog import JogLimits, TwistLimits, TwistServo, VelocityServo
 from heptarm.arm.motion.recovery import RecoveryAttempts
 from heptarm.arm.motion.rest import REST_TIMEOUT, RestDetector, settle
 from heptarm.arm.motion.servo import JointServo, PoseServo, ServoKeywords, ServoRequest, documented
@@ -46,6 +47,7 @@ from heptarm.values.result import Recovery, Result
 from heptarm.values.robot import RobotModel
 from heptarm.values.state import State, Wrench
 from heptarm.values.tool import KnownTool, Tool, Workpiece
+from heptarm.values.workspace import Workspace
 from heptarm.wire import messages as wire
 
 if TYPE_CHECKING:
@@ -392,6 +394,32 @@ class Arm:
             )
         self._foresight.check = value
 
+    @property
+    def workspace(self) -> Workspace | None:
+        """Where the tool and the joints may be, for all commands of this arm object; None: anywhere.
+
+        `move` and `start` refuse a motion that leaves it, before anything is sent; so far as the path is known: of
+        hand guiding and a hold it is not, of splines it is taken as straight from point to point. Servo motions,
+        velocities too, clamp their targets to it or refuse them. FRI sessions have limits of their own.
+
+        It is no safety function: only this program obeys it.
+
+        Raises:
+            ShapeError: not a Workspace (when it is set).
+            CommandRejected: its frame is neither "base" nor a taught frame (likewise).
+        """
+        return self._foresight.workspace
+
+    @workspace.setter
+    def workspace(self, value: Workspace | None) -> None:
+        before = self._foresight.workspace
+        self._foresight.workspace = None if value is None else instance(value, Workspace, "workspace")
+        try:
+            self._foresight.boundary()
+        except CommandRejected:
+            self._foresight.workspace = before
+            raise
+
     def move(
         self,
         motion: Motion | Sequence[Motion],
@@ -421,6 +449,7 @@ class Arm:
         Raises:
             CommandRejected: refused before anything moved; LimitError and others name the value and the range.
             CollisionForeseen: `collision_check` found bodies that would touch.
+            OutsideWorkspace: a motion leaves `workspace`.
             MotionAborted: ended early; carries cause, state and history.
             ConnectionLost: the connection was lost; the cabinet stops the arm.
             Timeout: not ended in time; the arm was stopped.
@@ -554,6 +583,7 @@ class Arm:
         ceiling, breaks = self._speed, self._breaks
         if speed is not None:
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
+        motions = program.with_kept_joints(self._connection, motions)
         self._foresight.examine(motions, when)
         return program.send(
             self._connection,
@@ -571,15 +601,22 @@ class Arm:
     def servo(self, kind: Literal["joint"] = "joint", **settings: Unpack[ServoKeywords]) -> JointServo: ...
     @overload
     def servo(self, kind: Literal["pose", "lin"], **settings: Unpack[ServoKeywords]) -> PoseServo: ...
+    @overload
+    def servo(self, kind: Literal["velocity"], **settings: Unpack[ServoKeywords]) -> VelocityServo: ...
+    @overload
+    def servo(self, kind: Literal["twist"], **settings: Unpack[ServoKeywords]) -> TwistServo: ...
     @documented
     def servo(
-        self, kind: Literal["joint", "pose", "lin"] = "joint", **settings: Unpack[ServoKeywords]
-    ) -> JointServo | PoseServo:
-        """A stream of targets that the arm follows; it begins with the `with` block.
+        self,
+        kind: Literal["joint", "pose", "lin", "velocity", "twist"] = "joint",
+        **settings: Unpack[ServoKeywords],
+    ) -> JointServo | PoseServo | VelocityServo | TwistServo:
+        """A stream of targets, or of velocities, that the arm follows; it begins with the `with` block.
 
         Args:
-            kind: what the targets are: "joint" positions; "pose" of the motion frame, reached by the joints; or "lin":
-                the same, reached on straight lines.
+            kind: what the targets are: "joint" positions; "pose" of the motion frame, reached by the joints; "lin":
+                the same, reached on straight lines; or velocities: "velocity" of the joints, or a "twist" of the
+                motion frame. Velocities ramp to zero when none is set for `timeout`.
             **settings: as follows.
 
         Raises:
@@ -596,12 +633,52 @@ class Arm:
         self._tooling.check_mode(request.mode)
         ends, parts = condition_message(self._until(request.until, breaks), self._connection.signals)
         self._tooling.check_until(parts)
-        stream = JointServo if kind == "joint" else PoseServo
-        return stream(
+        message, boundary = replace(message, until=ends), self._foresight.boundary()
+        period, watchdog = request.period, request.watchdog_time
+        if kind == "joint":
+            return JointServo(
+                self._connection,
+                message,
+                period=period,
+                watchdog=watchdog,
+                boundary=boundary,
+                until=parts,
+                breaks=breaks,
+            )
+        moving = self._tooling.on_flange(request.moving)
+        if kind in ("pose", "lin"):
+            return PoseServo(
+                self._connection,
+                message,
+                period=period,
+                watchdog=watchdog,
+                moving=moving,
+                boundary=boundary,
+                until=parts,
+                breaks=breaks,
+            )
+        speed, acceleration = request.joint_fractions(self._speed)
+        limits = JogLimits(speed, acceleration, request.silence, boundary, request.keep_clear_of)
+        if kind == "velocity":
+            return VelocityServo(
+                self._connection,
+                message,
+                limits,
+                period=period,
+                watchdog=watchdog,
+                until=parts,
+                breaks=breaks,
+            )
+        along, change, turn, spin = request.line_limits()
+        return TwistServo(
             self._connection,
-            replace(message, until=ends),
-            period=request.period,
-            watchdog=request.watchdog_time,
+            message,
+            limits,
+            twist=TwistLimits(along, change, turn, spin),
+            moving=moving,
+            axes=self._tooling.axes(TOOL if request.frame is None else request.frame),
+            period=period,
+            watchdog=watchdog,
             until=parts,
             breaks=breaks,
         )
@@ -829,6 +906,7 @@ class Arm:
     touch = touching.touch
     touch_twice = touching.touch_twice
     wait_for_taps = touching.wait_for_taps
+    on_taps = touching.on_taps
     collision_guard = guarding.collision_guard
     guarded = guarding.guarded
     guide_precisely = teaching.guide_precisely

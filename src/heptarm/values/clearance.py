@@ -49,3 +49,18 @@ class CollisionCheck(Protocol):
 
     def first_on(self, path: Array) -> TouchOnPath | None:
         """The first place on a joint path, shape (n, 7) [rad], at which two bodies touch; None: there is none."""
+
+
+class ClearanceModel(Protocol):
+    """What `keep_clear_of` of a stream of velocities needs; `heptarm.CollisionModel` is one."""
+
+    @property
+    def margin(self) -> float:
+        """Bodies nearer than this count as touching [m]."""
+
+    @property
+    def allowed(self) -> frozenset[frozenset[str]]:
+        """Pairs of names of bodies that may touch."""
+
+    def clearances(self, q: Array, *, below: float) -> tuple[Clearance, ...]:
+        """Pairs of bodies nearer than a distance [m] at joint positions, shape (7,) [rad]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from heptarm.arm.link.connection import Connection
@@ -221,6 +221,25 @@ class Tooling:
     def in_base(self, name: str) -> Pose | None:
         """Pose of a fixed frame in the base: the base itself, or a taught frame; None: it is no fixed one."""
         return _ORIGIN if name == BASE else self.taught.get(name)
+
+    def axes(self, frame: str | Pose) -> Callable[[Pose], Pose]:
+        """A function that returns a frame's pose in the base, by the pose of the flange.
+
+        Args:
+            frame: its name, or its pose in the base.
+
+        Raises:
+            CommandRejected: no such frame is known.
+        """
+        if isinstance(frame, str):
+            self.check_reference(frame, "frame")
+            fixed = self.in_base(frame)
+            if fixed is None:
+                moved = self.on_flange(frame)
+                return lambda flange: flange @ moved
+        else:
+            fixed = frame
+        return lambda _: fixed
 
     def wrench(self, state: State, name: str, axes: str) -> Wrench:
         """External force and torque at the origin of one frame in the axes of another; raises as `pose` does."""
