@@ -2,13 +2,13 @@
 
     .venv/bin/python scripts/arm_meshes.py [FOLDER]
 
-Writes src/heptarm/sim/models/meshes (OBJ, a file for each colour of a link) and, for ROS, Collada with a file for each
-link into ros2/heptarm_description/meshes; a test compares. The shapes are for the eye: contacts, masses and inertias have
+Writes src/heptarm/sim/models/meshes (OBJ, a file for each colour of a link) and ros2/heptarm_description/meshes
+(Collada for ROS, a file for each link); a test compares. The shapes are for the eye: contacts, masses and inertias have
 their own numbers.
 
-A link is the zero set of a signed distance: a tube along the z axis of its one joint, and a drum along the y axis of its
-other one, blended into each other. The tube is sampled in horizontal rings, the drum is turned on a lathe; both lie on
-the same surface where they meet.
+A link is the zero set of a signed distance: a tube along the z axis of its one joint, and a drum along the y axis of
+its other one, blended into each other. The tube is sampled in horizontal rings, the drum is turned on a lathe; both lie
+on the same surface where they meet.
 """
 
 from __future__ import annotations
@@ -449,7 +449,8 @@ def collada(parts: list[Part]) -> str:
                 f'<source id="{name}-{kind}"><float_array id="{name}-{kind}-array" count="{values.size}">'
                 f"{_numbers(values, digits)}</float_array><technique_common>"
                 f'<accessor source="#{name}-{kind}-array" count="{len(values)}" stride="3">'
-                '<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>'
+                '<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor>'
+                "</technique_common></source>"
             )
         indices = " ".join(map(str, part.faces.ravel().tolist()))
         geometries.append(
