@@ -83,20 +83,20 @@ def _drum(p: Array, axis: int, begin: float, end: float, radius: float, edge: fl
     out = np.linalg.norm(across, axis=1) - radius + edge
     along = np.abs(p[:, axis] - 0.5 * (begin + end)) - 0.5 * abs(end - begin) + edge
     inside = np.minimum(np.maximum(out, along), 0.0)
-    return inside + np.hypot(np.maximum(out, 0.0), np.maximum(along, 0.0)) - edge
+    return np.asarray(inside + np.hypot(np.maximum(out, 0.0), np.maximum(along, 0.0)) - edge)
 
 
 def _limb(p: Array, a: Array, b: Array, first: float, last: float) -> Array:
     """Distance to a capsule whose radius changes from its first to its last end; nearly."""
     ab = b - a
     t = _smooth((p - a) @ ab / (ab @ ab))
-    return np.linalg.norm(p - a - t[:, None] * ab, axis=1) - (first + (last - first) * t)
+    return np.asarray(np.linalg.norm(p - a - t[:, None] * ab, axis=1) - (first + (last - first) * t))
 
 
 def _gradient(f: Distance, p: Array) -> Array:
     step = 5e-4 * np.eye(3)
     g = np.stack([f(p + s) - f(p - s) for s in step], axis=1)
-    return g / np.linalg.norm(g, axis=1, keepdims=True)
+    return np.asarray(g / np.linalg.norm(g, axis=1, keepdims=True))
 
 
 # ------------------------------------------------------------------------------------- surfaces
@@ -167,21 +167,21 @@ def _lathe(
         first = (len(rows) - 2) * around
         faces.append(_strip(2, around)[:, ::-1] + first)
     table = np.array(rows)
-    c, s = np.cos(angles), np.sin(angles)
-    turn = lambda radial, axial: np.stack(  # noqa: E731
-        [np.outer(radial, c), np.outer(radial, s), np.outer(axial, np.ones(around))], -1
-    ).reshape(-1, 3)
-    return _tidy(
-        colour, turn(table[:, 0], table[:, 1]), turn(table[:, 2], table[:, 3]), np.concatenate(faces)
-    )
+    c, s, one = np.cos(angles), np.sin(angles), np.ones(around)
+
+    def turned(of: Array) -> Array:
+        around_z = [np.outer(of[:, 0], c), np.outer(of[:, 0], s), np.outer(of[:, 1], one)]
+        return np.stack(around_z, -1).reshape(-1, 3)
+
+    return _tidy(colour, turned(table[:, :2]), turned(table[:, 2:]), np.concatenate(faces))
 
 
 def _tidy(colour: str, vertices: Array, normals: Array, faces: Array) -> Part:
     """Leave out triangles without area, and vertices that no triangle has."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     faces = faces[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-9]
-    used, faces = np.unique(faces, return_inverse=True)
-    return Part(colour, vertices[used], normals[used], faces.reshape(-1, 3))
+    used, again = np.unique(faces, return_inverse=True)
+    return Part(colour, vertices[used], normals[used], again.reshape(-1, 3))
 
 
 def _arc(
@@ -378,8 +378,8 @@ def links(model: str) -> list[list[Part]]:
     slim = {"tube": 0.075, "neck": 0.058, "drum": 0.070, "neighbour": 0.072, "cap": 0.092}
     first = Elbow(height[1], -1)
     second = Elbow(height[2], +1, tube=0.075)
-    third = Elbow(height[3], +1, **slim)  # type: ignore[arg-type]
-    fourth = Elbow(height[4], -1, **{**slim, "tube": 0.070})  # type: ignore[arg-type]
+    third = Elbow(height[3], +1, **slim)
+    fourth = Elbow(height[4], -1, **{**slim, "tube": 0.070})
     fifth = Elbow(
         height[5], -1, 0.070, 0.036, 0.050, face=0.044, cap=0.098, edge=0.02, neighbour=0.062, foot=0.05
     )

@@ -100,7 +100,7 @@ def chosen(positions: Array) -> Array:
     moved = moved[first : last + 1]
     passed = np.cumsum(0.5 / len(moved) + 0.5 * moved / moved.sum())
     steps = np.searchsorted(passed, np.linspace(0.0, passed[-1], round(LENGTH * RATE)))
-    return positions[first + np.minimum(steps, len(moved))]
+    return np.asarray(positions[first + np.minimum(steps, len(moved))])
 
 
 def drawn(model: mujoco.MjModel, positions: Array) -> list[npt.NDArray[np.uint8]]:
