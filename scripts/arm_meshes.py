@@ -17,6 +17,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -181,7 +182,8 @@ def _tidy(colour: str, vertices: Array, normals: Array, faces: Array) -> Part:
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     faces = faces[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-9]
     used, again = np.unique(faces, return_inverse=True)
-    return Part(colour, vertices[used], normals[used], again.reshape(-1, 3))
+    triangles: Any = again.reshape(-1, 3)
+    return Part(colour, vertices[used], normals[used], triangles)
 
 
 def _arc(
@@ -480,7 +482,7 @@ def collada(parts: list[Part]) -> str:
 
 
 def files() -> dict[str, str]:
-    """What there is to write, by the path from the project's folder; links that models share are written once."""
+    """What there is to write, by the path from the project's folder; a link that models have in common is written once."""
     found = {}
     shapes = {model: links(model) for model in MODELS}
     for index in range(8):

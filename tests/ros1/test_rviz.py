@@ -1,4 +1,4 @@
-"""The real RViz of ROS 1 on a virtual display shows the arm: LONG=1 tests it where scripts/setup_rviz.sh has installed RViz.
+"""The real RViz of ROS 1 on a virtual display shows the arm: with LONG=1, after scripts/setup_rviz.sh.
 
 The picture is kept as build/rviz.png.
 """
