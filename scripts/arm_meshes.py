@@ -482,7 +482,7 @@ def collada(parts: list[Part]) -> str:
 
 
 def files() -> dict[str, str]:
-    """What there is to write, by the path from the project's folder; a link that models have in common is written once."""
+    """What there is to write, by the path from the project's folder; a common link is written once."""
     found = {}
     shapes = {model: links(model) for model in MODELS}
     for index in range(8):
