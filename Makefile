@@ -82,6 +82,7 @@ test-ros: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## both ROS nodes, parts of both 
 test-long: setup $(STAMPS)/browser  ## everything with LONG=1: soaks, long searches, all cases of conformance
 	LONG=1 $(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --timeout 3600 $(LONGEST) -m "not alone"
 	LONG=1 $(PY) -m pytest --timeout 3600 $(LONGEST) -m alone
+	scripts/setup_rviz.sh
 	@LONG=1 $(MAKE) --no-print-directory test-ros
 	@$(MAKE) --no-print-directory conformance
 	@$(MAKE) --no-print-directory test-pythons

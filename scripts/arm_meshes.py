@@ -2,12 +2,13 @@
 
     .venv/bin/python scripts/arm_meshes.py [FOLDER]
 
-Writes src/heptarm/sim/models/meshes (OBJ, a file for each colour of a link) and ros2/heptarm_description/meshes (Collada,
-a file for each link); a test compares. The shapes are for the eye: contacts, masses and inertias have their own numbers.
+Writes src/heptarm/sim/models/meshes (OBJ, a file for each colour of a link) and ros2/heptarm_description/meshes
+(Collada for ROS, a file for each link); a test compares. The shapes are for the eye: contacts, masses and inertias have
+their own numbers.
 
-A link is the zero set of a signed distance: a tube along the z axis of its one joint, and a drum along the y axis of its
-other one, blended into each other. The tube is sampled in horizontal rings, the drum is turned on a lathe; both lie on
-the same surface where they meet.
+A link is the zero set of a signed distance: a tube along the z axis of its one joint, and a drum along the y axis of
+its other one, blended into each other. The tube is sampled in horizontal rings, the drum is turned on a lathe; both lie
+on the same surface where they meet.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -82,20 +84,20 @@ def _drum(p: Array, axis: int, begin: float, end: float, radius: float, edge: fl
     out = np.linalg.norm(across, axis=1) - radius + edge
     along = np.abs(p[:, axis] - 0.5 * (begin + end)) - 0.5 * abs(end - begin) + edge
     inside = np.minimum(np.maximum(out, along), 0.0)
-    return inside + np.hypot(np.maximum(out, 0.0), np.maximum(along, 0.0)) - edge
+    return np.asarray(inside + np.hypot(np.maximum(out, 0.0), np.maximum(along, 0.0)) - edge)
 
 
 def _limb(p: Array, a: Array, b: Array, first: float, last: float) -> Array:
     """Distance to a capsule whose radius changes from its first to its last end; nearly."""
     ab = b - a
     t = _smooth((p - a) @ ab / (ab @ ab))
-    return np.linalg.norm(p - a - t[:, None] * ab, axis=1) - (first + (last - first) * t)
+    return np.asarray(np.linalg.norm(p - a - t[:, None] * ab, axis=1) - (first + (last - first) * t))
 
 
 def _gradient(f: Distance, p: Array) -> Array:
     step = 5e-4 * np.eye(3)
     g = np.stack([f(p + s) - f(p - s) for s in step], axis=1)
-    return g / np.linalg.norm(g, axis=1, keepdims=True)
+    return np.asarray(g / np.linalg.norm(g, axis=1, keepdims=True))
 
 
 # ------------------------------------------------------------------------------------- surfaces
@@ -166,21 +168,22 @@ def _lathe(
         first = (len(rows) - 2) * around
         faces.append(_strip(2, around)[:, ::-1] + first)
     table = np.array(rows)
-    c, s = np.cos(angles), np.sin(angles)
-    turn = lambda radial, axial: np.stack(  # noqa: E731
-        [np.outer(radial, c), np.outer(radial, s), np.outer(axial, np.ones(around))], -1
-    ).reshape(-1, 3)
-    return _tidy(
-        colour, turn(table[:, 0], table[:, 1]), turn(table[:, 2], table[:, 3]), np.concatenate(faces)
-    )
+    c, s, one = np.cos(angles), np.sin(angles), np.ones(around)
+
+    def turned(of: Array) -> Array:
+        around_z = [np.outer(of[:, 0], c), np.outer(of[:, 0], s), np.outer(of[:, 1], one)]
+        return np.stack(around_z, -1).reshape(-1, 3)
+
+    return _tidy(colour, turned(table[:, :2]), turned(table[:, 2:]), np.concatenate(faces))
 
 
 def _tidy(colour: str, vertices: Array, normals: Array, faces: Array) -> Part:
     """Leave out triangles without area, and vertices that no triangle has."""
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     faces = faces[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 1e-9]
-    used, faces = np.unique(faces, return_inverse=True)
-    return Part(colour, vertices[used], normals[used], faces.reshape(-1, 3))
+    used, again = np.unique(faces, return_inverse=True)
+    triangles: Any = again.reshape(-1, 3)
+    return Part(colour, vertices[used], normals[used], triangles)
 
 
 def _arc(
@@ -377,8 +380,8 @@ def links(model: str) -> list[list[Part]]:
     slim = {"tube": 0.075, "neck": 0.058, "drum": 0.070, "neighbour": 0.072, "cap": 0.092}
     first = Elbow(height[1], -1)
     second = Elbow(height[2], +1, tube=0.075)
-    third = Elbow(height[3], +1, **slim)  # type: ignore[arg-type]
-    fourth = Elbow(height[4], -1, **{**slim, "tube": 0.070})  # type: ignore[arg-type]
+    third = Elbow(height[3], +1, **slim)
+    fourth = Elbow(height[4], -1, **{**slim, "tube": 0.070})
     fifth = Elbow(
         height[5], -1, 0.070, 0.036, 0.050, face=0.044, cap=0.098, edge=0.02, neighbour=0.062, foot=0.05
     )
@@ -447,15 +450,17 @@ def collada(parts: list[Part]) -> str:
             sources.append(
                 f'<source id="{name}-{kind}"><float_array id="{name}-{kind}-array" count="{values.size}">'
                 f"{_numbers(values, digits)}</float_array><technique_common>"
-                f'<accessor source="#{name}-{kind}-array" count="{len(values)}" stride="3"><param name="X" type="float"/>'
-                '<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>'
+                f'<accessor source="#{name}-{kind}-array" count="{len(values)}" stride="3">'
+                '<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor>'
+                "</technique_common></source>"
             )
         indices = " ".join(map(str, part.faces.ravel().tolist()))
         geometries.append(
             f'<geometry id="{name}-mesh"><mesh>{"".join(sources)}<vertices id="{name}-vertices">'
             f'<input semantic="POSITION" source="#{name}-position"/><input semantic="NORMAL" source="#{name}-normal"/>'
             f'</vertices><triangles material="{name}" count="{len(part.faces)}">'
-            f'<input semantic="VERTEX" source="#{name}-vertices" offset="0"/><p>{indices}</p></triangles></mesh></geometry>'
+            f'<input semantic="VERTEX" source="#{name}-vertices" offset="0"/><p>{indices}</p></triangles>'
+            "</mesh></geometry>"
         )
         nodes.append(
             f'<node id="{name}-node"><instance_geometry url="#{name}-mesh"><bind_material><technique_common>'
@@ -477,7 +482,7 @@ def collada(parts: list[Part]) -> str:
 
 
 def files() -> dict[str, str]:
-    """What there is to write, by the path from the project's folder; links that models share are written once."""
+    """What there is to write, by the path from the project's folder; a common link is written once."""
     found = {}
     shapes = {model: links(model) for model in MODELS}
     for index in range(8):

@@ -2,8 +2,8 @@
 
     MUJOCO_GL=egl .venv/bin/python scripts/film.py [FILE]
 
-The program is that of examples/16_insertion.py, in real time; the film shows what happened, faster. It needs a display, or
-EGL or OSMesa for MUJOCO_GL.
+The program is that of examples/16_insertion.py, in real time; the film shows what happened, faster. It needs a display,
+or EGL or OSMesa for MUJOCO_GL.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _PERIOD = 0.02
 
 
 def perform(target: str) -> None:
-    """Take the peg out of its holder and insert it into the hole, which is 2.4 mm beside where the program expects it."""
+    """Take the peg out of its holder and insert it into the hole, 2.3 mm beside where it is expected."""
     gripper_tool = ha.Tool("two-finger", mass=1.0, com=(0, 0, 0.05), tcp=ha.Pose.at(0, 0, 0.16))
     peg = ha.Workpiece("peg", mass=0.19, com=(0, 0, 0.025), frames={"tip": ha.Pose.at(0, 0, 0.065)})
     with ha.connect(target, watchdog=2.0) as arm, arm.tool(gripper_tool):
@@ -100,7 +100,7 @@ def chosen(positions: Array) -> Array:
     moved = moved[first : last + 1]
     passed = np.cumsum(0.5 / len(moved) + 0.5 * moved / moved.sum())
     steps = np.searchsorted(passed, np.linspace(0.0, passed[-1], round(LENGTH * RATE)))
-    return positions[first + np.minimum(steps, len(moved))]
+    return np.asarray(positions[first + np.minimum(steps, len(moved))])
 
 
 def drawn(model: mujoco.MjModel, positions: Array) -> list[npt.NDArray[np.uint8]]:

@@ -159,7 +159,6 @@ def view(ros: str, *, moveit: bool) -> str:
         "# written by scripts/ros2_description.py",
         "Panels:",
         f"  - {{Class: {'rviz_common' if ros == 'ros2' else 'rviz'}/Displays, Name: Displays}}",
-        f"  - {{Class: {'rviz_common' if ros == 'ros2' else 'rviz'}/Views, Name: Views}}",
         "Visualization Manager:",
         '  Class: ""',
         "  Displays:",

@@ -18,7 +18,7 @@ pytest.importorskip("viser")
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (("--meshes", "."), "--meshes needs --view"),
+        (("--meshes", "."), "--meshes needs --view or --panel"),
         (("--view", "--meshes", "/nowhere"), "meshes must be a folder with link_0.stl to link_7.stl"),
         (("--fri", "2.5", "--meshes", "."), "--meshes cannot be used with --fri"),
         (("--app", ".", "--meshes", "."), "--meshes cannot be used with --app"),

@@ -50,6 +50,7 @@ def test_wheel_carries_jars_and_cabinet_sources(wheel: Path) -> None:
     for jar in ("heptarm-core.jar", "heptarm-app.jar", "heptarm-doubles-not-for-robots.jar"):
         assert f"heptarm/sim/jars/{jar}" in names
     assert "heptarm/sim/models/iiwa14.xml" in names
+    assert "heptarm/sim/models/meshes/lbr/link_0.silver.obj" in names
     assert "heptarm/py.typed" in names
     assert any(name.startswith("heptarm/_cabinet/core/src/") and name.endswith(".java") for name in names)
     assert any(name.startswith("heptarm/_cabinet/app/src/") and name.endswith(".java") for name in names)

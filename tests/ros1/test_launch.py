@@ -31,7 +31,13 @@ def test_the_node_is_started_with_its_parameters(ros: None, spare: Stage, tmp_pa
     values = tmp_path / "arm.yaml"
     values.write_text("state_rate: 50.0\nservo:\n  rate: 50.0\n")
     command = ["roslaunch", "--wait", "heptarm_ros1", "heptarm.launch"]
-    command += [f"target:={spare.target}", "name:=launched", "prefix:=l_", f"params:={values}"]
+    command += [
+        "description:=false",
+        f"target:={spare.target}",
+        "name:=launched",
+        "prefix:=l_",
+        f"params:={values}",
+    ]
     process = subprocess.Popen(
         [*command, "__ns:=launch"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )

@@ -1,4 +1,4 @@
-"""How the arm is drawn: its own meshes fit the kinematics, a folder's replace them, and the physics knows of neither."""
+"""How the arm is drawn: own meshes fit the kinematics, a folder's replace them, the physics knows of neither."""
 
 from __future__ import annotations
 
@@ -190,8 +190,9 @@ def test_meshes_that_cannot_be_used_are_refused(folder: Path) -> None:
         ValueError, match=r"link_5\.stl must be a link in metres, .* got 141 m; scale it, by 0\.001"
     ):
         ArmMeshes.of(str(folder))
-    (folder / "link_5.stl").write_text("solid ascii\nendsolid ascii\n")
-    with pytest.raises(ValueError, match=r"link_5\.stl must be a binary STL"):
+    # a new name: MuJoCo remembers what it has read within a second
+    (folder / "link_0.dark.stl").write_text("solid ascii\nendsolid ascii\n")
+    with pytest.raises(ValueError, match=r"link_0\.dark\.stl must be a binary STL"):
         ArmMeshes.of(str(folder))
 
 

@@ -76,13 +76,13 @@ def _row(report: EpisodeReport, target: Path, figures: Any, pictures: int = 6) -
 
 
 def _draw(axes: Any, arm: ArmPicture, report: EpisodeReport, episode: int, step: int) -> None:
-    """Draw one moment: the arm, the way of its flange until then, and the target."""
+    """Draw one moment: the arm, the path of its flange until then, and the target."""
     axes.clear()
     picture = arm.draw(report.joints[episode, step])
     height, width = picture.shape[:2]
     axes.imshow(picture, extent=(-0.5 * width / height, 0.5 * width / height, -0.5, 0.5))
-    way, goal = report.paths[episode, : step + 1], report.targets[episode]
-    axes.plot(*arm.viewpoint.seen(way)[:, :2].T, color="#1a73e8", linewidth=1.2)
+    path, goal = report.paths[episode, : step + 1], report.targets[episode]
+    axes.plot(*arm.viewpoint.seen(path)[:, :2].T, color="#1a73e8", linewidth=1.2)
     axes.plot(*arm.viewpoint.seen(goal[None])[:, :2].T, color="#d93025", marker="o", markersize=7)
     distance = report.task.distance(report.paths[episode, step], goal)
     axes.set_title(f"{step / report.task.rate:.2f} s, {1e3 * float(distance):.0f} mm", fontsize=10)

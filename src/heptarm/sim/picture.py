@@ -1,4 +1,4 @@
-"""Pictures of the arm without a graphics driver: its meshes, smoothly shaded, drawn by matplotlib's Agg from far to near."""
+"""Pictures of the arm without a graphics driver: matplotlib's Agg draws its shaded meshes from far to near."""
 
 from __future__ import annotations
 

@@ -28,9 +28,9 @@ class ArmMeshes:
     """Meshes of the arm's links.
 
     Attributes:
-        folder: with `link_0.stl` to `link_7.stl` (binary) or `.obj`, in the frames of the links as `iiwa14.xml` has them
-            [m]. A link may have a file for each of its colours instead, such as `link_3.orange.obj`; without a colour
-            it is silver. None: heptarm's own meshes.
+        folder: with `link_0.stl` to `link_7.stl` (binary) or `.obj`, in metres, in the frames of the links that
+            `iiwa14.xml` has. A link may have a file for each of its colours instead, such as `link_3.orange.obj`;
+            without a colour it is silver. None: heptarm's own meshes.
     """
 
     folder: Path | None = None
