@@ -124,6 +124,12 @@ from .errors import (
 from .errors import (
     VersionMismatch as VersionMismatch,
 )
+from .fri.loop.compiled import (
+    law as law,
+)
+from .fri.loop.compiled import (
+    law_from as law_from,
+)
 from .record.recorder import (
     Recorder as Recorder,
 )
@@ -195,6 +201,9 @@ from .values.motion.ptp import (
 )
 from .values.motion.ptp import (
     ptp_home as ptp_home,
+)
+from .values.motion.ptp import (
+    ptp_transport as ptp_transport,
 )
 from .values.motion.search import (
     Spiral as Spiral,

@@ -101,7 +101,9 @@ def test_every_command_names_its_target_and_its_key_in_one_way() -> None:
     for name in CONNECTING:
         arguments = EVERY[name].assemble_argument_collection()
         kinds = [argument.hint for argument in arguments]
-        assert options.CommandTarget in kinds, f"heptarm {name} connects without cli.options.CommandTarget"
+        assert {options.CommandTarget, options.CommandTargets} & set(kinds), (
+            f"heptarm {name} connects without cli.options.CommandTarget"
+        )
         names = {one for argument in arguments for one in argument.names}
         assert {"--target", "--key-file"} <= names, name
 

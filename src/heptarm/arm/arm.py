@@ -583,6 +583,7 @@ class Arm:
         ceiling, breaks = self._speed, self._breaks
         if speed is not None:
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
+        motions = program.with_kept_joints(self._connection, motions)
         self._foresight.examine(motions, when)
         return program.send(
             self._connection,
@@ -695,8 +696,11 @@ class Arm:
             **settings: period_ms: time between two messages, 1 to 100 [ms]; 5, and 1 for a monitor.
                 multiplier: answer every n-th message; 1.
                 mode: control mode of the hold; None: that of `using`, otherwise position.
-                law: `law(state, out, params)`, called in the loop's process in every cycle; None: `Fri.command`.
+                law: `law(state, out, params)` or `law(state, out, params, memory)`, called in the loop's process in
+                    every cycle; a law of `heptarm.law`, `heptarm.law_from` or `heptarm.laws` runs there without Python.
+                    None: `Fri.command`.
                 params: numbers and arrays by name for the law, which can change while it runs.
+                memory: what the law keeps from call to call, numbers and arrays by name with their initial values.
                 policy: what is sent while commands are missing, `heptarm.fri.Policy`; by default the arm brakes.
                 limits: limits of the guard, `heptarm.fri.Limits`; those of the robot, slightly reduced.
                 pose_limits: limits of commanded poses, `heptarm.fri.PoseLimits`; 0.25 m/s and 1 rad/s.
@@ -905,6 +909,7 @@ class Arm:
     touch = touching.touch
     touch_twice = touching.touch_twice
     wait_for_taps = touching.wait_for_taps
+    on_taps = touching.on_taps
     collision_guard = guarding.collision_guard
     guarded = guarding.guarded
     guide_precisely = teaching.guide_precisely

@@ -21,6 +21,7 @@ from heptarm.errors import HeptarmError, missing_extra
 COMMANDS = {
     "demo": "demo:demo",
     "sim": "sim:sim",
+    "panel": "panel:panel",
     "state": "state:state",
     "stop": "stop:stop",
     "recover": "motion:recover",
@@ -101,7 +102,8 @@ def main() -> None:
 
         if os.environ.get("HEPTARM_DEBUG"):
             raise
-        _fail(printable(str(error), lines=True))
+        page = f"\n{error.page}" if error.code and sys.stderr.isatty() else ""
+        _fail(printable(str(error), lines=True) + page)
     except ModuleNotFoundError as error:
         missing = missing_extra(error.name or "")
         if missing is None or os.environ.get("HEPTARM_DEBUG"):

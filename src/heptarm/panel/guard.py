@@ -1,7 +1,7 @@
-"""Who may see the view: a browser that was given the URL with its token.
+"""Who may open the panel: a browser that was given the URL with its token.
 
-The view listens on a port of this machine. Any web page that a browser on this machine shows could connect to it. The
-guard looks at every request before viser does: its Host must be the view's own (against DNS rebinding), its Origin too
+The panel listens on a port of this machine. Any web page that a browser on this machine shows could connect to it. The
+guard looks at every request before viser does: its Host must be the panel's own (against DNS rebinding), its Origin too
 if it has one (against other pages), and it must bring the token, in the URL or in the cookie that the first page sets.
 """
 
@@ -10,7 +10,9 @@ from __future__ import annotations
 import contextlib
 import hmac
 import http
+import ipaddress
 import secrets
+import socket
 from collections.abc import Callable, Iterator
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
@@ -18,19 +20,44 @@ from urllib.parse import parse_qs, urlsplit
 
 from heptarm.errors import HeptarmError
 
-#: Names under which a browser on this machine reaches a view that listens on an address of it.
+#: Names under which a browser on this machine reaches a panel that listens on an address of it.
 _LOCAL = ("127.0.0.1", "localhost", "[::1]")
+#: A remote address, to look up which own one is used for it; nothing is sent to it (RFC 5737, TEST-NET-1).
+_SOMEWHERE = ("192.0.2.1", 9)
 
 
-class ViewGuard:
-    """Checks requests to the view.
+def is_local(host: str) -> bool:
+    """Whether only this machine reaches what listens on an address."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host.lower() == "localhost"
+
+
+def _is_everywhere(host: str) -> bool:
+    """Whether an address stands for all addresses of this machine."""
+    return host in ("0.0.0.0", "::", "")
+
+
+def _own_address() -> str:
+    """This machine's address towards the network; without a network its name."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            probe.connect(_SOMEWHERE)
+            return str(probe.getsockname()[0])
+        except OSError:
+            return socket.gethostname()
+
+
+class PageGuard:
+    """Checks requests to the panel.
 
     Args:
-        host: address on which the view listens.
+        host: address on which the panel listens.
 
     Attributes:
-        token: secret of this view, in its URL.
-        port: TCP port of the view; 0 until it is known, and nobody gets in.
+        token: secret of this panel, in its URL.
+        port: TCP port of the panel; 0 until it is known, and nobody gets in.
     """
 
     def __init__(self, host: str) -> None:
@@ -41,12 +68,13 @@ class ViewGuard:
     @property
     def url(self) -> str:
         """URL with the token, to print once."""
-        return f"http://{self._host}:{self.port}/?token={self.token}"
+        host = _own_address() if _is_everywhere(self._host) else self._host
+        return f"http://{f'[{host}]' if ':' in host else host}:{self.port}/?token={self.token}"
 
     @property
     def cookie(self) -> str:
         """Name of the cookie; cookies belong to a host, so it names the port."""
-        return f"heptarm_view_{self.port}"
+        return f"heptarm_panel_{self.port}"
 
     def refusal(self, path: str, *, host: str, origin: str, cookies: str) -> str:
         """Say why a request is refused; empty: it is not.
@@ -57,15 +85,31 @@ class ViewGuard:
             origin: header Origin; empty: there is none.
             cookies: header Cookie.
         """
-        names = {*_LOCAL, self._host}
-        own = {f"{name}:{self.port}" for name in names} | (names if self.port == 80 else set())
-        if not self.port or host.lower() not in own:
-            return "the header Host names another host than the view"
-        if origin and origin.lower() not in {f"http://{name}" for name in own}:
-            return "a page of another origin asks for the view"
+        if not self.port or not self._is_own(host.lower()):
+            return "the header Host names another host than the panel"
+        if origin and origin.lower() != f"http://{host.lower()}":
+            return "a page of another origin asks for the panel"
         if not (self.is_token(self.token_in(path)) or self.is_token(self._token_in_cookie(cookies))):
-            return "the token is missing or wrong; open the URL that `heptarm sim --view` has printed"
+            return "the token is missing or wrong; open the URL that `heptarm panel` or `heptarm sim` has printed"
         return ""
+
+    def _is_own(self, place: str) -> bool:
+        """Whether a host with its port is the panel's own.
+
+        A panel that listens everywhere is reached by any address of this machine. Rebinding needs a name, which has to
+        be this machine's.
+        """
+        names = {*_LOCAL, self._host, f"[{self._host}]"}
+        name, _, port = place.rpartition(":") if f":{self.port}" in place else (place, "", "80")
+        if port != str(self.port):
+            return False
+        if not _is_everywhere(self._host):
+            return name in names
+        try:
+            ipaddress.ip_address(name.strip("[]"))
+            return True
+        except ValueError:
+            return name in (*names, socket.gethostname().lower(), socket.getfqdn().lower())
 
     def is_token(self, given: str) -> bool:
         """Whether a text is the token, in constant time."""
@@ -89,7 +133,7 @@ class ViewGuard:
         """Guard the servers of websockets that are started in this block.
 
         Raises:
-            HeptarmError: none was started: this version of viser works in another way, and all could see the view.
+            HeptarmError: none was started: this version of viser works in another way, and all could open the panel.
         """
         from websockets.asyncio import server
 
@@ -108,7 +152,7 @@ class ViewGuard:
             server.serve = original  # type: ignore[misc]
         if not guarded:
             raise HeptarmError(
-                "the view cannot be protected with this version of viser", hint="pip install 'viser>=1,<2'"
+                "the panel cannot be protected with this version of viser", hint="pip install 'viser>=1,<2'"
             )
 
     def _checked(self, then: Callable[[Any, Any], Any] | None) -> Callable[[Any, Any], Any]:
