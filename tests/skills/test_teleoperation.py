@@ -39,7 +39,7 @@ def at_home(arm: ha.Arm) -> None:
         arm.move(ha.ptp(HOME), speed=1.0)
 
 
-class Person(devices.Synthetic):
+class Person(devices.SyntheticDevice):
     """A person who decides by what has happened: called with the number of the reading."""
 
     def __init__(self, decide: Callable[[int], devices.DeviceInput]) -> None:
