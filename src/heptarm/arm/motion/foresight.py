@@ -95,7 +95,7 @@ class Foresight:
 
 
 def _check_inside(path: Array, boundary: Boundary, name: str) -> None:
-    """Check that a joint path stays inside; one that starts outside may lead inside.
+    """Check that a joint path stays inside; one that starts outside may end inside.
 
     Raises:
         OutsideWorkspace: it leaves the workspace, or ends outside.

@@ -43,7 +43,7 @@ _BELOW_CEILING = 0.95
 _LONGEST_STEP = 0.1
 #: The path may be so far ahead of the arm: a distance [rad], and one that grows with the velocity [s]. From half of it
 #: on the arm is slowed down, so that a blocked or pushed arm does not have a far target, and a spring no large force.
-_LEAD, _LEAD_TIME = 0.1, 0.25
+_AHEAD, _AHEAD_TIME = 0.1, 0.25
 #: Largest age of a state that is made up for by the commanded velocity [s].
 _OLDEST = 0.3
 #: Distance to other bodies below which they are looked at [m], and the time over which their approach is measured [s].
@@ -246,8 +246,8 @@ class JogServo(Servo):
         if sample is None or state is None or state.groups.joints is None:
             return None
         age = min((now - sample.received) * 1e-9 * self._connection.real_time_factor, _OLDEST)
-        lead = (path.q - state.q - path.dq * age) * np.sign(dq)
-        ratio = lead / (_LEAD + _LEAD_TIME * np.abs(path.dq))
+        ahead = (path.q - state.q - path.dq * age) * np.sign(dq)
+        ratio = ahead / (_AHEAD + _AHEAD_TIME * np.abs(path.dq))
         index = int(ratio.argmax())
         if ratio[index] <= 0.5:
             return None
