@@ -9,6 +9,7 @@ import enum
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from functools import cache
+from inspect import signature
 from operator import attrgetter
 from typing import Any, NoReturn, TypeVar
 
@@ -61,9 +62,11 @@ def _names(kind: type) -> tuple[str, ...]:
 def _getter(kind: type) -> Callable[[Any], tuple[Any, ...]] | None:
     """All fields of a value at once, in order; None: not all of them may be given in order."""
     names = _names(kind)
-    if len(names) < 2 or any(
-        one.kw_only for one in fields(kind)
-    ):  # an attrgetter of one name returns no tuple
+    # the constructor counts, which a class may have written itself
+    places = [
+        one.name for one in signature(kind).parameters.values() if one.kind is one.POSITIONAL_OR_KEYWORD
+    ]
+    if len(names) < 2 or places != list(names):  # an attrgetter of one name returns no tuple
         return None
     return attrgetter(*names)
 
