@@ -80,6 +80,8 @@ def calls(arm: Arm, handle: heptarm.MotionHandle) -> Iterator[Call]:
     yield from methods_of("arm.operator", Operator(_NoCabinet()))  # type: ignore[arg-type]
     yield from methods_of("JointServo", arm.servo())
     yield from methods_of("PoseServo", arm.servo("pose"))
+    yield from methods_of("VelocityServo", arm.servo("velocity"))
+    yield from methods_of("TwistServo", arm.servo("twist"))
     yield from methods_of("MotionHandle", handle, skip=SKIPPED)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from heptarm import devices
 from heptarm.devices.device import without_dead_zone
-from heptarm.devices.stream import Recorded, Recording, Synthetic
+from heptarm.devices.stream import RecordedDevice, RecordingDevice, SyntheticDevice
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.io.clock import StepClock
 
@@ -40,7 +40,7 @@ def test_a_function_of_time_is_a_device() -> None:
     def play(seconds: float) -> object:
         return None if seconds > 1.0 else [seconds, 0, 0, 0, 0, 0]
 
-    device = Synthetic(play, clock=clock)  # type: ignore[arg-type]
+    device = SyntheticDevice(play, clock=clock)  # type: ignore[arg-type]
     assert device.read().twist[0] == 0.0
     clock.step(0.5)
     assert device.read().twist[0] == 0.5
@@ -53,12 +53,12 @@ def test_a_function_of_time_is_a_device() -> None:
 def test_a_recording_replays_with_its_times_buttons_and_roles(tmp_path: Path) -> None:
     clock, file = StepClock(), tmp_path / "person.jsonl"
     roles = devices.Roles(dead_man="LB", gripper="A", quit="START")
-    source = Synthetic(
+    source = SyntheticDevice(
         lambda t: devices.DeviceInput.of(FORWARD if t >= 1.0 else [0.0] * 6, ["LB"] if t >= 0.5 else []),
         roles=roles,
         clock=clock,
     )
-    with Recording(source, file, clock=clock) as recording:
+    with RecordingDevice(source, file, clock=clock) as recording:
         assert recording.roles == roles
         for _ in range(20):
             seen = recording.read()
@@ -67,7 +67,7 @@ def test_a_recording_replays_with_its_times_buttons_and_roles(tmp_path: Path) ->
 
     replayed = devices.recorded(file)
     assert replayed.roles == roles and replayed.duration == pytest.approx(1.9)
-    again = Recorded(replayed.inputs, clock=clock)
+    again = RecordedDevice(replayed.inputs, clock=clock)
     states = []
     for _ in range(25):
         states.append(again.read())

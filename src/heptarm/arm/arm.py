@@ -452,9 +452,9 @@ class Arm:
     def workspace(self) -> Workspace | None:
         """Where the tool and the joints may be, for all commands of this arm object; None: anywhere.
 
-        `move` and `start` refuse a motion that leaves it, before anything is sent; so far as the path is known: of
-        hand guiding and a hold it is not, of splines it is taken as straight from point to point. Servo motions,
-        velocities too, clamp their targets to it or refuse them. FRI sessions have limits of their own.
+        `move` and `start` refuse a motion that leaves it, before anything is sent; they plan it as `plan` does, which
+        needs `pip install 'heptarm[sim]'`. Hand guiding has no path that could be checked, nor what follows it. Servo
+        motions, velocities too, clamp their targets to it or refuse them. FRI sessions have limits of their own.
 
         It is no safety function: only this program obeys it.
 

@@ -8,18 +8,25 @@ from heptarm.devices.device import DeviceInput, InputDevice, Roles
 from heptarm.devices.gamepad import Gamepad, gamepad
 from heptarm.devices.keyboard import Keyboard, keyboard
 from heptarm.devices.spacemouse import SpaceMouse, spacemouse
-from heptarm.devices.stream import Recorded, Recording, Synthetic, recorded, recording, synthetic
+from heptarm.devices.stream import (
+    RecordedDevice,
+    RecordingDevice,
+    SyntheticDevice,
+    recorded,
+    recording,
+    synthetic,
+)
 
 __all__ = [
     "DeviceInput",
     "Gamepad",
     "InputDevice",
     "Keyboard",
-    "Recorded",
-    "Recording",
+    "RecordedDevice",
+    "RecordingDevice",
     "Roles",
     "SpaceMouse",
-    "Synthetic",
+    "SyntheticDevice",
     "gamepad",
     "keyboard",
     "recorded",

@@ -70,7 +70,7 @@ class InputDevice(Protocol):
 
     @property
     def roles(self) -> Roles:
-        """What its buttons are for, unless the program says otherwise."""
+        """What its buttons are for, unless the program names others."""
 
     def read(self) -> DeviceInput:
         """What it reports now; does not wait.

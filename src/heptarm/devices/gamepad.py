@@ -51,7 +51,7 @@ _AXES = {
     _HAT_Y: (4, -1.0),
     _RIGHT_X: (5, -1.0),
 }
-#: Fraction of its way from which a trigger counts as held.
+#: Deflection from which a trigger counts as held.
 _PULLED = 0.5
 #: Most events that one reading handles: a pad sends some hundred a second.
 _MOST_EVENTS = 1000

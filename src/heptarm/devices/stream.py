@@ -20,7 +20,7 @@ from heptarm.values.arrays import callback, finite, instance
 _FORMAT = "heptarm input 1"
 
 
-class Synthetic:
+class SyntheticDevice:
     """A function of time as an input device; it rests when the function returns None.
 
     Args:
@@ -56,7 +56,7 @@ class Synthetic:
         """Has no effect."""
 
 
-class Recorded:
+class RecordedDevice:
     """A recorded stream of inputs; it begins with the first reading, and rests after its end.
 
     Args:
@@ -110,7 +110,7 @@ class Recorded:
         """Has no effect."""
 
 
-class Recording:
+class RecordingDevice:
     """Another device, whose inputs are written to a file while it is read.
 
     Args:
@@ -154,7 +154,7 @@ class Recording:
             file.close()
         self._device.close()
 
-    def __enter__(self) -> Recording:
+    def __enter__(self) -> RecordingDevice:
         """The recording itself."""
         return self
 
@@ -167,7 +167,7 @@ class Recording:
 
 def synthetic(
     function: Callable[[float], DeviceInput | npt.ArrayLike | None], *, roles: Roles | None = None
-) -> Synthetic:
+) -> SyntheticDevice:
     """An input device that a function of time plays, for tests and demonstrations.
 
     Args:
@@ -178,10 +178,10 @@ def synthetic(
     Raises:
         ShapeError: no function.
     """
-    return Synthetic(function, roles=roles)
+    return SyntheticDevice(function, roles=roles)
 
 
-def recording(device: InputDevice, path: str | Path) -> Recording:
+def recording(device: InputDevice, path: str | Path) -> RecordingDevice:
     """Write what a device reports to a file, while it is read as before; `recorded` replays it.
 
     Args:
@@ -191,10 +191,10 @@ def recording(device: InputDevice, path: str | Path) -> Recording:
     Raises:
         CommandRejected: the file cannot be written.
     """
-    return Recording(device, instance(path, (str, Path), "path"))
+    return RecordingDevice(device, instance(path, (str, Path), "path"))
 
 
-def recorded(path: str | Path) -> Recorded:
+def recorded(path: str | Path) -> RecordedDevice:
     """Replay a file that `recording` has written, with its timing, as an input device.
 
     Raises:
@@ -207,7 +207,7 @@ def recorded(path: str | Path) -> Recorded:
         if about["format"] != _FORMAT:
             raise ValueError(f"its format is {about['format']}")
         rows = [json.loads(line) for line in lines]
-        return Recorded(
+        return RecordedDevice(
             [(time, DeviceInput.of(twist, buttons)) for time, twist, buttons in rows],
             roles=Roles(*about["roles"]),
         )

@@ -199,7 +199,7 @@ class Foresight:
 
 
 def _check_inside(path: Array, boundary: Boundary, name: str) -> None:
-    """Check that a joint path stays inside; one that starts outside may lead inside.
+    """Check that a joint path stays inside; one that starts outside may end inside.
 
     Raises:
         OutsideWorkspace: it leaves the workspace, or ends outside.
@@ -213,7 +213,7 @@ def _check_inside(path: Array, boundary: Boundary, name: str) -> None:
             if excess > least + TOLERANCE:
                 raise boundary.refusal(q, name, parameter=name)
             least = min(least, excess)
-    if len(path) > 1 and least > TOLERANCE:
+    if least > TOLERANCE and np.abs(path[-1] - path[0]).max() > TOLERANCE:
         raise boundary.refusal(path[-1], f"the end of {name}", parameter=name)
 
 

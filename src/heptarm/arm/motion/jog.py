@@ -43,7 +43,7 @@ _BELOW_CEILING = 0.95
 _LONGEST_STEP = 0.1
 #: The path may be so far ahead of the arm: a distance [rad], and one that grows with the velocity [s]. From half of it
 #: on the arm is slowed down, so that a blocked or pushed arm does not have a far target, and a spring no large force.
-_LEAD, _LEAD_TIME = 0.1, 0.25
+_AHEAD, _AHEAD_TIME = 0.1, 0.25
 #: Largest age of a state that is made up for by the commanded velocity [s].
 _OLDEST = 0.3
 #: Distance to other bodies below which they are looked at [m], and the time over which their approach is measured [s].
@@ -190,7 +190,7 @@ class JogServo(Servo):
         boundary, path = self._boundary, self._path
         if boundary is not None and boundary.refuses and path is not None:
             now = path.q
-            ahead = now + self._resolved(now, command)[0] * _LOOK_AHEAD
+            ahead = now + self._unbounded(now, command) * _LOOK_AHEAD
             if boundary.excess(ahead) > max(boundary.excess(now), TOLERANCE):
                 self._command = None
                 raise boundary.refusal(ahead, "the velocity", parameter=self.name)
@@ -233,11 +233,11 @@ class JogServo(Servo):
 
     def _velocity(self, q: Array, wanted: Array, dt: float) -> tuple[Array, list[Slowdown]]:
         """Joint velocities of a command [rad/s], and what has slowed them down already."""
-        return self._resolved(q, wanted)
-
-    def _resolved(self, q: Array, wanted: Array) -> tuple[Array, list[Slowdown]]:
-        """The same without a memory."""
         return wanted, []
+
+    def _unbounded(self, q: Array, command: Array) -> Array:
+        """Joint velocities of a command without ramps and walls [rad/s]."""
+        return command
 
     def _lag(self, path: VelocityPath, dq: Array, now: int) -> Slowdown | None:
         """The arm does not follow: it is blocked, pushed, or its speed override is low."""
@@ -246,8 +246,8 @@ class JogServo(Servo):
         if sample is None or state is None or state.groups.joints is None:
             return None
         age = min((now - sample.received) * 1e-9 * self._connection.real_time_factor, _OLDEST)
-        lead = (path.q - state.q - path.dq * age) * np.sign(dq)
-        ratio = lead / (_LEAD + _LEAD_TIME * np.abs(path.dq))
+        ahead = (path.q - state.q - path.dq * age) * np.sign(dq)
+        ratio = ahead / (_AHEAD + _AHEAD_TIME * np.abs(path.dq))
         index = int(ratio.argmax())
         if ratio[index] <= 0.5:
             return None
@@ -378,16 +378,21 @@ class TwistServo(JogServo):
         goal = limited_twist(wanted, limits.speed, limits.turn)
         if dt > 0.0:
             self._twist = ramped_twist(self._twist, goal, limits.acceleration * dt, limits.spin * dt)
-        return self._resolved(q, self._twist)
-
-    def _resolved(self, q: Array, wanted: Array) -> tuple[Array, list[Slowdown]]:
-        robot = self._connection.robot
-        flange = Pose.from_matrix(forward(robot, q))
-        turn, point = self._axes(flange).rotation, (flange @ self._moving).xyz
-        twist = np.concatenate([turn @ wanted[:3], turn @ wanted[3:]])
+        twist, point = self._in_base(q, self._twist)
         slowed, wall = self._along_walls(twist, point, q)
-        dq, singular = resolved_twist(robot, q, slowed, point)
+        dq, singular = resolved_twist(self._connection.robot, q, slowed, point)
         return dq, [one for one in (singular, wall) if one.reason]
+
+    def _unbounded(self, q: Array, command: Array) -> Array:
+        limits = self._twist_limits
+        twist, point = self._in_base(q, limited_twist(command, limits.speed, limits.turn))
+        return resolved_twist(self._connection.robot, q, twist, point)[0]
+
+    def _in_base(self, q: Array, twist: Array) -> tuple[Array, Array]:
+        """A twist in the axes of the base, and its point: the origin of the motion frame in the base."""
+        flange = Pose.from_matrix(forward(self._connection.robot, q))
+        turn = self._axes(flange).rotation
+        return np.concatenate([turn @ twist[:3], turn @ twist[3:]]), (flange @ self._moving).xyz
 
     def _along_walls(self, twist: Array, point: Array, q: Array) -> tuple[Array, Slowdown]:
         """The twist of a point of the base, with the tool braking before the walls of the workspace."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from heptarm.arm.arm import Arm
-from heptarm.arm.motion.servo import JointServo, PoseServo
+from heptarm.arm.motion.servo import JointServo, PoseServo, Servo
 from heptarm.errors import HeptarmError, MotionAborted, Starved
 from heptarm.testing.measure import above, below, fresh, holds, near, note
 from heptarm.testing.scenario import Risk, scenario
@@ -25,9 +25,7 @@ _ENOUGH = 12
 _APART_NS = 20_000_000
 
 
-def stream(
-    arm: Arm, servo: JointServo | PoseServo, seconds: float, target: Callable[[float], None]
-) -> tuple[State, ...]:
+def stream(arm: Arm, servo: Servo, seconds: float, target: Callable[[float], object]) -> tuple[State, ...]:
     """Call `target` with the cabinet time since now [s], tick by tick; the states that were seen."""
     first = arm.state.stamp
     states: dict[int, State] = {}
@@ -132,26 +130,31 @@ def velocities(arm: Arm) -> None:
     near(arm.wait_for_rest().q[6] - start[6], 1.5 * speed, 0.03, "offset of A7", unit="rad")
 
 
-@scenario(line=5, rows="E9", space=0.15, needs=("servo_pose",))
+@scenario(line=5, rows="E7", space=0.1, needs=("servo",))
+def joint_velocities(arm: Arm) -> None:
+    """Joint velocities: A7 turns at the commanded speed, and comes to rest when nothing is commanded any more."""
+    speed = 0.2
+    with arm.servo("velocity", rate=_RATE, speed=0.5, watchdog=_PATIENT) as servo:
+        states = stream(arm, servo, 1.5, lambda _: servo.set(speed * _A7))
+        seen = [state.dq[6] for state in states if state.stamp - states[0].stamp > 0.6e9]
+        near(float(np.median(seen)), speed, 0.3 * speed, "speed of A7", unit="rad/s")
+        rest = stream(arm, servo, 1.5, lambda _: None)[-1]
+        holds(servo.active, "silence leaves the stream open")
+    near(rest.dq[6], 0.0, 0.01, "speed of A7 after silence", unit="rad/s")
+
+
+@scenario(line=5, rows="E9", space=0.15, needs=("servo",))
 def twist(arm: Arm) -> None:
-    """A stream of Cartesian velocities, as poses: the flange moves and turns as commanded."""
+    """Cartesian velocities: the flange moves and turns as commanded."""
     speed, turn = 0.04, 0.1
-    with arm.servo("pose", rate=_RATE, speed=0.5, acceleration=1.0, watchdog=_PATIENT) as servo:
+    with arm.servo("twist", frame="base", rate=_RATE, speed=0.5, watchdog=_PATIENT) as servo:
         start = servo.start.pose
-
-        def target(t: float) -> None:
-            now = min(t, 1.5)
-            servo.set(
-                Pose.of(start.xyz + [0.0, speed * now, 0.0], start.quat)
-                @ Pose.xyz_abc(0, 0, 0, turn * now, 0, 0)
-            )
-
-        states = stream(arm, servo, 2.2, target)
-    top = max(s.pose.distance_to(states[0].pose) for s in states if s.stamp - states[0].stamp < 1.0e9)
-    near(top, 0.9 * speed, 0.35 * speed, "distance in the first second", unit="m")
-    end = arm.wait_for_rest().pose
-    near(end.xyz - start.xyz, (0.0, 1.5 * speed, 0.0), 5e-3, "offset", unit="m")
-    near(end.angle_to(start), 1.5 * turn, 0.02, "turned", unit="rad")
+        states = stream(arm, servo, 1.5, lambda _: servo.set([0.0, speed, 0.0, 0.0, 0.0, turn]))
+    first, last = (next(s for s in states if s.stamp - states[0].stamp > t) for t in (0.5e9, 1.3e9))
+    seconds = (last.stamp - first.stamp) * 1e-9
+    near(last.pose.y - first.pose.y, speed * seconds, 0.35 * speed, "distance along y", unit="m")
+    near(last.pose.angle_to(first.pose), turn * seconds, 0.35 * turn, "turned", unit="rad")
+    near(last.pose.xyz[[0, 2]], start.xyz[[0, 2]], 5e-3, "x and z", unit="m")
 
 
 @scenario(line=5, rows="E14 E15 F10", space=0.15, needs=("servo",))
