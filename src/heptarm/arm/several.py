@@ -40,6 +40,8 @@ _log = logging.getLogger("heptarm.arm")
 _Answer = TypeVar("_Answer")
 #: Time that cabinets have to plan their programs before they are released [s].
 _LEAD = 0.2
+#: Longest wait for the state after the end of a motion [s].
+_SOON = 0.5
 #: Longest wait until a cabinet has taken up a program [s].
 _PATIENCE = 10.0
 
@@ -344,13 +346,14 @@ def start_together(
     seconds = within(lead, "lead", 0.0, 10.0, unit="s")
     arms = list(motions)
     for arm in arms:
-        status = arm.state.motion
-        if status is not None and (status.active or status.queued):
+        try:  # the last state may be older than the end of the last motion
+            arm.wait_until(_is_idle, timeout=_SOON)
+        except Timeout:
             raise ModeConflict(
                 "an arm still moves, so that it could not begin with the others",
                 parameter="motions",
                 hint="wait until all arms rest: arm.wait_for_rest()",
-            )
+            ) from None
     handles: dict[Arm, MotionHandle] = {}
     try:
         _raise_first(_of_each(arms, Arm.pause))
@@ -372,6 +375,10 @@ def start_together(
         _of_each(arms, Arm.stop)
         raise errors[0]
     return together
+
+
+def _is_idle(state: State) -> bool:
+    return state.motion is None or not (state.motion.active or state.motion.queued)
 
 
 def _wait_until_taken(arm: Arm, handle: MotionHandle) -> None:
