@@ -366,8 +366,7 @@ def start_together(
             if handle.error is not None:
                 raise handle.error
     except BaseException:
-        _of_each(list(handles.values()), MotionHandle.cancel)
-        _of_each(arms, Arm.resume)
+        _withdraw(arms, handles)
         raise
     together = MotionOfArms(handles, stops_others=stop_others)
     _, errors = _of_each(arms, Arm.resume)
@@ -375,6 +374,18 @@ def start_together(
         _of_each(arms, Arm.stop)
         raise errors[0]
     return together
+
+
+def _withdraw(arms: Sequence[Arm], handles: Mapping[Arm, MotionHandle]) -> None:
+    """Cancel programs that have not been released, and end the pause of each arm whose program has ended."""
+    _of_each(list(handles.values()), MotionHandle.cancel)
+    deadline = time.monotonic() + _PATIENCE
+    while not all(handle.done for handle in handles.values()) and time.monotonic() < deadline:
+        time.sleep(0.005)
+    waiting = [arm for arm, handle in handles.items() if not handle.done]
+    for arm in waiting:
+        _log.error("%r stays paused: its program could not be cancelled", arm)
+    _of_each([arm for arm in arms if arm not in waiting], Arm.resume)
 
 
 def _is_idle(state: State) -> bool:
