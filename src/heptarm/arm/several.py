@@ -19,7 +19,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from math import nan
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, TypeVar
@@ -32,7 +31,7 @@ from heptarm.record.recorder import Recorder
 from heptarm.values.arrays import flag, instance, shown, within
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion
-from heptarm.values.result import MotionEvent, Result
+from heptarm.values.result import Result
 from heptarm.values.state import State
 
 _log = logging.getLogger("heptarm.arm")
@@ -40,6 +39,8 @@ _log = logging.getLogger("heptarm.arm")
 _Answer = TypeVar("_Answer")
 #: Time that cabinets have to plan their programs before they are released [s].
 _LEAD = 0.2
+#: Time after which a pause holds what is sent then [s]: a cabinet lowers the speed smoothly.
+_PAUSING = 0.5
 #: Longest wait for the state after the end of a motion [s].
 _SOON = 0.5
 #: Longest wait until a cabinet has taken up a program [s].
@@ -225,36 +226,20 @@ class MotionOfArms:
 
     Attributes:
         handles: the program of each arm.
+        skew: upper bound of the time between the first and the last arm that was released [s]: from the first request
+            that was sent to the last one that was answered.
     """
 
-    def __init__(self, handles: Mapping[Arm, MotionHandle], *, stops_others: bool) -> None:
+    def __init__(self, handles: Mapping[Arm, MotionHandle], *, skew: float, stops_others: bool) -> None:
         self.handles = dict(handles)
+        self.skew = skew
         self._stops_others = stops_others
-        self._begun: dict[Arm, float] = {}
         self._first: HeptarmError | None = None
         self._ended: queue.SimpleQueue[Arm] = queue.SimpleQueue()
         for arm, handle in self.handles.items():
-            handle.add_event_callback(self._noting(arm))
             handle.add_done_callback(lambda _, arm=arm: self._ended.put(arm))  # type: ignore[misc]
         self._watcher = threading.Thread(target=self._watch, name="heptarm-together", daemon=True)
         self._watcher.start()
-
-    def _noting(self, arm: Arm) -> Callable[[MotionEvent], None]:
-        def note(event: MotionEvent) -> None:
-            if event.kind == "begun":
-                self._begun.setdefault(arm, time.monotonic())
-
-        return note
-
-    @property
-    def skew(self) -> float:
-        """Time between the first and the last arm that began to move [s]; NaN until all have.
-
-        It is taken where the cabinets' events arrive, so it holds within the round trip of the network.
-        """
-        if len(self._begun) < len(self.handles):
-            return nan
-        return max(self._begun.values()) - min(self._begun.values())
 
     @property
     def done(self) -> bool:
@@ -357,6 +342,8 @@ def start_together(
     handles: dict[Arm, MotionHandle] = {}
     try:
         _raise_first(_of_each(arms, Arm.pause))
+        slowest = min(arm.real_time_factor for arm in arms)
+        time.sleep(_PAUSING / min(1.0, slowest))  # until the speed override of each has come down
         for arm in arms:
             handles[arm] = arm.start(motions[arm], speed=speed, mode=mode, when="reject")
         for arm in arms:
@@ -368,12 +355,19 @@ def start_together(
     except BaseException:
         _withdraw(arms, handles)
         raise
-    together = MotionOfArms(handles, stops_others=stop_others)
-    _, errors = _of_each(arms, Arm.resume)
+    moments, errors = _of_each(arms, _released)
     if errors:
         _of_each(arms, Arm.stop)
         raise errors[0]
-    return together
+    skew = max(answered for _, answered in moments) - min(sent for sent, _ in moments)
+    return MotionOfArms(handles, skew=skew, stops_others=stop_others)
+
+
+def _released(arm: Arm) -> tuple[float, float]:
+    """End the pause of an arm; returns when that was requested and when it was answered [s]."""
+    sent = time.monotonic()
+    arm.resume()
+    return sent, time.monotonic()
 
 
 def _withdraw(arms: Sequence[Arm], handles: Mapping[Arm, MotionHandle]) -> None:
