@@ -81,7 +81,7 @@ def test_one_that_moves_already_is_not_joined(arms: ha.Arms) -> None:
 
 
 @pytest.mark.parametrize("stops", [True, False])
-def test_an_error_of_one_stops_the_others_unless_told_otherwise(arms: ha.Arms, stops: bool) -> None:
+def test_an_error_of_one_stops_the_others_where_that_is_chosen(arms: ha.Arms, stops: bool) -> None:
     left, right = arms
     both = ha.start_together({arm: ha.hold(2.0 if not stops else 60.0) for arm in arms}, stop_others=stops)
     right.stop()  # a motion that somebody stops has failed

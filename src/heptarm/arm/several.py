@@ -38,7 +38,7 @@ _log = logging.getLogger("heptarm.arm")
 
 _Answer = TypeVar("_Answer")
 #: Time that cabinets have to plan their programs before they are released [s].
-_LEAD = 0.2
+_PLANNING = 0.2
 #: Time after which a pause holds what is sent then [s]: a cabinet lowers the speed smoothly.
 _PAUSING = 0.5
 #: Longest wait for the state after the end of a motion [s].
@@ -298,7 +298,7 @@ def start_together(
     *,
     speed: float | None = None,
     mode: Mode | None = None,
-    lead: float = _LEAD,
+    planning_time: float = _PLANNING,
     stop_others: bool = True,
 ) -> MotionOfArms:
     """Begin motions of several arms at the same moment, and return then.
@@ -310,7 +310,7 @@ def start_together(
         motions: for each arm a motion, or several as one batch.
         speed: ceiling for all of them, (0, 1]; see `Arm.start`.
         mode: control mode of all of them; see `Arm.start`.
-        lead: time that the cabinets have to plan [s], 0 to 10.
+        planning_time: time that the cabinets have to plan [s], 0 to 10.
         stop_others: if one arm fails, or its connection is lost, stop the others.
 
     Returns:
@@ -328,7 +328,7 @@ def start_together(
             hint="for example {left: ha.lin_rel(z=0.1), right: ha.lin_rel(z=-0.1)}",
         )
     flag(stop_others, "stop_others")
-    seconds = within(lead, "lead", 0.0, 10.0, unit="s")
+    seconds = within(planning_time, "planning_time", 0.0, 10.0, unit="s")
     arms = list(motions)
     for arm in arms:
         try:  # the last state may be older than the end of the last motion

@@ -205,7 +205,7 @@ class Foresight:
 
 
 def _check_inside(path: Array, boundary: Boundary, name: str) -> None:
-    """Check that a joint path stays inside; one that starts outside may lead inside.
+    """Check that a joint path stays inside; one that starts outside may move inside.
 
     Raises:
         OutsideWorkspace: it leaves the workspace, or ends outside.
@@ -241,7 +241,7 @@ def _paths(program: PlannedProgram) -> list[Array]:
 def _listed(motions: Sequence[Motion], program: PlannedProgram) -> list[PreviewedMotion]:
     ends = [*program.begins[1:], program.duration]
     rows = zip(motions, program.begins, ends, program.is_blended, strict=True)
-    return [PreviewedMotion(type(one).__name__, begin, end - begin, soft) for one, begin, end, soft in rows]
+    return [PreviewedMotion(type(one).__name__, begin, end - begin, flows) for one, begin, end, flows in rows]
 
 
 def _collisions(program: PlannedProgram, check: CollisionCheck) -> list[ForeseenCollision]:
