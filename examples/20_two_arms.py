@@ -4,6 +4,7 @@ Run it without arguments for two simulators, or with two targets: python 20_two_
 """
 
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 import heptarm as ha
 
 SIDE = 0.12  # [m]
+FILE = Path(tempfile.mkdtemp()) / "both.mcap"
 
 
 def main() -> None:
@@ -21,7 +23,7 @@ def main() -> None:
         ready = ha.ptp(ha.deg(0, 30, 0, -90, 0, 60, 0))
         ha.start_together({left: ready, right: ready}).wait()
 
-        with arms.record("both.mcap"):
+        with arms.record(FILE):
             for sign in (1.0, -1.0):
                 both = ha.start_together(
                     {
@@ -30,17 +32,17 @@ def main() -> None:
                     }
                 )
                 both.wait()
-                print(f"began {both.skew * 1e3:.1f} ms apart")
+                print(f"began at most {both.skew * 1e3:.1f} ms apart")
         now = ha.states_together(left, right)
         print(f"at rest: {now.states[0].pose} and {now.states[1].pose}")
 
     # on one time line: how well the arms mirrored each other
-    one, other = (ha.load("both.mcap", arm=name) for name in arms.names)
+    one, other = (ha.load(FILE, arm=name) for name in arms.names)
     y = np.interp(one.t, other.t, other["xyz"][:, 1])
     moving = one["motion"] > 0
     if moving.any():
         print(f"mirrored within {np.abs(one['xyz'][:, 1] + y)[moving].max() * 1e3:.1f} mm")
-    print(f"{Path('both.mcap').stat().st_size / 1e6:.1f} MB in both.mcap")
+    print(f"{FILE.stat().st_size / 1e6:.1f} MB in {FILE}")
 
 
 if __name__ == "__main__":

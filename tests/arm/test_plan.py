@@ -93,10 +93,14 @@ def test_the_cabinet_does_what_was_planned(arm: ha.Arm, name: str) -> None:
         ):  # else a place has no sharp time
             offsets.append(stamp * 1e-9 - time)
     assert max(offsets) - min(offsets) < 0.01 * preview.duration
-    arrival = next(stamp for stamp, q in seen if np.abs(q - preview.q[-1]).max() < 1e-6) * 1e-9
-    assert arrival - offsets[0] == pytest.approx(
-        preview.duration, rel=0.01, abs=0.01
-    )  # of 4 ms between states
+    # a program may pass its end before it ends
+    late = [
+        stamp
+        for stamp, q in seen
+        if np.abs(q - preview.q[-1]).max() < 1e-6 and stamp * 1e-9 > offsets[0] + 0.1
+    ]
+    arrival = late[0] * 1e-9
+    assert arrival - offsets[0] == pytest.approx(preview.duration, rel=0.01, abs=0.01)  # 4 ms between states
     assert result.duration > 0.99 * preview.duration  # until the arm has settled
     end = arm.wait_for_rest()
     assert end.q == pytest.approx(preview.q[-1], abs=1e-3)
@@ -156,8 +160,8 @@ def test_torques_are_those_that_the_arm_then_has(arm: ha.Arm) -> None:
 
 
 def test_a_start_of_its_own_and_a_running_motion(arm: ha.Arm) -> None:
-    handle = arm.start(ha.ptp(HOME + 0.2, speed=0.2))
-    handle.wait_started(10.0)
+    handle = arm.start([ha.ptp(HOME + 0.2, speed=0.05), ha.hold(4.0)])
+    arm.wait_until(lambda state: state.motion.active)
     with pytest.raises(ha.ModeConflict, match=r"a motion runs.*give start"):
         arm.plan(ha.lin_rel(z=0.05))
     there = arm.plan(ha.lin_rel(z=0.05), start=HOME + 0.2)

@@ -19,7 +19,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from math import nan
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, TypeVar
@@ -32,14 +31,18 @@ from heptarm.record.recorder import Recorder
 from heptarm.values.arrays import flag, instance, shown, within
 from heptarm.values.mode.mode import Mode
 from heptarm.values.motion.motion import Motion
-from heptarm.values.result import MotionEvent, Result
+from heptarm.values.result import Result
 from heptarm.values.state import State
 
 _log = logging.getLogger("heptarm.arm")
 
 _Answer = TypeVar("_Answer")
 #: Time that cabinets have to plan their programs before they are released [s].
-_LEAD = 0.2
+_PLANNING = 0.2
+#: Time after which a pause holds what is sent then [s]: a cabinet lowers the speed smoothly.
+_PAUSING = 0.5
+#: Longest wait for the state after the end of a motion [s].
+_SOON = 0.5
 #: Longest wait until a cabinet has taken up a program [s].
 _PATIENCE = 10.0
 
@@ -223,36 +226,20 @@ class MotionOfArms:
 
     Attributes:
         handles: the program of each arm.
+        skew: upper bound of the time between the first and the last arm that was released [s]: from the first request
+            that was sent to the last one that was answered.
     """
 
-    def __init__(self, handles: Mapping[Arm, MotionHandle], *, stops_others: bool) -> None:
+    def __init__(self, handles: Mapping[Arm, MotionHandle], *, skew: float, stops_others: bool) -> None:
         self.handles = dict(handles)
+        self.skew = skew
         self._stops_others = stops_others
-        self._begun: dict[Arm, float] = {}
         self._first: HeptarmError | None = None
         self._ended: queue.SimpleQueue[Arm] = queue.SimpleQueue()
         for arm, handle in self.handles.items():
-            handle.add_event_callback(self._noting(arm))
             handle.add_done_callback(lambda _, arm=arm: self._ended.put(arm))  # type: ignore[misc]
         self._watcher = threading.Thread(target=self._watch, name="heptarm-together", daemon=True)
         self._watcher.start()
-
-    def _noting(self, arm: Arm) -> Callable[[MotionEvent], None]:
-        def note(event: MotionEvent) -> None:
-            if event.kind == "begun":
-                self._begun.setdefault(arm, time.monotonic())
-
-        return note
-
-    @property
-    def skew(self) -> float:
-        """Time between the first and the last arm that began to move [s]; NaN until all have.
-
-        It is taken where the cabinets' events arrive, so it holds within the round trip of the network.
-        """
-        if len(self._begun) < len(self.handles):
-            return nan
-        return max(self._begun.values()) - min(self._begun.values())
 
     @property
     def done(self) -> bool:
@@ -311,7 +298,7 @@ def start_together(
     *,
     speed: float | None = None,
     mode: Mode | None = None,
-    lead: float = _LEAD,
+    planning_time: float = _PLANNING,
     stop_others: bool = True,
 ) -> MotionOfArms:
     """Begin motions of several arms at the same moment, and return then.
@@ -323,7 +310,7 @@ def start_together(
         motions: for each arm a motion, or several as one batch.
         speed: ceiling for all of them, (0, 1]; see `Arm.start`.
         mode: control mode of all of them; see `Arm.start`.
-        lead: time that the cabinets have to plan [s], 0 to 10.
+        planning_time: time that the cabinets have to plan [s], 0 to 10.
         stop_others: if one arm fails, or its connection is lost, stop the others.
 
     Returns:
@@ -341,19 +328,22 @@ def start_together(
             hint="for example {left: ha.lin_rel(z=0.1), right: ha.lin_rel(z=-0.1)}",
         )
     flag(stop_others, "stop_others")
-    seconds = within(lead, "lead", 0.0, 10.0, unit="s")
+    seconds = within(planning_time, "planning_time", 0.0, 10.0, unit="s")
     arms = list(motions)
     for arm in arms:
-        status = arm.state.motion
-        if status is not None and (status.active or status.queued):
+        try:  # the last state may be older than the end of the last motion
+            arm.wait_until(_is_idle, timeout=_SOON)
+        except Timeout:
             raise ModeConflict(
                 "an arm still moves, so that it could not begin with the others",
                 parameter="motions",
                 hint="wait until all arms rest: arm.wait_for_rest()",
-            )
+            ) from None
     handles: dict[Arm, MotionHandle] = {}
     try:
         _raise_first(_of_each(arms, Arm.pause))
+        slowest = min(arm.real_time_factor for arm in arms)
+        time.sleep(_PAUSING / min(1.0, slowest))  # until the speed override of each has come down
         for arm in arms:
             handles[arm] = arm.start(motions[arm], speed=speed, mode=mode, when="reject")
         for arm in arms:
@@ -363,15 +353,37 @@ def start_together(
             if handle.error is not None:
                 raise handle.error
     except BaseException:
-        _of_each(list(handles.values()), MotionHandle.cancel)
-        _of_each(arms, Arm.resume)
+        _withdraw(arms, handles)
         raise
-    together = MotionOfArms(handles, stops_others=stop_others)
-    _, errors = _of_each(arms, Arm.resume)
+    moments, errors = _of_each(arms, _released)
     if errors:
         _of_each(arms, Arm.stop)
         raise errors[0]
-    return together
+    skew = max(answered for _, answered in moments) - min(sent for sent, _ in moments)
+    return MotionOfArms(handles, skew=skew, stops_others=stop_others)
+
+
+def _released(arm: Arm) -> tuple[float, float]:
+    """End the pause of an arm; returns when that was requested and when it was answered [s]."""
+    sent = time.monotonic()
+    arm.resume()
+    return sent, time.monotonic()
+
+
+def _withdraw(arms: Sequence[Arm], handles: Mapping[Arm, MotionHandle]) -> None:
+    """Cancel programs that have not been released, and end the pause of each arm whose program has ended."""
+    _of_each(list(handles.values()), MotionHandle.cancel)
+    deadline = time.monotonic() + _PATIENCE
+    while not all(handle.done for handle in handles.values()) and time.monotonic() < deadline:
+        time.sleep(0.005)
+    waiting = [arm for arm, handle in handles.items() if not handle.done]
+    for arm in waiting:
+        _log.error("%r stays paused: its program could not be cancelled", arm)
+    _of_each([arm for arm in arms if arm not in waiting], Arm.resume)
+
+
+def _is_idle(state: State) -> bool:
+    return state.motion is None or not (state.motion.active or state.motion.queued)
 
 
 def _wait_until_taken(arm: Arm, handle: MotionHandle) -> None:

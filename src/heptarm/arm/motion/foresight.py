@@ -17,7 +17,7 @@ from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.preview import PreviewedMotion, ProgramPreview
 from heptarm.arm.motion.program import with_kept_joints
 from heptarm.arm.translate.motions import items
-from heptarm.errors import CollisionForeseen, ModeConflict, require
+from heptarm.errors import CollisionForeseen, ModeConflict, Timeout, require
 from heptarm.model.batch import forward_batch
 from heptarm.model.boundary import TOLERANCE, Boundary
 from heptarm.model.dynamics import inverse_dynamics
@@ -40,6 +40,8 @@ _STEP = 0.02
 _TURN = 0.02
 #: Most samples at which torques are computed; between them they are interpolated.
 _MOST_TORQUES = 600
+#: Longest wait for the state after the end of a motion [s].
+_SOON = 0.5
 _BRIEF = hold(0.01)
 
 
@@ -180,12 +182,16 @@ class Foresight:
     def _rest(self) -> Array:
         """Where the arm rests: the commanded position, from which the controller plans."""
         state = self._connection.fresh()
-        if _is_busy(state):
+        try:  # the last state may be older than the end of the last motion
+            state = (
+                self._connection.wait_for(lambda one: not _is_busy(one), _SOON) if _is_busy(state) else state
+            )
+        except Timeout:
             raise ModeConflict(
                 "a motion runs, so that the arm does not rest where a preview could begin",
                 parameter="start",
                 hint="wait for its end, or give start, the joint positions at which the program would begin",
-            )
+            ) from None
         commanded = state.q_cmd
         return np.where(np.isnan(commanded), state.q, commanded)
 
@@ -235,7 +241,7 @@ def _paths(program: PlannedProgram) -> list[Array]:
 def _listed(motions: Sequence[Motion], program: PlannedProgram) -> list[PreviewedMotion]:
     ends = [*program.begins[1:], program.duration]
     rows = zip(motions, program.begins, ends, program.is_blended, strict=True)
-    return [PreviewedMotion(type(one).__name__, begin, end - begin, soft) for one, begin, end, soft in rows]
+    return [PreviewedMotion(type(one).__name__, begin, end - begin, flows) for one, begin, end, flows in rows]
 
 
 def _collisions(program: PlannedProgram, check: CollisionCheck) -> list[ForeseenCollision]:

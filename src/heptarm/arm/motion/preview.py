@@ -189,7 +189,7 @@ class ProgramPreview(Value):
             MissingExtra: matplotlib is not installed.
         """
         figures: Any = require("matplotlib.figure", extra="record")
-        figure = figures.Figure(figsize=(11, 9.5), layout="constrained")
+        figure: Figure = figures.Figure(figsize=(11, 9.5), layout="constrained")
         grid = figure.add_gridspec(4, 1, height_ratios=[1.9, 1.9, 1.9, 3.6])
         shared = None
         for row, limit in enumerate(("position", "velocity", "torque")):

@@ -25,7 +25,7 @@ from heptarm.values.motion.hand_guiding import HandGuide
 from heptarm.values.motion.line import Lin, LinRel
 from heptarm.values.motion.motion import Hold, Motion
 from heptarm.values.motion.ptp import Ptp, PtpHome, PtpPose
-from heptarm.values.motion.spline import JointSpline, Spline
+from heptarm.values.motion.spline import JointSpline, Segment, Spline
 from heptarm.values.pose import Pose
 from heptarm.values.robot import RobotModel
 
@@ -292,14 +292,13 @@ def _relative(order: Order, motion: LinRel, tcp: Pose, frames: FramesOfArm) -> O
     return replace(order, offset=_seven(turn @ motion.offset @ turn.inverse()))
 
 
-def _segment(order: Order, one: Motion | object, whole: Dynamics) -> Order:
+def _segment(order: Order, one: Segment, whole: Dynamics) -> Order:
     """The order of a segment of a spline."""
-    dynamics = one.dynamics.filled_from(whole)  # type: ignore[attr-defined]
     if isinstance(one, Circ):
         made = replace(order, kind="circ", via=_seven(one.via), pose=_seven(one.end))
     else:
-        made = replace(order, kind="lin" if isinstance(one, Lin) else "spl", pose=_seven(one.target))  # type: ignore[attr-defined]
-    return _limited(replace(made, orientation=one.orientation), dynamics)  # type: ignore[attr-defined]
+        made = replace(order, kind="lin" if isinstance(one, Lin) else "spl", pose=_seven(one.target))
+    return _limited(replace(made, orientation=one.orientation), one.dynamics.filled_from(whole))
 
 
 def _limited(order: Order, dynamics: Dynamics) -> Order:

@@ -232,3 +232,28 @@ def ceiling(arm: Arm) -> None:
         arm.speed = before
     top = float(np.abs(recording.rates[:, 6]).max() / arm.robot.dq_max[6])
     near(top, limit, 0.03 * limit, "fraction of A7's maximum")
+
+
+@scenario(line=2, rows="C28", space=0.15, needs=("ptp", "lin", "blending"))
+def preview(arm: Arm) -> None:
+    """A program moves along the path that a preview showed before, and takes as long."""
+    start = arm.wait_for_rest().pose
+    corner = Pose(start.xyz + [0.0, 0.1, 0.0], start.quat)
+    program = [
+        lin(corner, speed_mps=0.2, blend_m=0.02),
+        lin(Pose(corner.xyz + [0.0, 0.0, 0.1], start.quat), speed_mps=0.2),
+    ]
+    ahead = arm.plan(program)
+    holds(
+        arm.state.motion is None or not arm.state.motion.active,
+        f"nothing moves: {ahead.duration:.2f} s ahead",
+    )
+    note(f"closest to a limit: {ahead.closest('velocity')}")
+    seen = record(arm, program)
+    # a robot's own planner shapes the blend, and times it
+    path_tolerance, time_tolerance = (1.5e-3, 0.03) if arm.is_virtual else (0.02, 0.3)
+    places = ahead.tcp[:, :3]
+    off = max(float(np.linalg.norm(places - one, axis=1).min()) for one in seen.xyz_cmd)
+    below(off, path_tolerance + 0.5 * 0.2 * 0.01, "from the path of the preview", unit="m")
+    near(seen.moving, ahead.duration, time_tolerance * ahead.duration + 0.05, "it took", unit="s")
+    near(seen.q[-1], ahead.q[-1], 2e-3, "where it ended", unit="rad")
