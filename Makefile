@@ -4,7 +4,7 @@ STAMPS := build/stamps
 .DEFAULT_GOAL := setup
 
 .PHONY: setup cabinet demo test test-computing test-ros test-ros2 test-ros1 test-pythons test-long conformance lint check bench soak figures lock docs \
-	wheel clean help
+	wheel first-hour clean help
 
 ##@ To try it
 
@@ -72,11 +72,12 @@ test: setup $(STAMPS)/browser lint check  ## everything; what takes long begins 
 test-computing: setup  ## tests that wait for nothing: values, protocols, kinematics, simulated steps, training
 	nice -n 5 $(PY) -m pytest $(LONGEST) -m "computing and not alone"
 
-# They mostly wait for arms that move; ROS_JOBS=1 runs one after the other.
-ROS_JOBS ?= 2
+# They mostly wait for arms that move, so the two parts of each suite run side by side; ROS_JOBS=1 runs one after the other.
+ROS_JOBS ?= 3
+SIDE_BY_SIDE = @$(MAKE) --no-print-directory -j$(ROS_JOBS) $(if $(filter-out 1,$(ROS_JOBS)),--output-sync=target)
 
-test-ros: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## both ROS nodes, side by side; ROS_JOBS=1: one after the other
-	@$(MAKE) --no-print-directory -j$(ROS_JOBS) $(if $(filter-out 1,$(ROS_JOBS)),--output-sync=target) test-ros2 test-ros1
+test-ros: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## both ROS nodes, parts of both side by side; ROS_JOBS=1: one after the other
+	$(SIDE_BY_SIDE) ros2-shared ros1-shared ros2-own ros1-own
 
 test-long: setup $(STAMPS)/browser  ## everything with LONG=1: soaks, long searches, all cases of conformance
 	LONG=1 $(PY) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder --timeout 3600 $(LONGEST) -m "not alone"
@@ -89,12 +90,18 @@ test-pythons: cabinet  ## the package with each Python of this machine, 3.10 to 
 	scripts/test_pythons.sh $(PYTHONS)
 
 test-ros2: setup $(STAMPS)/ros2  ## the ROS 2 node with real rclpy, where there are wheels of it
-	@if [ -x build/ros2/bin/python ]; then build/ros2/bin/python -m pytest $(LONGEST) tests/ros2; \
-	else echo "no ROS 2 here: the tests of its node are skipped"; fi
+	$(SIDE_BY_SIDE) ros2-shared ros2-own
 
 test-ros1: setup $(STAMPS)/ros1  ## the ROS 1 node with a real roscore, where there are packages of it
-	@if [ -x build/ros1/bin/python ]; then build/ros1/bin/python -m pytest $(LONGEST) tests/ros1; \
-	else echo "no ROS 1 here: the tests of its node are skipped"; fi
+	$(SIDE_BY_SIDE) ros1-shared ros1-own
+
+# ros1 or ros2, and the part of its suite: see tests/conformance/parts.py
+PARTS := ros2-shared ros2-own ros1-shared ros1-own
+.PHONY: $(PARTS)
+$(PARTS):
+	@ros=$(firstword $(subst -, ,$@)); if [ -x build/$$ros/bin/python ]; then \
+	PART=$(lastword $(subst -, ,$@)) build/$$ros/bin/python -m pytest $(LONGEST) tests/$$ros; \
+	else echo "no ROS $${ros#ros} here: the tests of its node are skipped"; fi
 
 conformance: setup $(STAMPS)/ros2 $(STAMPS)/ros1  ## every case of conformance against both nodes, with each kind of execution
 	@for execution in servo spline fri; do for ros in ros2 ros1; do \
@@ -123,8 +130,11 @@ docs: $(STAMPS)/venv  ## the site, in docs/_build/html
 	.venv/bin/sphinx-build -W -q -b html docs docs/_build/html
 	@echo docs/_build/html/index.html
 
-wheel: setup  ## a wheel with the compiled jars, in dist/
-	$(PY) -m build --wheel
+wheel: cabinet  ## a wheel with the compiled jars, in dist/; installs only what that needs
+	$(PY) -m pip wheel -q --no-deps --no-build-isolation --wheel-dir dist .
+
+first-hour:  ## what a newcomer does, timed: clone, demo, tutorial, the wheel with each Python of this machine
+	python3 scripts/first_hour.py
 
 clean:  ## everything that make made, but for the virtual environment
 	rm -rf build dist docs/_build src/heptarm/sim/jars .pytest_cache .mypy_cache .ruff_cache .import_linter_cache

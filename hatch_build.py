@@ -19,5 +19,5 @@ class CabinetHook(BuildHookInterface[Any]):
             return
         cabinet = Path(self.root) / "cabinet"
         subprocess.run([sys.executable, str(cabinet / "build.py")], check=True)
-        for part in ("core/src", "app/src", "project"):
+        for part in ("core/src", "app/src", "without", "project"):
             build_data["force_include"][str(cabinet / part)] = f"heptarm/_cabinet/{part}"

@@ -1,15 +1,36 @@
-"""Sphinx configuration; `make docs` builds the site with every warning an error."""
+"""Sphinx configuration; `make docs` builds the site with every warning an error.
+
+DOCS_ONLINE=1 links names of Python and numpy to their documentation, which needs the network.
+"""
+
+import os
+
+from heptarm import __version__
 
 project = "heptarm"
 author = "The heptarm developers"
 copyright = "2026, The heptarm developers"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+version = release = __version__
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "sphinx_copybutton",
+]
+if os.environ.get("DOCS_ONLINE"):
+    extensions.append("sphinx.ext.intersphinx")
+    intersphinx_mapping = {
+        "python": ("https://docs.python.org/3", None),
+        "numpy": ("https://numpy.org/doc/stable", None),
+    }
 source_suffix = {".md": "markdown"}
 exclude_patterns = ["_build"]
 html_theme = "furo"
-html_title = "heptarm"
+html_title = f"heptarm {__version__}"
 html_show_sourcelink = False
 nitpicky = False
+copybutton_prompt_text = "$ "
 myst_enable_extensions = ["deflist", "colon_fence"]
 myst_heading_anchors = 3
 napoleon_use_ivar = True  # attributes in a docstring are not described twice

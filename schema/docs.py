@@ -1,4 +1,4 @@
-"""Writes docs/reference/protocol.md and errors.md from the schema."""
+"""Writes docs/reference/protocol.md, protocol-messages.md, protocol-types.md and errors.md from the schema."""
 
 from __future__ import annotations
 
@@ -25,7 +25,9 @@ def protocol(spec: Spec) -> str:
     lines = [
         "# The wire protocol",
         "",
-        "This page is generated from `schema/protocol.toml`; any language can speak the protocol from it.",
+        "Any language can speak the protocol from these pages, which are generated from `schema/protocol.toml`: the rules and the"
+        " list of messages here, the fields of each [message](protocol-messages.md), and the [types](protocol-types.md) of the"
+        " fields.",
         "",
         f"TCP, port {p['port']}, the cabinet listens. Version {p['major']}.{p['minor']}: equal major versions understand each"
         " other. Everything is big endian, SI units, quaternions x y z w. Poses are of the motion frame in the robot's base frame.",
@@ -54,11 +56,21 @@ def protocol(spec: Spec) -> str:
     ]
     for message in spec.messages.values():
         lines.append(
-            f"| {message.id} | [{message.name}](#{message.name.lower()}) | {message.source} | {message.kind} | {message.role} | {message.doc} |"
+            f"| {message.id} | [{message.name}](protocol-messages.md#{message.name.lower()}) | {message.source} | {message.kind} | {message.role} | {message.doc} |"
         )
-    lines.append("")
+    return "\n".join([*lines, ""])
+
+
+def messages(spec: Spec) -> str:
+    lines = [
+        "# The messages of the protocol",
+        "",
+        "The fields of each message, in their order; generated from `schema/protocol.toml`. [The wire protocol](protocol.md) has the"
+        " rules, [Types](protocol-types.md) what the fields are made of.",
+        "",
+    ]
     for message in spec.messages.values():
-        lines += [f"### {message.name}", "", f"Id {message.id}, {message.kind}. {message.doc}", ""]
+        lines += [f"## {message.name}", "", f"Id {message.id}, {message.kind}. {message.doc}", ""]
         if message.groups:
             lines += [
                 "A u16 mask of the groups, then each group whose bit is set, in this order:",
@@ -67,11 +79,22 @@ def protocol(spec: Spec) -> str:
                 "|---|---|",
             ]
             lines += [
-                f"| {number} | `{bit}`: [{kind}](#{kind.lower()}) |" for bit, number, kind in message.groups
+                f"| {number} | `{bit}`: [{kind}](protocol-types.md#{kind.lower()}) |" for bit, number, kind in message.groups
             ] + [""]
         else:
             lines += _table(message.fields)
-    lines += ["## Structs", ""]
+    return "\n".join(lines)
+
+
+def types(spec: Spec) -> str:
+    lines = [
+        "# The types of the protocol",
+        "",
+        "What the fields of [messages](protocol-messages.md) are made of; generated from `schema/protocol.toml`.",
+        "",
+        "## Structs",
+        "",
+    ]
     for struct in spec.structs.values():
         lines += [f"### {struct.name}", "", struct.doc, "", *_table(struct.fields)]
     lines += ["## Unions", ""]
@@ -97,16 +120,17 @@ def protocol(spec: Spec) -> str:
 
 def errors(spec: Spec) -> str:
     lines = [
-        "# Codes",
+        "# Errors and what to do",
         "",
-        "Every refusal and every failed motion carries a code, the parameter, its value, what is allowed, and a text. This table"
-        " is generated from `schema/errors.toml`.",
+        "Every refusal and every failed motion carries a code, the parameter, its value, what is allowed, and a text. `error.page` is"
+        " the address of the code's row; on a terminal `heptarm` prints it. Errors that this side finds by itself may have none: their"
+        " text has the remedy. This table is generated from `schema/errors.toml`.",
         "",
         "| code | name | Python error | what it means | what to do |",
         "|---|---|---|---|---|",
     ]
     lines += [
-        f"| {e['code']} | `{e['name']}` | `{e['class']}` | {e['title']} | {e['advice']} |"
+        f"| <a id=\"code-{e['code']}\"></a>{e['code']} | `{e['name']}` | `{e['class']}` | {e['title']} | {e['advice']} |"
         for e in spec.errors
     ]
     return "\n".join([*lines, ""])

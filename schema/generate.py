@@ -34,6 +34,8 @@ def outputs() -> dict[Path, str]:
         wire / "codes.py": python.codes(spec),
         wire / "states.py": python.states(spec),
         pages / "protocol.md": docs.protocol(spec),
+        pages / "protocol-messages.md": docs.messages(spec),
+        pages / "protocol-types.md": docs.types(spec),
         pages / "errors.md": docs.errors(spec),
         ROOT / "src" / "heptarm" / "fri" / "loop" / "native_layout.h": native.header(),
         ROOT / "cpp" / "include" / "heptarm" / "heptarm.hpp": cpp.header(spec),

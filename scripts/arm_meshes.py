@@ -137,7 +137,9 @@ def _rings(f: Distance, heights: Array, centres: Array, reach: float = 0.2) -> t
     return vertices, _gradient(f, vertices), _strip(len(heights))
 
 
-def _lathe(profile: list[tuple[float, float]], colour: str, around: int = AROUND, crease: float = 35.0) -> Part:
+def _lathe(
+    profile: list[tuple[float, float]], colour: str, around: int = AROUND, crease: float = 35.0
+) -> Part:
     """A body turned about the z axis.
 
     Args:
@@ -168,7 +170,9 @@ def _lathe(profile: list[tuple[float, float]], colour: str, around: int = AROUND
     turn = lambda radial, axial: np.stack(  # noqa: E731
         [np.outer(radial, c), np.outer(radial, s), np.outer(axial, np.ones(around))], -1
     ).reshape(-1, 3)
-    return _tidy(colour, turn(table[:, 0], table[:, 1]), turn(table[:, 2], table[:, 3]), np.concatenate(faces))
+    return _tidy(
+        colour, turn(table[:, 0], table[:, 1]), turn(table[:, 2], table[:, 3]), np.concatenate(faces)
+    )
 
 
 def _tidy(colour: str, vertices: Array, normals: Array, faces: Array) -> Part:
@@ -179,7 +183,9 @@ def _tidy(colour: str, vertices: Array, normals: Array, faces: Array) -> Part:
     return Part(colour, vertices[used], normals[used], faces.reshape(-1, 3))
 
 
-def _arc(radius: float, z: float, edge: float, begin: float, end: float, count: int = 5) -> list[tuple[float, float]]:
+def _arc(
+    radius: float, z: float, edge: float, begin: float, end: float, count: int = 5
+) -> list[tuple[float, float]]:
     """Points of a rounded edge about (radius, z), from one angle to another [deg]."""
     angles = np.radians(np.linspace(begin, end, count))
     return [(radius + edge * float(np.cos(t)), z + edge * float(np.sin(t))) for t in angles]
@@ -227,13 +233,19 @@ class Elbow:
         drum = _drum(up, 1, side * (self.face + SEAM), side * self.cap, self.drum, self.edge)
         middle = side * (0.45 * self.face + 0.42 * self.cap)
         limb = _limb(
-            p, np.array([0, 0, 0.2 * self.foot]), np.array([0, middle, self.height]), self.tube - 0.012, self.neck
+            p,
+            np.array([0, 0, 0.2 * self.foot]),
+            np.array([0, middle, self.height]),
+            self.tube - 0.012,
+            self.neck,
         )
         tube = _drum(p, 2, -0.1, self.foot, self.tube, 0.02)
         # no blending at the seam, where the tube is a circle
         body = _blend(_blend(tube, limb, 0.004 + 0.04 * _smooth(p[:, 2] / 0.08)), drum, 0.05)
         body = -_blend(-body, self.cap - 0.002 - side * p[:, 1], 0.03)
-        other = np.maximum(np.hypot(up[:, 0], up[:, 2]) - self.neighbour - 0.003, side * up[:, 1] - self.face - SEAM)
+        other = np.maximum(
+            np.hypot(up[:, 0], up[:, 2]) - self.neighbour - 0.003, side * up[:, 1] - self.face - SEAM
+        )
         return -_blend(-body, other, 0.016)
 
     def parts(self) -> list[Part]:
@@ -242,7 +254,9 @@ class Elbow:
         top = height - 0.15 * self.drum
         shelf = height - self.neighbour - 0.003
         steps = np.concatenate([np.linspace(0.012, shelf - 0.02, 7), np.linspace(shelf + 0.02, top, 4)])
-        heights = np.sort(np.concatenate([[SEAM, SEAM + 0.002], steps, shelf + 0.001 * np.array([-12, -7, -3, 0, 4, 10])]))
+        heights = np.sort(
+            np.concatenate([[SEAM, SEAM + 0.002], steps, shelf + 0.001 * np.array([-12, -7, -3, 0, 4, 10])])
+        )
         centres = side * 0.5 * (self.face + self.cap) * _smooth((heights / height - 0.25) / 0.37)
         vertices, normals, faces = _rings(self._distance, heights, centres)
         vertices[:AROUND, :2] *= 1 - 0.0005 / self.tube  # a bevel at the seam
@@ -323,7 +337,11 @@ def _hand(height: float, face: float) -> list[Part]:
     heights = np.concatenate([np.linspace(0.0, height - 0.006, 13), [height - SEAM]])
     vertices, normals, faces = _rings(distance, heights, 0 * heights)
     vertices[-AROUND:, :2] *= 1 - 0.0005 / 0.047
-    profile = [(radius - edge - 0.009, end), *_arc(radius - edge, end - edge, edge, 90, 0, 6), (radius, begin + 0.004)]
+    profile = [
+        (radius - edge - 0.009, end),
+        *_arc(radius - edge, end - edge, edge, 90, 0, 6),
+        (radius, begin + 0.004),
+    ]
     profile += [(radius - 0.004, begin), (0.0, begin)]
     ring = radius - edge
     accent = [(ring - 0.010, end - 0.001), (ring - 0.010, end + 0.001), (ring - 0.008, end + 0.0016)]
@@ -421,7 +439,9 @@ def collada(parts: list[Part]) -> str:
             "<specular><color>0.3 0.3 0.3 1</color></specular><shininess><float>40</float></shininess>"
             "</phong></technique></profile_COMMON></effect>"
         )
-        materials.append(f'<material id="{name}" name="{name}"><instance_effect url="#{name}-effect"/></material>')
+        materials.append(
+            f'<material id="{name}" name="{name}"><instance_effect url="#{name}-effect"/></material>'
+        )
         sources = []
         for kind, values, digits in (("position", part.vertices, 4), ("normal", part.normals, 2)):
             sources.append(
@@ -443,11 +463,13 @@ def collada(parts: list[Part]) -> str:
             "</instance_geometry></node>"
         )
     libraries = (("effects", effects), ("materials", materials), ("geometries", geometries))
-    body = "\n".join(f"<library_{name}>\n" + "\n".join(found) + f"\n</library_{name}>" for name, found in libraries)
+    body = "\n".join(
+        f"<library_{name}>\n" + "\n".join(found) + f"\n</library_{name}>" for name, found in libraries
+    )
     return (
         '<?xml version="1.0" encoding="utf-8"?>\n<!-- written by scripts/arm_meshes.py -->\n'
         '<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">\n'
-        '<asset><created>2026-01-01T00:00:00</created><modified>2026-01-01T00:00:00</modified>'
+        "<asset><created>2026-01-01T00:00:00</created><modified>2026-01-01T00:00:00</modified>"
         '<unit name="meter" meter="1"/><up_axis>Z_UP</up_axis></asset>\n'
         f'{body}\n<library_visual_scenes><visual_scene id="scene">{"".join(nodes)}</visual_scene>'
         '</library_visual_scenes>\n<scene><instance_visual_scene url="#scene"/></scene>\n</COLLADA>\n'

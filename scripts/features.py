@@ -27,8 +27,9 @@ The features of the open frameworks for this arm (libiiwa, iiwa_stack, KUKA-IIWA
 their names in Python and the scenarios that show them. [Scenarios](../guide/scenarios.md) run on the virtual cabinet
 and, with care, on a robot.
 
-The column *known from* lists the systems in which the feature works completely; it is empty where none has it. This
-page is written by `scripts/features.py` from `docs/features.toml`.
+The column *known from* lists the systems in which the feature works completely; it is empty where none does.
+*Partly*: a part of it is missing, and the text states which. `scripts/features.py` writes this page from
+`docs/features.toml`.
 """
 
 
@@ -42,6 +43,7 @@ class Row:
     api: tuple[str, ...] = ()
     how: str = ""
     elsewhere: str = ""
+    partly: str = ""
     left_out: str = ""
 
     @classmethod
@@ -102,7 +104,8 @@ def _cell(text: str) -> str:
 
 def _here(row: Row) -> str:
     names = ", ".join(f"`{_short(name)}`" for name in row.api)
-    return _cell(": ".join(part for part in (names, row.how) if part))
+    text = ": ".join(part for part in (names, row.how) if part)
+    return _cell(f"{text}. *Partly*: {row.partly}" if row.partly else text)
 
 
 def _shown(row: Row, every: tuple[Scenario, ...]) -> str:
@@ -116,7 +119,13 @@ def page() -> str:
     """The whole page."""
     groups, rows = load()
     every = scenarios()
-    lines = [HEAD]
+    partly, left_out = sum(bool(row.partly) for row in rows), sum(bool(row.left_out) for row in rows)
+    complete = len(rows) - partly - left_out
+    lines = [
+        HEAD,
+        f"Of {len(rows)} features {complete} are complete, {partly} partly here, {left_out} missing.",
+        "",
+    ]
     for letter, title in groups.items():
         lines += [
             f"## {title}",

@@ -139,6 +139,7 @@ ACCEPTED: dict[tuple[str, str], str] = {
     **{("Dynamics", bad): _OPEN for bad in ("nan", "nan array")},
     ("PoseLimits", "inf"): _FREE,
     ("Redundancy.e1", "nan"): _OPEN,
+    ("ptp.target", "nan array"): "NaN keeps this joint",
     ("hand_guide.q_min", "nan array"): _OPEN,
     ("hand_guide.q_max", "nan array"): _OPEN,
     ("hold.seconds", "inf"): "until it is cancelled",
@@ -219,7 +220,8 @@ def bad_values(annotation: str, parameter: str) -> Iterator[tuple[str, object]]:
     yield "matrix", np.full((2, 3), 0.1)
     yield "masked array", np.ma.masked_array(np.full(size, 0.1), mask=[True] + [False] * (size - 1))
     if any(
-        "ArrayLike" in part or part in ("Array", "Floats") or part.startswith("tuple[float") for part in parts
+        "ArrayLike" in part or part in ("Array", "Floats", "Directional") or part.startswith("tuple[float")
+        for part in parts
     ):
         yield "nan array", [math.nan] + [0.1] * (size - 1)
         yield "inf array", [math.inf] + [0.1] * (size - 1)
@@ -237,7 +239,9 @@ def bad_values(annotation: str, parameter: str) -> Iterator[tuple[str, object]]:
 
 def is_array(part: str) -> bool:
     """Whether an annotation is that of an array of numbers."""
-    return part in ("npt.ArrayLike", "Array", "Floats") or part.startswith(("tuple[float", "Sequence[float"))
+    return part in ("npt.ArrayLike", "Array", "Floats", "Directional") or part.startswith(
+        ("tuple[float", "Sequence[float")
+    )
 
 
 def alternatives(annotation: str) -> list[str]:
@@ -269,7 +273,7 @@ def has_meaning(annotation: str, bad: str) -> bool:
             or (part == "int" and bad == "negative")
             or (head in ("Sequence", "Mapping", "Iterable", "tuple") and bad == "empty list")
             or (head == "Iterable" and bad == "generator")
-            or (head in ("npt.ArrayLike",) and bad in _REAL)
+            or (head in ("npt.ArrayLike", "Directional") and bad in _REAL)
         ):
             return True
     return False

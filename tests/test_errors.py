@@ -11,6 +11,7 @@ import pytest
 from heptarm import errors
 from heptarm.errors import HeptarmError, LimitError, MissingExtra, MotionAborted, NeedsOperator, require
 from heptarm.values.result import Cause, Result
+from heptarm.wire.codes import MEANINGS
 
 ALL = [kind for _, kind in inspect.getmembers(errors, inspect.isclass) if issubclass(kind, HeptarmError)]
 
@@ -27,6 +28,14 @@ def test_carries_its_details(kind: type[HeptarmError]) -> None:
     assert str(error) == "it failed (do less)"
     assert (error.code, error.parameter, error.value, error.allowed) == (2, "q[3]", 4.0, "[0, 1]")
     assert str(kind("plain")) == "plain"
+
+
+def test_each_code_has_its_row_in_the_documentation() -> None:
+    page = (Path(__file__).parents[1] / "docs/reference/errors.md").read_text(encoding="utf-8")
+    for code in MEANINGS:
+        address, _, anchor = HeptarmError("it failed", code=code).page.partition("#")
+        assert address.endswith("/docs/reference/errors.md") and f'<a id="{anchor}"></a>{code} ' in page
+    assert "#" not in HeptarmError("found here").page
 
 
 @pytest.mark.parametrize(

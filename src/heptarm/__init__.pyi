@@ -196,6 +196,9 @@ from .values.motion.ptp import (
 from .values.motion.ptp import (
     ptp_home as ptp_home,
 )
+from .values.motion.ptp import (
+    ptp_transport as ptp_transport,
+)
 from .values.motion.search import (
     Spiral as Spiral,
 )

@@ -48,6 +48,8 @@ from typing import Any, TypeVar
 
 _Error = TypeVar("_Error", bound="HeptarmError")
 
+#: Documentation of the codes.
+_PAGE = "https://github.com/heptarm/heptarm/blob/main/docs/reference/errors.md"
 #: The operating system.
 _PLATFORM = sys.platform
 
@@ -86,6 +88,11 @@ class HeptarmError(Exception):
     def __str__(self) -> str:
         """The text and, if there is one, the hint."""
         return f"{self.text} ({self.hint})" if self.hint else self.text
+
+    @property
+    def page(self) -> str:
+        """Address of the documentation of its code: what it means, and what to do."""
+        return f"{_PAGE}#code-{self.code}" if self.code else _PAGE
 
     @property
     def black_box(self) -> Path | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
+from queue import SimpleQueue
 from threading import Event, Thread
 
 import numpy as np
@@ -185,6 +186,18 @@ def test_taps(arm: ha.Arm) -> None:
         done.set()
         hand.join()
     arm.wait_until(lambda state: np.abs(state.wrench.force).max() < 1.0)
+
+    tapped: SimpleQueue[ha.State] = SimpleQueue()
+    end = arm.on_taps(tapped.put, 1, gap=10.0)
+    arm.move(ha.lin_rel(z=0.02, frame="base", speed_mps=0.2))  # no tap
+    assert tapped.empty()
+    while tapped.empty():
+        arm.operator.push([0, 0, 30], duration=0.1)
+        arm.wait_until(lambda state: state.wrench.force[2] > 20.0)
+        arm.wait_until(lambda state: state.wrench.force[2] < 1.0)
+    assert tapped.get().wrench is not None
+    end()
+
     with pytest.raises(ha.Timeout, match="not tapped 2 times"):
         arm.wait_for_taps(2, timeout=0.3)
     with pytest.raises(ha.LimitError, match="count"):

@@ -55,6 +55,22 @@ def test_events_of_other_clients_motions_change_nothing(peer: Peer) -> None:
         assert handle.wait(timeout=20.0).arrived
 
 
+def test_nan_keeps_the_set_point_of_a_joint(peer: Peer) -> None:
+    sent: list[wire.Run] = []
+    peer.runs(1, wire.ItemReached(id=1, item=0), peer.finished(1, item=2), check=sent.append)
+    nan = np.nan
+    only_a7 = ha.ptp([nan] * 6 + [0.3])
+    with peer.arm() as arm:
+        arm.move([only_a7, ha.hold(0.1), ha.ptp([0.1] + [nan] * 6)])
+        first, _, third = (item.motion for item in sent[0].items)
+        assert isinstance(first, wire.Ptp) and isinstance(third, wire.Ptp)
+        assert first.q == pytest.approx([*peer.q[:6], 0.3]) and third.q == pytest.approx(
+            [0.1, *peer.q[1:6], 0.3]
+        )
+        with pytest.raises(ha.CommandRejected, match=r"motions\[1\] keeps joints .* not known yet"):
+            arm.move([ha.lin_rel(z=0.01), only_a7])
+
+
 def test_a_batch_is_one_program(peer: Peer) -> None:
     sent: list[wire.Run] = []
     peer.runs(1, wire.ItemReached(id=1, item=0), peer.finished(1, item=1), check=sent.append)

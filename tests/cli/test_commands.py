@@ -139,7 +139,7 @@ def test_dry_run_moves_nothing(target: str) -> None:
             ("move", "ptp", "0", "150", "0", "-90", "0", "60", "0", "--deg"),
             ("A2", "150.00", "[-120, 120] deg"),
         ),
-        (("move", "ptp", "0", "nan", "0", "-1", "0", "1", "0"), ("nan",)),
+        (("move", "ptp", "0", "inf", "0", "-1", "0", "1", "0"), ("inf",)),
         (("move", "lin-rel", "--x", "3"), ("Can not plan motion",)),
         (("move", "lin-rel", "--x", "0.01", "--speed", "1.5"), ("speed", "(0, 1]")),
     ],
@@ -167,6 +167,11 @@ def test_doctor_looks_at_a_cabinet(target: str) -> None:
     verdicts = {one["what"]: one for one in objects("doctor", "--target", target)}
     assert verdicts["session"]["how"] == verdicts["network"]["how"] == verdicts["safety"]["how"] == "ok"
     assert "us median" in verdicts["round trip"]["found"]
+    assert verdicts["options"]["how"] == "ok" and "Sunrise.FRI" in verdicts["options"]["found"]
+    docs = Path(__file__).parents[2] / "docs"
+    for verdict in verdicts.values():
+        place, _, _ = verdict["page"].partition("/docs/")[2].partition("#")
+        assert (docs / place).is_file(), verdict
     assert re.search(r"\d+ of \d+ pings answered by UDP", verdicts["datagrams"]["found"])
 
 
@@ -187,6 +192,17 @@ def test_install_cabinet_writes_sources_and_steps_once(tmp_path: Path) -> None:
     )
     again = run("install-cabinet", "--out", str(out))
     assert again.returncode == 1 and "must be a new or empty folder" in again.stderr
+
+
+def test_install_cabinet_leaves_options_out(tmp_path: Path) -> None:
+    (reported,) = objects("install-cabinet", "--out", str(tmp_path / "some"), "--without", "hand-guiding,fri")
+    assert reported["without"] == ["fri", "hand-guiding"]
+    app = tmp_path / "some/src/heptarm/app"
+    assert "left out" in (app / "SunriseFri.java").read_text(encoding="utf-8")
+    assert "SmartServo" in (app / "SunriseServo.java").read_text(encoding="utf-8")
+    done = run("install-cabinet", "--out", str(tmp_path / "none"), "--without", "welding")
+    assert done.returncode == 1 and "servoing, fri, hand-guiding, got 'welding'" in done.stderr
+    assert not (tmp_path / "none").exists()
 
 
 def test_demo_goes_as_designed_and_saves_a_plot(tmp_path: Path) -> None:

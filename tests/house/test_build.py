@@ -14,6 +14,7 @@ sys.path.insert(0, str(ROOT / "cabinet"))
 
 import classfile  # noqa: E402
 import toolchain  # noqa: E402
+from heptarm.cli.install_cabinet import install_cabinet  # noqa: E402
 
 REFUSALS = classfile.Refusals.load(ROOT / "cabinet" / "java7.txt", ("com/kuka/",))
 JARS = ROOT / "src" / "heptarm" / "sim" / "jars"
@@ -102,3 +103,45 @@ def test_doubles_say_that_they_must_not_be_deployed() -> None:
         assert "Never deploy" in file.read("META-INF/MANIFEST.MF").decode().replace("\r\n ", "")
         assert b"Never deploy" in file.read("NEVER-DEPLOY-TO-A-ROBOT.txt")
         assert "META-INF/services/heptarm.core.Clock" in file.namelist()
+
+
+#: Where the packages of an option have their classes.
+OPTIONS = {
+    "servoing": ("com/kuka/connectivity/motionModel/",),
+    "fri": ("com/kuka/connectivity/fastRobotInterface/",),
+    "hand-guiding": ("com/kuka/roboticsAPI/motionModel/HandGuidingMotion",),
+}
+
+
+@pytest.mark.parametrize("without", [[], [*OPTIONS]], ids=["everything", "no option"])
+def test_sources_compile_in_a_workbench_without_options(
+    jdk: toolchain.Jdk, tmp_path: Path, without: list[str]
+) -> None:
+    """What `heptarm install-cabinet` writes compiles where the classes of options that are left out do not exist."""
+    out, library = tmp_path / "cabinet", tmp_path / "library.jar"
+    install_cabinet(out=out, no_key=True, without=",".join(without))
+    gone = tuple(prefix for option in OPTIONS for prefix in OPTIONS[option])
+    with (
+        zipfile.ZipFile(JARS / "heptarm-doubles-not-for-robots.jar") as every,
+        zipfile.ZipFile(library, "w") as some,
+    ):
+        for name in every.namelist():
+            if not name.startswith(gone):
+                some.writestr(name, every.read(name))
+    sources = sorted(str(path) for path in (out / "src").rglob("*.java"))
+    java7 = toolchain.java7_library(jdk, tmp_path)
+    command = [*toolchain.find_ecj(jdk), "-bootclasspath", str(java7), "-source", "1.6", "-target", "1.6"]
+    command += [
+        "-nowarn",
+        "-proc:none",
+        "-classpath",
+        str(library),
+        "-d",
+        str(tmp_path / "classes"),
+        *sources,
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if without:
+        assert done.returncode == 0, done.stdout + done.stderr
+    else:
+        assert done.returncode != 0 and "smartServo" in done.stdout + done.stderr

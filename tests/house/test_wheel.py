@@ -53,6 +53,7 @@ def test_wheel_carries_jars_and_cabinet_sources(wheel: Path) -> None:
     assert "heptarm/py.typed" in names
     assert any(name.startswith("heptarm/_cabinet/core/src/") and name.endswith(".java") for name in names)
     assert any(name.startswith("heptarm/_cabinet/app/src/") and name.endswith(".java") for name in names)
+    assert "heptarm/_cabinet/without/fri/src/heptarm/app/SunriseFri.java" in names
     assert any(name.startswith("heptarm/_cabinet/project/") for name in names)
     assert not any("cabinet/doubles" in name for name in names)
     assert any(name.endswith("licenses/NOTICE") for name in names)

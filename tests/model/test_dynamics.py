@@ -16,7 +16,7 @@ from heptarm.model.dynamics import (
     mass_matrix,
 )
 from heptarm.model.kinematics import forward, jacobian
-from heptarm.values.robot import ROBOTS, Body, RobotModel
+from heptarm.values.robot import ROBOTS, Body, Friction, RobotModel
 from tests.model.arms import random_q
 
 ALL = list(ROBOTS.values())
@@ -137,7 +137,23 @@ def test_moving_mass(name: str, moving: float) -> None:
     assert ROBOTS[name].links.mass.sum() == pytest.approx(moving, abs=0.01)
 
 
+def test_friction_acts_against_the_motion() -> None:
+    robot = ROBOTS["iiwa14"]
+    friction = Friction(viscous=[0.5] * 7, coulomb=2.0)
+    q, dq, ddq = np.full(7, 0.3), np.array([1.0, -1.0, 0.5, 0.0, 0.2, -0.2, 0.1]), np.full(7, 0.1)
+    added = inverse_dynamics(robot, q, dq, ddq, friction=friction) - inverse_dynamics(robot, q, dq, ddq)
+    assert added == pytest.approx(0.5 * dq + 2.0 * np.sign(dq), abs=1e-6)
+    tau = inverse_dynamics(robot, q, dq, ddq, load=LOAD, friction=friction)
+    assert forward_dynamics(robot, q, dq, tau, load=LOAD, friction=friction) == pytest.approx(ddq, abs=1e-9)
+    assert friction.torque(np.full(7, 0.01)) == pytest.approx(0.5 * 0.01 + 2.0 * np.tanh(1.0))
+    assert (Friction().torque(dq) == 0.0).all() and Friction(1.0) == Friction([1.0] * 7)
+
+
 def test_refuses() -> None:
+    with pytest.raises(LimitError, match=r"coulomb\[2\] must be in \[0, 1000\], got -1"):
+        Friction(1.0, [0, 0, -1, 0, 0, 0, 0])
+    with pytest.raises(LimitError, match=r"transition must be in \(0, 10\] rad/s"):
+        Friction(1.0, transition=0.0)
     with pytest.raises(LimitError, match=r"mass must be in \[0, 50\] kg, got -1 kg"):
         Body(-1.0, (0, 0, 0))
     with pytest.raises(LimitError, match="principal moments 0, 0, 1"):

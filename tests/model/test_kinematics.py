@@ -89,6 +89,44 @@ def test_jacobian_of_a_tool_point(robot: RobotModel) -> None:
     assert np.abs(jacobian(robot, q, point)[:3] - numeric).max() < 1e-8
 
 
+def test_links_are_those_of_mujoco(robot: RobotModel) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(
+        files("heptarm.sim").joinpath("models", f"{robot.name}.xml").read_text()
+    )
+    data = mujoco.MjData(model)
+    j = np.zeros((6, model.nv))
+    rng = np.random.default_rng(6)
+    for _ in range(20):
+        q = random_q(robot, rng)
+        data.qpos[:7] = q
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        for link in range(1, 8):
+            body = data.body(f"link_{link}")
+            pose = forward(robot, q, link=link)
+            assert np.abs(pose[:3, 3] - body.xpos).max() < 1e-9
+            assert np.abs(pose[:3, :3].ravel() - body.xmat).max() < 1e-9
+            point = (pose @ [0.03, -0.02, 0.1, 1.0])[:3]
+            mujoco.mj_jac(model, data, j[:3], j[3:], point, body.id)
+            assert np.abs(jacobian(robot, q, point, link=link) - j[:, :7]).max() < 1e-9
+
+
+def test_the_table_of_denavit_and_hartenberg_is_the_robot(robot: RobotModel) -> None:
+    assert robot.dh.shape == (7, 4)
+    for q in np.random.default_rng(7).uniform(robot.q_min, robot.q_max, (20, 7)):
+        pose = np.eye(4)
+        for (a, alpha, d, theta), angle in zip(robot.dh, q):
+            c, s, ca, sa = np.cos(theta + angle), np.sin(theta + angle), np.cos(alpha), np.sin(alpha)
+            pose = pose @ [
+                [c, -s * ca, s * sa, a * c],
+                [s, c * ca, -c * sa, a * s],
+                [0, sa, ca, d],
+                [0, 0, 0, 1],
+            ]
+        assert np.abs(pose - forward(robot, q)).max() < 1e-14
+
+
 def test_jacobian_derivative_is_the_derivative(robot: RobotModel) -> None:
     rng = np.random.default_rng(4)
     h = 1e-6
@@ -121,3 +159,7 @@ def test_refuses(robot: RobotModel) -> None:
         forward(robot, np.zeros(6))
     with pytest.raises(LimitError, match=r"q\[2\] .*nan"):
         jacobian(robot, [0, 0, np.nan, 0, 0, 0, 0])
+    with pytest.raises(ShapeError, match=r"link 4 must be given with a point of it .*link=4"):
+        jacobian(robot, np.zeros(7), link=4)
+    with pytest.raises(LimitError, match=r"link must be in \[1, 7\]"):
+        forward(robot, np.zeros(7), link=8)

@@ -188,7 +188,14 @@ def six(index: int, value: float) -> list[float]:
         (lambda: JointImpedance(NAN), LimitError, r"stiffness\[0\] must .*got nan"),
         (lambda: JointImpedance(1.0, damping=1.1), LimitError, r"damping\[0\] must be in \[0, 1\], got 1.1"),
         (lambda: JointImpedance(1.0, damping=None), ShapeError, "must be one number or 7 numbers"),
-        (lambda: CartesianImpedance(300.0), ShapeError, r"must be 6 numbers.*three along the axes"),
+        (lambda: CartesianImpedance(3000.0), LimitError, r"\[3\] must be in \[0, 300\] Nm/rad.*\"abc\": 200"),
+        (lambda: CartesianImpedance({"xyz": 9000}), LimitError, r"stiffness\[0\] must .*got 9000"),
+        (lambda: CartesianImpedance({}), ShapeError, "must have groups of the directions"),
+        (lambda: CartesianImpedance({"q": 1}), ShapeError, "must have groups of the directions"),
+        (lambda: CartesianImpedance({"xy": 1, "x": 2}), ShapeError, "each direction at most once"),
+        (lambda: CartesianImpedance({1: 2}), ShapeError, "must have groups of the directions"),
+        (lambda: CartesianImpedance({"z": "stiff"}), ShapeError, "must be one number or 6 numbers"),
+        (lambda: CartesianImpedance(max_force={"z": -1}), LimitError, r"max_force\[2\] must"),
         (lambda: CartesianImpedance([1.0] * 7), ShapeError, r"stiffness must have shape .*got \(7,\)"),
         (lambda: CartesianImpedance(six(2, 5001)), LimitError, r"\[2\] must be in \[0, 5000\] N/m, got 5001"),
         (lambda: CartesianImpedance(six(3, 301)), LimitError, r"\[3\] must be in \[0, 300\] Nm/rad, got 301"),
@@ -281,3 +288,21 @@ def test_refuses_with_value_range_and_remedy(
 ) -> None:
     with pytest.raises(error, match=text):
         make()
+
+
+def test_groups_of_directions() -> None:
+    mode = CartesianImpedance(
+        {"xy": 3000, "abc": 150},
+        damping={"z": 1.0},
+        additional_force={"z": 5},
+        max_force={"xyz": 40, "a": 10},
+    )
+    assert mode.stiffness.tolist() == [3000, 3000, 2000, 150, 150, 150]  # z keeps the default
+    assert mode.damping.tolist() == [0.7, 0.7, 1.0, 0.7, 0.7, 0.7]
+    assert mode.additional_force.tolist() == [0, 0, 5, 0, 0, 0]
+    assert (
+        mode.max_force[[0, 1, 2, 5]].tolist() == [40, 40, 40, 10] and np.isnan(mode.max_force[[3, 4]]).all()
+    )
+    assert CartesianImpedance(250.0) == CartesianImpedance({"xyzabc": 250.0})
+    sine = SineImpedance(amplitude={"z": 5.0}, frequency={"z": 2.0}, position_limit={"xyz": 0.1})
+    assert sine.amplitude.tolist() == [0, 0, 5, 0, 0, 0] and np.isnan(sine.position_limit[3:]).all()

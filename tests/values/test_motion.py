@@ -18,8 +18,8 @@ from heptarm.values.frames import BASE
 from heptarm.values.motion.dynamics import Blending, Dynamics
 from heptarm.values.motion.line import Lin, LinRel, lin, lin_rel
 from heptarm.values.motion.motion import Hold, Motion, hold
-from heptarm.values.motion.ptp import Ptp, PtpPose, ptp, ptp_home
-from heptarm.values.motion.spline import spl
+from heptarm.values.motion.ptp import Ptp, PtpPose, ptp, ptp_home, ptp_transport
+from heptarm.values.motion.spline import spl, spline_joints
 from heptarm.values.pose import Pose, Redundancy, deg
 
 Q = deg(0, 30, 0, -90, 0, 60, 0)
@@ -31,6 +31,7 @@ MAKERS: list[Callable[[], Motion]] = [
     lambda: ptp(Q, speed=0.2, acceleration=[0.1] * 7, jerk=1.0, blend_rel=0.1),
     lambda: ptp(POSE, near=Q),
     lambda: ptp_home(speed=0.3, blend_rel=0.2),
+    lambda: ptp_transport(speed=0.3, blend_rel=0.2),
     lambda: ptp(POSE, redundancy=Redundancy(0.2, 2, 10), moving="flange"),
     lambda: lin(POSE, speed_mps=0.1, acceleration_mps2=1.0, jerk_mps3=10.0, near=Q),
     lambda: lin(POSE, speed_radps=0.5, joint_speed=0.3, blend_m=0.02, blend_rad=0.1),
@@ -64,6 +65,15 @@ def test_types() -> None:
     assert isinstance(lin(POSE), Lin)
     assert isinstance(lin_rel(), LinRel)
     assert isinstance(hold(), Hold)
+
+
+def test_the_transport_position_is_folded() -> None:
+    assert np.degrees(ptp_transport().q) == pytest.approx([0, 25, 0, 90, 0, 0, 0])
+
+
+def test_nan_keeps_a_joint() -> None:
+    motion = ptp([NAN] * 6 + [0.3])
+    assert isinstance(motion, Ptp) and motion.keeps and motion.q[6] == 0.3 and not ptp(Q).keeps
 
 
 def test_what_is_not_given_keeps_the_default() -> None:
@@ -137,7 +147,9 @@ def test_a_ceiling_only_slows_down(speed: float | None, ceiling: float) -> None:
         (lambda: ptp(None), ShapeError, "must be 7 numbers"),
         (lambda: ptp([None] * 7), ShapeError, "must be 7 numbers"),
         (lambda: ptp([True] * 7), ShapeError, "must be 7 numbers"),
-        (lambda: ptp([0.0] * 6 + [NAN]), LimitError, r"q\[6\] must .*got nan"),
+        (lambda: ptp([NAN] * 7), LimitError, "q must have .* one joint at least"),
+        (lambda: spline_joints([[0.0] * 6 + [NAN]]), LimitError, r"points\[0\]\[6\] must .*got nan"),
+        (lambda: spline_joints([ptp([0.0] * 6 + [NAN])]), LimitError, r"points\[0\]\[6\] must .*got nan"),
         (lambda: ptp([math.inf] + [0.0] * 6), LimitError, r"q\[0\] must .*got inf"),
         (lambda: ptp(Q, speed=0), LimitError, r"speed\[0\] must be in \(0, 1\], got 0"),
         (lambda: ptp(Q, speed=1.1), LimitError, r"speed\[0\] must be in \(0, 1\], got 1.1"),

@@ -583,6 +583,7 @@ class Arm:
         ceiling, breaks = self._speed, self._breaks
         if speed is not None:
             ceiling = min(ceiling, within(speed, "speed", 0.0, 1.0, above=True))
+        motions = program.with_kept_joints(self._connection, motions)
         self._foresight.examine(motions, when)
         return program.send(
             self._connection,
@@ -905,6 +906,7 @@ class Arm:
     touch = touching.touch
     touch_twice = touching.touch_twice
     wait_for_taps = touching.wait_for_taps
+    on_taps = touching.on_taps
     collision_guard = guarding.collision_guard
     guarded = guarding.guarded
     guide_precisely = teaching.guide_precisely

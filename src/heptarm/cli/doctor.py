@@ -57,6 +57,31 @@ _VERSION = (
     "leave --fri-version (version= in a program) out: heptarm takes it from the first message; a client that is built "
     "with KUKA's SDK has to be built for the cabinet's version"
 )
+_SITE = "https://github.com/heptarm/heptarm/blob/main/docs"
+#: Pages that explain a check, in the order of the checks: from what one needs to the first motion.
+_PAGES = {
+    "Python": "guide/real-robot/what-you-need.md",
+    "extras": "guide/real-robot/what-you-need.md",
+    "Java": "guide/virtual-cabinet.md",
+    "cabinet": "guide/virtual-cabinet.md",
+    "real time": "guide/fri.md",
+    "port": "guide/virtual-cabinet.md",
+    "network": "guide/real-robot/network.md",
+    "session": "guide/real-robot/project.md",
+    "options": "guide/real-robot/what-you-need.md#options-of-sunrise",
+    "protection": "guide/security.md",
+    "round trip": "guide/real-robot/network.md",
+    "state": "guide/state.md",
+    "datagrams": "guide/connect.md",
+    "safety": "guide/real-robot/safety-configuration.md",
+}
+#: What an option of Sunrise adds, by the capability that the cabinet reports.
+_OPTIONS = {
+    "servo": "servo motions (Sunrise.Servoing)",
+    "servo_lin": "straight servo motions",
+    "fri": "FRI (Sunrise.FRI)",
+    "hand_guide": "hand guiding",
+}
 _UNKNOWN = "read the messages on the smartPAD and the log of the cabinet application"
 
 
@@ -87,6 +112,12 @@ class CheckResult:
     how: str
     found: str
     remedy: str = ""
+
+    @property
+    def page(self) -> str:
+        """Address of the page that explains the check; empty: none does."""
+        page = _PAGES.get(self.what, "guide/fri.md" if self.what.startswith("FRI") else "")
+        return f"{_SITE}/{page}" if page else ""
 
 
 def doctor(
@@ -123,9 +154,13 @@ def doctor(
         verdicts += _fri(look, target=None if look.listens else target)
     if as_json:
         for verdict in verdicts:
-            emit(asdict(verdict))
+            emit(asdict(verdict) | {"page": verdict.page})
     else:
         Console().print(_table(verdicts))
+        for page in dict.fromkeys(
+            verdict.page for verdict in verdicts if verdict.how != "ok" and verdict.page
+        ):
+            print(f"see {page}")
     return 1 if any(verdict.how == "bad" for verdict in verdicts) else 0
 
 
@@ -237,11 +272,24 @@ def _target(target: CommandTarget, text: str) -> Iterator[CheckResult]:
             "ok",
             f"{arm.robot.title}{' (virtual)' if arm.is_virtual else ''}, cabinet application {arm.software}",
         )
+        yield _options(arm)
         yield _protection(arm, keyed=target.find_key() is not None)
         yield _round_trip(arm)
         yield _age(arm)
         yield datagram_check(arm)
         yield _safety(arm)
+
+
+def _options(arm: Arm) -> CheckResult:
+    missing = [text for name, text in _OPTIONS.items() if name not in arm.capabilities]
+    if not missing:
+        return CheckResult("options", "ok", f"installed: {', '.join(_OPTIONS.values())}")
+    return CheckResult(
+        "options",
+        "note",
+        f"this cabinet lacks {', '.join(missing)}",
+        "install the option in Workbench, synchronize, and write the sources without --without; or do without",
+    )
 
 
 def _protection(arm: Arm, *, keyed: bool) -> CheckResult:

@@ -20,6 +20,8 @@ from heptarm.io.keys import new_key, read_key_file, write_key_file
 from heptarm.wire.messages import MAJOR, MINOR
 
 _PROJECT = "RoboticsAPI.data.xml"
+#: Options of Sunrise that a Workbench may lack, and what is refused without them.
+OPTIONS = {"servoing": "arm.servo", "fri": "arm.fri", "hand-guiding": "ha.hand_guide"}
 _KEY = re.compile(r'(id="heptarm\.key" [^>]*? value=)""')
 
 
@@ -42,6 +44,13 @@ def install_cabinet(
             help="Make no key: any program that reaches the cabinet's port can move the robot.",
         ),
     ] = False,
+    without: Annotated[
+        str,
+        Parameter(
+            help="Options of Sunrise that your Workbench lacks: servoing, fri, hand-guiding, separated by commas. "
+            "The sources compile without them, and what needs them is refused."
+        ),
+    ] = "",
     as_json: Json = False,
 ) -> int:
     """Write the cabinet application for a Sunrise project, with a key and the steps.
@@ -49,7 +58,10 @@ def install_cabinet(
     For example:
 
         heptarm install-cabinet --out cabinet --target 172.31.1.147
+
+        heptarm install-cabinet --out cabinet --without fri,hand-guiding
     """
+    left_out = _options(without)
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise CommandRejected(
             f"--out must be a new or empty folder, got {out}",
@@ -65,6 +77,8 @@ def install_cabinet(
     sources = _resources.cabinet_sources()
     for part in ("core", "app"):
         shutil.copytree(sources / part / "src", out / "src", dirs_exist_ok=True)
+    for option in left_out:
+        shutil.copytree(sources / "without" / option / "src", out / "src", dirs_exist_ok=True)
     shutil.copytree(sources / "project", out, dirs_exist_ok=True)
     file = out / "heptarm.key" if stored is None else stored
     if key:
@@ -75,10 +89,14 @@ def install_cabinet(
     protocol = f"{MAJOR}.{MINOR}"
     if as_json:
         data = {"out": str(out), "files": len(files), "protocol": protocol, "version": __version__}
+        data |= {"without": list(left_out)}
         emit(data | {"key_file": str(file) if key else ""})
         return 0
     print(f"{len(files)} Java sources and the project's data are in {out}.")
     print(f"They speak protocol {protocol} and pair with heptarm {__version__}.")
+    if left_out:
+        refused = " and ".join(f"{OPTIONS[one]} (option {one})" for one in left_out)
+        print(f"They compile without the packages of these options, and refuse {refused}.")
     if not key:
         risk = "without a key, any program that reaches the cabinet's port can move the robot"
         print(
@@ -91,6 +109,26 @@ def install_cabinet(
             print(f"Store it for the cabinet: heptarm key set --target ADDRESS --key-file {file}")
     print(f"Continue with the steps in {out / 'INSTALL.md'}.")
     return 0
+
+
+def _options(text: str) -> tuple[str, ...]:
+    """Options that are left out, each once.
+
+    Raises:
+        CommandRejected: there is no such option.
+    """
+    names = [one.strip() for one in text.split(",") if one.strip()]
+    for name in names:
+        if name not in OPTIONS:
+            allowed = ", ".join(OPTIONS)
+            raise CommandRejected(
+                f"--without must name options of {allowed}, got {name!r}",
+                parameter="without",
+                value=name,
+                allowed=allowed,
+                hint="for example --without fri,hand-guiding",
+            )
+    return tuple(one for one in OPTIONS if one in names)
 
 
 def _set_key(project: Path, key: str) -> None:

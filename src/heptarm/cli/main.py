@@ -102,7 +102,8 @@ def main() -> None:
 
         if os.environ.get("HEPTARM_DEBUG"):
             raise
-        _fail(printable(str(error), lines=True))
+        page = f"\n{error.page}" if error.code and sys.stderr.isatty() else ""
+        _fail(printable(str(error), lines=True) + page)
     except ModuleNotFoundError as error:
         missing = missing_extra(error.name or "")
         if missing is None or os.environ.get("HEPTARM_DEBUG"):

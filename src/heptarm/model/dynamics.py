@@ -7,8 +7,8 @@ Newton's and Euler's laws of every link, projected on the joints by the Jacobian
     C = sum m Jv' dJv + Jw' (I dJw + [w] I Jw)
     g = - sum m Jv' g0
 
-With this C the matrix dM/dt - 2 C is skew-symmetric. Gear friction and rotor inertia are not in it: the torque sensors
-sit behind the gears. The link data are nominal, see `heptarm.values.robot`.
+With this C the matrix dM/dt - 2 C is skew-symmetric. Rotor inertia is not in it, and friction only as you give it: the
+torque sensors sit behind the gears. The link data are nominal, see `heptarm.values.robot`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.values.arrays import Array, array, instance
-from heptarm.values.robot import Body, RobotModel, symmetric
+from heptarm.values.robot import Body, Friction, RobotModel, symmetric
 
 #: Acceleration of gravity in the frame of an upright base [m/s²].
 GRAVITY = (0.0, 0.0, -9.81)
@@ -184,8 +184,9 @@ def inverse_dynamics(
     *,
     load: Body | None = None,
     acceleration: npt.ArrayLike = GRAVITY,
+    friction: Friction | None = None,
 ) -> Array:
-    """Inverse dynamics: joint torques M ddq + C dq + g.
+    """Inverse dynamics: joint torques M ddq + C dq + g, and the friction.
 
     Args:
         robot: the robot.
@@ -194,13 +195,19 @@ def inverse_dynamics(
         ddq: joint accelerations, shape (7,) [rad/s²].
         load: on the flange.
         acceleration: of gravity in the base frame, shape (3,) [m/s²].
+        friction: of the joints; None: without.
 
     Returns:
         Shape (7,) [Nm].
     """
     posture, rates = _posture(robot, q, load), array(dq, 7, "dq")
     inertial = _mass_matrix(posture) @ array(ddq, 7, "ddq")
-    return inertial + _coriolis_matrix(posture, rates) @ rates + _gravity(posture, acceleration)
+    rigid = inertial + _coriolis_matrix(posture, rates) @ rates + _gravity(posture, acceleration)
+    return rigid + _friction(friction, rates)
+
+
+def _friction(friction: Friction | None, rates: Array) -> Array:
+    return np.zeros(7) if friction is None else instance(friction, Friction, "friction").torque(rates)
 
 
 def forward_dynamics(
@@ -211,8 +218,9 @@ def forward_dynamics(
     *,
     load: Body | None = None,
     acceleration: npt.ArrayLike = GRAVITY,
+    friction: Friction | None = None,
 ) -> Array:
-    """Forward dynamics: joint accelerations M^-1 (tau - C dq - g).
+    """Forward dynamics: joint accelerations M^-1 (tau - C dq - g - friction).
 
     Args:
         robot: the robot.
@@ -221,10 +229,12 @@ def forward_dynamics(
         tau: joint torques, shape (7,) [Nm].
         load: on the flange.
         acceleration: of gravity in the base frame, shape (3,) [m/s²].
+        friction: of the joints; None: without.
 
     Returns:
         Shape (7,) [rad/s²].
     """
     posture, rates = _posture(robot, q, load), array(dq, 7, "dq")
     bias = _coriolis_matrix(posture, rates) @ rates + _gravity(posture, acceleration)
+    bias = bias + _friction(friction, rates)
     return np.asarray(np.linalg.solve(_mass_matrix(posture), array(tau, 7, "tau") - bias), dtype=np.float64)

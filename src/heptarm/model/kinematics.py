@@ -15,7 +15,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.values.arrays import Array, array, instance
+from heptarm.errors import ShapeError
+from heptarm.values.arrays import Array, array, instance, integer
 from heptarm.values.robot import RobotModel
 
 Vec: TypeAlias = tuple[float, float, float]
@@ -57,25 +58,42 @@ def flange(robot: RobotModel, q: Sequence[float]) -> tuple[Columns, Vec]:
     return _turn_z(m, q[6]), p
 
 
-def forward(robot: RobotModel, q: npt.ArrayLike) -> Array:
-    """Pose of the flange in the base frame.
+def forward(robot: RobotModel, q: npt.ArrayLike, *, link: int | None = None) -> Array:
+    """Pose of the flange, or of a link, in the base frame.
 
     Args:
         robot: the robot.
         q: joint positions, shape (7,) [rad].
+        link: 1 to 7: the frame of this link, at the origin of its joint in `robot.links`; its axes are the base's when
+            all joints are at 0. None: the flange.
 
     Returns:
         Homogeneous matrix, shape (4, 4) [m].
 
     Raises:
         ShapeError: `q` has not seven entries.
-        LimitError: one is not finite.
+        LimitError: one is not finite, or no such link.
     """
     instance(robot, RobotModel, "robot")
-    columns, position = flange(robot, array(q, 7, "q").tolist())
+    angles = array(q, 7, "q").tolist()
+    if link is not None:
+        return _link(robot, angles, integer(link, "link", 1, 7))
+    columns, position = flange(robot, angles)
     result = np.eye(4)
     result[:3, :3] = np.array(columns).T
     result[:3, 3] = position
+    return result
+
+
+def _link(robot: RobotModel, q: Sequence[float], link: int) -> Array:
+    """Pose of the frame of link 1 to 7, shape (4, 4) [m]."""
+    columns, position = _IDENTITY, np.zeros(3)
+    for index in range(link):
+        position = position + np.array(columns).T @ robot.links.origin[index]
+        angle = -q[index] if index == 3 else q[index]
+        columns = _turn_z(columns, angle) if index % 2 == 0 else _turn_y(columns, angle)
+    result = np.eye(4)
+    result[:3, :3], result[:3, 3] = np.array(columns).T, position
     return result
 
 
@@ -96,23 +114,37 @@ def joints(robot: RobotModel, q: Sequence[float]) -> tuple[list[Vec], list[Vec],
     return axes, points, _along(wrist, m5[2], robot.d_wf)
 
 
-def jacobian(robot: RobotModel, q: npt.ArrayLike, point: npt.ArrayLike | None = None) -> Array:
-    """Geometric Jacobian, base axes.
+def jacobian(
+    robot: RobotModel, q: npt.ArrayLike, point: npt.ArrayLike | None = None, *, link: int = 7
+) -> Array:
+    """Geometric Jacobian of a point of a link, base axes.
 
     Args:
         robot: the robot.
         q: joint positions, shape (7,) [rad].
-        point: point of the last link whose velocity is wanted, in the base frame, shape (3,) [m]; None: the
-            flange.
+        point: point of the link whose velocity is asked for, in the base frame, shape (3,) [m]; None: the flange.
+        link: the link that the point moves with, 1 to 7; the columns of the joints behind it are 0.
 
     Returns:
         Shape (6, 7): rows vx vy vz [m/rad], wx wy wz.
+
+    Raises:
+        ShapeError: a wrong shape, or a link other than the last without a point.
+        LimitError: a number is not finite, or no such link.
     """
     instance(robot, RobotModel, "robot")
+    if integer(link, "link", 1, 7) < 7 and point is None:
+        raise ShapeError(
+            f"link {link} must be given with a point of it",
+            parameter="point",
+            hint=f"for example model.forward(robot, q, link={link})[:3, 3]",
+        )
     axes, points, tip = joints(robot, array(q, 7, "q").tolist())
     target = np.asarray(tip) if point is None else array(point, 3, "point")
     z = np.array(axes)
-    return np.vstack([np.cross(z, target - np.array(points)).T, z.T])
+    result = np.vstack([np.cross(z, target - np.array(points)).T, z.T])
+    result[:, link:] = 0.0
+    return result
 
 
 def jacobian_derivative(robot: RobotModel, q: npt.ArrayLike, dq: npt.ArrayLike) -> Array:

@@ -79,7 +79,10 @@ class ArmPicture:
         first, count = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
         vertices = model.mesh_vert[int(model.mesh_vertadr[mesh]) :]
         normals = model.mesh_normal[int(model.mesh_normaladr[mesh]) :]
-        faces, of_normals = model.mesh_face[first : first + count], model.mesh_facenormal[first : first + count]
+        faces, of_normals = (
+            model.mesh_face[first : first + count],
+            model.mesh_facenormal[first : first + count],
+        )
         colour = model.mat_rgba[int(model.geom_matid[geom])][:3]
         return vertices[faces].astype(float), normals[of_normals].astype(float), np.array(colour, float)
 

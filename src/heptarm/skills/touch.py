@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
+import threading
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import LimitError, MotionAborted, NoContact, Timeout
+from heptarm.errors import HeptarmError, LimitError, MotionAborted, NoContact, Timeout
 from heptarm.skills.taps import TapWatch
 from heptarm.values.arrays import Array, integer, optional, within, word
+from heptarm.values.arrays import callback as check_callback
 from heptarm.values.condition.condition import Condition
 from heptarm.values.condition.contact import Contact, direction_of
 from heptarm.values.condition.force import force as force_signal
@@ -198,6 +202,58 @@ def wait_for_taps(
         f"the arm was not tapped {count} times within {timeout:g} s",
         hint="give a longer timeout, a lower force or a longer gap",
     )
+
+
+def on_taps(
+    arm: Arm,
+    callback: Callable[[State], object],
+    count: int = 2,
+    *,
+    force: float = 8.0,
+    gap: float = 1.0,
+) -> Callable[[], None]:
+    """Call a function each time somebody taps the resting arm; checked by this program, not by the cabinet.
+
+    While a motion runs nothing counts as a tap: its forces look like taps.
+
+    Args:
+        arm: connected.
+        callback: called with the state after the last tap, from a thread of its own; it may move the arm. An exception
+            in it ends the watch.
+        count: number of taps.
+        force: smallest force of a tap [N]; a constant force is no tap.
+        gap: longest time between two taps [s].
+
+    Returns:
+        A function that ends it; closing the arm ends it as well.
+
+    Raises:
+        ShapeError: not a function, or not a number.
+        LimitError: a value outside its range.
+        StaleState: the pushed states lack the wrench, or are too old.
+    """
+    check_callback(callback, "callback")
+    integer(count, "count", 1, 1000)
+    watch = TapWatch(force=force, gap=gap)
+    ended = threading.Event()
+    arm.state.wrench  # noqa: B018  (raises now, not in the thread, if states lack it)
+
+    def run() -> None:
+        taps, moved = watch, False
+        with contextlib.suppress(HeptarmError):  # the connection has ended, and with it the states
+            for state in arm.states():
+                if ended.is_set():
+                    return
+                moves = state.motion is not None and state.motion.active
+                if moved and not moves:
+                    taps = TapWatch(force=force, gap=gap)
+                moved = moves
+                if not moves and taps.see(state.wrench.stamp * 1e-9, state.wrench.force) >= count:
+                    callback(state)
+                    taps = TapWatch(force=force, gap=gap)
+
+    threading.Thread(target=run, name="heptarm-taps", daemon=True).start()
+    return ended.set
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError
-from heptarm.values.arrays import Array, Value, array, frozen, shown, within
+from heptarm.values.arrays import Array, Value, array, frozen, one_or_each, shown, within
 from heptarm.values.pose import deg
 
 
@@ -47,6 +48,46 @@ class Body(Value):
                 allowed="none negative, none above the sum of the other two",
                 hint="check the order xx yy zz xy xz yz and that it is about the centre of mass",
             )
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class Friction(Value):
+    """Friction of the joints: viscous · dq + coulomb · tanh(dq / transition). KUKA publishes none: identify yours.
+
+    Args:
+        viscous: [Nm s/rad], one number for all joints or seven, not negative.
+        coulomb: [Nm], likewise.
+        transition: joint speed at which the Coulomb friction has 76 % of its value [rad/s], above 0.
+
+    Raises:
+        ShapeError: neither one number nor seven.
+        LimitError: a number outside its range.
+    """
+
+    viscous: Array
+    coulomb: Array
+    transition: float
+
+    def __init__(
+        self, viscous: npt.ArrayLike = 0.0, coulomb: npt.ArrayLike = 0.0, *, transition: float = 0.01
+    ) -> None:
+        for name, value in (("viscous", viscous), ("coulomb", coulomb)):
+            numbers = one_or_each(value, 7, name)
+            for index, one in enumerate(numbers.tolist()):
+                within(one, f"{name}[{index}]", 0.0, _STRONGEST_FRICTION)
+            object.__setattr__(self, name, numbers)
+        object.__setattr__(
+            self, "transition", within(transition, "transition", 0.0, 10.0, above=True, unit="rad/s")
+        )
+
+    def torque(self, dq: npt.ArrayLike) -> Array:
+        """Torque against which the joints move at speeds `dq`, shape (7,) [Nm]."""
+        rates = array(dq, 7, "dq")
+        return self.viscous * rates + self.coulomb * np.tanh(rates / self.transition)
+
+
+#: Largest coefficient of friction [Nm], [Nm s/rad].
+_STRONGEST_FRICTION = 1e3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,6 +152,19 @@ class RobotModel:
     ddq_max: Array
     dddq_max: Array
     tau_max: Array
+
+    @property
+    def dh(self) -> Array:
+        """Table of Denavit and Hartenberg, standard convention, shape (7, 4): a [m], alpha [rad], d [m], theta [rad].
+
+        Joint i's transformation is Rz(theta + q[i]) Tz(d) Tx(a) Rx(alpha), from the robot's base to its flange.
+        """
+        quarter = np.pi / 2
+        alpha = (-quarter, quarter, quarter, -quarter, -quarter, quarter, 0.0)
+        table = np.zeros((7, 4))
+        table[:, 1] = alpha
+        table[0::2, 2] = self.d_bs, self.d_se, self.d_ew, self.d_wf
+        return frozen(table)
 
     def check(self, q: Array, name: str = "q") -> None:
         """Check joint positions against the limits.

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from dataclasses import replace
 from math import isinf
 
+import numpy as np
+
 from heptarm.arm.devices.tools import Tooling
 from heptarm.arm.link.connection import Connection
 from heptarm.arm.motion.handle import BreakRule, MotionHandle
@@ -14,11 +16,12 @@ from heptarm.arm.translate.conditions import condition_message, reaction_message
 from heptarm.arm.translate.modes import mode_message
 from heptarm.arm.translate.motions import items
 from heptarm.arm.translate.triggers import trigger_messages
-from heptarm.errors import HeptarmError, ShapeError
+from heptarm.errors import CommandRejected, HeptarmError, ShapeError
 from heptarm.values.condition.condition import Condition, condition_nodes
 from heptarm.values.condition.reaction import Reaction
 from heptarm.values.mode.mode import Mode
-from heptarm.values.motion.motion import Motion, triggers_of
+from heptarm.values.motion.motion import Hold, Motion, triggers_of
+from heptarm.values.motion.ptp import Ptp
 from heptarm.values.robot import RobotModel
 from heptarm.wire import messages as wire
 
@@ -51,6 +54,42 @@ def listed(motion: Motion | Sequence[Motion]) -> tuple[Motion, ...]:
                 hint="make motions with ptp, lin, lin_rel, circ, spline and hold; joint positions alone are ptp(q)",
             )
     return tuple(motions)
+
+
+def with_kept_joints(connection: Connection, motions: tuple[Motion, ...]) -> tuple[Motion, ...]:
+    """The motions with a number for every joint that a PTP keeps: its set-point when the PTP starts.
+
+    Args:
+        connection: to the cabinet.
+        motions: in their order.
+
+    Raises:
+        CommandRejected: the set-point is not known yet: another motion runs, or one to a pose or home comes before.
+        StaleState: the newest state is too old, or lacks the joints.
+    """
+    if not any(isinstance(one, Ptp) and one.keeps for one in motions):
+        return motions
+    state = connection.fresh()
+    moves = state.motion is not None and (state.motion.active or state.motion.queued > 0)
+    known = None if moves else state.q_cmd
+    made: list[Motion] = []
+    for index, one in enumerate(motions):
+        if isinstance(one, Ptp) and one.keeps:
+            if known is None:
+                raise CommandRejected(
+                    f"motions[{index}] keeps joints (NaN) whose set-points are not known yet",
+                    parameter=f"motions[{index}].q",
+                    hint="wait until the arm rests, or give all seven joints",
+                )
+            made.append(replace(one, q=np.where(np.isnan(one.q), known, one.q)))
+        else:
+            made.append(one)
+        last = made[-1]
+        if isinstance(last, Ptp):
+            known = last.q
+        elif not isinstance(last, Hold):
+            known = None
+    return tuple(made)
 
 
 def _text(value: object) -> str:

@@ -8,18 +8,11 @@ from __future__ import annotations
 
 import ctypes
 import functools
-import hashlib
-import os
-import shutil
 import socket
-import subprocess
-import sys
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from heptarm.errors import HeptarmError
 from heptarm.fri.guard.fallback import Missing
 from heptarm.fri.guard.joint_guard import AXES, Limited
 from heptarm.fri.loop import shared_memory as at
@@ -28,9 +21,8 @@ from heptarm.fri.protocol.messages import CommandMode, SessionState
 from heptarm.fri.protocol.protobuf import fields
 from heptarm.fri.protocol.version import unwrap
 from heptarm.fri.session.statistics import BINS
+from heptarm.io.compiled import Unavailable, compiled_library
 
-#: Environment variable; any value switches the native part off.
-SWITCH = "HEPTARM_PURE_PYTHON"
 HANDBACK, LAW = -1, -2
 TIMEOUT, HANDED_BACK, CHECK, SOCKET_ERROR, CALL_LAW = range(5)
 BUFFER = 2048
@@ -43,10 +35,6 @@ _WORD, _POINTER = ctypes.c_int64, ctypes.c_void_p
 #: Fallbacks for missing commands, in the numbering of the native part.
 MISSING = tuple(Missing)
 _JOINT_MODES = (CommandMode.POSITION, CommandMode.TORQUE, CommandMode.WRENCH)
-
-
-class Unavailable(HeptarmError):
-    """The native part is not available; the text gives the reason."""
 
 
 #: `struct loop` of native.c, whose header schema/generate.py writes from this table: type, size (1: no array), names.
@@ -115,20 +103,8 @@ def library() -> ctypes.CDLL:
     Raises:
         Unavailable: this system is not supported, or has no compiler.
     """
-    if os.environ.get(SWITCH):
-        raise Unavailable(f"switched off by {SWITCH}")
-    if sys.platform != "linux" or sys.byteorder != "little":
-        raise Unavailable("the native part needs Linux on a little-endian machine")
-    source = _HEADER.read_bytes() + _SOURCE.read_bytes()
-    key = hashlib.sha256(source + os.uname().machine.encode()).hexdigest()[:16]
-    root = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    target = Path(root) / "heptarm" / f"fri-{key}.so"
-    try:
-        if not target.exists():
-            _compile(target)
-        made = ctypes.CDLL(str(target))
-    except OSError as error:
-        raise Unavailable(f"the native part cannot be built or loaded: {error}") from error
+    layout = f'#include "{_HEADER.name}"'.encode()
+    made = compiled_library("fri", _SOURCE.read_bytes().replace(layout, _HEADER.read_bytes()))
     made.hf_size.restype = _WORD
     made.hf_turn.argtypes = (_POINTER, ctypes.c_char_p, ctypes.c_int, _WORD)
     made.hf_answer.argtypes = (_POINTER,)
@@ -138,27 +114,6 @@ def library() -> ctypes.CDLL:
     if made.hf_size() != ctypes.sizeof(_Memory):
         raise Unavailable(f"`struct loop` must have {ctypes.sizeof(_Memory)} bytes, got {made.hf_size()}")
     return made
-
-
-def _compile(target: Path) -> None:
-    compiler = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-    if compiler is None:
-        raise Unavailable("no C compiler found: install gcc for the fastest loop")
-    target.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    # on the same file system, so that the last step is atomic
-    with tempfile.TemporaryDirectory(dir=target.parent) as folder:
-        made = Path(folder) / "made.so"
-        # without contraction, so that all numbers equal Python's to the last bit
-        flags = ("-O2", "-shared", "-fPIC", "-ffp-contract=off")
-        run = subprocess.run(
-            [compiler, *flags, "-o", str(made), str(_SOURCE), "-lm"],
-            check=False,
-            capture_output=True,
-            text=True,
-        )
-        if run.returncode:
-            raise Unavailable(f"{compiler} fails: {run.stderr.strip().splitlines()[0]}")
-        os.replace(made, target)
 
 
 class Native:

@@ -32,10 +32,11 @@ from heptarm.fri.guard.joint_guard import Limits
 from heptarm.fri.guard.pose_guard import PoseLimits
 from heptarm.fri.loop import shared_memory as at
 from heptarm.fri.loop.cycle import LOOP_FAILED, Cycle, Law, describe
-from heptarm.fri.loop.native import CALL_LAW, CHECK, HANDED_BACK, SOCKET_ERROR, TIMEOUT, Native, Unavailable
+from heptarm.fri.loop.native import CALL_LAW, CHECK, HANDED_BACK, SOCKET_ERROR, TIMEOUT, Native
 from heptarm.fri.loop.user_api import Output, Params, State
 from heptarm.fri.protocol.messages import SessionState
 from heptarm.fri.protocol.version import Version
+from heptarm.io.compiled import Unavailable
 from heptarm.io.shared import MemoryBlock
 from heptarm.io.udp import Address, UdpSocket
 

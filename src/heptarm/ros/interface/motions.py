@@ -11,7 +11,7 @@ import numpy as np
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.ros.interface.events import with_triggers
 from heptarm.ros.node.driver import Driver
-from heptarm.values.arrays import Array
+from heptarm.values.arrays import Array, finite_entries
 from heptarm.values.frames import TOOL
 from heptarm.values.motion.circle import circ
 from heptarm.values.motion.hand_guiding import hand_guide
@@ -32,8 +32,9 @@ def positions(driver: Driver, names: Sequence[str], values: Sequence[float]) -> 
 
     Raises:
         ShapeError: an unknown name, a name twice, or not as many numbers as names.
+        LimitError: a number is not finite.
     """
-    return _ordered(driver, names, values, driver.arm.state.q_cmd)
+    return finite_entries(_ordered(driver, names, values, driver.arm.state.q_cmd), "position")
 
 
 def partial_joints(driver: Driver, names: Sequence[str], values: Sequence[float]) -> Array:
@@ -72,8 +73,9 @@ def joint_target(driver: Driver, names: Sequence[str], values: Sequence[float]) 
     Raises:
         ShapeError: an unknown name, a name twice, or not as many numbers as names.
     """
-    target = positions(driver, names, values)
-    return np.where(np.isnan(target), driver.arm.state.q_cmd, target)
+    here = driver.arm.state.q_cmd
+    target = _ordered(driver, names, values, here)
+    return np.where(np.isnan(target), here, target)
 
 
 def pose_target(driver: Driver, xyz: Sequence[float], quat: Sequence[float]) -> Pose:

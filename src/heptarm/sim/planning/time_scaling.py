@@ -133,6 +133,18 @@ class TabulatedProfile:
         place = self._place[index] + self._step * k * (v + 0.5 * k * (w - v))
         return place, v + k * (w - v), a + k * (b - a)
 
+    def places(self, times: Array) -> Array:
+        """See `TimeLaw`."""
+        low, high = int(times[0] / self._step), int(times[-1] / self._step) + 2
+        place, speed = np.array(self._place[low:high]), np.array(self._speed[low:high])
+        steps = times / self._step
+        index = steps.astype(np.int64)
+        index = index[index < len(self._place) - 1] - low
+        k = steps[: len(index)] - (index + low)
+        v, w = speed[index], speed[index + 1]
+        found: Array = place[index] + self._step * k * (v + 0.5 * k * (w - v))
+        return found
+
 
 class ProfileSequence:
     """Profiles one after the other; each begins where the one before it came to rest."""
@@ -150,6 +162,13 @@ class ProfileSequence:
             if time < end:
                 return profile.at(time - begin)
         return self._profiles[-1].at(self._profiles[-1].duration)
+
+    def places(self, times: Array) -> Array:
+        """See `TimeLaw`."""
+        for begin, end, profile in zip(self._begins, self._begins[1:], self._profiles, strict=False):
+            if times[0] < end:
+                return profile.places(times[times < end] - begin)
+        return times[:0]
 
     def next_rest(self, time: float) -> float:
         """Time of the first rest after a time [s]."""

@@ -74,7 +74,9 @@ class ArmMeshes:
         """
         assert self.folder is not None
         if not self.folder.is_dir():
-            raise ValueError(f"meshes must be a folder with link_0.stl to link_7.stl, got {str(self.folder)!r}")
+            raise ValueError(
+                f"meshes must be a folder with link_0.stl to link_7.stl, got {str(self.folder)!r}"
+            )
         found: dict[tuple[str, str], Path] = {}
         for path in sorted(self.folder.iterdir()):
             match = _FILE.fullmatch(path.name)

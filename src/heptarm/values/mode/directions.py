@@ -1,13 +1,14 @@
 """Numbers for the six Cartesian directions: x y z, then about x, about y, about z; checked.
 
 Where a direction is given by its name, rotations have KUKA's names: "a" is about z, "b" about y, "c" about x.
+Six numbers may also be given by groups of directions, `{"xyz": 3000, "abc": 200}`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isnan, nan
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +27,42 @@ LENGTH = ("m", "rad")
 SPEED = ("m/s", "rad/s")
 
 _T = TypeVar("_T")
+
+#: Six numbers x y z, about x, about y, about z; or one number for each group of directions, such as "xyz", "z", "abc".
+Directional: TypeAlias = npt.ArrayLike | Mapping[str, float]
+
+
+def by_groups(value: Directional, name: str, others: Sequence[float]) -> npt.ArrayLike:
+    """The six numbers that groups of directions stand for; what is no mapping is returned as it is.
+
+    Args:
+        value: numbers by groups; anything else.
+        name: of the parameter, for the error.
+        others: numbers of the directions that no group names.
+
+    Raises:
+        ShapeError: a group with other letters than those of `DIRECTIONS`, a direction twice, or no group.
+    """
+    if not isinstance(value, Mapping):
+        return value
+    result: list[float] = list(others)
+    named: list[str] = [letter for group in value if isinstance(group, str) for letter in group]
+    if (
+        not named
+        or not all(isinstance(group, str) and group for group in value)
+        or not set(named) <= set(DIRECTIONS)
+        or len(set(named)) != len(named)
+    ):
+        raise ShapeError(
+            f"{name} must have groups of the directions x y z a b c, each direction at most once, got {shown(value)}",
+            parameter=name,
+            value=value,
+            hint='for example {"xyz": 1.0, "abc": 1.0}; a is about z, b about y, c about x',
+        )
+    for group, number in value.items():
+        for letter in group:
+            result[DIRECTIONS[letter]] = number
+    return result
 
 
 def one(value: float, name: str, low: float, high: float, unit: str = "", *, above: bool = False) -> float:
@@ -51,21 +88,21 @@ def each(value: npt.ArrayLike, size: int, name: str, low: float, high: float, un
     return result
 
 
-def six(value: npt.ArrayLike, name: str, low: float, high: float, units: tuple[str, str]) -> Array:
-    """One number in [low, high] for each direction, shape (6,); `units` along and about an axis.
+def six(value: Directional, name: str, low: float, high: float, units: tuple[str, str]) -> Array:
+    """One number in [low, high] for each direction, 0 where no group names it, shape (6,); `units` along and about.
 
     Raises:
         LimitError: one is outside; the text names it.
         ShapeError: not six numbers.
     """
-    result = array(value, 6, name)
+    result = array(by_groups(value, name, (0.0,) * 6), 6, name)
     for index, entry in enumerate(result.tolist()):
         within(entry, f"{name}[{index}]", low, high, unit=units[index // 3])
     return result
 
 
 def limit(
-    value: npt.ArrayLike | None, name: str, high: float, units: tuple[str, str], *, above: bool = False
+    value: Directional | None, name: str, high: float, units: tuple[str, str], *, above: bool = False
 ) -> Array:
     """Limits of six directions in [0, high] (or (0, high] with `above`), shape (6,); NaN or None: unlimited.
 
@@ -75,7 +112,7 @@ def limit(
     """
     if value is None:
         return frozen(np.full(6, nan))
-    result = array(value, 6, name, nan=True)
+    result = array(by_groups(value, name, (nan,) * 6), 6, name, nan=True)
     for index, entry in enumerate(result.tolist()):
         if not isnan(entry):
             within(entry, f"{name}[{index}]", 0.0, high, above=above, unit=units[index // 3])

@@ -11,10 +11,21 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected, ShapeError
-from heptarm.values.arrays import Array, Value, array, flag, numbers, shown, within
+from heptarm.errors import CommandRejected, LimitError
+from heptarm.values.arrays import Array, Value, flag, one_or_each, within
 from heptarm.values.frames import TOOL, check_name
-from heptarm.values.mode.directions import FORCE, LENGTH, SPEED, each, limit, one, put, six
+from heptarm.values.mode.directions import (
+    FORCE,
+    LENGTH,
+    SPEED,
+    Directional,
+    by_groups,
+    each,
+    limit,
+    one,
+    put,
+    six,
+)
 
 #: Largest stiffness of a joint [Nm/rad].
 STIFFEST_JOINT = 5000.0
@@ -56,8 +67,11 @@ class JointImpedance(Value):
 class CartesianImpedance(Value):
     """A spring and a damper between the motion frame and its set-point, and another for the elbow (null space).
 
+    Where shape (6,) is asked for, groups of directions may be given instead: `{"xyz": 3000, "abc": 200}`, where "a" is
+    about z, "b" about y, "c" about x; the directions that no group names keep the default.
+
     Args:
-        stiffness: shape (6,); along the axes 0 to 5000 N/m, about them 0 to 300 Nm/rad.
+        stiffness: shape (6,), or one number for all; along the axes 0 to 5000 N/m, about them 0 to 300 Nm/rad.
         damping: damping ratio, one number for all directions or shape (6,), 0.1 to 1.
         nullspace_stiffness: of the spring that holds the elbow [Nm/rad], 0 to 5000.
         nullspace_damping: its damping ratio, 0.3 to 1.
@@ -89,20 +103,20 @@ class CartesianImpedance(Value):
 
     def __init__(
         self,
-        stiffness: npt.ArrayLike = STIFFNESS,
+        stiffness: Directional = STIFFNESS,
         *,
-        damping: npt.ArrayLike = DAMPING,
+        damping: Directional = DAMPING,
         nullspace_stiffness: float = NULLSPACE_STIFFNESS,
         nullspace_damping: float = DAMPING,
-        additional_force: npt.ArrayLike = NO_FORCE,
-        max_force: npt.ArrayLike | None = None,
+        additional_force: Directional = NO_FORCE,
+        max_force: Directional | None = None,
         max_force_stops: bool = False,
-        max_velocity: npt.ArrayLike | None = None,
-        max_deviation: npt.ArrayLike | None = None,
+        max_velocity: Directional | None = None,
+        max_deviation: Directional | None = None,
         frame: str = TOOL,
     ) -> None:
         put(self, "stiffness", _stiffness(stiffness))
-        put(self, "damping", each(damping, 6, "damping", 0.1, 1.0))
+        put(self, "damping", each(by_groups(damping, "damping", (DAMPING,) * 6), 6, "damping", 0.1, 1.0))
         put(
             self,
             "nullspace_stiffness",
@@ -128,16 +142,14 @@ class CartesianImpedance(Value):
             )
 
 
-def _stiffness(value: npt.ArrayLike) -> Array:
-    if numbers(value, "stiffness", "6 numbers").ndim == 0:
-        raise ShapeError(
-            f"stiffness must be 6 numbers, got {shown(value)}",
-            parameter="stiffness",
-            value=value,
-            hint="three along the axes [N/m], three about them [Nm/rad]",
-        )
-    result = array(value, 6, "stiffness")
+def _stiffness(value: Directional) -> Array:
+    result = one_or_each(by_groups(value, "stiffness", STIFFNESS), 6, "stiffness")
     for index, entry in enumerate(result.tolist()):
         unit = "N/m" if index < 3 else "Nm/rad"
-        within(entry, f"stiffness[{index}]", 0.0, STIFFEST[index // 3], unit=unit)
+        try:
+            within(entry, f"stiffness[{index}]", 0.0, STIFFEST[index // 3], unit=unit)
+        except LimitError as error:
+            if index > 2 and 0.0 < entry <= STIFFEST[0]:
+                error.hint = 'the stiffness about an axis has a unit of its own: {"xyz": 3000, "abc": 200}'
+            raise
     return result

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from math import isnan, nan, pi
 
 import numpy as np
-import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, ShapeError
 from heptarm.values.arrays import Array, Value, finite, flag, optional, shown
@@ -19,6 +18,7 @@ from heptarm.values.mode.directions import (
     FORCE,
     LENGTH,
     PLANES,
+    Directional,
     at,
     choice,
     limit,
@@ -82,12 +82,12 @@ class SineImpedance(Value):
         self,
         base: CartesianImpedance | None = None,
         *,
-        amplitude: npt.ArrayLike = NO_FORCE,
-        frequency: npt.ArrayLike = (0.0,) * 6,
-        phase: npt.ArrayLike = (0.0,) * 6,
-        bias: npt.ArrayLike = NO_FORCE,
-        force_limit: npt.ArrayLike | None = None,
-        position_limit: npt.ArrayLike | None = None,
+        amplitude: Directional = NO_FORCE,
+        frequency: Directional = (0.0,) * 6,
+        phase: Directional = (0.0,) * 6,
+        bias: Directional = NO_FORCE,
+        force_limit: Directional | None = None,
+        position_limit: Directional | None = None,
         total_time: float | None = None,
         rise_time: float = 0.0,
         hold_time: float | None = None,

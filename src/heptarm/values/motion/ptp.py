@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
 import numpy.typing as npt
 
-from heptarm.errors import CommandRejected
+from heptarm.errors import CommandRejected, LimitError
 from heptarm.values.arrays import Array, array
 from heptarm.values.frames import TOOL, check_name
 from heptarm.values.motion.dynamics import Blended, JointSettings, keywords, settings
-from heptarm.values.pose import Pose, Redundancy, check_pose, near_of
+from heptarm.values.pose import Pose, Redundancy, check_pose, deg, near_of
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -22,13 +23,26 @@ class Ptp(Blended):
     """Point-to-point motion to joint positions; all joints start and end together.
 
     Attributes:
-        q: target, shape (7,) [rad].
+        q: target, shape (7,) [rad]; NaN: this joint keeps its set-point.
     """
 
     q: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "q", array(self.q, 7, "q"))
+        object.__setattr__(self, "q", array(self.q, 7, "q", nan=True))
+        if np.isnan(self.q).all():
+            raise LimitError(
+                "q must have the position of one joint at least, got NaN for all seven",
+                code=1,
+                parameter="q",
+                value=self.q.tolist(),
+                hint="NaN keeps a joint; check how q was computed",
+            )
+
+    @property
+    def keeps(self) -> bool:
+        """Whether some joints keep their set-points, so that the target depends on where it starts."""
+        return bool(np.isnan(self.q).any())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +84,9 @@ def ptp(
     """Point-to-point motion in joint space.
 
     Args:
-        target: joint positions, shape (7,) [rad], or a pose of the motion frame in the base frame.
+        target: joint positions, shape (7,) [rad], or a pose of the motion frame in the base frame. A NaN keeps this
+            joint's set-point, as in `ptp([nan, nan, nan, nan, nan, nan, 0.3])`; `arm.move` refuses it where the
+            set-point at the start is not known yet: behind a running motion, or one to a pose.
         near: for a pose: joint positions whose arm angle and Status it keeps, shape (7,) [rad].
         redundancy: for a pose: arm angle E1, Status and Turn, instead of `near`.
         moving: for a pose: the motion frame: "tool", "flange" or the name of a frame.
@@ -85,7 +101,7 @@ def ptp(
 
     Raises:
         ShapeError: a wrong shape.
-        LimitError: a value outside its range.
+        LimitError: a value outside its range, or seven NaN.
         CommandRejected: an argument that belongs to a pose is given with joint positions, both `near` and
             `redundancy`, or dynamics with limits along a path.
     """
@@ -101,7 +117,7 @@ def ptp(
             parameter=names.partition(",")[0],
             hint="leave it out, or give a pose as the target",
         )
-    return Ptp(array(target, 7, "q"), **chosen)
+    return Ptp(array(target, 7, "q", nan=True), **chosen)
 
 
 @keywords(JointSettings)
@@ -126,3 +142,29 @@ def ptp_home(**limits: Unpack[JointSettings]) -> PtpHome:
         CommandRejected: dynamics with limits along a path.
     """
     return PtpHome(**settings("ptp_home", JointSettings, limits))
+
+
+#: The folded arm in which it is packed and carried [deg].
+_TRANSPORT = (0, 25, 0, 90, 0, 0, 0)
+
+
+@keywords(JointSettings)
+def ptp_transport(**limits: Unpack[JointSettings]) -> Ptp:
+    """Point-to-point motion to the folded position in which the arm is packed: A2 at 25 and A4 at 90 degrees, others 0.
+
+    Args:
+        **limits: as follows.
+        dynamics: see `ptp`.
+        speed: fraction of each joint's maximum, (0, 1], one number for all joints or shape (7,).
+        acceleration: likewise.
+        jerk: likewise.
+        blend_rel: see `ptp`.
+        blend_m: see `ptp`.
+        blend_rad: see `ptp`.
+
+    Raises:
+        ShapeError: a wrong shape.
+        LimitError: a value outside its range.
+        CommandRejected: dynamics with limits along a path.
+    """
+    return Ptp(deg(*_TRANSPORT), **settings("ptp_transport", JointSettings, limits))

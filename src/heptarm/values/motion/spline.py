@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.values.arrays import Array, Value, array, shown, within
+from heptarm.values.arrays import Array, Value, array, finite_entries, shown, within
 from heptarm.values.frames import TOOL, check_name
 from heptarm.values.motion.circle import Circ, normal_of
 from heptarm.values.motion.dynamics import (
@@ -222,6 +222,7 @@ def spline_joints(
     made = []
     for index, one in enumerate(_listed(points, "points")):
         point = one if isinstance(one, Ptp) else Ptp(array(one, 7, f"points[{index}]"))  # type: ignore[arg-type]
+        finite_entries(point.q, f"points[{index}]")
         if point.blending != EXACT:
             raise CommandRejected(
                 f"points[{index}] has blending of its own, which a point of a spline cannot have",

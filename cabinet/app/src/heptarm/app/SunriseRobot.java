@@ -45,6 +45,11 @@ final class SunriseRobot {
     private static String[] capabilities(Log log) {
         List<String> all = new ArrayList<String>(Arrays.asList(MotionBuilder.CAPABILITIES));
         try {
+            all.addAll(Arrays.asList(SunriseServo.capabilities()));
+        } catch (LinkageError e) {
+            log.info("this cabinet has no servo motions: " + e);
+        }
+        try {
             all.add(SunriseServoLin.capability());
         } catch (LinkageError e) {
             log.info("this cabinet has no Cartesian servo motions: " + e);

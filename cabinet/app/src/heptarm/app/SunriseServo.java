@@ -40,6 +40,11 @@ final class SunriseServo implements ServoJob {
         this.isStraight = isStraight;
     }
 
+    /** Capabilities that the option adds; a LinkageError if it is not installed. */
+    static String[] capabilities() {
+        return SmartServo.class == null ? new String[0] : new String[] {"servo", "servo_direct", "servo_pose"};
+    }
+
     /** Build a servo motion at the current position. */
     static SunriseServo of(ServoOpen open, LBR robot, SunriseTools tools, ControlModes modes, SunriseJob job) throws CommandRejected {
         ServoMotion<?> motion = open.engine == ServoEngine.LIN ? SunriseServoLin.of(open, robot, tools) : joints(open, robot);
