@@ -1,8 +1,8 @@
 """Gamepads, through Linux's input events: sticks are velocities, a shoulder button is the dead-man switch.
 
 They are read with the library evdev: it needs no window and no display server, gets the events as the kernel sends
-them, and knows the range of every axis. (pygame and other layers over SDL want a video system and an event loop of their
-own; `inputs` has had no release since 2018.)
+them, and knows the range of every axis. (pygame and other layers over SDL want a video system and an event loop;
+`inputs` has had no release since 2018.)
 """
 
 from __future__ import annotations

@@ -90,6 +90,11 @@ class Recorded:
         self._began: int | None = None
 
     @property
+    def inputs(self) -> list[tuple[float, DeviceInput]]:
+        """The inputs, each with its time [s]."""
+        return list(zip(self._times, self._inputs))
+
+    @property
     def duration(self) -> float:
         """Time of its last input [s]."""
         return self._times[-1] - self._times[0]
