@@ -79,7 +79,8 @@ def messages(spec: Spec) -> str:
                 "|---|---|",
             ]
             lines += [
-                f"| {number} | `{bit}`: [{kind}](protocol-types.md#{kind.lower()}) |" for bit, number, kind in message.groups
+                f"| {number} | `{bit}`: [{kind}](protocol-types.md#{kind.lower()}) |"
+                for bit, number, kind in message.groups
             ] + [""]
         else:
             lines += _table(message.fields)
@@ -130,7 +131,7 @@ def errors(spec: Spec) -> str:
         "|---|---|---|---|---|",
     ]
     lines += [
-        f"| <a id=\"code-{e['code']}\"></a>{e['code']} | `{e['name']}` | `{e['class']}` | {e['title']} | {e['advice']} |"
+        f'| <a id="code-{e["code"]}"></a>{e["code"]} | `{e["name"]}` | `{e["class"]}` | {e["title"]} | {e["advice"]} |'
         for e in spec.errors
     ]
     return "\n".join([*lines, ""])

@@ -47,6 +47,8 @@ WITHOUT_A_CONNECTION = {
 ARGUMENTS = {
     "move ptp": "0 0 0 0 0 0 0",
     "move lin": "0.5 0 0.5 0 0 0",
+    "plan ptp": "0 0 0 0 0 0 0",
+    "plan lin": "0.5 0 0.5 0 0 0",
     "teach": "{folder}/taught.npz",
     "replay": "{folder}/recorded.npz",
     "bench": "--fri",

@@ -25,7 +25,10 @@ from tests.bad_values import HOME, HUGE, POSE, REPORTS, Call, made_by, methods_o
 
 MODULES = (heptarm, heptarm.fri, heptarm.when, heptarm.modes, heptarm.do, heptarm.model, heptarm.testing)
 #: Made with a running process or a connection; tests/arm/test_bad_values.py has these.
-CONNECTED = ("connect", "target_from_env", "Client", "Recorder", "TwoSignalGripper", "run")
+CONNECTED = (
+    *("connect", "connect_all", "target_from_env", "Client", "Recorder", "TwoSignalGripper"),
+    *("start_together", "states_together", "stop_all", "run"),
+)
 #: Values whose methods are called, by the name in a report.
 OBJECTS: dict[str, object] = {
     "Pose": POSE,

@@ -13,7 +13,6 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from moveit_configs_utils import MoveItConfigsBuilder
 
-
 ARGUMENTS = {
     "model": ("iiwa14", "iiwa7, iiwa14, med7 or med14"),
     "namespace": ("", "namespace of the arm's node and of move_group"),

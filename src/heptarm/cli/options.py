@@ -168,7 +168,12 @@ Degrees = Annotated[bool, Parameter(name="--deg", negative="", help="Angles are 
 Speed = Annotated[float, Parameter(name="--speed", help="Fraction of the full speed, (0, 1].")]
 Yes = Annotated[bool, Parameter(name="--yes", negative="", help="Do not ask before a real robot moves.")]
 DryRun = Annotated[
-    bool, Parameter(name="--dry-run", negative="", help="Check and show the motion, move nothing.")
+    bool,
+    Parameter(
+        name="--dry-run",
+        negative="",
+        help="Show how the motion would go, as heptarm plan does; move nothing.",
+    ),
 ]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -21,13 +22,21 @@ class Unavailable(HeptarmError):
     """A compiled part is not available; the text gives the reason."""
 
 
-def compiled_library(name: str, source: bytes, *, holds_gil: bool = False) -> ctypes.CDLL:
-    """Load C code; compile it at its first use.
+def with_headers(source: Path, *headers: Path) -> bytes:
+    """The text of a source with the text of own headers in place of the lines that include them."""
+    text = source.read_text(encoding="utf-8")
+    for header in headers:
+        included = re.compile(rf'#include ["<](?:[^"<]*/)?{re.escape(header.name)}[">]')
+        text = included.sub(lambda _, header=header: header.read_text(encoding="utf-8"), text)  # type: ignore[misc]
+    return text.encode()
+
+
+def compiled_file(name: str, source: bytes) -> Path:
+    """The shared library of C code; compiled at its first use.
 
     Args:
         name: of its file in the cache, which is `~/.cache/heptarm`, or `$XDG_CACHE_HOME/heptarm`.
         source: complete: it includes headers of the system only.
-        holds_gil: for short functions: they run without releasing Python's lock.
 
     Raises:
         Unavailable: this system is not supported, or has no compiler.
@@ -42,9 +51,27 @@ def compiled_library(name: str, source: bytes, *, holds_gil: bool = False) -> ct
     try:
         if not target.exists():
             _compile(source, target)
+    except OSError as error:
+        raise Unavailable(f"the compiled part {name} cannot be built: {error}") from error
+    return target
+
+
+def compiled_library(name: str, source: bytes, *, holds_gil: bool = False) -> ctypes.CDLL:
+    """Load C code.
+
+    Args:
+        name: see `compiled_file`.
+        source: likewise.
+        holds_gil: for short functions: they run without releasing Python's lock.
+
+    Raises:
+        Unavailable: see `compiled_file`.
+    """
+    target = compiled_file(name, source)
+    try:
         return (ctypes.PyDLL if holds_gil else ctypes.CDLL)(str(target))
     except OSError as error:
-        raise Unavailable(f"the compiled part {name} cannot be built or loaded: {error}") from error
+        raise Unavailable(f"the compiled part {name} cannot be loaded: {error}") from error
 
 
 def _compile(source: bytes, target: Path) -> None:
@@ -58,7 +85,7 @@ def _compile(source: bytes, target: Path) -> None:
         # without contraction, so that all numbers equal Python's to the last bit
         flags = ("-O2", "-shared", "-fPIC", "-ffp-contract=off")
         run = subprocess.run(
-            [compiler, *flags, "-x", "c", "-o", str(made), "-", "-lm"],
+            [compiler, *flags, "-x", "c", "-o", str(made), "-", "-lm", "-lrt"],
             input=source,
             check=False,
             capture_output=True,

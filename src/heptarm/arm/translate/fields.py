@@ -61,7 +61,9 @@ def _names(kind: type) -> tuple[str, ...]:
 def _getter(kind: type) -> Callable[[Any], tuple[Any, ...]] | None:
     """All fields of a value at once, in order; None: not all of them may be given in order."""
     names = _names(kind)
-    if len(names) < 2 or any(one.kw_only for one in fields(kind)):  # an attrgetter of one name returns no tuple
+    if len(names) < 2 or any(
+        one.kw_only for one in fields(kind)
+    ):  # an attrgetter of one name returns no tuple
         return None
     return attrgetter(*names)
 

@@ -48,6 +48,8 @@ _LEAST = 0.3
 _EVEN = 0.9
 #: Samples of each phase of a profile when it is checked.
 _CHECKS = 60
+#: Shortest time between two of them, as a fraction of the duration.
+_APART = 1e-9
 _AXES = 7
 #: A motion slower than this fraction of its full speed stops at once.
 _BARELY = 1e-3
@@ -260,6 +262,8 @@ def _axis_excess(path: PathConstraints, profile: JerkProfile, limits: ProfileLim
     ramp = min(ramp, profile.duration / 2)
     edges = (0.0, ramp, profile.duration - ramp, profile.duration)
     times = np.unique(np.concatenate([np.linspace(a, b, _CHECKS) for a, b in pairwise(edges)]))
+    # without a constant phase two of them differ by rounding only, and the difference quotient below would be noise
+    times = times[np.concatenate([[True], np.diff(times) > _APART * profile.duration])]
     s, speed, acceleration = np.array([profile.at(time) for time in times.tolist()]).T
     v, a = speed[:, None], acceleration[:, None]
     j = np.gradient(acceleration, times)[:, None]
