@@ -16,6 +16,7 @@ from heptarm.panel.jog import Jog, JointJog, PoseJog, TwistJog
 from heptarm.panel.model import PanelArm
 from heptarm.panel.process import PanelOptions, model_of
 from heptarm.values.state import State
+from tests.cli.running import run
 
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
 PATIENCE = 30.0
@@ -421,3 +422,27 @@ def test_a_recording_that_cannot_be_written_is_refused(model: PanelArm, tmp_path
         lost.start_recording()
     assert lost.poll().recording == ""
     lost.close()
+
+
+def test_a_page_of_two_arms_draws_both_and_its_stop_stops_both(model: PanelArm) -> None:
+    pytest.importorskip("viser")
+    from heptarm.panel.process import Panel
+
+    halted: list[str] = []
+    arms = [
+        PanelArm(model.arm, halt=lambda: halted.append("left"), operate=lambda _: ""),
+        PanelArm(model.arm, halt=lambda: halted.append("right"), may_control=False),
+    ]
+    panel = Panel(arms, PanelOptions(port=0, scene="table"))
+    try:
+        for count in (0, 1):  # with texts and without
+            panel.draw(count)
+        panel.stop()
+        assert sorted(halted) == ["left", "right"]
+    finally:
+        panel.close()
+
+
+def test_the_command_refuses_what_contradicts_itself() -> None:
+    done = run("panel", "--read-only", "--allow-control", "--target", "sim://localhost:1")
+    assert done.returncode == 1 and "contradict" in done.stderr
