@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.errors import CommandRejected, HeptarmError, LimitError, ModeConflict
+from heptarm.errors import CommandRejected, LimitError, ModeConflict, MotionAborted
 from heptarm.panel.jog import Jog, JointJog, PoseJog, TwistJog
 from heptarm.panel.model import PanelArm
 from heptarm.panel.process import PanelOptions, model_of
@@ -219,7 +219,7 @@ def test_stop_works_without_control(model: PanelArm, observer: ha.Arm) -> None:
         handle = program.start(ha.ptp(ha.deg(90, 30, 0, -90, 0, 60, 0), speed=0.05))
         observer.wait_until(lambda state: state.q[0] > 0.02, timeout=PATIENCE)
         model.stop()
-        with pytest.raises(HeptarmError):
+        with pytest.raises(MotionAborted):
             handle.wait(timeout=PATIENCE)
         assert observer.wait_for_rest(timeout=PATIENCE).q[0] < 1.0
     last = model.poll().last_stop
