@@ -30,8 +30,6 @@ sys.path[:0] = [str(ROOT / "src")]
 import heptarm as ha  # noqa: E402
 
 SIZE = (1280, 800)  # of a tablet [pixels]
-#: Fewer colours make a smaller file.
-STEPS = 20
 OPTIONS = (
     "--headless=new",
     "--no-sandbox",
@@ -88,6 +86,12 @@ def press(browser: Any, label: str) -> None:
     time.sleep(0.5)
 
 
+def hold(browser: Any, label: str, seconds: float) -> None:
+    """Hold a button."""
+    (button,) = browser.find_elements("xpath", f"//button[normalize-space()={label!r}]")
+    webdriver.ActionChains(browser).click_and_hold(button).pause(seconds).release().perform()
+
+
 def settled(browser: Any) -> Any:
     """The picture when it no longer changes much, shape (height, width, 3)."""
     before = np.zeros((1, 1, 3))
@@ -114,6 +118,8 @@ def main(folder: Path) -> int:
     with cabinet() as ready, chromium() as browser:
         browser.get(ready["panel"])
         settled(browser)
+        for note in browser.find_elements("css selector", ".mantine-Notification-closeButton"):
+            note.click()  # there is no graphics card
         with ha.connect(ready["target"], name="cell", watchdog=5.0, timeout=30.0) as arm:
             arm.move(ha.ptp(ha.deg(-20, 25, 0, -80, 0, 75, 0), speed=0.4))
             for x, y, z in ((0.0, 0.25, 0.05), (0.08, 0.0, 0.1), (0.0, -0.25, -0.05), (-0.08, 0.0, -0.1)):
@@ -121,7 +127,11 @@ def main(folder: Path) -> int:
             arm.move(ha.ptp(ha.deg(15, 25, 0, -80, 0, 75, 0), speed=0.4))
         press(browser, "Take control")
         press(browser, "Program")
-        for _ in range(3):
+        press(browser, "Teach here")
+        for joint in ("A1 −", "A2 −"):
+            press(browser, "Jog")
+            hold(browser, joint, 5.0)
+            press(browser, "Program")
             press(browser, "Teach here")
         save(settled(browser), folder / "panel-program.png")
         press(browser, "Operator")

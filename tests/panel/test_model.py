@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 import heptarm as ha
-from heptarm.errors import CommandRejected, HeptarmError, LimitError, ModeConflict
+from heptarm.errors import CommandRejected, LimitError, ModeConflict, MotionAborted
 from heptarm.panel.jog import Jog, JointJog, PoseJog, TwistJog
 from heptarm.panel.model import PanelArm
 from heptarm.panel.process import PanelOptions, model_of
 from heptarm.values.state import State
+from tests.cli.running import run
 
 HOME = ha.deg(0, 30, 0, -90, 0, 60, 0)
 PATIENCE = 30.0
@@ -218,7 +219,7 @@ def test_stop_works_without_control(model: PanelArm, observer: ha.Arm) -> None:
         handle = program.start(ha.ptp(ha.deg(90, 30, 0, -90, 0, 60, 0), speed=0.05))
         observer.wait_until(lambda state: state.q[0] > 0.02, timeout=PATIENCE)
         model.stop()
-        with pytest.raises(HeptarmError):
+        with pytest.raises(MotionAborted):
             handle.wait(timeout=PATIENCE)
         assert observer.wait_for_rest(timeout=PATIENCE).q[0] < 1.0
     last = model.poll().last_stop
@@ -421,3 +422,27 @@ def test_a_recording_that_cannot_be_written_is_refused(model: PanelArm, tmp_path
         lost.start_recording()
     assert lost.poll().recording == ""
     lost.close()
+
+
+def test_a_page_of_two_arms_draws_both_and_its_stop_stops_both(model: PanelArm) -> None:
+    pytest.importorskip("viser")
+    from heptarm.panel.process import Panel
+
+    halted: list[str] = []
+    arms = [
+        PanelArm(model.arm, halt=lambda: halted.append("left"), operate=lambda _: ""),
+        PanelArm(model.arm, halt=lambda: halted.append("right"), may_control=False),
+    ]
+    panel = Panel(arms, PanelOptions(port=0, scene="table"))
+    try:
+        for count in (0, 1):  # with texts and without
+            panel.draw(count)
+        panel.stop()
+        assert sorted(halted) == ["left", "right"]
+    finally:
+        panel.close()
+
+
+def test_the_command_refuses_what_contradicts_itself() -> None:
+    done = run("panel", "--read-only", "--allow-control", "--target", "sim://localhost:1")
+    assert done.returncode == 1 and "contradict" in done.stderr

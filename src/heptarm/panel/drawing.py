@@ -20,7 +20,7 @@ from heptarm.values.pose import Pose
 _COLOURS = {"silver": (192, 194, 199), "orange": (255, 107, 10), "dark": (64, 64, 69)}
 _ACCENT, _TRAIL, _TOOL = (255, 107, 10), (64, 160, 255), (150, 152, 158)
 #: Length of the arrow of a contact [m/N], its longest [m], and the force that is not drawn [N].
-_ARROW_SCALE, _LONGEST_ARROW, _LEAST_FORCE = 0.005, 0.5, 2.0
+_ARROW_SCALE, _LONGEST_ARROW, _LEAST_FORCE = 0.01, 0.6, 2.0
 #: A flange and a motion frame closer than this have no line between them [m].
 _NO_TOOL = 0.005
 #: The segments that an empty trail is drawn with.

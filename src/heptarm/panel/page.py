@@ -91,7 +91,10 @@ class ArmPage:
                 ),
                 legend={"show": False},
                 aspect=2.4,
+                padding=(10, 10, 0, 0),
             )
+            if model.may_control:
+                self._make_recording()
         self._head = self._gui.add_html("")
         atop()
         self._safety = self._gui.add_html("")
@@ -165,7 +168,7 @@ class ArmPage:
         times, forces = self.model.forces
         if len(times) < 2:
             return
-        top = next((one for one in _SCALES if one > forces.max()), _SCALES[-1])
+        top = next((one for one in _SCALES if one > 1.1 * forces.max()), _SCALES[-1])
         if top != self._top:
             self._top = top
             self._plot.scales = self._scales()
@@ -227,10 +230,13 @@ class ArmPage:
             self._button("Recover", model.recover, color="gray")
             self._button("Pause", model.pause, color="gray")
             self._button("Resume", model.resume, color="gray")
-            self._override = self._gui.add_slider("Override", 0, 100, 1, 100, hint="on every speed [%]")
-            self._override.on_update(self._on_override)
-            self._record = self._button("Record", self._toggle_recording, color="gray")
-            self._button("Clear trail", model.clear_path, color="gray")
+
+    def _make_recording(self) -> None:
+        self._grid()
+        self._override = self._gui.add_slider("Override [%]", 0, 100, 1, 100, hint="a factor on every speed")
+        self._override.on_update(self._on_override)
+        self._record = self._button("Record", self._toggle_recording, color="gray")
+        self._button("Clear trail", self.model.clear_path, color="gray")
 
     def _toggle_control(self) -> None:
         if self.model.arm.in_control:
@@ -261,12 +267,12 @@ class ArmPage:
             hint="joints, or along whose axes",
         )
         self._turning = [
-            self._held(f"A{index + 1} {sign}", self._joint_jog(index, factor), color="dark")
+            self._held(f"A{index + 1} {sign}", self._joint_jog(index, factor), color="gray")
             for index in range(7)
             for sign, factor in (("−", -1.0), ("+", 1.0))
         ]
         self._driving = [
-            self._held(f"{axis} {sign}", self._twist_jog(axis, factor), color="dark", visible=False)
+            self._held(f"{axis} {sign}", self._twist_jog(axis, factor), color="gray", visible=False)
             for axis in _AXES
             for sign, factor in (("−", -1.0), ("+", 1.0))
         ]

@@ -44,9 +44,10 @@ STYLE = """<style>
 div:has(> div > .ha-grid){display:grid;grid-template-columns:1fr 1fr}
 div:has(> div > .ha-grid) > div:not(:has(> button)){grid-column:1/-1}
 div:has(> div > .ha-grid) > div:has(> button){margin-left:4px;margin-right:4px}
-div:has(> div > .ha-grid) > div > button{height:2.7em !important;touch-action:none;user-select:none;
+div:has(> div > .ha-grid) > div > button{height:2.4em !important;touch-action:none;user-select:none;
 -webkit-user-select:none;-webkit-touch-callout:none}
 div:has(> .ha-wide) + div:has(> button){grid-column:1/-1}
+div:has(> .ha-stop) + div{position:sticky;top:0;z-index:9}
 div:has(> .ha-stop) + div > button{height:3.1em !important;font-size:22px;font-weight:800;letter-spacing:.25em;
 touch-action:none;user-select:none;-webkit-touch-callout:none}
 </style>"""
@@ -95,7 +96,8 @@ def safety(readout: Readout) -> str:
         ]
     last = readout.last_stop
     if last is not None and not boxes:
-        boxes.append(_box(last, "", f"Last stop {time.strftime('%H:%M:%S', time.localtime(last.at))}: "))
+        at = time.strftime("%H:%M:%S", time.localtime(last.at))
+        boxes.append(_box(Advice(last.what), "", f"Last stop {at}: "))
     if readout.message is not None:
         boxes.append(_box(readout.message, _LEVELS[readout.message.level]))
     return f'<div class="ha">{"".join(boxes)}</div>'
