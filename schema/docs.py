@@ -145,7 +145,7 @@ def errors(spec: Spec) -> str:
         "|---|---|---|---|---|",
     ]
     lines += [
-        f"| <a id=\"code-{e['code']}\"></a>{e['code']} | `{e['name']}` | `{e['class']}` | {e['title']} | {e['advice']} |"
+        f'| <a id="code-{e["code"]}"></a>{e["code"]} | `{e["name"]}` | `{e["class"]}` | {e["title"]} | {e["advice"]} |'
         for e in spec.errors
     ]
     return "\n".join([*lines, ""])
